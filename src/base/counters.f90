@@ -1,0 +1,63 @@
+!> Named exact counts (pairs, contacts, swaps, nodes, ...) that the parts of a run report.
+!>
+!> Parts count in their own integers while they work and hand the sums over here when asked, so that
+!> counting costs an addition and no look-up.
+module polydem_counters
+   use polydem_kinds, only: lp
+   implicit none
+   private
+   public :: counters_t, counter_name_length
+
+   !> Longest name of a counter
+   integer, parameter :: counter_name_length = 32
+
+   !> A list of names and values, in the order in which they were set
+   type :: counters_t
+      !> Names, as in the output
+      character(len=counter_name_length), allocatable :: name(:)
+      !> Values
+      integer(lp), allocatable :: value(:)
+   contains
+      procedure :: set
+      procedure :: get
+   end type counters_t
+
+contains
+
+   !> Set a counter, appending it if it is new.
+   subroutine set(self, name, value)
+      class(counters_t), intent(inout) :: self
+      !> Its name, at most counter_name_length characters
+      character(len=*), intent(in) :: name
+      !> Its value
+      integer(lp), intent(in) :: value
+      character(len=counter_name_length) :: padded
+      integer :: k
+
+      if (.not. allocated(self%name)) allocate (self%name(0), self%value(0))
+      padded = name
+      do k = 1, size(self%name)
+         if (self%name(k) == padded) then
+            self%value(k) = value
+            return
+         end if
+      end do
+      self%name = [self%name, padded]
+      self%value = [self%value, value]
+   end subroutine set
+
+   !> Value of a counter, zero if it was never set
+   integer(lp) function get(self, name)
+      class(counters_t), intent(in) :: self
+      !> Its name
+      character(len=*), intent(in) :: name
+      integer :: k
+
+      get = 0_lp
+      if (.not. allocated(self%name)) return
+      do k = 1, size(self%name)
+         if (self%name(k) == name) get = self%value(k)
+      end do
+   end function get
+
+end module polydem_counters

@@ -1,0 +1,42 @@
+!> Errors as values: an allocated `error_t` means failure, and only the program itself stops.
+!>
+!> Use in a procedure:      call raise(error, input_error, 'drum.nml:7: dt must be positive'); return
+!> Use at the call:         call read(..., error); if (allocated(error)) return
+module polydem_errors
+   implicit none
+   private
+   public :: error_t, raise, run_error, input_error, io_error
+
+   !> Exit code of a run that failed numerically or at run time
+   integer, parameter :: run_error = 1
+   !> Exit code of bad input: namelist, bodies file, trace, command line
+   integer, parameter :: input_error = 2
+   !> Exit code of files and folders that cannot be read or written
+   integer, parameter :: io_error = 3
+
+   !> What went wrong
+   type :: error_t
+      !> Exit code: run_error, input_error or io_error
+      integer :: code = run_error
+      !> What is wrong, where (file and line, or body, position and step), and what to do
+      character(len=:), allocatable :: message
+   end type error_t
+
+contains
+
+   !> Report a failure; the first one stands if `error` is already allocated.
+   pure subroutine raise(error, code, message)
+      !> Error to allocate
+      type(error_t), allocatable, intent(inout) :: error
+      !> run_error, input_error or io_error
+      integer, intent(in) :: code
+      !> What is wrong, where, and what to do
+      character(len=*), intent(in) :: message
+
+      if (allocated(error)) return
+      allocate (error)
+      error%code = code
+      error%message = message
+   end subroutine raise
+
+end module polydem_errors

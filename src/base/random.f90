@@ -1,0 +1,93 @@
+!> Reproducible random numbers: the combined multiple recursive generator MRG32k3a.
+!>
+!> P. L'Ecuyer, Operations Research 47 (1999) 159, Fig. I. Exact in 64-bit integers, so the same seed gives
+!> the same numbers with every compiler, and every scene can be made again from its namelist.
+module polydem_random
+   use polydem_kinds, only: ip, lp, wp
+   implicit none
+   private
+   public :: random_t, new_random
+
+   integer(lp), parameter :: m1 = 4294967087_lp
+   integer(lp), parameter :: m2 = 4294944443_lp
+   integer(lp), parameter :: a12 = 1403580_lp
+   integer(lp), parameter :: a13 = 810728_lp
+   integer(lp), parameter :: a21 = 527612_lp
+   integer(lp), parameter :: a23 = 1370589_lp
+
+   !> A stream of random numbers
+   type :: random_t
+      private
+      integer(lp) :: s1(3) = 12345_lp
+      integer(lp) :: s2(3) = 12345_lp
+   contains
+      procedure :: uniform
+      procedure :: between
+      procedure :: whole
+      procedure :: normal
+   end type random_t
+
+contains
+
+   !> A stream that depends on the seed alone; neighbouring seeds give unrelated streams.
+   function new_random(seed) result(stream)
+      !> Any integer
+      integer(ip), intent(in) :: seed
+      type(random_t) :: stream
+      real(wp) :: ignored
+      integer :: k
+
+      stream%s1(1) = modulo(int(seed, lp)*2654435761_lp + 12345_lp, m1 - 1_lp) + 1_lp
+      stream%s2(2) = modulo(int(seed, lp)*40503_lp + 67891_lp, m2 - 1_lp) + 1_lp
+      do k = 1, 32
+         ignored = stream%uniform()
+      end do
+   end function new_random
+
+   !> A number in the open interval (0, 1), uniformly distributed
+   real(wp) function uniform(self)
+      class(random_t), intent(inout) :: self
+      integer(lp) :: p1, p2, difference
+
+      p1 = modulo(a12*self%s1(2) - a13*self%s1(1), m1)
+      self%s1 = [self%s1(2), self%s1(3), p1]
+      p2 = modulo(a21*self%s2(3) - a23*self%s2(1), m2)
+      self%s2 = [self%s2(2), self%s2(3), p2]
+      difference = p1 - p2
+      if (difference <= 0_lp) difference = difference + m1
+      uniform = real(difference, wp)/real(m1 + 1_lp, wp)
+   end function uniform
+
+   !> A number between two bounds, uniformly distributed
+   real(wp) function between(self, low, high)
+      class(random_t), intent(inout) :: self
+      !> Lower bound
+      real(wp), intent(in) :: low
+      !> Upper bound
+      real(wp), intent(in) :: high
+
+      between = low + (high - low)*self%uniform()
+   end function between
+
+   !> A whole number from low to high, both included
+   integer(ip) function whole(self, low, high)
+      class(random_t), intent(inout) :: self
+      !> Least value
+      integer(ip), intent(in) :: low
+      !> Greatest value
+      integer(ip), intent(in) :: high
+
+      whole = min(high, low + int(self%uniform()*real(high - low + 1_ip, wp), ip))
+   end function whole
+
+   !> A normally distributed number of mean 0 and variance 1 (Box & Muller 1958)
+   real(wp) function normal(self)
+      class(random_t), intent(inout) :: self
+      real(wp), parameter :: two_pi = 6.283185307179586476925286766559_wp
+      real(wp) :: radius
+
+      radius = sqrt(-2.0_wp*log(self%uniform()))
+      normal = radius*cos(two_pi*self%uniform())
+   end function normal
+
+end module polydem_random

@@ -1,0 +1,90 @@
+!> Sorting of 64-bit keys: bottom-up merge sort, stable, O(n log n) in the worst case, no recursion.
+module polydem_sort
+   use polydem_kinds, only: ip, lp
+   implicit none
+   private
+   public :: sort_keys
+
+contains
+
+   !> Sort keys in ascending order and carry an integer with each.
+   pure subroutine sort_keys(n, keys, carried, spare_keys, spare_carried)
+      !> Number of entries
+      integer(ip), intent(in) :: n
+      !> Keys, (n) or longer
+      integer(lp), intent(inout) :: keys(:)
+      !> What goes with each key, (n) or longer
+      integer(ip), intent(inout) :: carried(:)
+      !> Work space, (n) or longer
+      integer(lp), intent(inout) :: spare_keys(:)
+      !> Work space, (n) or longer
+      integer(ip), intent(inout) :: spare_carried(:)
+      integer(ip) :: width, low, middle, high
+      integer(ip), parameter :: run = 16_ip
+
+      do low = 1_ip, n, run
+         call insertion_sort(keys, carried, low, min(low + run - 1_ip, n))
+      end do
+      width = run
+      do while (width < n)
+         do low = 1_ip, n, 2_ip*width
+            middle = min(low + width, n + 1_ip)
+            high = min(low + 2_ip*width, n + 1_ip)
+            call merge_runs(keys, carried, low, middle, high, spare_keys, spare_carried)
+         end do
+         keys(1:n) = spare_keys(1:n)
+         carried(1:n) = spare_carried(1:n)
+         width = 2_ip*width
+      end do
+   end subroutine sort_keys
+
+   pure subroutine insertion_sort(keys, carried, low, high)
+      integer(lp), intent(inout) :: keys(:)
+      integer(ip), intent(inout) :: carried(:)
+      integer(ip), intent(in) :: low, high
+      integer(lp) :: key
+      integer(ip) :: k, place, item
+
+      do k = low + 1_ip, high
+         key = keys(k)
+         item = carried(k)
+         place = k
+         do while (place > low)
+            if (keys(place - 1_ip) <= key) exit
+            keys(place) = keys(place - 1_ip)
+            carried(place) = carried(place - 1_ip)
+            place = place - 1_ip
+         end do
+         keys(place) = key
+         carried(place) = item
+      end do
+   end subroutine insertion_sort
+
+   !> Merge the sorted ranges [low, middle) and [middle, high) into the spare arrays.
+   pure subroutine merge_runs(keys, carried, low, middle, high, spare_keys, spare_carried)
+      integer(lp), intent(in) :: keys(:)
+      integer(ip), intent(in) :: carried(:)
+      integer(ip), intent(in) :: low, middle, high
+      integer(lp), intent(inout) :: spare_keys(:)
+      integer(ip), intent(inout) :: spare_carried(:)
+      integer(ip) :: a, b, k
+      logical :: take_left
+
+      a = low
+      b = middle
+      do k = low, high - 1_ip
+         take_left = a < middle
+         if (take_left .and. b < high) take_left = keys(a) <= keys(b)
+         if (take_left) then
+            spare_keys(k) = keys(a)
+            spare_carried(k) = carried(a)
+            a = a + 1_ip
+         else
+            spare_keys(k) = keys(b)
+            spare_carried(k) = carried(b)
+            b = b + 1_ip
+         end if
+      end do
+   end subroutine merge_runs
+
+end module polydem_sort
