@@ -1,0 +1,312 @@
+!> The command line: verbs, options and what each verb takes, from one table.
+!>
+!> Parsing is pure and works on an array of arguments; only `read_command_line` asks the system.
+module polydem_command_line
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_namelist_entries, only: choices_of
+   use polydem_strings, only: join
+   use polydem_words, only: quoted, split_words, suggestion
+   implicit none
+   private
+   public :: command_t, parse_command, read_command_line, usage
+
+   !> What the user asks for
+   type :: command_t
+      !> run, check, info or replay; empty if only help or the version is wanted
+      character(len=:), allocatable :: verb
+      !> Namelist, result or trace; empty if none is given
+      character(len=:), allocatable :: file
+      !> Overrides 'group.key=value' in the order given
+      character(len=:), allocatable :: overrides(:)
+      !> Number of threads; 0: as many as the system offers
+      integer :: threads = 0
+      !> Whether results may be overwritten
+      logical :: force = .false.
+      !> Neighbour finder of a replay
+      character(len=:), allocatable :: finder
+      !> How often a replay is repeated
+      integer :: repeat = 1
+      !> Whether help is wanted, on the verb or on all
+      logical :: help = .false.
+      !> Whether the version is wanted
+      logical :: version = .false.
+   end type command_t
+
+   !> One verb
+   type :: verb_t
+      !> As it is typed
+      character(len=8) :: name
+      !> What it takes, in the usage
+      character(len=16) :: file
+      !> Whether the file may be left out
+      logical :: file_is_optional
+      !> What it does
+      character(len=88) :: meaning
+   end type verb_t
+
+   type(verb_t), parameter :: verbs(*) = [ &
+      verb_t('run', 'FILE.nml', .false., 'run the simulation that a namelist file describes'), &
+      verb_t('check', 'FILE.nml', .false., &
+      'read a namelist file, build its scene and say what a run would do; run nothing'), &
+      verb_t('info', '[RESULT.h5]', .true., 'describe this program, or a result file'), &
+      verb_t('replay', 'TRACE.h5', .false., &
+      'replay recorded boxes through a neighbour finder and check every step')]
+
+   !> One option
+   type :: option_t
+      !> As it is typed
+      character(len=12) :: name
+      !> Name of its value; blank if it takes none
+      character(len=16) :: value
+      !> Verbs that take it
+      character(len=24) :: verbs
+      !> What it does
+      character(len=88) :: meaning
+   end type option_t
+
+   character(len=*), parameter :: all_verbs = 'run check info replay'
+
+   type(option_t), parameter :: options(*) = [ &
+      option_t('--set', 'GROUP.KEY=VALUE', 'run check', &
+      'override an entry of the namelist; may be repeated'), &
+      option_t('--threads', 'T', 'run check replay', &
+      'number of threads (default: all that the system offers)'), &
+      option_t('--force', '', 'run', 'overwrite results that are there already'), &
+      option_t('--finder', 'NAME', 'replay', 'neighbour finder (default: quadtree)'), &
+      option_t('--repeat', 'R', 'replay', 'how often the trace is replayed (default: 1)'), &
+      option_t('--help', '', all_verbs, 'show this help'), &
+      option_t('--version', '', all_verbs, 'show the version')]
+
+contains
+
+   !> Understand how the program was called.
+   subroutine read_command_line(command, error)
+      !> What the user asks for
+      type(command_t), intent(out) :: command
+      !> A verb or option that is unknown, misplaced or incomplete
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k, length, longest
+
+      longest = 0
+      do k = 1, command_argument_count()
+         call get_command_argument(k, length=length)
+         longest = max(longest, length)
+      end do
+      call parse_arguments(command_argument_count(), longest, command, error)
+   end subroutine read_command_line
+
+   !> Collect n arguments of at most the given length and understand them.
+   subroutine parse_arguments(n, length, command, error)
+      integer, intent(in) :: n, length
+      type(command_t), intent(out) :: command
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=length) :: arguments(n)
+      integer :: k
+
+      do k = 1, n
+         call get_command_argument(k, value=arguments(k))
+      end do
+      call parse_command(arguments, command, error)
+   end subroutine parse_arguments
+
+   !> Understand the arguments.
+   pure subroutine parse_command(arguments, command, error)
+      !> Arguments of the program, blank-padded
+      character(len=*), intent(in) :: arguments(:)
+      !> What the user asks for
+      type(command_t), intent(out) :: command
+      !> A verb or option that is unknown, misplaced or incomplete
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=len(arguments)) :: overrides(size(arguments))
+      character(len=:), allocatable :: value
+      logical :: only_files, used(size(options))
+      integer :: k, n_overrides, which
+
+      command%verb = ''
+      command%file = ''
+      command%finder = 'quadtree'
+      used = .false.
+      n_overrides = 0
+      only_files = .false.
+      k = 1
+      do while (k <= size(arguments))
+         if (only_files .or. arguments(k)(1:min(1, len(arguments))) /= '-') then
+            call take_word(trim(arguments(k)), command, error)
+            k = k + 1
+         else if (arguments(k) == '--') then
+            only_files = .true.
+            k = k + 1
+         else
+            call take_option(arguments, k, which, value, error)
+            if (allocated(error)) return
+            used(which) = .true.
+            if (options(which)%name == '--set') then
+               n_overrides = n_overrides + 1
+               overrides(n_overrides) = value
+            else
+               call set_option(which, value, command, error)
+            end if
+         end if
+         if (allocated(error)) return
+      end do
+      allocate (command%overrides, source=overrides(:n_overrides))
+      call check_command(command, used, error)
+   end subroutine parse_command
+
+   !> The first word is the verb, the second the file.
+   pure subroutine take_word(word, command, error)
+      character(len=*), intent(in) :: word
+      type(command_t), intent(inout) :: command
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (command%verb == '') then
+         command%verb = word
+         if (all(verbs%name /= word)) call raise(error, input_error, 'unknown verb '//quoted(word)// &
+            suggestion(word, verbs%name)//' (polydem --help explains them)')
+      else if (word == '') then
+         call raise(error, input_error, 'the name of the file is empty')
+      else if (command%file == '') then
+         command%file = word
+      else
+         call raise(error, input_error, command%verb//' takes one file, but '//quoted(command%file)// &
+            ' and '//quoted(word)//' are given')
+      end if
+   end subroutine take_word
+
+   !> Take the option at place k, with its value behind '=' or in the next argument, and step on.
+   pure subroutine take_option(arguments, k, which, value, error)
+      character(len=*), intent(in) :: arguments(:)
+      integer, intent(inout) :: k
+      integer, intent(out) :: which
+      character(len=:), allocatable, intent(out) :: value
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: name
+      integer :: equals
+
+      equals = index(arguments(k)//'=', '=')
+      name = trim(arguments(k)(:equals - 1))
+      which = option_at(name)
+      if (which == 0) then
+         call raise(error, input_error, 'unknown option '//name//suggestion(name, options%name))
+         return
+      end if
+      value = ''
+      if (options(which)%value /= '') then
+         if (equals > len(arguments)) then
+            k = k + 1
+            if (k <= size(arguments)) value = trim(arguments(k))
+         else
+            value = trim(arguments(k)(equals + 1:))
+         end if
+         if (value == '') call raise(error, input_error, name//' needs a value: '//name//' '// &
+            trim(options(which)%value))
+      else if (equals <= len(arguments)) then
+         call raise(error, input_error, name//' takes no value')
+      end if
+      k = k + 1
+   end subroutine take_option
+
+   !> Row of an option; 0 if there is none
+   pure integer function option_at(name)
+      character(len=*), intent(in) :: name
+
+      do option_at = 1, size(options)
+         if (options(option_at)%name == name) return
+      end do
+      option_at = 0
+   end function option_at
+
+   pure subroutine set_option(which, value, command, error)
+      integer, intent(in) :: which
+      character(len=*), intent(in) :: value
+      type(command_t), intent(inout) :: command
+      type(error_t), allocatable, intent(inout) :: error
+
+      select case (options(which)%name)
+      case ('--threads')
+         call read_count('--threads', value, command%threads, error)
+      case ('--force')
+         command%force = .true.
+      case ('--finder')
+         command%finder = value
+         if (all(choices_of('neighbours', 'finder') /= value)) call raise(error, input_error, '--finder '// &
+            value//': there is no such finder'//suggestion(value, choices_of('neighbours', 'finder')))
+      case ('--repeat')
+         call read_count('--repeat', value, command%repeat, error)
+      case ('--help')
+         command%help = .true.
+      case default
+         command%version = .true.
+      end select
+   end subroutine set_option
+
+   !> A whole number from 1 to 999999
+   pure subroutine read_count(name, text, number, error)
+      character(len=*), intent(in) :: name, text
+      integer, intent(inout) :: number
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: read_number
+
+      read_number = 0
+      if (verify(text, '0123456789') == 0 .and. len(text) < 7) read (text, *) read_number
+      if (read_number > 0) then
+         number = read_number
+      else
+         call raise(error, input_error, name//' '//text//': a whole number from 1 to 999999 was expected')
+      end if
+   end subroutine read_count
+
+   !> The verb must be there with its file, and take every option used.
+   pure subroutine check_command(command, used, error)
+      type(command_t), intent(in) :: command
+      logical, intent(in) :: used(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      if (command%verb == '') then
+         if (.not. (command%help .or. command%version)) call raise(error, input_error, &
+            'a verb is missing; polydem --help explains them')
+         return
+      end if
+      do k = 1, size(options)
+         if (used(k) .and. all(split_words(options(k)%verbs) /= command%verb)) then
+            call raise(error, input_error, command%verb//' does not take '//trim(options(k)%name)// &
+               '; it belongs to '//join(split_words(options(k)%verbs), ' and '))
+            return
+         end if
+      end do
+      if (command%help .or. command%version .or. command%file /= '') return
+      do k = 1, size(verbs)
+         if (verbs(k)%name /= command%verb .or. verbs(k)%file_is_optional) cycle
+         call raise(error, input_error, &
+            command%verb//' needs a file: polydem '//command%verb//' '//trim(verbs(k)%file))
+      end do
+   end subroutine check_command
+
+   !> How to call the program, one line to a verb or option
+   pure function usage(verb) result(text)
+      !> A verb, or an empty text for all of them
+      character(len=*), intent(in) :: verb
+      character(len=:), allocatable :: text
+      character(len=*), parameter :: line_end = new_line('a')
+      character(len=40) :: call_text
+      integer :: k
+
+      text = 'Usage:'//line_end
+      do k = 1, size(verbs)
+         if (verb /= '' .and. verbs(k)%name /= verb) cycle
+         call_text = '  polydem '//trim(verbs(k)%name)//' '//trim(verbs(k)%file)//' [options]'
+         text = text//call_text//trim(verbs(k)%meaning)//line_end
+      end do
+      text = text//'Options:'//line_end
+      do k = 1, size(options)
+         if (verb /= '' .and. all(split_words(options(k)%verbs) /= verb)) cycle
+         call_text = '  '//trim(options(k)%name)//' '//trim(options(k)%value)
+         text = text//call_text//trim(options(k)%meaning)
+         if (verb == '' .and. options(k)%verbs /= all_verbs) text = text//' ('// &
+            join(split_words(options(k)%verbs), ', ')//')'
+         text = text//line_end
+      end do
+   end function usage
+
+end module polydem_command_line

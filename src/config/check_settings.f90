@@ -1,0 +1,53 @@
+!> Checks across entries, which a single row of the table cannot make.
+module polydem_check_settings
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_namelist_entries, only: first_row
+   use polydem_namelist_values, only: value_t
+   use polydem_settings, only: settings_t
+   implicit none
+   private
+   public :: check_settings
+
+contains
+
+   !> Check entries against each other.
+   pure subroutine check_settings(settings, values, error)
+      !> Settings with all entries filled in
+      type(settings_t), intent(in) :: settings
+      !> Values they come from, (rows of the table), for the places
+      type(value_t), intent(in) :: values(:)
+      !> The first contradiction
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (scene => settings%scene)
+         call require(scene%corners_min <= scene%corners_max, &
+            'must not exceed', 'corners_min', 'corners_max', values, error)
+         call require(scene%short_axis <= scene%long_axis_min, &
+            'must not exceed', 'short_axis', 'long_axis_min', values, error)
+         call require(scene%long_axis_min <= scene%long_axis_max, &
+            'must not exceed', 'long_axis_min', 'long_axis_max', values, error)
+         if (scene%name == 'drum') then
+            call require(scene%boxes > 0 .or. scene%bodies > 0, &
+               'must be given, or else', 'boxes', 'bodies', values, error)
+            call require(scene%boxes == 0 .or. scene%bodies == 0, &
+               'must be 0, or else', 'boxes', 'bodies', values, error)
+         end if
+      end associate
+   end subroutine check_settings
+
+   !> Refuse two entries of &scene that do not go together.
+   pure subroutine require(holds, relation, key, other, values, error)
+      logical, intent(in) :: holds
+      character(len=*), intent(in) :: relation, key, other
+      type(value_t), intent(in) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: blamed
+
+      if (holds) return
+      blamed = first_row('scene', other)
+      if (values(first_row('scene', key))%is_given) blamed = first_row('scene', key)
+      call raise(error, input_error, values(blamed)%place//': '''//key//''' in &scene '//relation// &
+         ' '''//other//'''')
+   end subroutine require
+
+end module polydem_check_settings

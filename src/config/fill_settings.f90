@@ -1,0 +1,149 @@
+!> From the values of the table to the typed settings.
+module polydem_fill_settings
+   use polydem_kinds, only: ip, wp
+   use polydem_namelist_entries, only: entries, first_row
+   use polydem_namelist_values, only: value_t
+   use polydem_settings, only: settings_t
+   implicit none
+   private
+   public :: fill_settings
+
+   !> Take the value of an entry, given as 'group.key'.
+   interface take
+      module procedure take_real, take_reals, take_integer, take_integers, take_logical, take_text
+   end interface take
+
+contains
+
+   !> Fill every component from the entry of its name.
+   pure subroutine fill_settings(values, settings)
+      !> Values, (rows of the table)
+      type(value_t), intent(in) :: values(:)
+      !> Settings to fill; `file`, `text` and `resolved` stay
+      type(settings_t), intent(inout) :: settings
+
+      call fill_scene(values, settings)
+      call take(values, 'boxes.largest_ratio', settings%boxes%largest_ratio)
+      call take(values, 'neighbours.finder', settings%neighbours%finder)
+      call take(values, 'overlap.degenerate', settings%overlap%degenerate)
+      associate (forces => settings%forces, integrate => settings%integrate, output => settings%output)
+         call take(values, 'forces.gravity', forces%gravity)
+         call take(values, 'forces.stiffness', forces%stiffness)
+         call take(values, 'forces.damping', forces%damping)
+         call take(values, 'forces.damping_coefficient', forces%damping_coefficient)
+         call take(values, 'forces.friction', forces%friction)
+         call take(values, 'forces.friction_coefficient', forces%friction_coefficient)
+         call take(values, 'forces.tangential_stiffness', forces%tangential_stiffness)
+         call take(values, 'forces.tangential_damping', forces%tangential_damping)
+         call take(values, 'integrate.scheme', integrate%scheme)
+         call take(values, 'integrate.dt', integrate%dt)
+         call take(values, 'integrate.fraction', integrate%fraction)
+         call take(values, 'integrate.duration', integrate%duration)
+         call take(values, 'output.folder', output%folder)
+         call take(values, 'output.frame_interval', output%frame_interval)
+         call take(values, 'output.frames_per_segment', output%frames_per_segment)
+         call take(values, 'output.log_interval', output%log_interval)
+         call take(values, 'output.contacts', output%contacts)
+         call take(values, 'output.ledger', output%ledger)
+      end associate
+   end subroutine fill_settings
+
+   pure subroutine fill_scene(values, settings)
+      type(value_t), intent(in) :: values(:)
+      type(settings_t), intent(inout) :: settings
+
+      associate (scene => settings%scene)
+         call take(values, 'scene.name', scene%name)
+         call take(values, 'scene.bodies_file', scene%bodies_file)
+         call take(values, 'scene.seed', scene%seed)
+         call take(values, 'scene.boxes', scene%boxes)
+         call take(values, 'scene.bodies', scene%bodies)
+         call take(values, 'scene.corners_min', scene%corners_min)
+         call take(values, 'scene.corners_max', scene%corners_max)
+         call take(values, 'scene.short_axis', scene%short_axis)
+         call take(values, 'scene.long_axis_min', scene%long_axis_min)
+         call take(values, 'scene.long_axis_max', scene%long_axis_max)
+         call take(values, 'scene.density', scene%density)
+         call take(values, 'scene.radius', scene%radius)
+         call take(values, 'scene.width', scene%width)
+         call take(values, 'scene.height', scene%height)
+         call take(values, 'scene.opening', scene%opening)
+         call take(values, 'scene.slope', scene%slope)
+         call take(values, 'scene.fraction', scene%fraction)
+         call take(values, 'scene.speed', scene%speed)
+         call take(values, 'scene.motion', scene%motion)
+         call take(values, 'scene.motion_bodies', scene%motion_bodies)
+         call take(values, 'scene.motion_pivot', scene%motion_pivot)
+         call take(values, 'scene.motion_rate', scene%motion_rate)
+         call take(values, 'scene.motion_velocity', scene%motion_velocity)
+         call take(values, 'scene.motion_amplitude', scene%motion_amplitude)
+         call take(values, 'scene.motion_frequency', scene%motion_frequency)
+         call take(values, 'scene.motion_start', scene%motion_start)
+         call take(values, 'scene.motion_ramp', scene%motion_ramp)
+      end associate
+   end subroutine fill_scene
+
+   pure subroutine take_real(values, name, component)
+      type(value_t), intent(in) :: values(:)
+      character(len=*), intent(in) :: name
+      real(wp), intent(inout) :: component
+
+      component = values(row_of(values, name))%reals(1)
+   end subroutine take_real
+
+   pure subroutine take_reals(values, name, component)
+      type(value_t), intent(in) :: values(:)
+      character(len=*), intent(in) :: name
+      real(wp), intent(inout) :: component(:)
+
+      component = values(row_of(values, name))%reals
+   end subroutine take_reals
+
+   pure subroutine take_integer(values, name, component)
+      type(value_t), intent(in) :: values(:)
+      character(len=*), intent(in) :: name
+      integer(ip), intent(inout) :: component
+
+      component = values(row_of(values, name))%integers(1)
+   end subroutine take_integer
+
+   pure subroutine take_integers(values, name, component)
+      type(value_t), intent(in) :: values(:)
+      character(len=*), intent(in) :: name
+      integer(ip), allocatable, intent(inout) :: component(:)
+
+      component = values(row_of(values, name))%integers
+   end subroutine take_integers
+
+   pure subroutine take_logical(values, name, component)
+      type(value_t), intent(in) :: values(:)
+      character(len=*), intent(in) :: name
+      logical, intent(inout) :: component
+
+      component = values(row_of(values, name))%flag
+   end subroutine take_logical
+
+   pure subroutine take_text(values, name, component)
+      type(value_t), intent(in) :: values(:)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable, intent(inout) :: component
+
+      component = values(row_of(values, name))%text
+   end subroutine take_text
+
+   !> Row of an entry that is in force, or else its first row
+   pure integer function row_of(values, name) result(row)
+      type(value_t), intent(in) :: values(:)
+      character(len=*), intent(in) :: name
+      integer :: dot, first
+
+      dot = index(name, '.')
+      first = first_row(name(:dot - 1), name(dot + 1:))
+      do row = first, size(entries)
+         if (values(row)%in_force .and. entries(row)%group == name(:dot - 1) &
+            .and. entries(row)%key == name(dot + 1:)) return
+      end do
+      row = first
+   end function row_of
+
+end module polydem_fill_settings

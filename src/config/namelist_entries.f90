@@ -1,0 +1,228 @@
+!> The one table of namelist entries, from which the reader, its checks and the manual are made.
+!>
+!> To add an entry: a row here, a component in `settings`, a line in `fill_settings`; then let the manual be
+!> written anew (see `entries_manual`). An entry that means different things in different scenes has several
+!> rows of the same type of which at most one is in force. The row of a key named in `needs` stands above.
+module polydem_namelist_entries
+   use polydem_words, only: count_words, split_words
+   implicit none
+   private
+   public :: entry_t, entries, required, group_length, first_row, groups, keys_of, choices_of
+
+   !> Greatest lengths in the table
+   integer, parameter :: group_length = 10, key_length = 24, allowed_length = 72
+
+   !> One row of the table
+   type :: entry_t
+      !> Namelist group
+      character(len=group_length) :: group
+      !> Name in the group
+      character(len=key_length) :: key
+      !> real, integer, logical, word (one of `allowed`) or path (any text)
+      character(len=7) :: type
+      !> Number of values; 0: any number from one on, none unless given
+      integer :: count
+      !> Default as in a namelist, but without quotes; or `required`
+      character(len=20) :: default
+      !> Unit, blank if there is none
+      character(len=8) :: unit
+      !> Choices of a word, bounds of a number such as '>= 0, < 1'; blank: anything (finite)
+      character(len=allowed_length) :: allowed
+      !> When it is in force: 'key: word word' of the same group; blank: always
+      character(len=48) :: needs
+      !> What it means, in one sentence
+      character(len=100) :: meaning
+   end type entry_t
+
+   !> Default of an entry that must be given while it is in force
+   character(len=*), parameter :: required = '(required)'
+
+   character(len=*), parameter :: grains = 'name: drum hopper gas bed heap'
+   character(len=*), parameter :: moving = 'motion: rotation translation oscillation'
+
+   !> Group &scene
+   type(entry_t), parameter :: scene_entries(*) = [ &
+      entry_t('scene', 'name', 'word', 1, required, '', 'drum hopper gas bed heap incline stack file', '', &
+      'Scene to make, or file to read the bodies from `bodies_file`'), &
+      entry_t('scene', 'bodies_file', 'path', 1, required, '', '', 'name: file', &
+      'HDF5 file of the bodies'), &
+      entry_t('scene', 'seed', 'integer', 1, '1', '', '>= 0', grains, &
+      'Seed of the random numbers; the same seed makes the same scene'), &
+      entry_t('scene', 'boxes', 'integer', 1, '0', '', '>= 0', 'name: drum', &
+      'Number of boxes, those of walls included; 0: as many as `bodies` needs'), &
+      entry_t('scene', 'bodies', 'integer', 1, '0', '', '>= 0', 'name: drum', &
+      'Number of grains; 0: as many as `boxes` leaves'), &
+      entry_t('scene', 'bodies', 'integer', 1, required, '', '> 0', 'name: hopper gas bed heap stack', &
+      'Number of free bodies'), &
+      entry_t('scene', 'corners_min', 'integer', 1, '7', '', '>= 3, <= 64', grains, &
+      'Least number of corners of a grain'), &
+      entry_t('scene', 'corners_max', 'integer', 1, '12', '', '>= 3, <= 64', grains, &
+      'Greatest number of corners of a grain'), &
+      entry_t('scene', 'short_axis', 'real', 1, '8e-3', 'm', '> 0', grains, &
+      'Short axis (full length) of the ellipse around a grain'), &
+      entry_t('scene', 'long_axis_min', 'real', 1, '8e-3', 'm', '> 0', grains, &
+      'Least long axis (full length) of the ellipse around a grain'), &
+      entry_t('scene', 'long_axis_max', 'real', 1, '11e-3', 'm', '> 0', grains, &
+      'Greatest long axis (full length) of the ellipse around a grain'), &
+      entry_t('scene', 'density', 'real', 1, '2500', 'kg/m3', '> 0', '', &
+      'Density of the bodies that have none of their own'), &
+      entry_t('scene', 'radius', 'real', 1, '0', 'm', '>= 0', 'name: drum', &
+      'Inner radius of the drum; 0: from the number of grains'), &
+      entry_t('scene', 'width', 'real', 1, '0', 'm', '>= 0', 'name: hopper gas bed', &
+      'Width of the container; 0: from the number of grains'), &
+      entry_t('scene', 'width', 'real', 1, '0', 'm', '>= 0', 'name: heap', &
+      'Length of the floor; 0: from the number of grains'), &
+      entry_t('scene', 'width', 'real', 1, required, 'm', '> 0', 'name: incline stack', &
+      'Width of a block'), &
+      entry_t('scene', 'height', 'real', 1, required, 'm', '> 0', 'name: incline stack', &
+      'Height of a block'), &
+      entry_t('scene', 'opening', 'real', 1, required, 'm', '> 0', 'name: hopper', &
+      'Width of the opening at the bottom'), &
+      entry_t('scene', 'slope', 'real', 1, required, 'degree', '> 0, < 90', 'name: hopper', &
+      'Angle of the inclined walls to the horizontal'), &
+      entry_t('scene', 'slope', 'real', 1, required, 'degree', '>= 0, < 90', 'name: incline', &
+      'Angle of the incline to the horizontal'), &
+      entry_t('scene', 'fraction', 'real', 1, '0.3', '', '> 0, < 1', 'name: gas', &
+      'Share of the area that grains cover'), &
+      entry_t('scene', 'speed', 'real', 1, required, 'm/s', '> 0', 'name: gas', &
+      'Root mean square speed of the grains at the start'), &
+      entry_t('scene', 'speed', 'real', 1, '0', 'm/s', '>= 0', 'name: drum hopper bed heap', &
+      'Root mean square speed of the grains at the start'), &
+      entry_t('scene', 'speed', 'real', 1, '0', 'm/s', '>= 0', 'name: incline', &
+      'Speed of the block down the incline at the start'), &
+      entry_t('scene', 'motion', 'word', 1, 'none', '', 'none rotation translation oscillation', '', &
+      'Prescribed motion of fixed bodies'), &
+      entry_t('scene', 'motion_bodies', 'integer', 0, '', '', '', moving, &
+      'Identifiers of the fixed bodies that move; left out: all fixed bodies'), &
+      entry_t('scene', 'motion_pivot', 'real', 2, '0, 0', 'm', '', 'motion: rotation', &
+      'Centre of the rotation'), &
+      entry_t('scene', 'motion_rate', 'real', 1, required, '1/s', '', 'motion: rotation', &
+      'Revolutions per second, anticlockwise'), &
+      entry_t('scene', 'motion_velocity', 'real', 2, required, 'm/s', '', 'motion: translation', &
+      'Velocity of the translation'), &
+      entry_t('scene', 'motion_amplitude', 'real', 2, required, 'm', '', 'motion: oscillation', &
+      'Amplitude of the oscillation'), &
+      entry_t('scene', 'motion_frequency', 'real', 1, required, 'Hz', '> 0', 'motion: oscillation', &
+      'Frequency of the oscillation'), &
+      entry_t('scene', 'motion_start', 'real', 1, '0', 's', '>= 0', moving, &
+      'Time at which the motion starts'), &
+      entry_t('scene', 'motion_ramp', 'real', 1, '0', 's', '>= 0', moving, &
+      'Time over which the motion smoothly gets to full speed')]
+
+   !> Groups of the stages of a step, from boxes to forces
+   type(entry_t), parameter :: stage_entries(*) = [ &
+      entry_t('boxes', 'largest_ratio', 'real', 1, '4', '', '>= 1', '', &
+      'A body longer than this many median grain diameters is cut into several boxes'), &
+      entry_t('neighbours', 'finder', 'word', 1, 'quadtree', '', 'all_pairs sort_and_sweep quadtree', '', &
+      'How pairs of overlapping boxes are found'), &
+      entry_t('overlap', 'degenerate', 'word', 1, 'push', '', 'push stop', '', &
+      'A contact without direction is pushed apart along the line of centres, or stops the run'), &
+      entry_t('forces', 'gravity', 'real', 2, '0, -9.81', 'm/s2', '', '', &
+      'Acceleration of gravity'), &
+      entry_t('forces', 'stiffness', 'real', 1, '1e7', 'N/m2', '> 0', '', &
+      'Young''s modulus E in two dimensions'), &
+      entry_t('forces', 'damping', 'word', 1, 'rate', '', 'rate book none', '', &
+      'Normal damping by the exact rate of the area, by backward difference as in the book, or none'), &
+      entry_t('forces', 'damping_coefficient', 'real', 1, '0.0251', '', '>= 0', 'damping: rate book', &
+      'Damping coefficient gamma'), &
+      entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack none', '', &
+      'Friction law'), &
+      entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0', 'friction: cundall_strack', &
+      'Friction coefficient mu'), &
+      entry_t('forces', 'tangential_stiffness', 'real', 1, '0.2857142857142857', '', '> 0', &
+      'friction: cundall_strack', &
+      'Tangential stiffness as a share of E'), &
+      entry_t('forces', 'tangential_damping', 'real', 1, '0.25', '', '>= 0', 'friction: cundall_strack', &
+      'Tangential damping as a share of sqrt(k_t m_t)')]
+
+   !> Groups of the run
+   type(entry_t), parameter :: run_entries(*) = [ &
+      entry_t('integrate', 'scheme', 'word', 1, 'velocity_verlet', '', 'velocity_verlet gear', '', &
+      'Integration scheme'), &
+      entry_t('integrate', 'dt', 'real', 1, '0', 's', '>= 0', '', &
+      'Time step; 0: `fraction` of the stable step'), &
+      entry_t('integrate', 'fraction', 'real', 1, '0.3', '', '> 0', '', &
+      'Share of the stable step that is taken if `dt` is 0'), &
+      entry_t('integrate', 'duration', 'real', 1, required, 's', '> 0', '', &
+      'Simulated time'), &
+      entry_t('output', 'folder', 'path', 1, '', '', '', '', &
+      'Folder of the result; empty: results/ and the name of the namelist file'), &
+      entry_t('output', 'frame_interval', 'real', 1, '0', 's', '>= 0', '', &
+      'Simulated time between two frames; 0: the first and the last frame only'), &
+      entry_t('output', 'frames_per_segment', 'integer', 1, '20', '', '>= 1', '', &
+      'Frames in a file of the trajectory'), &
+      entry_t('output', 'log_interval', 'real', 1, '0', 's', '>= 0', '', &
+      'Simulated time between two lines of the log; 0: twenty lines in all'), &
+      entry_t('output', 'contacts', 'logical', 1, '.false.', '', '', '', &
+      'Whether frames hold the contacts'), &
+      entry_t('output', 'ledger', 'logical', 1, '.true.', '', '', '', &
+      'Whether energy and momentum are booked')]
+
+   !> The table
+   type(entry_t), parameter :: entries(*) = [scene_entries, stage_entries, run_entries]
+
+contains
+
+   !> First row of an entry; 0 if there is no such entry
+   pure integer function first_row(group, key)
+      !> Namelist group
+      character(len=*), intent(in) :: group
+      !> Name in the group
+      character(len=*), intent(in) :: key
+
+      do first_row = 1, size(entries)
+         if (entries(first_row)%group == group .and. entries(first_row)%key == key) return
+      end do
+      first_row = 0
+   end function first_row
+
+   !> Names of the groups in the order of the table
+   pure function groups() result(names)
+      character(len=group_length), allocatable :: names(:)
+      logical :: is_new(size(entries))
+      integer :: k, n
+
+      do k = 1, size(entries)
+         is_new(k) = all(entries(:k - 1)%group /= entries(k)%group)
+      end do
+      allocate (names(count(is_new)))
+      n = 0
+      do k = 1, size(entries)
+         if (.not. is_new(k)) cycle
+         n = n + 1
+         names(n) = entries(k)%group
+      end do
+   end function groups
+
+   !> Names of the entries of a group in the order of the table, each once
+   pure function keys_of(group) result(names)
+      !> Namelist group
+      character(len=*), intent(in) :: group
+      character(len=key_length), allocatable :: names(:)
+      logical :: is_new(size(entries))
+      integer :: k, n
+
+      do k = 1, size(entries)
+         is_new(k) = entries(k)%group == group .and. first_row(group, trim(entries(k)%key)) == k
+      end do
+      allocate (names(count(is_new)))
+      n = 0
+      do k = 1, size(entries)
+         if (.not. is_new(k)) cycle
+         n = n + 1
+         names(n) = entries(k)%key
+      end do
+   end function keys_of
+
+   !> Choices of a word entry, for instance the names of the finders
+   pure function choices_of(group, key) result(words)
+      !> Namelist group
+      character(len=*), intent(in) :: group
+      !> Name in the group; the entry must exist
+      character(len=*), intent(in) :: key
+      character(len=allowed_length) :: words(count_words(entries(first_row(group, key))%allowed))
+
+      words = split_words(entries(first_row(group, key))%allowed)
+   end function choices_of
+
+end module polydem_namelist_entries

@@ -1,0 +1,226 @@
+!> Namelist text as a list of statements: `&group` opens, `key = value, value` gives.
+!>
+!> Only the syntax is checked here; what groups and keys there are is the business of `resolve_entries`.
+module polydem_namelist_statements
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_namelist_tokens, only: source_t, token_t, split_tokens, &
+      group_token, end_token, equals_token, comma_token, bare_token, quoted_token
+   use polydem_words, only: lower_case, quoted
+   implicit none
+   private
+   public :: literal_t, statement_t, read_statements
+
+   !> A value as it was written
+   type :: literal_t
+      !> Its text, without the quotes around it
+      character(len=:), allocatable :: text
+      !> Whether there were quotes
+      logical :: has_quotes = .false.
+   contains
+      !> The value as it was written, for messages
+      procedure :: as_written
+   end type literal_t
+
+   !> The opening of a group, or a key with its values
+   type :: statement_t
+      !> Group in small letters
+      character(len=:), allocatable :: group
+      !> Key in small letters; empty if the statement opens the group
+      character(len=:), allocatable :: key
+      !> Values, none if the statement opens a group
+      type(literal_t), allocatable :: values(:)
+      !> Where it stands, for the beginning of a message
+      character(len=:), allocatable :: place
+      !> Line, from 1
+      integer :: line = 0
+      !> Whether it comes from the command line
+      logical :: is_override = .false.
+   end type statement_t
+
+contains
+
+   !> The value as it was written
+   pure function as_written(self) result(text)
+      class(literal_t), intent(in) :: self
+      character(len=:), allocatable :: text
+
+      text = self%text
+      if (self%has_quotes) text = quoted(self%text)
+   end function as_written
+
+   !> Read all statements of a namelist text.
+   pure subroutine read_statements(source, statements, error)
+      !> The text
+      type(source_t), intent(in) :: source
+      !> Its statements in order
+      type(statement_t), allocatable, intent(out) :: statements(:)
+      !> The first offence against the syntax
+      type(error_t), allocatable, intent(inout) :: error
+      type(token_t), allocatable :: tokens(:)
+      integer :: n, next, opening
+
+      call split_tokens(source, tokens, error)
+      if (allocated(error)) return
+      allocate (statements(count(tokens%kind == group_token .or. tokens%kind == equals_token)))
+      n = 0
+      opening = 0
+      next = 1
+      do while (next <= size(tokens))
+         select case (tokens(next)%kind)
+         case (group_token)
+            if (opening > 0) exit
+            opening = next
+            n = n + 1
+            call open_group(source, tokens(next), statements(n))
+            next = next + 1
+         case (end_token)
+            if (opening == 0) exit
+            opening = 0
+            next = next + 1
+         case default
+            if (opening == 0) exit
+            call read_assignment(source, tokens, next, statements, n, error)
+            if (allocated(error)) return
+         end select
+      end do
+
+      if (opening > 0) then
+         call raise(error, input_error, source%place(tokens(opening)%line)//': group &'// &
+            statements(n)%group//' is not closed by ''/''')
+      else if (next <= size(tokens)) then
+         call raise(error, input_error, source%place(tokens(next)%line)//': '// &
+            text_of(source, tokens(next))//' stands outside a group; &name opens one and / closes it')
+      end if
+   end subroutine read_statements
+
+   pure subroutine open_group(source, token, statement)
+      type(source_t), intent(in) :: source
+      type(token_t), intent(in) :: token
+      type(statement_t), intent(inout) :: statement
+
+      statement%group = lower_case(text_of(source, token))
+      statement%key = ''
+      allocate (statement%values(0))
+      statement%line = token%line
+      statement%place = source%place(token%line)
+   end subroutine open_group
+
+   !> Read `key = values` of the group that the last statement belongs to.
+   pure subroutine read_assignment(source, tokens, next, statements, n, error)
+      type(source_t), intent(in) :: source
+      type(token_t), intent(in) :: tokens(:)
+      integer, intent(inout) :: next
+      type(statement_t), intent(inout) :: statements(:)
+      integer, intent(inout) :: n
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: key, place
+      integer :: last
+
+      place = source%place(tokens(next)%line)
+      key = text_of(source, tokens(next))
+      if (scan(key, '(%') > 0) then
+         call raise(error, input_error, &
+            place//': parts of an entry ('//key//') cannot be given; give all its values')
+      else if (tokens(next)%kind /= bare_token) then
+         call raise(error, input_error, place//': a key was expected in &'//statements(n)%group//', but '// &
+            key//' is there')
+      else if (kind_at(tokens, next + 1) /= equals_token) then
+         call raise(error, input_error, &
+            place//': ''='' was expected after '//key//' in &'//statements(n)%group)
+      end if
+      if (allocated(error)) return
+
+      n = n + 1
+      statements(n)%group = statements(n - 1)%group
+      statements(n)%key = lower_case(key)
+      statements(n)%line = tokens(next)%line
+      statements(n)%place = place
+      last = last_of_values(tokens, next + 2)
+      call read_values(source, tokens(next + 2:last), statements(n), error)
+      next = last + 1
+   end subroutine read_assignment
+
+   !> Last token of a list of values: up to the next key, group or end
+   pure integer function last_of_values(tokens, first) result(last)
+      type(token_t), intent(in) :: tokens(:)
+      integer, intent(in) :: first
+
+      last = first - 1
+      do
+         select case (kind_at(tokens, last + 1))
+         case (bare_token, quoted_token)
+            if (kind_at(tokens, last + 2) == equals_token) exit
+            last = last + 1
+         case (comma_token)
+            last = last + 1
+         case default
+            exit
+         end select
+      end do
+   end function last_of_values
+
+   pure integer function kind_at(tokens, place)
+      type(token_t), intent(in) :: tokens(:)
+      integer, intent(in) :: place
+
+      kind_at = 0
+      if (place <= size(tokens)) kind_at = tokens(place)%kind
+   end function kind_at
+
+   !> Values with a comma or blanks between them; a comma may stand after the last.
+   pure subroutine read_values(source, tokens, statement, error)
+      type(source_t), intent(in) :: source
+      type(token_t), intent(in) :: tokens(:)
+      type(statement_t), intent(inout) :: statement
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: may_follow
+      integer :: k, n
+
+      n = count(tokens%kind /= comma_token)
+      allocate (statement%values(n))
+      n = 0
+      may_follow = .false.
+      do k = 1, size(tokens)
+         if (tokens(k)%kind == comma_token) then
+            if (.not. may_follow) exit
+            may_follow = .false.
+         else
+            n = n + 1
+            call read_literal(source, tokens(k), statement%values(n))
+            may_follow = .true.
+         end if
+      end do
+      if (n == 0 .or. k <= size(tokens)) call raise(error, input_error, statement%place//': a value of '''// &
+         statement%key//''' in &'//statement%group//' is missing')
+   end subroutine read_values
+
+   !> A value without its quotes
+   pure subroutine read_literal(source, token, literal)
+      type(source_t), intent(in) :: source
+      type(token_t), intent(in) :: token
+      type(literal_t), intent(inout) :: literal
+      integer :: k
+
+      literal%has_quotes = token%kind == quoted_token
+      if (literal%has_quotes) then
+         literal%text = ''
+         k = token%first + 1
+         do while (k < token%last)
+            literal%text = literal%text//source%text(k:k)
+            if (source%text(k:k) == source%text(token%first:token%first)) k = k + 1
+            k = k + 1
+         end do
+      else
+         literal%text = text_of(source, token)
+      end if
+   end subroutine read_literal
+
+   pure function text_of(source, token) result(text)
+      type(source_t), intent(in) :: source
+      type(token_t), intent(in) :: token
+      character(len=:), allocatable :: text
+
+      text = source%text(token%first:token%last)
+   end function text_of
+
+end module polydem_namelist_statements

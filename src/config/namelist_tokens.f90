@@ -1,0 +1,177 @@
+!> Namelist text cut into tokens: group names, keys and values, quoted texts, signs.
+!>
+!> Syntax: the common ground of Fortran compilers and f90nml. Comments run from `!` to the end of the line;
+!> blanks, tabs and line ends (also CR LF) separate; a quoted text stays on its line, its quotes doubled
+!> inside.
+module polydem_namelist_tokens
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_strings, only: to_text
+   use polydem_words, only: lower_case
+   implicit none
+   private
+   public :: source_t, token_t, split_tokens
+   public :: group_token, end_token, equals_token, comma_token, bare_token, quoted_token
+
+   !> Kinds of tokens: `&name`; `/` or `&end`; `=`; `,`; anything without quotes; a text in quotes
+   integer, parameter :: group_token = 1, end_token = 2, equals_token = 3
+   integer, parameter :: comma_token = 4, bare_token = 5, quoted_token = 6
+
+   character(len=*), parameter :: tab = achar(9), line_feed = achar(10), carriage_return = achar(13)
+   !> What ends a token without quotes
+   character(len=*), parameter :: separators = ' '//tab//line_feed//carriage_return//'=,/!&''"'
+
+   !> Where namelist text comes from
+   type :: source_t
+      !> Path of the file, or the command-line option
+      character(len=:), allocatable :: name
+      !> The text
+      character(len=:), allocatable :: text
+      !> Whether messages name the line
+      logical :: has_lines = .true.
+   contains
+      !> Where a line is, for the beginning of a message
+      procedure :: place
+   end type source_t
+
+   !> A token
+   type :: token_t
+      !> One of the kinds above
+      integer :: kind = 0
+      !> First and last place in the text; of a group without `&`, of a quoted text with its quotes
+      integer :: first = 0, last = 0
+      !> Line, from 1
+      integer :: line = 0
+   end type token_t
+
+contains
+
+   !> `file:line`, or the name alone
+   pure function place(self, line) result(text)
+      class(source_t), intent(in) :: self
+      !> Line, from 1
+      integer, intent(in) :: line
+      character(len=:), allocatable :: text
+
+      text = self%name
+      if (self%has_lines) text = text//':'//to_text(line)
+   end function place
+
+   !> Cut the text into tokens.
+   pure subroutine split_tokens(source, tokens, error)
+      !> Text to cut
+      type(source_t), intent(in) :: source
+      !> All tokens in order
+      type(token_t), allocatable, intent(out) :: tokens(:)
+      !> An open quote or a character that has no place in a namelist
+      type(error_t), allocatable, intent(inout) :: error
+      type(token_t) :: token
+      integer :: length, line, n, next
+
+      length = len(source%text)
+      allocate (tokens(length))
+      n = 0
+      line = 1
+      next = 1
+      do while (next <= length)
+         select case (source%text(next:next))
+         case (line_feed)
+            line = line + 1
+            next = next + 1
+         case (' ', tab, carriage_return)
+            next = next + 1
+         case ('!')
+            next = next + scan(source%text(next:)//line_feed, line_feed) - 1
+         case default
+            call read_token(source, next, line, token, error)
+            if (allocated(error)) return
+            n = n + 1
+            tokens(n) = token
+            next = token%last + 1
+         end select
+      end do
+      tokens = tokens(:n)
+   end subroutine split_tokens
+
+   !> The token that begins at a place
+   pure subroutine read_token(source, first, line, token, error)
+      type(source_t), intent(in) :: source
+      integer, intent(in) :: first, line
+      type(token_t), intent(out) :: token
+      type(error_t), allocatable, intent(inout) :: error
+
+      token = token_t(bare_token, first, first, line)
+      select case (source%text(first:first))
+      case ('/')
+         token%kind = end_token
+      case ('=')
+         token%kind = equals_token
+      case (',')
+         token%kind = comma_token
+      case ('''', '"')
+         token%kind = quoted_token
+         token%last = end_of_quote(source%text, first)
+      case ('&')
+         token%kind = group_token
+         token%first = first + 1
+         token%last = end_of_bare(source%text, first + 1)
+         if (lower_case(source%text(token%first:token%last)) == 'end') token%kind = end_token
+      case default
+         token%last = end_of_bare(source%text, first)
+      end select
+      if (token%kind == quoted_token .and. token%last == 0) then
+         call raise(error, input_error, &
+            source%place(line)//': a quote is not closed before the end of the line')
+      else
+         call refuse_characters(source, token, error)
+      end if
+   end subroutine read_token
+
+   !> Last place of a token without quotes; one before `first` if it is empty
+   pure integer function end_of_bare(text, first)
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: first
+
+      end_of_bare = first + scan(text(first:)//' ', separators) - 2
+   end function end_of_bare
+
+   !> Place of the quote that closes the one at `first`; 0 if there is none on the line
+   pure integer function end_of_quote(text, first)
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: first
+      character(len=1) :: quote
+      integer :: k
+
+      quote = text(first:first)
+      end_of_quote = 0
+      k = first + 1
+      do while (k <= len(text))
+         if (text(k:k) == line_feed) return
+         if (text(k:k) == quote) then
+            if (k == len(text)) exit
+            if (text(k + 1:k + 1) /= quote) exit
+            k = k + 1
+         end if
+         k = k + 1
+      end do
+      if (k <= len(text)) end_of_quote = k
+   end function end_of_quote
+
+   !> Control characters have no place in values, and letters beyond ASCII none outside quotes.
+   pure subroutine refuse_characters(source, token, error)
+      type(source_t), intent(in) :: source
+      type(token_t), intent(in) :: token
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: code, k
+
+      do k = token%first, token%last
+         code = iachar(source%text(k:k))
+         if ((code < 32 .and. source%text(k:k) /= tab) .or. code == 127 &
+            .or. (token%kind /= quoted_token .and. code > 127)) then
+            call raise(error, input_error, source%place(token%line)// &
+               ': the character with code '//to_text(code)//' cannot stand here; is this a namelist file?')
+            return
+         end if
+      end do
+   end subroutine refuse_characters
+
+end module polydem_namelist_tokens

@@ -1,0 +1,330 @@
+!> Values of namelist entries: from what was written to numbers, with the checks of the table, and back.
+module polydem_namelist_values
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_namelist_entries, only: entry_t, required
+   use polydem_namelist_statements, only: literal_t, statement_t
+   use polydem_strings, only: to_text
+   use polydem_words, only: count_words, lower_case, quoted, split_words, suggestion
+   implicit none
+   private
+   public :: value_t, read_value, value_text, label
+
+   character(len=*), parameter :: digits = '0123456789'
+
+   !> The value of an entry
+   type :: value_t
+      !> Where it was given, for the beginning of a message; the file alone for a default
+      character(len=:), allocatable :: place
+      !> Whether it is no default but was written down
+      logical :: is_given = .false.
+      !> Whether it comes from the command line
+      logical :: is_override = .false.
+      !> Whether the chosen scene and options use it
+      logical :: in_force = .false.
+      !> Values of a real entry, (count)
+      real(wp), allocatable :: reals(:)
+      !> Values of an integer entry, (count)
+      integer(ip), allocatable :: integers(:)
+      !> Value of a logical entry
+      logical :: flag = .false.
+      !> Value of a word or path entry
+      character(len=:), allocatable :: text
+   end type value_t
+
+contains
+
+   !> Read the values of an entry and check them against its row.
+   pure subroutine read_value(entry, statement, value, error)
+      !> Row of the entry
+      type(entry_t), intent(in) :: entry
+      !> What was written
+      type(statement_t), intent(in) :: statement
+      !> Checked value
+      type(value_t), intent(inout) :: value
+      !> Number of values, type, finiteness, bounds or choice
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: problem
+      integer :: k, n
+
+      n = size(statement%values)
+      value%place = statement%place
+      value%is_override = statement%is_override
+      value%is_given = statement%is_override .or. statement%line > 0
+      if (entry%count > 0 .and. n /= entry%count) then
+         call raise(error, input_error, value%place//': '//label(entry)//' takes '//counted(entry%count)// &
+            ', but '//counted(n)//trim(merge(' is ', ' are', n == 1))//' given')
+         return
+      end if
+      value%reals = [(0.0_wp, k=1, merge(n, 0, entry%type == 'real'))]
+      value%integers = [(0_ip, k=1, merge(n, 0, entry%type == 'integer'))]
+      value%text = ''
+      do k = 1, n
+         call read_one(entry, statement%values(k), k, value, problem)
+         if (allocated(problem)) then
+            call raise(error, input_error, value%place//': '//label(entry)//' '//problem)
+            return
+         end if
+      end do
+   end subroutine read_value
+
+   !> An entry in messages
+   pure function label(entry) result(text)
+      !> Its row
+      type(entry_t), intent(in) :: entry
+      character(len=:), allocatable :: text
+
+      text = quoted(trim(entry%key))//' in &'//trim(entry%group)
+   end function label
+
+   pure function counted(n) result(text)
+      integer, intent(in) :: n
+      character(len=:), allocatable :: text
+
+      text = to_text(n)//' value'
+      if (n /= 1) text = text//'s'
+   end function counted
+
+   !> Read value number k.
+   pure subroutine read_one(entry, literal, k, value, problem)
+      type(entry_t), intent(in) :: entry
+      type(literal_t), intent(in) :: literal
+      integer, intent(in) :: k
+      type(value_t), intent(inout) :: value
+      character(len=:), allocatable, intent(out) :: problem
+
+      select case (entry%type)
+      case ('real')
+         call read_real(literal, value%reals(k), problem)
+         if (.not. allocated(problem)) call check_bounds(entry, literal, value%reals(k), problem)
+      case ('integer')
+         call read_integer(literal, value%integers(k), problem)
+         if (.not. allocated(problem)) call check_bounds(entry, literal, real(value%integers(k), wp), problem)
+      case ('logical')
+         call read_logical(literal, value%flag, problem)
+      case default
+         value%text = trim(literal%text)
+         call check_text(entry, literal, problem)
+      end select
+   end subroutine read_one
+
+   pure subroutine read_real(literal, number, problem)
+      type(literal_t), intent(in) :: literal
+      real(wp), intent(out) :: number
+      character(len=:), allocatable, intent(inout) :: problem
+      character(len=len(literal%text)) :: text
+
+      number = 0.0_wp
+      text = lower_case(literal%text)
+      if (literal%has_quotes .or. .not. (is_number(text) .or. is_not_finite(text))) then
+         problem = 'must be a real number, but '//literal%as_written()//' is given'
+      else if (is_not_finite(text)) then
+         problem = 'must be finite, but '//literal%text//' is given'
+      else if (abs(magnitude(text)) > range(number)) then
+         problem = 'must fit into a number of this precision, but '//literal%text//' is given'
+      else
+         read (text, *) number
+      end if
+   end subroutine read_real
+
+   pure logical function is_not_finite(text)
+      character(len=*), intent(in) :: text
+      integer :: first
+
+      first = 1 + merge(1, 0, scan(text_at(text, 1), '+-') > 0)
+      is_not_finite = any(text(first:) == [character(len=8) :: 'nan', 'inf', 'infinity'])
+   end function is_not_finite
+
+   !> Whether a text in small letters is [sign] digits [. digits] [e or d [sign] digits]; digits may lack on
+   !> one side of the point.
+   pure logical function is_number(text)
+      character(len=*), intent(in) :: text
+      integer :: k, n
+
+      k = 1
+      if (scan(text_at(text, 1), '+-') > 0) k = 2
+      n = run_of_digits(text(k:))
+      k = k + n
+      if (text_at(text, k) == '.') then
+         k = k + 1
+         n = n + run_of_digits(text(k:))
+         k = k + run_of_digits(text(k:))
+      end if
+      is_number = n > 0
+      if (scan(text_at(text, k), 'ed') > 0) then
+         k = k + 1
+         if (scan(text_at(text, k), '+-') > 0) k = k + 1
+         n = run_of_digits(text(k:))
+         is_number = is_number .and. n > 0 .and. n < 6
+         k = k + n
+      end if
+      is_number = is_number .and. k == len(text) + 1
+   end function is_number
+
+   pure integer function run_of_digits(text)
+      character(len=*), intent(in) :: text
+
+      run_of_digits = verify(text//'.', digits) - 1
+   end function run_of_digits
+
+   pure character(len=1) function text_at(text, place)
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: place
+
+      text_at = ' '
+      if (place <= len(text)) text_at = text(place:place)
+   end function text_at
+
+   !> Power of ten of the leading digit of a number; 0 for zero
+   pure integer function magnitude(text)
+      character(len=*), intent(in) :: text
+      integer :: exponent_mark, leading, point
+
+      magnitude = 0
+      exponent_mark = scan(text//'e', 'ed')
+      leading = scan(text(:exponent_mark - 1), '123456789')
+      if (leading == 0) return
+      if (exponent_mark < len(text)) read (text(exponent_mark + 1:), *) magnitude
+      point = index(text(:exponent_mark - 1)//'.', '.')
+      magnitude = magnitude + point - leading - merge(1, 0, point > leading)
+   end function magnitude
+
+   pure subroutine read_integer(literal, number, problem)
+      type(literal_t), intent(in) :: literal
+      integer(ip), intent(out) :: number
+      character(len=:), allocatable, intent(inout) :: problem
+      character(len=len(literal%text)) :: text
+      integer(lp) :: wide
+
+      number = 0_ip
+      text = literal%text
+      if (literal%has_quotes .or. .not. is_number(text) .or. scan(text, '.edED') > 0) then
+         problem = 'must be an integer, but '//literal%as_written()//' is given'
+         return
+      end if
+      wide = huge(wide)
+      if (magnitude(text) <= range(number)) read (text, *) wide
+      if (abs(wide) <= huge(number)) then
+         number = int(wide, ip)
+      else
+         problem = 'must be at most '//to_text(huge(number))//' in size, but '//text//' is given'
+      end if
+   end subroutine read_integer
+
+   pure subroutine read_logical(literal, flag, problem)
+      type(literal_t), intent(in) :: literal
+      logical, intent(out) :: flag
+      character(len=:), allocatable, intent(inout) :: problem
+
+      flag = .false.
+      if (.not. literal%has_quotes) then
+         select case (lower_case(literal%text))
+         case ('.true.', '.t.', 't', 'true')
+            flag = .true.
+            return
+         case ('.false.', '.f.', 'f', 'false')
+            return
+         end select
+      end if
+      problem = 'must be .true. or .false., but '//literal%as_written()//' is given'
+   end subroutine read_logical
+
+   !> Check a number against bounds such as '>= 0, < 1'.
+   pure subroutine check_bounds(entry, literal, number, problem)
+      type(entry_t), intent(in) :: entry
+      type(literal_t), intent(in) :: literal
+      real(wp), intent(in) :: number
+      character(len=:), allocatable, intent(inout) :: problem
+      character(len=len(entry%allowed)) :: words(count_words(entry%allowed))
+      real(wp) :: bound
+      logical :: kept
+      integer :: k
+
+      words = split_words(entry%allowed)
+      do k = 1, size(words), 2
+         read (words(k + 1), *) bound
+         select case (words(k))
+         case ('>')
+            kept = number > bound
+         case ('>=')
+            kept = number >= bound
+         case ('<')
+            kept = number < bound
+         case default
+            kept = number <= bound
+         end select
+         if (.not. kept) problem = 'must be '//trim(words(k))//' '//trim(words(k + 1))//', but '// &
+            literal%text//' is given'
+      end do
+   end subroutine check_bounds
+
+   !> A word must be one of the choices, a required path must not be empty.
+   pure subroutine check_text(entry, literal, problem)
+      type(entry_t), intent(in) :: entry
+      type(literal_t), intent(in) :: literal
+      character(len=:), allocatable, intent(inout) :: problem
+
+      if (.not. literal%has_quotes) then
+         problem = 'must stand in quotes: write '//quoted(literal%text)
+      else if (entry%type == 'path') then
+         if (literal%text == '' .and. entry%default == required) problem = 'must not be empty'
+      else if (all(split_words(entry%allowed) /= literal%text)) then
+         problem = 'cannot be '//literal%as_written()//suggestion(literal%text, split_words(entry%allowed))
+      end if
+   end subroutine check_text
+
+   !> A value as a namelist has it; reading it again gives the same bits
+   pure function value_text(entry, value) result(text)
+      !> Row of the entry
+      type(entry_t), intent(in) :: entry
+      !> Its value
+      type(value_t), intent(in) :: value
+      character(len=:), allocatable :: text
+      integer :: k
+
+      text = ''
+      select case (entry%type)
+      case ('real')
+         do k = 1, size(value%reals)
+            text = text//', '//real_text(value%reals(k))
+         end do
+         text = text(3:)
+      case ('integer')
+         do k = 1, size(value%integers)
+            text = text//', '//to_text(value%integers(k))
+         end do
+         text = text(min(3, len(text) + 1):)
+      case ('logical')
+         text = trim(merge('.true. ', '.false.', value%flag))
+      case default
+         text = quoted(value%text)
+      end select
+   end function value_text
+
+   !> Fewest digits that give a number back bit for bit
+   pure function real_text(number) result(text)
+      real(wp), intent(in) :: number
+      character(len=:), allocatable :: text
+      character(len=64) :: buffer, form
+      real(wp) :: again
+      integer :: mark, n, power
+
+      do n = 0, precision(number) + 3
+         write (form, '(a,i0,a)') '(es60.', n, 'e4)'
+         write (buffer, form) number
+         read (buffer, *) again
+         if (.not. abs(again - number) > 0.0_wp) exit
+      end do
+      buffer = adjustl(buffer)
+      mark = scan(buffer, 'E')
+      read (buffer(mark + 1:), *) power
+      if (power < -4 .or. power > 6) then
+         text = buffer(:mark - 1)//trim(merge('0', ' ', n == 0))//'e'//to_text(power)
+      else
+         write (form, '(a,i0,a)') '(f60.', max(1, n - power), ')'
+         write (buffer, form) number
+         text = trim(adjustl(buffer))
+      end if
+   end function real_text
+
+end module polydem_namelist_values

@@ -1,0 +1,84 @@
+!> Settings from a namelist file: one table says what there is, one path checks file and command line.
+!>
+!> The reader is our own because the namelist input of compilers neither names the line of a mistake nor
+!> notices keys given twice, and reports most mistakes as 'end of file'.
+module polydem_read_settings
+   use polydem_check_settings, only: check_settings
+   use polydem_errors, only: error_t
+   use polydem_fill_settings, only: fill_settings
+   use polydem_namelist_tokens, only: source_t
+   use polydem_namelist_values, only: value_t
+   use polydem_resolve_entries, only: resolve_entries, resolved_text
+   use polydem_settings, only: settings_t
+   use polydem_text_file, only: read_text_file
+   implicit none
+   private
+   public :: read_settings, read_settings_text
+
+contains
+
+   !> Read the settings of a run from a file.
+   subroutine read_settings(file, overrides, settings, error)
+      !> Path of the namelist file
+      character(len=*), intent(in) :: file
+      !> Overrides of the command line, each 'group.key=value'; the last one of an entry counts
+      character(len=*), intent(in) :: overrides(:)
+      !> Complete, checked settings
+      type(settings_t), intent(out) :: settings
+      !> What is wrong with the file or an override, with file:line or --set group.key=value in front
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: text
+
+      call read_text_file(file, text, error)
+      if (allocated(error)) return
+      call read_settings_text(file, text, overrides, settings, error)
+   end subroutine read_settings
+
+   !> Read the settings of a run from a text.
+   pure subroutine read_settings_text(file_name, text, overrides, settings, error)
+      !> Name in messages
+      character(len=*), intent(in) :: file_name
+      !> Namelist groups
+      character(len=*), intent(in) :: text
+      !> Overrides of the command line, each 'group.key=value'; the last one of an entry counts
+      character(len=*), intent(in) :: overrides(:)
+      !> Complete, checked settings
+      type(settings_t), intent(out) :: settings
+      !> What is wrong with the text or an override
+      type(error_t), allocatable, intent(inout) :: error
+      type(source_t) :: source
+      type(value_t), allocatable :: values(:)
+
+      source%name = trim(file_name)
+      source%text = text
+      call resolve_entries(source, overrides, values, error)
+      if (allocated(error)) return
+      settings%file = trim(file_name)
+      settings%text = with_plain_line_ends(text)
+      settings%resolved = resolved_text(values)
+      call fill_settings(values, settings)
+      call check_settings(settings, values, error)
+   end subroutine read_settings_text
+
+   !> The text without carriage returns and with a line end after the last line
+   pure function with_plain_line_ends(text) result(plain)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: plain
+      character(len=*), parameter :: line_feed = achar(10), carriage_return = achar(13)
+      integer :: k, n
+
+      allocate (character(len=len(text) + 1) :: plain)
+      n = 0
+      do k = 1, len(text)
+         if (text(k:k) == carriage_return) cycle
+         n = n + 1
+         plain(n:n) = text(k:k)
+      end do
+      if (n > 0) then
+         if (plain(n:n) /= line_feed) n = n + 1
+         plain(n:n) = line_feed
+      end if
+      plain = plain(:n)
+   end function with_plain_line_ends
+
+end module polydem_read_settings

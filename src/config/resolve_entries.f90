@@ -1,0 +1,320 @@
+!> From statements to the values in force: what is written must be known, unique, used and right.
+!>
+!> Overrides of the command line replace what the file says. An entry of the file that such an override leaves
+!> without use (friction_coefficient after --set forces.friction=none) is dropped; otherwise an entry without
+!> use is an error.
+module polydem_resolve_entries
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_kinds, only: ip, wp
+   use polydem_namelist_entries, only: entries, entry_t, first_row, group_length, groups, keys_of, required
+   use polydem_namelist_statements, only: read_statements, statement_t
+   use polydem_namelist_tokens, only: source_t
+   use polydem_namelist_values, only: label, read_value, value_t, value_text
+   use polydem_strings, only: join, to_text
+   use polydem_words, only: count_words, quoted, split_words, suggestion
+   implicit none
+   private
+   public :: resolve_entries, resolved_text
+
+contains
+
+   !> Find the value of every row of the table.
+   pure subroutine resolve_entries(source, overrides, values, error)
+      !> Namelist text
+      type(source_t), intent(in) :: source
+      !> Overrides 'group.key=value'; the last one of an entry counts
+      character(len=*), intent(in) :: overrides(:)
+      !> Values, (rows of the table)
+      type(value_t), allocatable, intent(out) :: values(:)
+      !> The first offence
+      type(error_t), allocatable, intent(inout) :: error
+      type(statement_t), allocatable :: statements(:)
+      type(statement_t) :: given(size(entries))
+      integer :: row
+
+      call read_statements(source, statements, error)
+      if (allocated(error)) return
+      if (size(statements) == 0) then
+         call raise(error, input_error, &
+            source%name//': holds no namelist group; it needs &scene and &integrate')
+         return
+      end if
+      call collect_statements(statements, given, error)
+      if (allocated(error)) return
+      call collect_overrides(overrides, given, error)
+      if (allocated(error)) return
+
+      allocate (values(size(entries)))
+      do row = 1, size(entries)
+         call resolve_row(source, given, row, values, error)
+         if (allocated(error)) return
+      end do
+      do row = 1, size(entries)
+         call check_use(given(row), row, values, error)
+         if (allocated(error)) return
+      end do
+   end subroutine resolve_entries
+
+   !> Sort the statements of the file by the first rows of their entries.
+   pure subroutine collect_statements(statements, given, error)
+      type(statement_t), intent(in) :: statements(:)
+      type(statement_t), intent(inout) :: given(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: earlier, k, row
+
+      do k = 1, size(statements)
+         call check_names(statements(k), error)
+         if (allocated(error)) return
+         do earlier = 1, k - 1
+            if (statements(earlier)%group /= statements(k)%group) cycle
+            if (statements(earlier)%key /= statements(k)%key) cycle
+            call raise(error, input_error, statements(k)%place//': '//name_of(statements(k))// &
+               ' is given twice (first in line '//to_text(statements(earlier)%line)//')')
+            return
+         end do
+         row = first_row(statements(k)%group, statements(k)%key)
+         if (row > 0) given(row) = statements(k)
+      end do
+   end subroutine collect_statements
+
+   pure function name_of(statement) result(text)
+      type(statement_t), intent(in) :: statement
+      character(len=:), allocatable :: text
+
+      text = 'group &'//statement%group
+      if (statement%key /= '') text = quoted(statement%key)//' in &'//statement%group
+   end function name_of
+
+   !> The group and the key must be in the table.
+   pure subroutine check_names(statement, error)
+      type(statement_t), intent(in) :: statement
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (all(groups() /= statement%group)) then
+         call raise(error, input_error, statement%place//': unknown group &'//statement%group// &
+            suggestion(statement%group, groups()))
+      else if (statement%key /= '' .and. first_row(statement%group, statement%key) == 0) then
+         call raise(error, input_error, statement%place//': unknown key '//quoted(statement%key)//' in &'// &
+            statement%group//suggestion(statement%key, keys_of(statement%group)))
+      end if
+   end subroutine check_names
+
+   !> Let the command line replace what the file says.
+   pure subroutine collect_overrides(overrides, given, error)
+      character(len=*), intent(in) :: overrides(:)
+      type(statement_t), intent(inout) :: given(:)
+      type(error_t), allocatable, intent(inout) :: error
+      type(statement_t) :: statement
+      integer :: k
+
+      do k = 1, size(overrides)
+         call read_override(trim(overrides(k)), statement, error)
+         if (allocated(error)) return
+         given(first_row(statement%group, statement%key)) = statement
+      end do
+   end subroutine collect_overrides
+
+   !> Read 'group.key=value' as the statement '&group key = value'; words and paths need no quotes.
+   pure subroutine read_override(override, statement, error)
+      character(len=*), intent(in) :: override
+      type(statement_t), intent(out) :: statement
+      type(error_t), allocatable, intent(inout) :: error
+      type(statement_t), allocatable :: statements(:)
+      type(source_t) :: source
+      character(len=*), parameter :: line_end = new_line('a')
+      integer :: dot, equals
+
+      source%name = '--set '//override
+      source%has_lines = .false.
+      equals = index(override, '=')
+      dot = index(override(:max(0, equals - 1)), '.')
+      if (dot < 2 .or. equals < dot + 2) then
+         call raise(error, input_error, source%name//': group.key=value was expected')
+         return
+      end if
+      associate (group => override(:dot - 1), key => override(dot + 1:equals - 1), &
+                 value => override(equals + 1:))
+         source%text = '&'//group//line_end//key//'='//value_of_override(group, key, value)//line_end//'/'
+      end associate
+      call read_statements(source, statements, error)
+      if (allocated(error)) return
+      if (size(statements) /= 2) then
+         call raise(error, input_error, source%name//': one entry was expected, group.key=value')
+         return
+      end if
+      statement = statements(2)
+      statement%is_override = .true.
+      call check_names(statement, error)
+   end subroutine read_override
+
+   !> The value, in quotes if the entry is a text and has none
+   pure function value_of_override(group, key, given) result(text)
+      character(len=*), intent(in) :: group, key, given
+      character(len=:), allocatable :: text
+      integer :: row
+
+      text = given
+      row = first_row(group, key)
+      if (row == 0) return
+      if (entries(row)%type /= 'word' .and. entries(row)%type /= 'path') return
+      if (scan(adjustl(given)//' ', '''"') == 1) return
+      text = quoted(trim(adjustl(given)))
+   end function value_of_override
+
+   !> The value of a row: what is given, or the default.
+   pure subroutine resolve_row(source, given, row, values, error)
+      type(source_t), intent(in) :: source
+      type(statement_t), intent(in) :: given(:)
+      integer, intent(in) :: row
+      type(value_t), intent(inout) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: home
+
+      associate (entry => entries(row))
+         home = first_row(entry%group, entry%key)
+         values(row)%in_force = is_needed(entry, values)
+         if (values(row)%in_force .and. allocated(given(home)%values)) then
+            call read_value(entry, given(home), values(row), error)
+         else if (entry%default /= required) then
+            call read_value(entry, default_statement(source, entry), values(row), error)
+         else if (values(row)%in_force) then
+            call raise(error, input_error, source%name//': '//label(entry)//' is required'// &
+               reason(entry, values)//expected(entry))
+         else
+            call read_nothing(source, entry, values(row))
+         end if
+      end associate
+   end subroutine resolve_row
+
+   !> Whether an entry is in force, given the values of the rows above
+   pure logical function is_needed(entry, values)
+      type(entry_t), intent(in) :: entry
+      type(value_t), intent(in) :: values(:)
+      integer :: colon, row
+
+      is_needed = entry%needs == ''
+      if (is_needed) return
+      colon = index(entry%needs, ':')
+      row = first_row(entry%group, entry%needs(:colon - 1))
+      if (values(row)%in_force) is_needed = any(split_words(entry%needs(colon + 1:)) == values(row)%text)
+   end function is_needed
+
+   !> The default of a row as if it had been written
+   pure function default_statement(source, entry) result(statement)
+      type(source_t), intent(in) :: source
+      type(entry_t), intent(in) :: entry
+      type(statement_t) :: statement
+      character(len=len(entry%default)) :: words(count_words(entry%default))
+      integer :: k
+
+      statement%place = source%name
+      if (entry%type == 'word' .or. entry%type == 'path') then
+         allocate (statement%values(1))
+         statement%values(1)%text = trim(entry%default)
+         statement%values(1)%has_quotes = .true.
+      else
+         words = split_words(entry%default)
+         allocate (statement%values(size(words)))
+         do k = 1, size(words)
+            statement%values(k)%text = trim(words(k))
+         end do
+      end if
+   end function default_statement
+
+   !> Zeros and an empty text for an entry without default that is not in force
+   pure subroutine read_nothing(source, entry, value)
+      type(source_t), intent(in) :: source
+      type(entry_t), intent(in) :: entry
+      type(value_t), intent(inout) :: value
+      integer :: k
+
+      value%place = source%name
+      value%text = ''
+      value%reals = [(0.0_wp, k=1, merge(entry%count, 0, entry%type == 'real'))]
+      value%integers = [(0_ip, k=1, merge(entry%count, 0, entry%type == 'integer'))]
+   end subroutine read_nothing
+
+   !> ' with name = 'hopper'' for an entry that is required only then
+   pure function reason(entry, values) result(text)
+      type(entry_t), intent(in) :: entry
+      type(value_t), intent(in) :: values(:)
+      character(len=:), allocatable :: text, key
+
+      text = ''
+      if (entry%needs == '') return
+      key = entry%needs(:index(entry%needs, ':') - 1)
+      text = ' with '//key//' = '//quoted(values(first_row(entry%group, key))%text)
+   end function reason
+
+   !> What a required entry looks like, as the end of a message
+   pure function expected(entry) result(text)
+      type(entry_t), intent(in) :: entry
+      character(len=:), allocatable :: text
+
+      select case (entry%type)
+      case ('word')
+         text = suggestion('', split_words(entry%allowed))
+      case default
+         text = ' ('//trim(entry%meaning)
+         if (entry%allowed /= '') text = text//', '//trim(entry%allowed)
+         if (entry%unit /= '') text = text//' ['//trim(entry%unit)//']'
+         text = text//')'
+      end select
+   end function expected
+
+   !> What the file gives must be in force, unless an override is why it is not.
+   pure subroutine check_use(given, home, values, error)
+      type(statement_t), intent(in) :: given
+      integer, intent(in) :: home
+      type(value_t), intent(in) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: key, needs
+      integer :: decider, row
+
+      if (.not. allocated(given%values)) return
+      needs = ''
+      do row = home, size(entries)
+         if (entries(row)%group /= given%group .or. entries(row)%key /= given%key) cycle
+         if (values(row)%in_force) return
+         needs = needs//entries(row)%needs(index(entries(row)%needs, ':') + 1:)
+      end do
+      key = entries(home)%needs(:index(entries(home)%needs, ':') - 1)
+      decider = first_row(given%group, key)
+      if (values(decider)%is_override .and. .not. given%is_override) return
+      call raise(error, input_error, given%place//': '//label(entries(home))//' is used only with '//key// &
+         ' = '//join(split_words(needs), ' or ')//', not with '//values(decider)%text)
+   end subroutine check_use
+
+   !> All values in force as a namelist that can be read again, one entry to a line; an empty list is left out
+   pure function resolved_text(values) result(text)
+      !> Values, (rows of the table)
+      type(value_t), intent(in) :: values(:)
+      character(len=:), allocatable :: text
+      character(len=*), parameter :: line_end = new_line('a')
+      character(len=group_length) :: group
+      integer :: row
+
+      text = ''
+      group = ''
+      do row = 1, size(entries)
+         if (entries(row)%group /= group) then
+            if (row > 1) text = text//'/'//line_end
+            group = entries(row)%group
+            text = text//'&'//trim(group)//line_end
+         end if
+         if (values(row)%in_force) text = text//line_of(entries(row), value_text(entries(row), values(row)))
+      end do
+      text = text//'/'//line_end
+   end function resolved_text
+
+   !> The line of an entry; none for an empty list
+   pure function line_of(entry, value) result(line)
+      type(entry_t), intent(in) :: entry
+      character(len=*), intent(in) :: value
+      character(len=:), allocatable :: line
+
+      line = ''
+      if (value /= '') line = '   '//trim(entry%key)//' = '//value//new_line('a')
+   end function line_of
+
+end module polydem_resolve_entries

@@ -1,0 +1,159 @@
+!> The settings of a run: one type per namelist group, immutable once read.
+!>
+!> Defaults are not stated here but in `namelist_entries`, once.
+module polydem_settings
+   use polydem_kinds, only: ip, wp
+   implicit none
+   private
+   public :: settings_t, scene_settings_t, boxes_settings_t, neighbours_settings_t, overlap_settings_t
+   public :: forces_settings_t, integrate_settings_t, output_settings_t
+
+   !> Group &scene: what there is at the start
+   type :: scene_settings_t
+      !> Name of the generator, or 'file'
+      character(len=:), allocatable :: name
+      !> Bodies file (HDF5) of the scene 'file'
+      character(len=:), allocatable :: bodies_file
+      !> Seed of the random generator
+      integer(ip) :: seed
+      !> Number of boxes, walls included (drum); 0: use `bodies`
+      integer(ip) :: boxes
+      !> Number of free bodies
+      integer(ip) :: bodies
+      !> Least number of corners of a grain
+      integer(ip) :: corners_min
+      !> Greatest number of corners of a grain
+      integer(ip) :: corners_max
+      !> Full short axis of the ellipse around a grain [m]
+      real(wp) :: short_axis
+      !> Least full long axis of the ellipse around a grain [m]
+      real(wp) :: long_axis_min
+      !> Greatest full long axis of the ellipse around a grain [m]
+      real(wp) :: long_axis_max
+      !> Density of the grains [kg/m2 per metre of depth, that is kg/m3]
+      real(wp) :: density
+      !> Radius of the drum [m]; 0: from the number of grains
+      real(wp) :: radius
+      !> Width of the container, of the floor (heap) or of a block [m]; 0: from the number of grains
+      real(wp) :: width
+      !> Height of a block [m]
+      real(wp) :: height
+      !> Opening of the hopper [m]
+      real(wp) :: opening
+      !> Slope of the incline or of the hopper walls [degree]
+      real(wp) :: slope
+      !> Share of the area covered by grains (gas)
+      real(wp) :: fraction
+      !> Root mean square speed of the grains, or speed of the block (incline), at the start [m/s]
+      real(wp) :: speed
+      !> Prescribed motion of walls: none, rotation, translation or oscillation
+      character(len=:), allocatable :: motion
+      !> Identifiers of the fixed bodies that move; empty: all fixed bodies
+      integer(ip), allocatable :: motion_bodies(:)
+      !> Pivot of a rotation [m]
+      real(wp) :: motion_pivot(2)
+      !> Rate of a rotation, anticlockwise [1/s, revolutions per second]
+      real(wp) :: motion_rate
+      !> Velocity of a translation [m/s]
+      real(wp) :: motion_velocity(2)
+      !> Amplitude of an oscillation [m]
+      real(wp) :: motion_amplitude(2)
+      !> Frequency of an oscillation [Hz]
+      real(wp) :: motion_frequency
+      !> Time at which the motion starts [s]
+      real(wp) :: motion_start
+      !> Time over which the motion gets to full speed [s]
+      real(wp) :: motion_ramp
+   end type scene_settings_t
+
+   !> Group &boxes
+   type :: boxes_settings_t
+      !> A body longer than this many median grain diameters is cut into several boxes
+      real(wp) :: largest_ratio
+   end type boxes_settings_t
+
+   !> Group &neighbours
+   type :: neighbours_settings_t
+      !> Name of the neighbour finder
+      character(len=:), allocatable :: finder
+   end type neighbours_settings_t
+
+   !> Group &overlap
+   type :: overlap_settings_t
+      !> What to do with a contact that has no direction: 'push' along the line of centres, or 'stop'
+      character(len=:), allocatable :: degenerate
+   end type overlap_settings_t
+
+   !> Group &forces
+   type :: forces_settings_t
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp) :: gravity(2)
+      !> Young's modulus E in two dimensions [N/m2]
+      real(wp) :: stiffness
+      !> Normal damping: 'rate', 'book' or 'none'
+      character(len=:), allocatable :: damping
+      !> Dimensionless damping coefficient gamma
+      real(wp) :: damping_coefficient
+      !> Friction: 'cundall_strack' or 'none'
+      character(len=:), allocatable :: friction
+      !> Friction coefficient mu
+      real(wp) :: friction_coefficient
+      !> Tangential stiffness as a share of E
+      real(wp) :: tangential_stiffness
+      !> Tangential damping as a share of sqrt(k_t m_t)
+      real(wp) :: tangential_damping
+   end type forces_settings_t
+
+   !> Group &integrate
+   type :: integrate_settings_t
+      !> 'velocity_verlet' or 'gear'
+      character(len=:), allocatable :: scheme
+      !> Time step [s]; 0: `fraction` of the stable step
+      real(wp) :: dt
+      !> Share of the stable step that is taken if dt is 0
+      real(wp) :: fraction
+      !> Simulated time [s]
+      real(wp) :: duration
+   end type integrate_settings_t
+
+   !> Group &output
+   type :: output_settings_t
+      !> Folder of the result; empty: results/<name of the input file>
+      character(len=:), allocatable :: folder
+      !> Simulated time between two frames [s]; 0: none but the first and last
+      real(wp) :: frame_interval
+      !> Frames per trajectory segment
+      integer(ip) :: frames_per_segment
+      !> Simulated time between two lines of the log [s]; 0: twenty lines
+      real(wp) :: log_interval
+      !> Whether frames hold the contacts
+      logical :: contacts
+      !> Whether energy and momentum are booked
+      logical :: ledger
+   end type output_settings_t
+
+   !> All settings of a run
+   type :: settings_t
+      !> Path of the namelist file, for messages
+      character(len=:), allocatable :: file
+      !> The namelist as it was read, with a line end after each line
+      character(len=:), allocatable :: text
+      !> Every group with every entry as it is in force, one per line
+      character(len=:), allocatable :: resolved
+      !> Group &scene
+      type(scene_settings_t) :: scene
+      !> Group &boxes
+      type(boxes_settings_t) :: boxes
+      !> Group &neighbours
+      type(neighbours_settings_t) :: neighbours
+      !> Group &overlap
+      type(overlap_settings_t) :: overlap
+      !> Group &forces
+      type(forces_settings_t) :: forces
+      !> Group &integrate
+      type(integrate_settings_t) :: integrate
+      !> Group &output
+      type(output_settings_t) :: output
+   end type settings_t
+
+end module polydem_settings

@@ -1,0 +1,49 @@
+!> A text file as one string.
+module polydem_text_file
+   use polydem_errors, only: error_t, input_error, io_error, raise
+   implicit none
+   private
+   public :: read_text_file
+
+   !> Longer files are no namelists [bytes]
+   integer, parameter :: greatest_size = 1048576
+
+contains
+
+   !> Read a whole file.
+   subroutine read_text_file(file, text, error)
+      !> Path of the file
+      character(len=*), intent(in) :: file
+      !> Its bytes
+      character(len=:), allocatable, intent(out) :: text
+      !> File is missing (input_error), or a folder, too long or unreadable
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=256) :: reason
+      integer :: bytes, status, unit
+      logical :: there
+
+      inquire (file=trim(file)//'/.', exist=there)
+      if (there .or. len_trim(file) == 0) then
+         call raise(error, input_error, trim(file)//': is a folder, not a namelist file')
+         return
+      end if
+      inquire (file=trim(file), exist=there, size=bytes)
+      if (.not. there) then
+         call raise(error, input_error, trim(file)//': no such file')
+      else if (bytes < 0 .or. bytes > greatest_size) then
+         call raise(error, input_error, &
+            trim(file)//': is not a namelist file (longer than 1 MiB, or no plain file)')
+      end if
+      if (allocated(error)) return
+
+      open (newunit=unit, file=trim(file), access='stream', form='unformatted', action='read', status='old', &
+         iostat=status, iomsg=reason)
+      if (status == 0) then
+         allocate (character(len=bytes) :: text)
+         if (bytes > 0) read (unit, iostat=status, iomsg=reason) text
+         close (unit)
+      end if
+      if (status /= 0) call raise(error, io_error, trim(file)//': cannot be read ('//trim(reason)//')')
+   end subroutine read_text_file
+
+end module polydem_text_file
