@@ -1,0 +1,120 @@
+!> The bodies of a simulation as a structure of arrays.
+!>
+!> A body is a convex polygon, free or fixed. Its *slot* is its place in the arrays and may change; its
+!> *identifier* never does. Slots stand in ascending order of identifiers.
+!>
+!> Vertices are packed: body `s` owns the columns `vertex_start(s) : vertex_start(s + 1) - 1`,
+!> anticlockwise, of two arrays:
+!>
+!>     shape(:, k)    in the body frame: relative to the centre of mass, at angle 0; never changes
+!>     turned(:, k)   shape turned by the angle, still relative to the centre of mass
+!>
+!> World coordinates are `position + turned`. They are not stored: differences between two near bodies
+!> are exact only if they are formed from positions first, so that results do not suffer far from the origin.
+module polydem_bodies
+   use polydem_kinds, only: ip, lp, wp, dp, worth_threads
+   use polydem_hash, only: mix_word
+   implicit none
+   private
+   public :: bodies_t, turn_bodies, state_hash
+
+   !> Structure of arrays over slots 1..n
+   type :: bodies_t
+      !> Number of bodies
+      integer(ip) :: n = 0_ip
+      !> Identifier of each slot, ascending
+      integer(ip), allocatable :: id(:)
+      !> Whether the body is moved by prescription or not at all
+      logical, allocatable :: fixed(:)
+      !> Slots of the free bodies, ascending
+      integer(ip), allocatable :: free(:)
+      !> Mass [kg/m]; infinite mass of a fixed body is stored as 0
+      real(wp), allocatable :: mass(:)
+      !> Moment of inertia about the centre of mass [kg m]; infinite is stored as 0
+      real(wp), allocatable :: inertia(:)
+      !> 1/mass, 0 for infinite mass [m/kg]
+      real(wp), allocatable :: inverse_mass(:)
+      !> 1/inertia, 0 for infinite inertia [1/(kg m)]
+      real(wp), allocatable :: inverse_inertia(:)
+      !> Centre of mass, (2, slot) [m]
+      real(wp), allocatable :: position(:, :)
+      !> Angle since the start [rad]
+      real(wp), allocatable :: angle(:)
+      !> Velocity of the centre of mass, (2, slot) [m/s]
+      real(wp), allocatable :: velocity(:, :)
+      !> Angular velocity [rad/s]
+      real(wp), allocatable :: angular_velocity(:)
+      !> Acceleration of the centre of mass, (2, slot) [m/s2]
+      real(wp), allocatable :: acceleration(:, :)
+      !> Angular acceleration [rad/s2]
+      real(wp), allocatable :: angular_acceleration(:)
+      !> Sum of the forces, (2, slot) [N/m]
+      real(wp), allocatable :: force(:, :)
+      !> Sum of the torques about the centre of mass [N]
+      real(wp), allocatable :: torque(:)
+      !> Cosine and sine of the angle, (2, slot)
+      real(wp), allocatable :: direction(:, :)
+      !> First vertex of each body, (n + 1)
+      integer(ip), allocatable :: vertex_start(:)
+      !> Vertices in the body frame, (2, vertex) [m]
+      real(wp), allocatable :: shape(:, :)
+      !> Vertices turned by the angle, relative to the centre of mass, (2, vertex) [m]
+      real(wp), allocatable :: turned(:, :)
+   end type bodies_t
+
+contains
+
+   !> Bring `direction` and `turned` of the given bodies up to date with their angles.
+   !>
+   !> The only place of the program that takes the sine of a body's angle.
+   subroutine turn_bodies(bodies, slots)
+      !> Bodies; only `direction` and `turned` change
+      type(bodies_t), intent(inout) :: bodies
+      !> Slots of the bodies that may have turned
+      integer(ip), intent(in) :: slots(:)
+      integer(ip) :: k, s, v
+      real(wp) :: c, si
+
+      !$omp parallel do if (size(slots) > worth_threads) schedule(static) default(none) &
+      !$omp    shared(bodies, slots) private(k, s, v, c, si)
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
+         c = cos(bodies%angle(s))
+         si = sin(bodies%angle(s))
+         bodies%direction(1, s) = c
+         bodies%direction(2, s) = si
+         do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
+            bodies%turned(1, v) = c*bodies%shape(1, v) - si*bodies%shape(2, v)
+            bodies%turned(2, v) = si*bodies%shape(1, v) + c*bodies%shape(2, v)
+         end do
+      end do
+      !$omp end parallel do
+   end subroutine turn_bodies
+
+   !> Hash of the bits of every body's identifier, position, angle and velocities in identifier order.
+   !>
+   !> Real numbers enter as double precision. Two runs agree in every bit if their hashes agree.
+   pure integer(lp) function state_hash(bodies)
+      !> Bodies to hash
+      type(bodies_t), intent(in) :: bodies
+      integer(ip) :: s
+
+      state_hash = int(bodies%n, lp)
+      do s = 1_ip, bodies%n
+         state_hash = mix_word(state_hash, int(bodies%id(s), lp))
+         state_hash = mix_word(state_hash, bits(bodies%position(1, s)))
+         state_hash = mix_word(state_hash, bits(bodies%position(2, s)))
+         state_hash = mix_word(state_hash, bits(bodies%angle(s)))
+         state_hash = mix_word(state_hash, bits(bodies%velocity(1, s)))
+         state_hash = mix_word(state_hash, bits(bodies%velocity(2, s)))
+         state_hash = mix_word(state_hash, bits(bodies%angular_velocity(s)))
+      end do
+   end function state_hash
+
+   pure integer(lp) function bits(number)
+      real(wp), intent(in) :: number
+
+      bits = transfer(real(number, dp), 0_lp)
+   end function bits
+
+end module polydem_bodies

@@ -1,0 +1,207 @@
+!> Bodies one by one, as generators and readers find them, to be turned into the arrays of `bodies_t`.
+module polydem_body_list
+   use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_polygon, only: clean_polygon, mass_properties
+   use polydem_sort, only: sort_keys
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: body_list_t, new_bodies
+
+   !> Density where none is given [kg/m3]
+   real(wp), parameter :: default_density = 2500.0_wp
+
+   !> What is known of one body before its masses are computed
+   type :: entry_t
+      !> Identifier
+      integer(ip) :: id = 0_ip
+      !> Whether it is fixed
+      logical :: fixed = .false.
+      !> Corners in the world, (2, corner) [m]
+      real(wp), allocatable :: vertices(:, :)
+      !> Density [kg/m3]
+      real(wp) :: density = default_density
+      !> Velocity of the centre of mass [m/s]
+      real(wp) :: velocity(2) = 0.0_wp
+      !> Angular velocity [rad/s]
+      real(wp) :: angular_velocity = 0.0_wp
+      !> Mass, 0 if not given [kg/m]
+      real(wp) :: mass = 0.0_wp
+      !> Moment of inertia, 0 if not given [kg m]
+      real(wp) :: inertia = 0.0_wp
+   end type entry_t
+
+   !> A growing list of bodies
+   type :: body_list_t
+      !> Number of bodies so far
+      integer(ip) :: n = 0_ip
+      type(entry_t), allocatable, private :: entries(:)
+   contains
+      procedure :: append
+   end type body_list_t
+
+contains
+
+   !> Append a body. Without `mass` and `inertia` a free body gets those of its polygon, a fixed one infinite ones.
+   subroutine append(self, vertices, fixed, density, velocity, angular_velocity, id, mass, inertia)
+      class(body_list_t), intent(inout) :: self
+      !> Corners in the world, any orientation, (2, corner) [m]
+      real(wp), intent(in) :: vertices(:, :)
+      !> Whether the body is fixed, .false. if absent
+      logical, intent(in), optional :: fixed
+      !> Density, 2500 if absent [kg/m3]
+      real(wp), intent(in), optional :: density
+      !> Velocity of the centre of mass [m/s]
+      real(wp), intent(in), optional :: velocity(2)
+      !> Angular velocity [rad/s]
+      real(wp), intent(in), optional :: angular_velocity
+      !> Identifier, the place in the list if absent
+      integer(ip), intent(in), optional :: id
+      !> Mass instead of that of the polygon [kg/m]
+      real(wp), intent(in), optional :: mass
+      !> Moment of inertia instead of that of the polygon [kg m]
+      real(wp), intent(in), optional :: inertia
+
+      call make_room(self)
+      self%n = self%n + 1_ip
+      associate (entry => self%entries(self%n))
+         entry%vertices = vertices
+         entry%id = self%n
+         if (present(fixed)) entry%fixed = fixed
+         if (present(density)) entry%density = density
+         if (present(velocity)) entry%velocity = velocity
+         if (present(angular_velocity)) entry%angular_velocity = angular_velocity
+         if (present(id)) entry%id = id
+         if (present(mass)) entry%mass = mass
+         if (present(inertia)) entry%inertia = inertia
+      end associate
+   end subroutine append
+
+   !> Check every polygon and make the arrays, in ascending order of the identifiers, at angle 0.
+   subroutine new_bodies(list, bodies, error)
+      !> Bodies one by one
+      type(body_list_t), intent(in) :: list
+      !> Structure of arrays
+      type(bodies_t), intent(out) :: bodies
+      !> Names the body whose polygon or identifier cannot be used
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp), allocatable :: key(:), spare_key(:)
+      integer(ip), allocatable :: order(:), spare(:)
+      integer(ip) :: k, s
+
+      allocate (key(list%n), spare_key(list%n), order(list%n), spare(list%n))
+      do k = 1_ip, list%n
+         key(k) = int(list%entries(k)%id, lp)
+         order(k) = k
+      end do
+      call sort_keys(list%n, key, order, spare_key, spare)
+      do k = 2_ip, list%n
+         if (key(k) == key(k - 1_ip)) then
+            call raise(error, input_error, 'body '//to_text(key(k))//': the identifier is used twice')
+            return
+         end if
+      end do
+      call allocate_bodies(bodies, list%n)
+      do s = 1_ip, list%n
+         call place(list%entries(order(s)), s, bodies, error)
+         if (allocated(error)) return
+      end do
+      call finish(bodies)
+   end subroutine new_bodies
+
+   subroutine make_room(self)
+      type(body_list_t), intent(inout) :: self
+      type(entry_t), allocatable :: longer(:)
+
+      if (.not. allocated(self%entries)) allocate (self%entries(64))
+      if (self%n < size(self%entries)) return
+      allocate (longer(2*size(self%entries)))
+      longer(1:self%n) = self%entries
+      call move_alloc(longer, self%entries)
+   end subroutine make_room
+
+   subroutine allocate_bodies(bodies, n)
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip), intent(in) :: n
+
+      bodies%n = n
+      allocate (bodies%id(n), bodies%fixed(n), bodies%mass(n), bodies%inertia(n), &
+                bodies%inverse_mass(n), bodies%inverse_inertia(n), bodies%position(2, n), &
+                bodies%angle(n), bodies%velocity(2, n), bodies%angular_velocity(n), &
+                bodies%acceleration(2, n), bodies%angular_acceleration(n), bodies%force(2, n), &
+                bodies%torque(n), bodies%direction(2, n), bodies%vertex_start(n + 1_ip))
+      bodies%angle = 0.0_wp
+      bodies%acceleration = 0.0_wp
+      bodies%angular_acceleration = 0.0_wp
+      bodies%force = 0.0_wp
+      bodies%torque = 0.0_wp
+      bodies%vertex_start(1) = 1_ip
+      allocate (bodies%shape(2, 16*n))
+   end subroutine allocate_bodies
+
+   !> Put one body into its slot.
+   subroutine place(entry, s, bodies, error)
+      type(entry_t), intent(in) :: entry
+      integer(ip), intent(in) :: s
+      type(bodies_t), intent(inout) :: bodies
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp), allocatable :: cleaned(:, :)
+      character(len=:), allocatable :: problem
+      real(wp) :: area, centroid(2), second_moment
+      integer(ip) :: k
+
+      call clean_polygon(entry%vertices, cleaned, problem)
+      if (allocated(problem)) then
+         call raise(error, input_error, 'body '//to_text(entry%id)//': the polygon '//problem)
+         return
+      end if
+      if (.not. entry%density > 0.0_wp) then
+         call raise(error, input_error, 'body '//to_text(entry%id)//': the density must be positive')
+         return
+      end if
+      call mass_properties(cleaned, area, centroid, second_moment)
+      bodies%id(s) = entry%id
+      bodies%fixed(s) = entry%fixed
+      bodies%position(:, s) = centroid
+      bodies%velocity(:, s) = entry%velocity
+      bodies%angular_velocity(s) = entry%angular_velocity
+      bodies%mass(s) = entry%mass
+      bodies%inertia(s) = entry%inertia
+      if (.not. entry%fixed .and. bodies%mass(s) <= 0.0_wp) bodies%mass(s) = entry%density*area
+      if (.not. entry%fixed .and. bodies%inertia(s) <= 0.0_wp) bodies%inertia(s) = entry%density*second_moment
+      call reserve_vertices(bodies, bodies%vertex_start(s), size(cleaned, 2, kind=ip))
+      do k = 1_ip, size(cleaned, 2, kind=ip)
+         bodies%shape(:, bodies%vertex_start(s) + k - 1_ip) = cleaned(:, k) - centroid
+      end do
+      bodies%vertex_start(s + 1_ip) = bodies%vertex_start(s) + size(cleaned, 2, kind=ip)
+   end subroutine place
+
+   subroutine reserve_vertices(bodies, first, more)
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip), intent(in) :: first, more
+      real(wp), allocatable :: longer(:, :)
+
+      if (first + more - 1_ip <= size(bodies%shape, 2)) return
+      allocate (longer(2, 2_ip*(first + more)))
+      longer(:, 1:first - 1_ip) = bodies%shape(:, 1:first - 1_ip)
+      call move_alloc(longer, bodies%shape)
+   end subroutine reserve_vertices
+
+   subroutine finish(bodies)
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: s, n_vertices
+
+      n_vertices = bodies%vertex_start(bodies%n + 1_ip) - 1_ip
+      bodies%shape = bodies%shape(:, 1:n_vertices)
+      allocate (bodies%turned(2, n_vertices))
+      bodies%inverse_mass = 0.0_wp
+      bodies%inverse_inertia = 0.0_wp
+      where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass
+      where (bodies%inertia > 0.0_wp) bodies%inverse_inertia = 1.0_wp/bodies%inertia
+      bodies%free = pack([(s, s=1_ip, bodies%n)],.not. bodies%fixed)
+      call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
+   end subroutine finish
+
+end module polydem_body_list

@@ -1,0 +1,93 @@
+!> Contacts (pairs of bodies whose polygons overlap), and what is remembered about pairs between steps.
+!>
+!> Contacts stand in ascending order of their pairs: of the first body, then of the second. The first body
+!> has the lower identifier. All vectors point in world directions.
+!>
+!> Memory rides on the pair list: entry `p` belongs to pair `p`, follows it when the list changes, and is
+!> cleared when the polygons part. A column that no model of the scene needs is never allocated.
+module polydem_contacts
+   use polydem_kinds, only: ip, wp, bp
+   implicit none
+   private
+   public :: contacts_t, contact_memory_t, reserve_contacts
+
+   !> Structure of arrays over contacts 1..n; the arrays may be longer
+   type :: contacts_t
+      !> Number of contacts
+      integer(ip) :: n = 0_ip
+      !> Number of contacts without a direction (one body inside the other, or crossing bars)
+      integer(ip) :: n_degenerate = 0_ip
+      !> The first of them, 0 if there is none
+      integer(ip) :: first_degenerate = 0_ip
+      !> Place in the pair list
+      integer(ip), allocatable :: pair(:)
+      !> Slot of the body with the lower identifier
+      integer(ip), allocatable :: first(:)
+      !> Slot of the body with the higher identifier
+      integer(ip), allocatable :: second(:)
+      !> Area of the overlap [m2]
+      real(wp), allocatable :: area(:)
+      !> Rate of change of the area, exact from positions and velocities [m2/s]
+      real(wp), allocatable :: rate(:)
+      !> Integral of the outward normal over the outline of the first body inside the second, (2, contact) [m]
+      real(wp), allocatable :: normal(:, :)
+      !> Moment of that integral about the centres of the first and of the second body, (2, contact) [m2]
+      real(wp), allocatable :: moment(:, :)
+      !> Centroid of the overlap relative to the centre of the first body, (2, contact) [m]
+      real(wp), allocatable :: arm_first(:, :)
+      !> Centroid of the overlap relative to the centre of the second body, (2, contact) [m]
+      real(wp), allocatable :: arm_second(:, :)
+      !> Unit vector from the second body to the first, (2, contact): -normal/|normal|
+      real(wp), allocatable :: direction(:, :)
+      !> Length of the contact |normal| [m]
+      real(wp), allocatable :: length(:)
+      !> Reciprocal of the characteristic length of the force law [1/m]
+      real(wp), allocatable :: inverse_length(:)
+      !> Elastic part of the normal force, positive in repulsion [N/m]
+      real(wp), allocatable :: elastic(:)
+      !> Normal force, positive in repulsion [N/m]
+      real(wp), allocatable :: normal_force(:)
+      !> Tangential force on the first body along (-direction_y, direction_x) [N/m]
+      real(wp), allocatable :: tangential_force(:)
+      !> Force on the first body; the second feels the opposite, (2, contact) [N/m]
+      real(wp), allocatable :: force(:, :)
+   end type contacts_t
+
+   !> Columns that ride on the pair list; unallocated where no model asks for them
+   type :: contact_memory_t
+      !> Whether the polygons overlapped at the last step (1) or not (0)
+      integer(bp), allocatable :: touching(:)
+      !> Edge that separated the pair last: +k of the first body, -k of the second, 0 unknown
+      integer(ip), allocatable :: separating_edge(:)
+      !> Stored tangential spring force [N/m]
+      real(wp), allocatable :: tangential(:)
+      !> Area at the last step [m2], for the book's backward difference
+      real(wp), allocatable :: area(:)
+   end type contact_memory_t
+
+contains
+
+   !> Make room for at least `capacity` contacts; contents are lost when the arrays grow.
+   subroutine reserve_contacts(contacts, capacity)
+      !> Table of contacts
+      type(contacts_t), intent(inout) :: contacts
+      !> Number of contacts to make room for
+      integer(ip), intent(in) :: capacity
+      integer(ip) :: m
+
+      if (allocated(contacts%pair)) then
+         if (size(contacts%pair) >= capacity) return
+         deallocate (contacts%pair, contacts%first, contacts%second, contacts%area, contacts%rate, &
+                     contacts%normal, contacts%moment, contacts%arm_first, contacts%arm_second, &
+                     contacts%direction, contacts%length, contacts%inverse_length, contacts%elastic, &
+                     contacts%normal_force, contacts%tangential_force, contacts%force)
+      end if
+      m = capacity + capacity/4_ip + 16_ip
+      allocate (contacts%pair(m), contacts%first(m), contacts%second(m), contacts%area(m), &
+                contacts%rate(m), contacts%normal(2, m), contacts%moment(2, m), &
+                contacts%arm_first(2, m), contacts%arm_second(2, m), contacts%direction(2, m), &
+                contacts%length(m), contacts%inverse_length(m), contacts%elastic(m), &
+                contacts%normal_force(m), contacts%tangential_force(m), contacts%force(2, m))
+   end subroutine reserve_contacts
+
+end module polydem_contacts
