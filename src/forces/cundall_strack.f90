@@ -1,0 +1,92 @@
+!> Friction by a tangential spring with a Coulomb limit.
+!>
+!> P.A. Cundall & O.D.L. Strack, Geotechnique 29 (1979) 47; as in Matuttis & Chen 2014, Sec. 3.4.1: the spring
+!> force changes by -k_t v_t dt and is cut at mu F_n, as is its sum with the damping -d sqrt(k_t m_t) v_t,
+!> 1/m_t = 1/m1 + 1/m2 + r1^2/I1 + r2^2/I2 (p. 144). The cut spring is what is remembered.
+module polydem_cundall_strack
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_force_part, only: force_part_t
+   use polydem_kinds, only: ip, wp, worth_threads
+   implicit none
+   private
+   public :: cundall_strack_t
+
+   !> Friction by a spring with memory
+   type, extends(force_part_t) :: cundall_strack_t
+      !> Friction coefficient mu
+      real(wp) :: coefficient
+      !> Stiffness of the spring k_t [N/m2]
+      real(wp) :: stiffness
+      !> Damping as a share of sqrt(k_t m_t)
+      real(wp) :: damping
+   contains
+      procedure :: add
+   end type cundall_strack_t
+
+contains
+
+   !> Add the tangential force and remember the spring.
+   subroutine add(self, bodies, dt, contacts, memory)
+      class(cundall_strack_t), intent(in) :: self
+      !> Bodies, for their masses and velocities
+      type(bodies_t), intent(in) :: bodies
+      !> Time since the last evaluation [s]
+      real(wp), intent(in) :: dt
+      !> Contacts; `tangential_force` changes
+      type(contacts_t), intent(inout) :: contacts
+      !> Memory of the pairs; `tangential` is read and set
+      type(contact_memory_t), intent(inout) :: memory
+      real(wp) :: slip, limit, spring
+      integer(ip) :: c
+
+      !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
+      !$omp    shared(self, bodies, dt, contacts, memory) &
+      !$omp    private(c, slip, limit, spring)
+      do c = 1_ip, contacts%n
+         slip = slip_velocity(bodies, contacts, c)
+         limit = self%coefficient*contacts%normal_force(c)
+         spring = memory%tangential(contacts%pair(c)) - self%stiffness*slip*dt
+         spring = max(-limit, min(limit, spring))
+         memory%tangential(contacts%pair(c)) = spring
+         if (self%damping > 0.0_wp) then
+            spring = spring - self%damping*sqrt(self%stiffness/tangential_mobility(bodies, contacts, c))*slip
+            spring = max(-limit, min(limit, spring))
+         end if
+         contacts%tangential_force(c) = contacts%tangential_force(c) + spring
+      end do
+      !$omp end parallel do
+   end subroutine add
+
+   !> Velocity of the first body against the second at the force point, along (-direction_y, direction_x) [m/s]
+   pure real(wp) function slip_velocity(bodies, contacts, c)
+      type(bodies_t), intent(in) :: bodies
+      type(contacts_t), intent(in) :: contacts
+      integer(ip), intent(in) :: c
+      real(wp) :: vx, vy
+
+      associate (i => contacts%first(c), j => contacts%second(c))
+         vx = (bodies%velocity(1, i) - bodies%angular_velocity(i)*contacts%arm_first(2, c)) &
+            - (bodies%velocity(1, j) - bodies%angular_velocity(j)*contacts%arm_second(2, c))
+         vy = (bodies%velocity(2, i) + bodies%angular_velocity(i)*contacts%arm_first(1, c)) &
+            - (bodies%velocity(2, j) + bodies%angular_velocity(j)*contacts%arm_second(1, c))
+      end associate
+      slip_velocity = contacts%direction(1, c)*vy - contacts%direction(2, c)*vx
+   end function slip_velocity
+
+   !> Reciprocal of the tangential effective mass m_t [m/kg]
+   pure real(wp) function tangential_mobility(bodies, contacts, c)
+      type(bodies_t), intent(in) :: bodies
+      type(contacts_t), intent(in) :: contacts
+      integer(ip), intent(in) :: c
+      real(wp) :: square_first, square_second
+
+      square_first = contacts%arm_first(1, c)**2 + contacts%arm_first(2, c)**2
+      square_second = contacts%arm_second(1, c)**2 + contacts%arm_second(2, c)**2
+      associate (i => contacts%first(c), j => contacts%second(c))
+         tangential_mobility = bodies%inverse_mass(i) + bodies%inverse_mass(j) &
+            + square_first*bodies%inverse_inertia(i) + square_second*bodies%inverse_inertia(j)
+      end associate
+   end function tangential_mobility
+
+end module polydem_cundall_strack

@@ -1,0 +1,236 @@
+!> The books of a run: where energy and momentum come from and go to.
+!>
+!> Work is the sum over steps of power times step (trapezoids between force evaluations): of the elastic
+!> normal forces, of damping and of friction (all contacts; usually negative), and of moving walls. With the
+!> potential of gravity, kinetic + potential - work stays constant up to the error of integration. The area law has
+!> no potential energy, so its elastic work does not return to zero when contacts open.
+!>
+!> Impulses of gravity and of the fixed bodies are summed likewise. For velocity Verlet these sums equal the
+!> change of momentum and angular momentum exactly, so that their residuals are rounding errors, if
+!> and only if the forces of every contact are opposite and act at one point.
+!>
+!> Sums run over fixed blocks and then over blocks in order: the same bits for any number of threads.
+module polydem_ledger
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contacts_t
+   use polydem_kinds, only: ip, wp
+   implicit none
+   private
+   public :: ledger_t, balance_t, open_ledger, book_step, balance_of
+
+   !> Accumulated work and impulses
+   type :: ledger_t
+      !> Work of the elastic normal forces on both bodies [J/m]
+      real(wp) :: elastic_work = 0.0_wp
+      !> Work of the normal damping [J/m]
+      real(wp) :: damping_work = 0.0_wp
+      !> Work of the tangential forces [J/m]
+      real(wp) :: friction_work = 0.0_wp
+      !> Work done by moving walls [J/m]
+      real(wp) :: wall_work = 0.0_wp
+      !> Impulse of gravity and fixed bodies, (2) [N s/m]
+      real(wp) :: impulse(2) = 0.0_wp
+      !> Angular impulse of gravity and fixed bodies about the origin [N s]
+      real(wp) :: angular_impulse = 0.0_wp
+      !> Energy, momentum and angular momentum at the start
+      real(wp), private :: start(4) = 0.0_wp
+      !> Rates at the last evaluation: elastic, damping, friction, wall, force x, force y, torque
+      real(wp), private :: rate(7) = 0.0_wp
+      !> Greatest kinetic energy so far, the scale of the residual [J/m]
+      real(wp), private :: energy_scale = 0.0_wp
+      !> Sums of absolute impulses so far, the scales of the residuals
+      real(wp), private :: impulse_scale = 0.0_wp, angular_scale = 0.0_wp
+   end type ledger_t
+
+   !> The state of the books at one time
+   type :: balance_t
+      !> Kinetic energy of the free bodies [J/m]
+      real(wp) :: kinetic = 0.0_wp
+      !> Potential of gravity of the free bodies, zero at the origin [J/m]
+      real(wp) :: potential = 0.0_wp
+      !> Momentum of the free bodies, (2) [kg/s]
+      real(wp) :: momentum(2) = 0.0_wp
+      !> Their angular momentum about the origin [kg m/s]
+      real(wp) :: angular_momentum = 0.0_wp
+      !> Energy that the books cannot explain [J/m]
+      real(wp) :: energy_residual = 0.0_wp
+      !> The same over the energy turned over: the greatest kinetic energy or work done, but at least a billionth of
+      !> the potential, below which there is nothing but rounding
+      real(wp) :: relative_energy_residual = 0.0_wp
+      !> Momentum that the books cannot explain, over the sum of absolute impulses
+      real(wp) :: relative_momentum_residual = 0.0_wp
+      !> Angular momentum that the books cannot explain, over the sum of absolute angular impulses
+      real(wp) :: relative_angular_residual = 0.0_wp
+   end type balance_t
+
+   !> Least energy turned over, as a share of the potential
+   real(wp), parameter :: least_share = 1.0e-9_wp
+   !> Contacts or bodies per block of a sum
+   integer(ip), parameter :: block = 1024_ip
+
+contains
+
+   !> Start the books with the bodies and forces of step 0.
+   subroutine open_ledger(ledger, gravity, bodies, contacts)
+      !> Books
+      type(ledger_t), intent(out) :: ledger
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Bodies with their forces
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with their forces
+      type(contacts_t), intent(in) :: contacts
+      real(wp) :: kinetic, potential, momentum(2), angular_momentum
+
+      call measure(gravity, bodies, kinetic, potential, momentum, angular_momentum)
+      ledger%start = [kinetic + potential, momentum, angular_momentum]
+      ledger%energy_scale = kinetic
+      ledger%impulse_scale = abs(momentum(1)) + abs(momentum(2))
+      ledger%angular_scale = abs(angular_momentum)
+      ledger%rate = rates(gravity, bodies, contacts)
+   end subroutine open_ledger
+
+   !> Book one step; call it after the forces of the step are known.
+   subroutine book_step(ledger, dt, gravity, bodies, contacts)
+      !> Books
+      type(ledger_t), intent(inout) :: ledger
+      !> Step [s]
+      real(wp), intent(in) :: dt
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Bodies with the forces of this step
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with the forces of this step
+      type(contacts_t), intent(in) :: contacts
+      real(wp) :: now(7), change(7)
+
+      now = rates(gravity, bodies, contacts)
+      change = (0.5_wp*dt)*(ledger%rate + now)
+      ledger%elastic_work = ledger%elastic_work + change(1)
+      ledger%damping_work = ledger%damping_work + change(2)
+      ledger%friction_work = ledger%friction_work + change(3)
+      ledger%wall_work = ledger%wall_work + change(4)
+      ledger%impulse = ledger%impulse + change(5:6)
+      ledger%angular_impulse = ledger%angular_impulse + change(7)
+      ledger%impulse_scale = ledger%impulse_scale + abs(change(5)) + abs(change(6))
+      ledger%angular_scale = ledger%angular_scale + abs(change(7))
+      ledger%rate = now
+   end subroutine book_step
+
+   !> Compare the bodies with the books.
+   subroutine balance_of(ledger, gravity, bodies, balance)
+      !> Books
+      type(ledger_t), intent(inout) :: ledger
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Bodies at the end of a step
+      type(bodies_t), intent(in) :: bodies
+      !> Energy, momentum, and what is unexplained
+      type(balance_t), intent(out) :: balance
+      real(wp) :: work, missing(2), missing_angular
+
+      call measure(gravity, bodies, balance%kinetic, balance%potential, balance%momentum, balance%angular_momentum)
+      work = ledger%elastic_work + ledger%damping_work + ledger%friction_work + ledger%wall_work
+      ledger%energy_scale = max(ledger%energy_scale, balance%kinetic, abs(ledger%elastic_work), &
+                                abs(ledger%damping_work), abs(ledger%friction_work), abs(ledger%wall_work), &
+                                least_share*abs(balance%potential))
+      balance%energy_residual = balance%kinetic + balance%potential - ledger%start(1) - work
+      missing = balance%momentum - ledger%start(2:3) - ledger%impulse
+      missing_angular = balance%angular_momentum - ledger%start(4) - ledger%angular_impulse
+      balance%relative_energy_residual = share(balance%energy_residual, ledger%energy_scale)
+      balance%relative_momentum_residual = share(abs(missing(1)) + abs(missing(2)), ledger%impulse_scale)
+      balance%relative_angular_residual = share(missing_angular, ledger%angular_scale)
+   end subroutine balance_of
+
+   pure real(wp) function share(part, whole)
+      real(wp), intent(in) :: part, whole
+
+      share = 0.0_wp
+      if (whole > 0.0_wp) share = abs(part)/whole
+   end function share
+
+   !> Power of elastic, damping and friction forces and of walls; force and torque on the free bodies from outside.
+   function rates(gravity, bodies, contacts) result(rate)
+      real(wp), intent(in) :: gravity(2)
+      type(bodies_t), intent(in) :: bodies
+      type(contacts_t), intent(in) :: contacts
+      real(wp) :: rate(7)
+      real(wp), allocatable :: partial(:, :)
+      integer(ip) :: b, n_blocks, s
+
+      n_blocks = (contacts%n + block - 1_ip)/block
+      allocate (partial(3, n_blocks))
+      !$omp parallel do if (n_blocks > 1_ip) schedule(static) default(none) &
+      !$omp    shared(n_blocks, partial, bodies, contacts) private(b)
+      do b = 1_ip, n_blocks
+         partial(:, b) = contact_power(bodies, contacts, (b - 1_ip)*block + 1_ip, min(b*block, contacts%n))
+      end do
+      !$omp end parallel do
+      rate = 0.0_wp
+      do b = 1_ip, n_blocks
+         rate(1:3) = rate(1:3) + partial(:, b)
+      end do
+      do s = 1_ip, bodies%n
+         if (bodies%fixed(s)) then
+            rate(4) = rate(4) - bodies%force(1, s)*bodies%velocity(1, s) - bodies%force(2, s)*bodies%velocity(2, s) &
+               - bodies%torque(s)*bodies%angular_velocity(s)
+            rate(5:6) = rate(5:6) - bodies%force(:, s)
+            rate(7) = rate(7) - bodies%torque(s) &
+               - (bodies%position(1, s)*bodies%force(2, s) - bodies%position(2, s)*bodies%force(1, s))
+         else
+            rate(5:6) = rate(5:6) + bodies%mass(s)*gravity
+            rate(7) = rate(7) &
+               + bodies%mass(s)*(bodies%position(1, s)*gravity(2) - bodies%position(2, s)*gravity(1))
+         end if
+      end do
+   end function rates
+
+   !> Power of the elastic, damping and friction forces of some contacts [W/m]
+   pure function contact_power(bodies, contacts, low, high) result(power)
+      type(bodies_t), intent(in) :: bodies
+      type(contacts_t), intent(in) :: contacts
+      integer(ip), intent(in) :: low, high
+      real(wp) :: power(3)
+      real(wp) :: vx, vy, approach
+      integer(ip) :: c
+
+      power = 0.0_wp
+      do c = low, high
+         associate (i => contacts%first(c), j => contacts%second(c))
+            vx = (bodies%velocity(1, i) - bodies%angular_velocity(i)*contacts%arm_first(2, c)) &
+               - (bodies%velocity(1, j) - bodies%angular_velocity(j)*contacts%arm_second(2, c))
+            vy = (bodies%velocity(2, i) + bodies%angular_velocity(i)*contacts%arm_first(1, c)) &
+               - (bodies%velocity(2, j) + bodies%angular_velocity(j)*contacts%arm_second(1, c))
+         end associate
+         approach = contacts%direction(1, c)*vx + contacts%direction(2, c)*vy
+         power(1) = power(1) + contacts%elastic(c)*approach
+         power(2) = power(2) + (contacts%normal_force(c) - contacts%elastic(c))*approach
+         power(3) = power(3) + contacts%tangential_force(c) &
+            *(contacts%direction(1, c)*vy - contacts%direction(2, c)*vx)
+      end do
+   end function contact_power
+
+   subroutine measure(gravity, bodies, kinetic, potential, momentum, angular_momentum)
+      real(wp), intent(in) :: gravity(2)
+      type(bodies_t), intent(in) :: bodies
+      real(wp), intent(out) :: kinetic, potential, momentum(2), angular_momentum
+      integer(ip) :: k, s
+
+      kinetic = 0.0_wp
+      potential = 0.0_wp
+      momentum = 0.0_wp
+      angular_momentum = 0.0_wp
+      do k = 1_ip, size(bodies%free, kind=ip)
+         s = bodies%free(k)
+         associate (v => bodies%velocity(:, s), x => bodies%position(:, s))
+            kinetic = kinetic + 0.5_wp*(bodies%mass(s)*(v(1)*v(1) + v(2)*v(2)) &
+                                        + bodies%inertia(s)*bodies%angular_velocity(s)**2)
+            potential = potential - bodies%mass(s)*(gravity(1)*x(1) + gravity(2)*x(2))
+            momentum = momentum + bodies%mass(s)*v
+            angular_momentum = angular_momentum + bodies%mass(s)*(x(1)*v(2) - x(2)*v(1)) &
+               + bodies%inertia(s)*bodies%angular_velocity(s)
+         end associate
+      end do
+   end subroutine measure
+
+end module polydem_ledger

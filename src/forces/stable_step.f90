@@ -1,0 +1,209 @@
+!> The largest stable time step, from actual contacts or, before there are any, from the shapes of the bodies.
+!>
+!> Each contact is an element of its own: with the normal stiffness K_n = E L/l, the tangential stiffness K_t and the
+!> mobilities G of its two bodies, each mass shared among the n contacts that it carries, the greatest
+!> eigenvalue of K^(1/2) G K^(1/2) is an upper bound of the square of the frequencies of the whole (element
+!> bound; in the spirit of C. O'Sullivan & J.D. Bray, Eng. Comput. 21 (2004) 278). The integrator says which
+!> product of frequency and step it stands, as a function of the damping ratio.
+module polydem_stable_step
+   use polydem_assemble, only: incidence_t
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contacts_t
+   use polydem_kinds, only: ip, wp
+   use polydem_settings, only: forces_settings_t
+   implicit none
+   private
+   public :: stability_table_t, stable_step_of_contacts, stable_step_of_shapes
+
+   !> Greatest stable product of frequency and step against the damping ratio, piecewise linear
+   type :: stability_table_t
+      !> Damping ratios, ascending from 0
+      real(wp), allocatable :: damping_ratio(:)
+      !> Greatest stable product at each of them; beyond the last it falls like 1/ratio
+      real(wp), allocatable :: limit(:)
+   end type stability_table_t
+
+   !> Contacts per pair of bodies assumed before there are any: two equal bodies with four each
+   real(wp), parameter :: assumed_contacts = 8.0_wp
+
+contains
+
+   !> Stable step of the contacts as they are [s], huge if there are none, and the contact that sets it.
+   subroutine stable_step_of_contacts(settings, table, bodies, incidence, contacts, step, critical)
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+      !> What the integrator stands
+      type(stability_table_t), intent(in) :: table
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Index of the contacts
+      type(incidence_t), intent(in) :: incidence
+      !> Contacts with their forces
+      type(contacts_t), intent(in) :: contacts
+      !> Stable step [s]
+      real(wp), intent(out) :: step
+      !> The contact that sets it, 0 if there is none
+      integer(ip), intent(out) :: critical
+      real(wp) :: this
+      integer(ip) :: c
+
+      step = huge(step)
+      critical = 0_ip
+      do c = 1_ip, contacts%n
+         this = step_of_contact(settings, table, bodies, incidence, contacts, c)
+         if (this < step) then
+            step = this
+            critical = c
+         end if
+      end do
+   end subroutine stable_step_of_contacts
+
+   !> Stable step expected from the shapes of the free bodies [s], and the body that sets it.
+   !>
+   !> A face contact on the longest edge: K_n = E times that edge over twice its distance from the centre.
+   subroutine stable_step_of_shapes(settings, table, bodies, step, critical)
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+      !> What the integrator stands
+      type(stability_table_t), intent(in) :: table
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Stable step [s], huge if there is no free body
+      real(wp), intent(out) :: step
+      !> Slot of the body that sets it, 0 if there is none
+      integer(ip), intent(out) :: critical
+      real(wp) :: ratio, square, g_nn, g_tt, this
+      integer(ip) :: k, s
+
+      step = huge(step)
+      critical = 0_ip
+      do k = 1_ip, size(bodies%free, kind=ip)
+         s = bodies%free(k)
+         call shape_of_body(bodies, s, ratio, square)
+         g_nn = assumed_contacts*bodies%inverse_mass(s)
+         g_tt = assumed_contacts*(bodies%inverse_mass(s) + square*bodies%inverse_inertia(s))
+         this = step_of_element(settings, table, ratio, [g_nn, g_tt, 0.0_wp], &
+                                0.5_wp*bodies%mass(s), 1.0_wp/(g_tt/assumed_contacts))
+         if (this < step) then
+            step = this
+            critical = s
+         end if
+      end do
+   end subroutine stable_step_of_shapes
+
+   real(wp) function step_of_contact(settings, table, bodies, incidence, contacts, c)
+      type(forces_settings_t), intent(in) :: settings
+      type(stability_table_t), intent(in) :: table
+      type(bodies_t), intent(in) :: bodies
+      type(incidence_t), intent(in) :: incidence
+      type(contacts_t), intent(in) :: contacts
+      integer(ip), intent(in) :: c
+      real(wp) :: g(3), alone(3), mobility
+
+      g = 0.0_wp
+      alone = 0.0_wp
+      call add_body(contacts%first(c), contacts%arm_first(:, c))
+      call add_body(contacts%second(c), contacts%arm_second(:, c))
+      mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
+      step_of_contact = step_of_element(settings, table, contacts%length(c)*contacts%inverse_length(c), g, &
+                                        1.0_wp/mobility, 1.0_wp/alone(2))
+
+   contains
+
+      !> Add the normal, tangential and mixed mobility of one body.
+      subroutine add_body(s, arm)
+         integer(ip), intent(in) :: s
+         real(wp), intent(in) :: arm(2)
+         real(wp) :: along, across, mine(3)
+
+         if (bodies%fixed(s)) return
+         across = arm(1)*contacts%direction(2, c) - arm(2)*contacts%direction(1, c)
+         along = arm(1)*contacts%direction(1, c) + arm(2)*contacts%direction(2, c)
+         mine(1) = bodies%inverse_mass(s) + across*across*bodies%inverse_inertia(s)
+         mine(2) = bodies%inverse_mass(s) + along*along*bodies%inverse_inertia(s)
+         mine(3) = along*across*bodies%inverse_inertia(s)
+         alone = alone + mine
+         g = g + mine*real(contacts_of(incidence, s), wp)
+      end subroutine add_body
+
+   end function step_of_contact
+
+   pure integer(ip) function contacts_of(incidence, s)
+      type(incidence_t), intent(in) :: incidence
+      integer(ip), intent(in) :: s
+
+      contacts_of = incidence%start_first(s + 1_ip) - incidence%start_first(s) &
+         + incidence%start_second(s + 1_ip) - incidence%start_second(s)
+   end function contacts_of
+
+   !> Stable step of one element [s].
+   pure real(wp) function step_of_element(settings, table, ratio, g, mass_normal, mass_tangential)
+      type(forces_settings_t), intent(in) :: settings
+      type(stability_table_t), intent(in) :: table
+      !> L/l of the contact
+      real(wp), intent(in) :: ratio
+      !> Mobilities: normal, tangential, mixed [m/kg]
+      real(wp), intent(in) :: g(3)
+      !> Effective masses of the damping [kg/m]
+      real(wp), intent(in) :: mass_normal, mass_tangential
+      real(wp) :: k_n, k_t, c_n, c_t, a, b, frequency, damping
+
+      k_n = settings%stiffness*ratio
+      k_t = 0.0_wp
+      c_n = 0.0_wp
+      c_t = 0.0_wp
+      if (settings%damping /= 'none') c_n = settings%damping_coefficient*sqrt(mass_normal*settings%stiffness)*ratio
+      if (settings%friction /= 'none') then
+         k_t = settings%tangential_stiffness*settings%stiffness
+         c_t = settings%tangential_damping*sqrt(mass_tangential*k_t)
+      end if
+      a = k_n*g(1)
+      b = k_t*g(2)
+      frequency = sqrt(0.5_wp*(a + b) + sqrt(0.25_wp*(a - b)**2 + k_n*k_t*g(3)**2))
+      damping = 0.5_wp*max(c_n*g(1), c_t*g(2))/frequency
+      step_of_element = limit_at(table, damping)/frequency
+   end function step_of_element
+
+   pure real(wp) function limit_at(table, ratio)
+      type(stability_table_t), intent(in) :: table
+      real(wp), intent(in) :: ratio
+      integer :: k, n
+      real(wp) :: share
+
+      n = size(table%limit)
+      if (ratio >= table%damping_ratio(n)) then
+         limit_at = table%limit(n)*table%damping_ratio(n)/ratio
+         return
+      end if
+      do k = 2, n - 1
+         if (ratio < table%damping_ratio(k)) exit
+      end do
+      share = (ratio - table%damping_ratio(k - 1))/(table%damping_ratio(k) - table%damping_ratio(k - 1))
+      limit_at = table%limit(k - 1) + share*(table%limit(k) - table%limit(k - 1))
+   end function limit_at
+
+   !> Greatest ratio of an edge to twice its distance from the centre, and the square of the greatest radius.
+   pure subroutine shape_of_body(bodies, s, ratio, square)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      real(wp), intent(out) :: ratio, square
+      real(wp) :: dx, dy, length, distance
+      integer(ip) :: first, last, v, w
+
+      first = bodies%vertex_start(s)
+      last = bodies%vertex_start(s + 1_ip) - 1_ip
+      ratio = 0.0_wp
+      square = 0.0_wp
+      w = last
+      do v = first, last
+         dx = bodies%shape(1, v) - bodies%shape(1, w)
+         dy = bodies%shape(2, v) - bodies%shape(2, w)
+         length = sqrt(dx*dx + dy*dy)
+         distance = abs(dx*bodies%shape(2, w) - dy*bodies%shape(1, w))/length
+         ratio = max(ratio, length/(2.0_wp*distance))
+         square = max(square, bodies%shape(1, v)**2 + bodies%shape(2, v)**2)
+         w = v
+      end do
+   end subroutine shape_of_body
+
+end module polydem_stable_step

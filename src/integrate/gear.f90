@@ -1,0 +1,128 @@
+!> Gear's predictor-corrector with six values, as used in the book.
+!>
+!> C.W. Gear, Numerical Initial Value Problems in Ordinary Differential Equations (1971); Matuttis & Chen 2014: scaled
+!> derivatives r_k = x^(k) dt^k/k!, predicted by the Pascal triangle and corrected by c_k times the difference of r_2,
+!> c = 3/16, 251/360, 1, 11/18, 1/6, 1/60 (forces that depend on velocities). One evaluation per step, at the
+!> predicted state. The scheme starts from gravity alone, with zero higher derivatives.
+module polydem_gear
+   use polydem_bodies, only: bodies_t
+   use polydem_integrator, only: integrator_t
+   use polydem_kinds, only: ip, wp, worth_threads
+   use polydem_stable_step, only: stability_table_t
+   implicit none
+   private
+   public :: gear_t
+
+   !> Gear's scheme of fifth order
+   type, extends(integrator_t) :: gear_t
+      !> Scaled third to fifth derivatives of x, y and angle, (3..5, 3, slot)
+      real(wp), allocatable, private :: higher(:, :, :)
+   contains
+      procedure :: start
+      procedure :: predict
+      procedure :: correct
+      procedure :: stability
+   end type gear_t
+
+   real(wp), parameter :: c0 = 3.0_wp/16.0_wp
+   real(wp), parameter :: c1 = 251.0_wp/360.0_wp
+   real(wp), parameter :: c_higher(3:5) = [11.0_wp/18.0_wp, 1.0_wp/6.0_wp, 1.0_wp/60.0_wp]
+
+contains
+
+   !> Start with zero derivatives above the second.
+   subroutine start(self, bodies)
+      class(gear_t), intent(inout) :: self
+      !> Bodies at the start
+      type(bodies_t), intent(in) :: bodies
+
+      if (allocated(self%higher)) deallocate (self%higher)
+      allocate (self%higher(3:5, 3, bodies%n))
+      self%higher = 0.0_wp
+   end subroutine start
+
+   !> Taylor expansion to the end of the step.
+   subroutine predict(self, dt, bodies)
+      class(gear_t), intent(inout) :: self
+      !> Step [s]
+      real(wp), intent(in) :: dt
+      !> Bodies; position, angle, velocities and accelerations of the free ones change
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: k, s
+
+      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp    shared(self, bodies, dt) private(k, s)
+      do k = 1_ip, size(bodies%free, kind=ip)
+         s = bodies%free(k)
+         call expand(dt, bodies%position(1, s), bodies%velocity(1, s), bodies%acceleration(1, s), self%higher(:, 1, s))
+         call expand(dt, bodies%position(2, s), bodies%velocity(2, s), bodies%acceleration(2, s), self%higher(:, 2, s))
+         call expand(dt, bodies%angle(s), bodies%angular_velocity(s), bodies%angular_acceleration(s), &
+                     self%higher(:, 3, s))
+      end do
+      !$omp end parallel do
+   end subroutine predict
+
+   !> Correct all derivatives by the difference between computed and predicted acceleration.
+   subroutine correct(self, dt, bodies)
+      class(gear_t), intent(inout) :: self
+      !> Step [s]
+      real(wp), intent(in) :: dt
+      !> Bodies; position, angle, velocities and accelerations of the free ones change
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: k, s
+
+      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp    shared(self, bodies, dt) private(k, s)
+      do k = 1_ip, size(bodies%free, kind=ip)
+         s = bodies%free(k)
+         call adjust(dt, bodies%force(1, s)*bodies%inverse_mass(s), bodies%position(1, s), bodies%velocity(1, s), &
+                     bodies%acceleration(1, s), self%higher(:, 1, s))
+         call adjust(dt, bodies%force(2, s)*bodies%inverse_mass(s), bodies%position(2, s), bodies%velocity(2, s), &
+                     bodies%acceleration(2, s), self%higher(:, 2, s))
+         call adjust(dt, bodies%torque(s)*bodies%inverse_inertia(s), bodies%angle(s), bodies%angular_velocity(s), &
+                     bodies%angular_acceleration(s), self%higher(:, 3, s))
+      end do
+      !$omp end parallel do
+   end subroutine correct
+
+   pure subroutine expand(dt, x, v, a, r)
+      real(wp), intent(in) :: dt
+      real(wp), intent(inout) :: x, v, a, r(3:5)
+      real(wp) :: r1, r2
+
+      r1 = v*dt
+      r2 = 0.5_wp*a*dt*dt
+      x = x + r1 + r2 + r(3) + r(4) + r(5)
+      r1 = r1 + 2.0_wp*r2 + 3.0_wp*r(3) + 4.0_wp*r(4) + 5.0_wp*r(5)
+      r2 = r2 + 3.0_wp*r(3) + 6.0_wp*r(4) + 10.0_wp*r(5)
+      r(3) = r(3) + 4.0_wp*r(4) + 10.0_wp*r(5)
+      r(4) = r(4) + 5.0_wp*r(5)
+      v = r1/dt
+      a = 2.0_wp*r2/(dt*dt)
+   end subroutine expand
+
+   pure subroutine adjust(dt, computed, x, v, a, r)
+      real(wp), intent(in) :: dt, computed
+      real(wp), intent(inout) :: x, v, a, r(3:5)
+      real(wp) :: difference
+
+      difference = 0.5_wp*dt*dt*(computed - a)
+      x = x + c0*difference
+      v = v + c1*difference/dt
+      a = computed
+      r = r + c_higher*difference
+   end subroutine adjust
+
+   !> Limits for x'' + 2 z w x' + w^2 x = 0 with one evaluation per step: where the spectral radius leaves 1.
+   function stability(self) result(table)
+      class(gear_t), intent(in) :: self
+      type(stability_table_t) :: table
+
+      associate (unused => self)
+      end associate
+      table%damping_ratio = [0.0_wp, 0.0125_wp, 0.05_wp, 0.1_wp, 0.2_wp, 0.35_wp, 0.5_wp, 0.75_wp, 1.0_wp, 2.0_wp]
+      table%limit = [0.313_wp, 0.7516_wp, 0.6271_wp, 0.4986_wp, 0.3361_wp, 0.2163_wp, 0.157_wp, 0.107_wp, 0.0809_wp, &
+                     0.0408_wp]
+   end function stability
+
+end module polydem_gear

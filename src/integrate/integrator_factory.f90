@@ -1,0 +1,29 @@
+!> Integrators by name. The only file that knows all of them.
+module polydem_integrator_factory
+   use polydem_gear, only: gear_t
+   use polydem_integrator, only: integrator_t
+   use polydem_settings, only: integrate_settings_t
+   use polydem_velocity_verlet, only: velocity_verlet_t
+   implicit none
+   private
+   public :: new_integrator
+
+contains
+
+   !> Make the integrator that the settings name (the reader has checked the name).
+   subroutine new_integrator(settings, integrator)
+      !> Group &integrate
+      type(integrate_settings_t), intent(in) :: settings
+      !> The integrator
+      class(integrator_t), allocatable, intent(out) :: integrator
+
+      select case (settings%scheme)
+      case ('gear')
+         allocate (gear_t :: integrator)
+         integrator%starts_from_forces = .false.
+      case default
+         allocate (velocity_verlet_t :: integrator)
+      end select
+   end subroutine new_integrator
+
+end module polydem_integrator_factory

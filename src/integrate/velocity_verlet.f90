@@ -1,0 +1,104 @@
+!> Velocity Verlet: second order, symplectic, one force evaluation per step.
+!>
+!> x' = x + dt v + dt^2/2 a, forces at x' with the velocity v + dt a, v' = v + dt/2 (a + a')
+!> (W.C. Swope, H.C. Andersen, P.H. Berens & K.R. Wilson, J. Chem. Phys. 76 (1982) 637).
+module polydem_velocity_verlet
+   use polydem_bodies, only: bodies_t
+   use polydem_integrator, only: integrator_t
+   use polydem_kinds, only: ip, wp, worth_threads
+   use polydem_stable_step, only: stability_table_t
+   implicit none
+   private
+   public :: velocity_verlet_t
+
+   !> Velocity Verlet
+   type, extends(integrator_t) :: velocity_verlet_t
+      !> Velocity and angular velocity half a step back, (3, slot) [m/s, m/s, rad/s]
+      real(wp), allocatable, private :: half(:, :)
+   contains
+      procedure :: start
+      procedure :: predict
+      procedure :: correct
+      procedure :: stability
+   end type velocity_verlet_t
+
+contains
+
+   !> Make room for the velocities in the middle of the step.
+   subroutine start(self, bodies)
+      class(velocity_verlet_t), intent(inout) :: self
+      !> Bodies at the start
+      type(bodies_t), intent(in) :: bodies
+
+      if (allocated(self%half)) deallocate (self%half)
+      allocate (self%half(3, bodies%n))
+   end subroutine start
+
+   !> Move to the end of the step and predict the velocities there.
+   subroutine predict(self, dt, bodies)
+      class(velocity_verlet_t), intent(inout) :: self
+      !> Step [s]
+      real(wp), intent(in) :: dt
+      !> Bodies; position, angle and velocities of the free ones change
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: k, s
+      real(wp) :: h, half(3)
+
+      h = 0.5_wp*dt
+      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp    shared(self, bodies, dt, h) private(k, s, half)
+      do k = 1_ip, size(bodies%free, kind=ip)
+         s = bodies%free(k)
+         half(1) = bodies%velocity(1, s) + h*bodies%acceleration(1, s)
+         half(2) = bodies%velocity(2, s) + h*bodies%acceleration(2, s)
+         half(3) = bodies%angular_velocity(s) + h*bodies%angular_acceleration(s)
+         bodies%position(1, s) = bodies%position(1, s) + dt*half(1)
+         bodies%position(2, s) = bodies%position(2, s) + dt*half(2)
+         bodies%angle(s) = bodies%angle(s) + dt*half(3)
+         bodies%velocity(1, s) = half(1) + h*bodies%acceleration(1, s)
+         bodies%velocity(2, s) = half(2) + h*bodies%acceleration(2, s)
+         bodies%angular_velocity(s) = half(3) + h*bodies%angular_acceleration(s)
+         self%half(:, s) = half
+      end do
+      !$omp end parallel do
+   end subroutine predict
+
+   !> Final velocities and accelerations from the forces at the end of the step.
+   subroutine correct(self, dt, bodies)
+      class(velocity_verlet_t), intent(inout) :: self
+      !> Step [s]
+      real(wp), intent(in) :: dt
+      !> Bodies; velocities and accelerations of the free ones change
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: k, s
+      real(wp) :: h
+
+      h = 0.5_wp*dt
+      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp    shared(self, bodies, h) private(k, s)
+      do k = 1_ip, size(bodies%free, kind=ip)
+         s = bodies%free(k)
+         bodies%acceleration(1, s) = bodies%force(1, s)*bodies%inverse_mass(s)
+         bodies%acceleration(2, s) = bodies%force(2, s)*bodies%inverse_mass(s)
+         bodies%angular_acceleration(s) = bodies%torque(s)*bodies%inverse_inertia(s)
+         bodies%velocity(1, s) = self%half(1, s) + h*bodies%acceleration(1, s)
+         bodies%velocity(2, s) = self%half(2, s) + h*bodies%acceleration(2, s)
+         bodies%angular_velocity(s) = self%half(3, s) + h*bodies%angular_acceleration(s)
+      end do
+      !$omp end parallel do
+   end subroutine correct
+
+   !> Limits for x'' + 2 z w x' + w^2 x = 0 with the force taken at the predicted velocity: where the spectral
+   !> radius of the step leaves 1.
+   function stability(self) result(table)
+      class(velocity_verlet_t), intent(in) :: self
+      type(stability_table_t) :: table
+
+      associate (unused => self)
+      end associate
+      table%damping_ratio = [0.0_wp, 0.0125_wp, 0.05_wp, 0.1_wp, 0.2_wp, 0.35_wp, 0.5_wp, 0.75_wp, 1.0_wp, 2.0_wp]
+      table%limit = [2.0_wp, 1.9507_wp, 1.81_wp, 1.6397_wp, 1.3542_wp, 1.0413_wp, 0.8285_wp, 0.6056_wp, 0.4722_wp, &
+                     0.2462_wp]
+   end function stability
+
+end module polydem_velocity_verlet
