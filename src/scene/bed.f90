@@ -1,0 +1,46 @@
+!> Bed: loose grains that settle between a floor and two side walls.
+module polydem_bed
+   use polydem_body_list, only: body_list_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_grains, only: settled_area
+   use polydem_kinds, only: wp
+   use polydem_lattice, only: lattice_height
+   use polydem_pour, only: loose_spacing, pour_grains
+   use polydem_settings, only: scene_settings_t
+   use polydem_walls, only: append_box, rectangle
+   implicit none
+   private
+   public :: list_bed
+
+   !> Width over depth of the settled bed if the width is not given
+   real(wp), parameter :: aspect = 2.0_wp
+
+contains
+
+   !> List the bodies of the bed: grains first, then floor, left wall, right wall. The floor is at y = 0.
+   subroutine list_bed(scene, list, error)
+      !> Settings: bodies (grains), width, grains
+      type(scene_settings_t), intent(in) :: scene
+      !> List to extend
+      type(body_list_t), intent(inout) :: list
+      !> If the grains do not fit
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: width, height, inside(2, 4)
+
+      width = scene%width
+      if (.not. width > 0.0_wp) then
+         width = max(sqrt(aspect*settled_area(scene, scene%bodies)), 2.0_wp*loose_spacing(scene))
+      end if
+      height = lattice_height(scene%bodies, width, loose_spacing(scene))
+      if (height < 0.0_wp) then
+         call raise(error, input_error, 'width is less than a grain needs')
+         return
+      end if
+      ! Grains that start with a speed may rise above the lattice.
+      inside = rectangle(-0.5_wp*width, 0.5_wp*width, 0.0_wp, height + 2.0_wp*loose_spacing(scene))
+      call pour_grains(list, scene, inside, scene%bodies, error)
+      if (allocated(error)) return
+      call append_box(list, inside, scene%long_axis_max, closed=.false.)
+   end subroutine list_bed
+
+end module polydem_bed

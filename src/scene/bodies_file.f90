@@ -1,0 +1,278 @@
+!> Bodies from an HDF5 file, so that any packing from anywhere can be a scene.
+!>
+!> Data sets, with shapes as h5py shows them, of n bodies with nv vertices together:
+!>
+!>     vertex            (nv, 2)  corners in the world, body after body [m]
+!>     vertex_start      (n + 1)  first corner of each body, counted from 0, and nv at the end
+!>     fixed             (n)      1 for a fixed body, 0 for a free one
+!>     velocity          (n, 2)   optional, of the centre of mass [m/s]
+!>     angular_velocity  (n)      optional [rad/s]
+!>     density           (n)      optional, the namelist's where absent [kg/m3]
+!>     mass, inertia     (n)      optional [kg/m, kg m]; 0, or absent: from the polygon if free,
+!>                                infinite if fixed
+!>     id                (n)      optional, 1 to n where absent
+module polydem_bodies_file
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use polydem_body_list, only: body_list_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_hdf5_file, only: hdf5_file_t
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_sort, only: sort_keys
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: read_bodies_file
+
+   !> What the file says, complete and consistent once it is read
+   type :: table_t
+      integer(ip) :: n = 0_ip
+      real(dp), allocatable :: vertex(:, :)
+      integer(ip), allocatable :: vertex_start(:)
+      integer(ip), allocatable :: fixed(:)
+      real(dp), allocatable :: velocity(:, :)
+      real(dp), allocatable :: angular_velocity(:)
+      real(dp), allocatable :: density(:)
+      real(dp), allocatable :: mass(:)
+      real(dp), allocatable :: inertia(:)
+      integer(ip), allocatable :: id(:)
+   end type table_t
+
+contains
+
+   !> List the bodies of a file.
+   subroutine read_bodies_file(path, density, list, error)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Density of bodies that have none in the file [kg/m3]
+      real(wp), intent(in) :: density
+      !> List to extend
+      type(body_list_t), intent(inout) :: list
+      !> Names file, data set and body
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+      type(table_t) :: table
+      type(error_t), allocatable :: ignored
+
+      call file%open(path, error)
+      if (allocated(error)) return
+      call read_table(file, path, real(density, dp), table, error)
+      if (allocated(error)) then
+         call file%close(ignored)
+         return
+      end if
+      call file%close(error)
+      if (allocated(error)) return
+      call list_table(table, list)
+   end subroutine read_bodies_file
+
+   subroutine list_table(table, list)
+      type(table_t), intent(in) :: table
+      type(body_list_t), intent(inout) :: list
+      integer(ip) :: k, first, last
+
+      do k = 1_ip, table%n
+         first = table%vertex_start(k) + 1_ip
+         last = table%vertex_start(k + 1_ip)
+         call list%append(real(table%vertex(:, first:last), wp), &
+                          fixed=table%fixed(k) == 1_ip, &
+                          density=real(table%density(k), wp), &
+                          velocity=real(table%velocity(:, k), wp), &
+                          angular_velocity=real(table%angular_velocity(k), wp), &
+                          id=table%id(k), &
+                          mass=real(table%mass(k), wp), &
+                          inertia=real(table%inertia(k), wp))
+      end do
+   end subroutine list_table
+
+   !> Read and check all data sets, filling in those that are absent.
+   subroutine read_table(file, path, density, table, error)
+      type(hdf5_file_t), intent(inout) :: file
+      character(len=*), intent(in) :: path
+      real(dp), intent(in) :: density
+      type(table_t), intent(out) :: table
+      type(error_t), allocatable, intent(inout) :: error
+
+      call read_polygons(file, path, table, error)
+      call read_flags(file, path, table, error)
+      call read_identifiers(file, path, table, error)
+      call read_velocity(file, path, table, error)
+      call read_column(file, path, 'angular_velocity', table, 0.0_dp, -huge(1.0_dp), &
+                       table%angular_velocity, error)
+      call read_column(file, path, 'density', table, density, tiny(1.0_dp), table%density, error)
+      call read_column(file, path, 'mass', table, 0.0_dp, 0.0_dp, table%mass, error)
+      call read_column(file, path, 'inertia', table, 0.0_dp, 0.0_dp, table%inertia, error)
+   end subroutine read_table
+
+   !> Read the vertices and their shares, and check that every body has some.
+   subroutine read_polygons(file, path, table, error)
+      type(hdf5_file_t), intent(in) :: file
+      character(len=*), intent(in) :: path
+      type(table_t), intent(inout) :: table
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: k, n_vertices
+
+      call file%read('vertex_start', table%vertex_start, error)
+      if (allocated(error)) return
+      table%n = size(table%vertex_start, kind=ip) - 1_ip
+      if (table%n < 1_ip) then
+         call raise(error, input_error, path//': vertex_start must have an entry more than there are '// &
+                    'bodies, and there must be a body')
+         return
+      end if
+      call file%read('vertex', table%vertex, error)
+      if (allocated(error)) return
+      n_vertices = size(table%vertex, 2, kind=ip)
+      if (size(table%vertex, 1) /= 2) then
+         call raise(error, input_error, path//': vertex must have two columns, x and y, as h5py shows it')
+      else if (table%vertex_start(1) /= 0_ip) then
+         call raise(error, input_error, path//': '//entry_text('vertex_start', 1_ip)//' is ' &
+                    //to_text(table%vertex_start(1))//', but must be 0')
+      else if (table%vertex_start(table%n + 1_ip) /= n_vertices) then
+         call raise(error, input_error, path//': '//entry_text('vertex_start', table%n + 1_ip)//' is ' &
+                    //to_text(table%vertex_start(table%n + 1_ip))//', but vertex has ' &
+                    //to_text(n_vertices)//' rows')
+      end if
+      do k = 1_ip, table%n
+         if (table%vertex_start(k + 1_ip) <= table%vertex_start(k)) then
+            call raise(error, input_error, path//': '//entry_text('vertex_start', k + 1_ip)// &
+                       ' must be greater than the entry before it')
+         end if
+      end do
+   end subroutine read_polygons
+
+   !> Read which bodies are fixed.
+   subroutine read_flags(file, path, table, error)
+      type(hdf5_file_t), intent(in) :: file
+      character(len=*), intent(in) :: path
+      type(table_t), intent(inout) :: table
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: k
+
+      if (allocated(error)) return
+      call file%read('fixed', table%fixed, error)
+      if (allocated(error)) return
+      call check_length(path, 'fixed', size(table%fixed, kind=ip), table%n, error)
+      do k = 1_ip, size(table%fixed, kind=ip)
+         if (any(table%fixed(k) == [0_ip, 1_ip])) cycle
+         call raise(error, input_error, path//': '//entry_text('fixed', k)//' is ' &
+                    //to_text(table%fixed(k))//', but must be 0 or 1')
+      end do
+   end subroutine read_flags
+
+   !> Read the identifiers, or number the bodies from 1.
+   subroutine read_identifiers(file, path, table, error)
+      type(hdf5_file_t), intent(in) :: file
+      character(len=*), intent(in) :: path
+      type(table_t), intent(inout) :: table
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp), allocatable :: key(:), spare_key(:)
+      integer(ip), allocatable :: row(:), spare(:)
+      integer(ip) :: k
+
+      if (allocated(error)) return
+      allocate (row(table%n))
+      do k = 1_ip, table%n
+         row(k) = k
+      end do
+      if (.not. file%has('id')) then
+         table%id = row
+         return
+      end if
+      call file%read('id', table%id, error)
+      if (allocated(error)) return
+      call check_length(path, 'id', size(table%id, kind=ip), table%n, error)
+      if (allocated(error)) return
+      key = int(table%id, lp)
+      allocate (spare_key(table%n), spare(table%n))
+      call sort_keys(table%n, key, row, spare_key, spare)
+      do k = 1_ip, table%n
+         if (key(k) < 0_lp) then
+            call raise(error, input_error, path//': '//entry_text('id', row(k))//' is negative')
+         else if (key(k) == key(max(k - 1_ip, 1_ip)) .and. k > 1_ip) then
+            call raise(error, input_error, path//': '//entry_text('id', row(k))//' is '//to_text(key(k))// &
+                       ', which '//entry_text('id', row(k - 1_ip))//' is already')
+         end if
+      end do
+   end subroutine read_identifiers
+
+   !> Read the velocities, zero if absent.
+   subroutine read_velocity(file, path, table, error)
+      type(hdf5_file_t), intent(in) :: file
+      character(len=*), intent(in) :: path
+      type(table_t), intent(inout) :: table
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: k
+
+      if (allocated(error)) return
+      if (.not. file%has('velocity')) then
+         allocate (table%velocity(2, table%n), source=0.0_dp)
+         return
+      end if
+      call file%read('velocity', table%velocity, error)
+      if (allocated(error)) return
+      if (size(table%velocity, 1) /= 2) then
+         call raise(error, input_error, path//': velocity must have two columns, x and y, as h5py shows it')
+      end if
+      call check_length(path, 'velocity', size(table%velocity, 2, kind=ip), table%n, error)
+      do k = 1_ip, size(table%velocity, 2, kind=ip)
+         if (all(ieee_is_finite(table%velocity(:, k)))) cycle
+         call raise(error, input_error, path//': '//entry_text('velocity', k)//' is not finite')
+      end do
+   end subroutine read_velocity
+
+   !> Read one number per body, finite and not below a bound; the default if the data set is absent.
+   subroutine read_column(file, path, name, table, default, least, values, error)
+      type(hdf5_file_t), intent(in) :: file
+      character(len=*), intent(in) :: path, name
+      type(table_t), intent(in) :: table
+      real(dp), intent(in) :: default, least
+      real(dp), allocatable, intent(out) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: k
+
+      if (allocated(error)) return
+      if (.not. file%has(name)) then
+         allocate (values(table%n), source=default)
+         return
+      end if
+      call file%read(name, values, error)
+      if (allocated(error)) return
+      call check_length(path, name, size(values, kind=ip), table%n, error)
+      do k = 1_ip, size(values, kind=ip)
+         if (.not. ieee_is_finite(values(k))) then
+            call raise(error, input_error, path//': '//entry_text(name, k)//' is not finite')
+         else if (values(k) < least) then
+            call raise(error, input_error, path//': '//entry_text(name, k)//' is '// &
+                       to_text(real(values(k), wp))//', but must '//bound_text(least))
+         end if
+      end do
+   end subroutine read_column
+
+   pure subroutine check_length(path, name, length, n, error)
+      character(len=*), intent(in) :: path, name
+      integer(ip), intent(in) :: length, n
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (length == n) return
+      call raise(error, input_error, path//': '//name//' has '//to_text(length)//' rows, but '// &
+                 'vertex_start says that there are '//to_text(n)//' bodies')
+   end subroutine check_length
+
+   !> Name of an entry as h5py users write it: counted from 0
+   pure function entry_text(name, k) result(text)
+      character(len=*), intent(in) :: name
+      integer(ip), intent(in) :: k
+      character(len=:), allocatable :: text
+
+      text = name//'['//to_text(k - 1_ip)//']'
+   end function entry_text
+
+   pure function bound_text(least) result(text)
+      real(dp), intent(in) :: least
+      character(len=:), allocatable :: text
+
+      text = 'not be negative'
+      if (least > 0.0_dp) text = 'be positive'
+   end function bound_text
+
+end module polydem_bodies_file

@@ -1,0 +1,56 @@
+!> Incline: a rectangular block on one long slope, at rest in the normal direction.
+!>
+!> The middle of the contact is at the origin at the start. The slope falls to the right and has a stop
+!> at either end.
+module polydem_incline
+   use polydem_body_list, only: body_list_t
+   use polydem_grains, only: pi
+   use polydem_kinds, only: wp
+   use polydem_settings, only: settings_t
+   use polydem_static_depth, only: static_depth
+   use polydem_walls, only: rectangle
+   implicit none
+   private
+   public :: list_incline
+
+   !> Where the slope begins, in widths of the block from the start
+   real(wp), parameter :: uphill = 10.0_wp
+   !> Where the slope ends, in widths of the block from the start
+   real(wp), parameter :: downhill = 90.0_wp
+
+contains
+
+   !> List the bodies of the incline: block, slope, upper stop, lower stop.
+   subroutine list_incline(settings, list)
+      !> Settings: slope, width and height of the block, speed (downhill); gravity, stiffness
+      type(settings_t), intent(in) :: settings
+      !> List to extend
+      type(body_list_t), intent(inout) :: list
+      real(wp) :: along(2), depth, load, top, bottom
+
+      along = [cos(settings%scene%slope*pi/180.0_wp), -sin(settings%scene%slope*pi/180.0_wp)]
+      associate (width => settings%scene%width, height => settings%scene%height, &
+                 density => settings%scene%density, gravity => settings%forces%gravity)
+         load = density*width*height*max(0.0_wp, gravity(1)*along(2) - gravity(2)*along(1))
+         depth = static_depth(load, settings%forces%stiffness, width, height, height, &
+                              0.5_wp*(downhill - uphill)*width)
+         call list%append(tilted(rectangle(-0.5_wp*width, 0.5_wp*width, -depth, height - depth), along), &
+                          density=density, velocity=settings%scene%speed*along)
+         top = -uphill*width
+         bottom = downhill*width
+         call list%append(tilted(rectangle(top, bottom, -height, 0.0_wp), along), fixed=.true.)
+         call list%append(tilted(rectangle(top - width, top, -height, height), along), fixed=.true.)
+         call list%append(tilted(rectangle(bottom, bottom + width, -height, height), along), fixed=.true.)
+      end associate
+   end subroutine list_incline
+
+   !> Corners turned about the origin from the horizontal to a direction
+   pure function tilted(corners, along)
+      real(wp), intent(in) :: corners(2, 4), along(2)
+      real(wp) :: tilted(2, 4)
+
+      tilted(1, :) = along(1)*corners(1, :) - along(2)*corners(2, :)
+      tilted(2, :) = along(2)*corners(1, :) + along(1)*corners(2, :)
+   end function tilted
+
+end module polydem_incline

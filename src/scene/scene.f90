@@ -1,0 +1,138 @@
+!> What there is at the start: the bodies of a scene and the prescribed motion of its walls.
+!>
+!> A generator lists polygons; this module makes the bodies and ties the motion to them. A new scene is a
+!> generator, its name here, and its name in the table of namelist entries, where single entries are checked.
+module polydem_scene
+   use polydem_bed, only: list_bed
+   use polydem_bodies, only: bodies_t
+   use polydem_bodies_file, only: read_bodies_file
+   use polydem_body_list, only: body_list_t, new_bodies
+   use polydem_drum, only: list_drum
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_gas, only: list_gas
+   use polydem_grains, only: pi
+   use polydem_heap, only: list_heap
+   use polydem_hopper, only: list_hopper
+   use polydem_incline, only: list_incline
+   use polydem_kinds, only: ip, wp
+   use polydem_motion, only: motion_t, new_motion
+   use polydem_settings, only: scene_settings_t, settings_t
+   use polydem_stack, only: list_stack
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: build_scene
+
+contains
+
+   !> Make the bodies of a scene and the motions of its walls.
+   subroutine build_scene(settings, bodies, motions, error)
+      !> Settings; groups &scene and &forces (gravity and stiffness, for blocks at rest)
+      type(settings_t), intent(in) :: settings
+      !> Bodies at the start, free ones first unless a bodies file says otherwise
+      type(bodies_t), intent(out) :: bodies
+      !> Prescribed motions, none or one
+      type(motion_t), allocatable, intent(out) :: motions(:)
+      !> What in the namelist or the bodies file cannot be used
+      type(error_t), allocatable, intent(inout) :: error
+      type(body_list_t) :: list
+      character(len=:), allocatable :: origin
+
+      origin = settings%file//': &scene'
+      if (settings%scene%name == 'file') then
+         origin = settings%scene%bodies_file
+         call read_bodies_file(origin, settings%scene%density, list, error)
+         if (allocated(error)) return
+      else
+         call list_generated(settings, list, error)
+      end if
+      if (.not. allocated(error)) call new_bodies(list, bodies, error)
+      if (allocated(error)) then
+         error%message = origin//': '//error%message
+         return
+      end if
+      call tie_motion(settings%scene, bodies, motions, error)
+      if (allocated(error)) error%message = settings%file//': &scene: '//error%message
+   end subroutine build_scene
+
+   !> Have the generator of the scene list its bodies.
+   subroutine list_generated(settings, list, error)
+      type(settings_t), intent(in) :: settings
+      type(body_list_t), intent(inout) :: list
+      type(error_t), allocatable, intent(inout) :: error
+
+      select case (settings%scene%name)
+      case ('drum')
+         call list_drum(settings%scene, list, error)
+      case ('hopper')
+         call list_hopper(settings%scene, list, error)
+      case ('gas')
+         call list_gas(settings%scene, list, error)
+      case ('bed')
+         call list_bed(settings%scene, list, error)
+      case ('heap')
+         call list_heap(settings%scene, list, error)
+      case ('incline')
+         call list_incline(settings, list)
+      case ('stack')
+         call list_stack(settings, list)
+      case default
+         call raise(error, input_error, 'there is no scene '//settings%scene%name)
+      end select
+   end subroutine list_generated
+
+   !> Tie the prescribed motion to its bodies, from revolutions and hertz to radians per second.
+   subroutine tie_motion(scene, bodies, motions, error)
+      type(scene_settings_t), intent(in) :: scene
+      type(bodies_t), intent(in) :: bodies
+      type(motion_t), allocatable, intent(out) :: motions(:)
+      type(error_t), allocatable, intent(inout) :: error
+      type(motion_t) :: prescription
+      integer(ip), allocatable :: slots(:)
+
+      if (scene%motion == 'none') then
+         allocate (motions(0))
+         return
+      end if
+      call find_moved(scene%motion_bodies, bodies, slots, error)
+      if (allocated(error)) return
+      prescription%kind = scene%motion
+      prescription%pivot = scene%motion_pivot
+      prescription%rate = 2.0_wp*pi*scene%motion_rate
+      prescription%velocity = scene%motion_velocity
+      prescription%amplitude = scene%motion_amplitude
+      prescription%frequency = 2.0_wp*pi*scene%motion_frequency
+      prescription%start = scene%motion_start
+      prescription%ramp = scene%motion_ramp
+      allocate (motions(1))
+      call new_motion(motions(1), prescription, bodies, slots)
+   end subroutine tie_motion
+
+   !> Slots of the bodies to move: those with the given identifiers, or all fixed ones if none are given
+   subroutine find_moved(ids, bodies, slots, error)
+      integer(ip), intent(in) :: ids(:)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), allocatable, intent(out) :: slots(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: k, s
+
+      slots = pack([(s, s=1_ip, bodies%n)], bodies%fixed)
+      if (size(slots) == 0) then
+         call raise(error, input_error, 'motion needs a fixed body, and there is none')
+      end if
+      if (size(ids) == 0 .or. allocated(error)) return
+      slots = ids
+      do k = 1_ip, size(ids, kind=ip)
+         slots(k) = findloc(bodies%id, ids(k), dim=1)
+         if (slots(k) == 0_ip) then
+            call raise(error, input_error, 'motion_bodies: there is no body '//to_text(ids(k)))
+         else if (.not. bodies%fixed(slots(k))) then
+            call raise(error, input_error, 'motion_bodies: body '//to_text(ids(k))//' is not fixed')
+         else if (any(ids(:k - 1_ip) == ids(k))) then
+            call raise(error, input_error, 'motion_bodies: body '//to_text(ids(k))//' is named twice')
+         end if
+         if (allocated(error)) return
+      end do
+   end subroutine find_moved
+
+end module polydem_scene

@@ -1,0 +1,41 @@
+!> Stack: blocks on top of each other at rest, each interface as deep as the weight above it asks for.
+module polydem_stack
+   use polydem_body_list, only: body_list_t
+   use polydem_kinds, only: ip, wp
+   use polydem_settings, only: settings_t
+   use polydem_static_depth, only: static_depth
+   use polydem_walls, only: rectangle
+   implicit none
+   private
+   public :: list_stack
+
+   !> Width of the floor over that of a block
+   real(wp), parameter :: floor_width = 10.0_wp
+
+contains
+
+   !> List the bodies of the stack: blocks from the bottom up, then the floor, as thick as a block, top at 0.
+   subroutine list_stack(settings, list)
+      !> Settings: bodies (blocks), width and height of a block; gravity, stiffness
+      type(settings_t), intent(in) :: settings
+      !> List to extend
+      type(body_list_t), intent(inout) :: list
+      real(wp) :: weight, bottom
+      integer(ip) :: k
+
+      bottom = 0.0_wp
+      associate (n => settings%scene%bodies, width => settings%scene%width, height => settings%scene%height)
+         weight = settings%scene%density*width*height*max(0.0_wp, -settings%forces%gravity(2))
+         do k = 1_ip, n
+            bottom = bottom - static_depth(real(n - k + 1_ip, wp)*weight, settings%forces%stiffness, &
+                                           width, height, height, 0.0_wp)
+            call list%append(rectangle(-0.5_wp*width, 0.5_wp*width, bottom, bottom + height), &
+                             density=settings%scene%density)
+            bottom = bottom + height
+         end do
+         call list%append(rectangle(-0.5_wp*floor_width*width, 0.5_wp*floor_width*width, -height, 0.0_wp), &
+                          fixed=.true.)
+      end associate
+   end subroutine list_stack
+
+end module polydem_stack

@@ -1,0 +1,164 @@
+!> What the tests of scenes share: making a scene from a few words, and naive checks of its geometry.
+module scene_checks
+   use polydem_bodies, only: bodies_t
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: ip, wp
+   use polydem_motion, only: motion_t
+   use polydem_read_settings, only: read_settings_text
+   use polydem_scene, only: build_scene
+   use polydem_settings, only: settings_t
+   implicit none
+   private
+   public :: make_scene, scene_message, find_vertices, polygon_area, all_convex, count_overlaps
+   public :: count_differences
+
+contains
+
+   !> Make the scene that the entries of &scene describe.
+   subroutine make_scene(entries, bodies, error, settings, motions)
+      !> Entries, separated by commas
+      character(len=*), intent(in) :: entries
+      !> Bodies
+      type(bodies_t), intent(out) :: bodies
+      !> Error of the reader or the generator
+      type(error_t), allocatable, intent(out) :: error
+      !> Settings
+      type(settings_t), intent(out), optional :: settings
+      !> Motions
+      type(motion_t), allocatable, intent(out), optional :: motions(:)
+      type(settings_t) :: own_settings
+      type(motion_t), allocatable :: own_motions(:)
+      character(len=8) :: no_overrides(0)
+
+      call read_settings_text('test.nml', '&scene '//entries//' /'//new_line('a') &
+                              //'&integrate duration = 1 /'//new_line('a'), no_overrides, own_settings, error)
+      if (.not. allocated(error)) call build_scene(own_settings, bodies, own_motions, error)
+      if (present(settings)) settings = own_settings
+      if (present(motions) .and. .not. allocated(error)) call move_alloc(own_motions, motions)
+   end subroutine make_scene
+
+   !> Message of the error that a scene ends with; empty if there is none
+   function scene_message(entries) result(message)
+      !> Entries, separated by commas
+      character(len=*), intent(in) :: entries
+      character(len=:), allocatable :: message
+      type(bodies_t) :: bodies
+      type(error_t), allocatable :: error
+
+      message = ''
+      call make_scene(entries, bodies, error)
+      if (allocated(error)) message = error%message
+   end function scene_message
+
+   !> Corners of a body in the world.
+   subroutine find_vertices(bodies, slot, vertices)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: slot
+      !> Its corners, anticlockwise, (2, :) [m]
+      real(wp), allocatable, intent(out) :: vertices(:, :)
+      integer :: k, first, n
+
+      first = bodies%vertex_start(slot)
+      n = bodies%vertex_start(slot + 1) - first
+      allocate (vertices(2, n))
+      do k = 1, n
+         vertices(:, k) = bodies%turned(:, first + k - 1) + bodies%position(:, slot)
+      end do
+   end subroutine find_vertices
+
+   !> Area by the shoelace formula
+   real(wp) function polygon_area(vertices)
+      !> Corners, (2, :)
+      real(wp), intent(in) :: vertices(:, :)
+      integer :: k, n
+
+      polygon_area = 0.0_wp
+      do k = 1, size(vertices, 2)
+         n = modulo(k, size(vertices, 2)) + 1
+         polygon_area = polygon_area + 0.5_wp*(vertices(1, k)*vertices(2, n) - vertices(1, n)*vertices(2, k))
+      end do
+   end function polygon_area
+
+   !> Whether every polygon turns left at every corner, once around
+   logical function all_convex(bodies)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      real(wp), allocatable :: v(:, :)
+      integer :: k, l, m, s, n
+      real(wp) :: a(2), b(2), total
+
+      all_convex = .true.
+      do s = 1, bodies%n
+         call find_vertices(bodies, int(s, ip), v)
+         n = size(v, 2)
+         total = 0.0_wp
+         do k = 1, n
+            l = modulo(k, n) + 1
+            m = modulo(l, n) + 1
+            a = v(:, l) - v(:, k)
+            b = v(:, m) - v(:, l)
+            if (a(1)*b(2) - a(2)*b(1) <= 0.0_wp) all_convex = .false.
+            total = total + atan2(a(1)*b(2) - a(2)*b(1), a(1)*b(1) + a(2)*b(2))
+         end do
+         if (abs(total - 8.0_wp*atan(1.0_wp)) > 1.0e-6_wp) all_convex = .false.
+      end do
+   end function all_convex
+
+   !> Number of pairs of bodies, not both fixed, without a separating edge
+   integer function count_overlaps(bodies)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      real(wp), allocatable :: reach(:), v_i(:, :), v_j(:, :)
+      real(wp) :: distance(2)
+      integer(ip) :: i, j
+
+      allocate (reach(bodies%n))
+      do i = 1_ip, bodies%n
+         associate (v => bodies%turned(:, bodies%vertex_start(i):bodies%vertex_start(i + 1) - 1))
+            reach(i) = sqrt(maxval(v(1, :)**2 + v(2, :)**2))
+         end associate
+      end do
+      count_overlaps = 0
+      do j = 2_ip, bodies%n
+         do i = 1_ip, j - 1_ip
+            if (bodies%fixed(i) .and. bodies%fixed(j)) cycle
+            distance = bodies%position(:, i) - bodies%position(:, j)
+            if (distance(1)**2 + distance(2)**2 > (reach(i) + reach(j))**2) cycle
+            call find_vertices(bodies, i, v_i)
+            call find_vertices(bodies, j, v_j)
+            if (.not. (separated(v_i, v_j) .or. separated(v_j, v_i))) count_overlaps = count_overlaps + 1
+         end do
+      end do
+   end function count_overlaps
+
+   !> Whether all of b lies outside some edge of a
+   logical function separated(a, b)
+      real(wp), intent(in) :: a(:, :), b(:, :)
+      real(wp) :: edge(2)
+      integer :: k
+
+      separated = .true.
+      do k = 1, size(a, 2)
+         edge = a(:, modulo(k, size(a, 2)) + 1) - a(:, k)
+         if (all(edge(1)*(b(2, :) - a(2, k)) - edge(2)*(b(1, :) - a(1, k)) <= 0.0_wp)) return
+      end do
+      separated = .false.
+   end function separated
+
+   !> Number of coordinates in which two sets of bodies differ at all; -1 if their shapes differ in size
+   integer function count_differences(a, b)
+      !> Bodies
+      type(bodies_t), intent(in) :: a
+      !> Other bodies
+      type(bodies_t), intent(in) :: b
+
+      count_differences = -1
+      if (a%n /= b%n .or. size(a%shape, 2) /= size(b%shape, 2)) return
+      count_differences = count(abs(a%shape - b%shape) > 0.0_wp) &
+                                   + count(abs(a%position - b%position) > 0.0_wp) &
+                                   + count(abs(a%velocity - b%velocity) > 0.0_wp)
+   end function count_differences
+
+end module scene_checks
