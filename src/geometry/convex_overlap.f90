@@ -1,0 +1,371 @@
+!> The overlap of two convex polygons: area, centroid, and the integrals over the outline that forces need.
+!>
+!> One polygon, the *subject*, is clipped by the half-planes of the edges of the other, the *clipper*
+!> (Sutherland & Hodgman, Commun. ACM 17 (1974) 32). Every edge of the result remembers whose outline it lies
+!> on. The result is a closed loop by construction, so vertices on edges, common edges, containment and any
+!> number of crossings need no case of their own, and nothing is counted twice or left out.
+!>
+!> Accuracy. The subject is the smaller body, and coordinates are relative to its centre, so that errors scale
+!> with its size even against a wall a thousand times as long. A vertex within `roundoff` times that size of a
+!> clip line lies on it, and an edge on the clip line belongs to the clipper. Hence bodies that touch up to
+!> rounding do not overlap, and a body inside another is pushed out through an edge that they share.
+!>
+!> The remembered edge saves time and changes no result: whatever it decides, the full search decides too.
+module polydem_convex_overlap
+   use polydem_exact_cross, only: exact_cross
+   use polydem_kinds, only: ip, wp
+   use polydem_overlap_integrals, only: integrate_loop, overlap_t
+   implicit none
+   private
+   public :: overlap_t, overlap_polygons
+
+   !> Share of the size of the smaller body within which a vertex lies on a line
+   real(wp), parameter :: roundoff = 4.0_wp*epsilon(1.0_wp)
+   !> Beyond this multiple of that size, line equations are formed without rounding
+   real(wp), parameter :: far = 8.0_wp
+   !> Share of the square of that size above which an overlap is too large for an edge to count as separating
+   real(wp), parameter :: sure = 64.0_wp*epsilon(1.0_wp)
+   !> Two polygons with no more vertices than this together need no work array of their own
+   integer(ip), parameter :: usual_corners = 48_ip
+
+contains
+
+   !> Overlap of two convex polygons.
+   !>
+   !> Costs of the order of the product of the numbers of vertices at worst, and of the vertices of one body
+   !> if the remembered edge still separates them.
+   pure subroutine overlap_polygons(a, b, offset, separating_edge, overlap)
+      !> Vertices of the first polygon, anticlockwise, relative to its centre, which is inside, (2, n) [m]
+      real(wp), intent(in), contiguous :: a(:, :)
+      !> Vertices of the second polygon, anticlockwise, relative to its own centre, (2, m) [m]
+      real(wp), intent(in), contiguous :: b(:, :)
+      !> Centre of b minus centre of a [m]
+      real(wp), intent(in) :: offset(2)
+      !> Edge to try first: +k from vertex k of a, -k from vertex k of b, 0 none
+      integer(ip), intent(in) :: separating_edge
+      !> The overlap
+      type(overlap_t), intent(out) :: overlap
+      real(wp) :: reach_a, reach_b, scale
+      integer(ip) :: edge
+
+      reach_a = reach(a)
+      reach_b = reach(b)
+      scale = min(reach_a, reach_b)
+      overlap%separating_edge = separating_edge
+      if (separating_edge > 0_ip) then
+         if (separates(a, separating_edge, b, offset, reach_b, scale)) return
+      else if (separating_edge < 0_ip) then
+         if (separates(b, -separating_edge, a, -offset, reach_a, scale)) return
+      end if
+
+      if (reach_a <= reach_b) then
+         call clip(a, b, offset, scale, overlap)
+         overlap%normal = -overlap%normal
+         overlap%moment_a = -overlap%moment_a
+         overlap%moment_b = -overlap%moment_b
+      else
+         call clip(b, a, -offset, scale, overlap)
+         call swap(overlap%moment_a, overlap%moment_b)
+         overlap%centroid = overlap%centroid + offset
+      end if
+
+      overlap%separating_edge = 0_ip
+      if (overlap%area > sure*scale*scale) return
+      edge = first_separating(a, b, offset, reach_b, scale)
+      if (edge == 0_ip) edge = -first_separating(b, a, -offset, reach_a, scale)
+      if (edge /= 0_ip .or. .not. overlap%area > 0.0_wp) overlap = overlap_t(separating_edge=edge)
+   end subroutine overlap_polygons
+
+   !> Size of a polygon: no vertex is farther from its centre [m]
+   pure real(wp) function reach(vertices)
+      real(wp), intent(in), contiguous :: vertices(:, :)
+      integer(ip) :: k
+
+      reach = 0.0_wp
+      do k = 1_ip, size(vertices, 2, kind=ip)
+         reach = max(reach, abs(vertices(1, k)) + abs(vertices(2, k)))
+      end do
+   end function reach
+
+   !> First edge of one polygon that separates it from another, 0 if there is none
+   pure integer(ip) function first_separating(polygon, other, offset, reach_other, scale)
+      real(wp), intent(in), contiguous :: polygon(:, :)
+      real(wp), intent(in), contiguous :: other(:, :)
+      !> Centre of the other minus centre of the polygon
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: reach_other
+      !> Size of the smaller of the two
+      real(wp), intent(in) :: scale
+
+      do first_separating = 1_ip, size(polygon, 2, kind=ip)
+         if (separates(polygon, first_separating, other, offset, reach_other, scale)) return
+      end do
+      first_separating = 0_ip
+   end function first_separating
+
+   !> Whether no vertex of the other polygon lies on the inner side of an edge
+   pure logical function separates(polygon, k, other, offset, reach_other, scale)
+      real(wp), intent(in), contiguous :: polygon(:, :)
+      integer(ip), intent(in) :: k
+      real(wp), intent(in), contiguous :: other(:, :)
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: reach_other
+      real(wp), intent(in) :: scale
+      real(wp) :: start(2), end(2), edge(2), tolerance, level, depth
+      integer(ip) :: i
+
+      start = polygon(:, k)
+      end = polygon(:, merge(1_ip, k + 1_ip, k == size(polygon, 2, kind=ip)))
+      edge = end - start
+      tolerance = roundoff*scale*(abs(edge(1)) + abs(edge(2)))
+      level = depth_of(offset, start, end, scale)
+      separates = .false.
+      ! The centre lies in the other polygon, so a centre on the inner side settles it.
+      if (level > tolerance) return
+      depth = level
+      if (reach_other <= far*scale) then
+         do i = 1_ip, size(other, 2, kind=ip)
+            depth = max(depth, (edge(1)*other(2, i) - edge(2)*other(1, i)) + level)
+         end do
+      else
+         do i = 1_ip, size(other, 2, kind=ip)
+            depth = max(depth, exact_cross(start, end, offset, other(:, i)))
+         end do
+      end if
+      separates = depth <= tolerance
+   end function separates
+
+   !> Depth of a point below the line of an edge, that is on its inner side, times the length of the edge [m2]
+   pure real(wp) function depth_of(point, start, end, scale)
+      real(wp), intent(in) :: point(2)
+      real(wp), intent(in) :: start(2)
+      real(wp), intent(in) :: end(2)
+      real(wp), intent(in) :: scale
+      real(wp) :: arm(2)
+
+      arm = point - start
+      if (max(abs(arm(1)), abs(arm(2))) <= far*scale) then
+         depth_of = (end(1) - start(1))*arm(2) - (end(2) - start(2))*arm(1)
+      else
+         depth_of = exact_cross(start, end, point, [0.0_wp, 0.0_wp])
+      end if
+   end function depth_of
+
+   !> Clip the subject by all edges of the clipper, and integrate over what is left.
+   !>
+   !> The normal and the moments are those of the clipper's outline inside the subject; `moment_a` is about
+   !> the subject's centre, `moment_b` about the clipper's.
+   pure subroutine clip(subject, clipper, offset, scale, overlap)
+      real(wp), intent(in), contiguous :: subject(:, :)
+      real(wp), intent(in), contiguous :: clipper(:, :)
+      !> Centre of the clipper minus centre of the subject
+      real(wp), intent(in) :: offset(2)
+      !> Size of the subject
+      real(wp), intent(in) :: scale
+      type(overlap_t), intent(inout) :: overlap
+      real(wp) :: vertex(usual_corners, 2, 2), depth(usual_corners), level(usual_corners)
+      logical :: on_clipper(usual_corners, 2)
+      integer(ip) :: corners
+
+      ! Each edge of the clipper adds one vertex at most.
+      corners = size(subject, 2, kind=ip) + size(clipper, 2, kind=ip)
+      if (corners <= usual_corners) then
+         call clip_in(subject, clipper, offset, scale, usual_corners, vertex, on_clipper, depth, level, &
+                      overlap)
+      else
+         call clip_many(subject, clipper, offset, scale, corners, overlap)
+      end if
+   end subroutine clip
+
+   !> The same with work arrays made to measure
+   pure subroutine clip_many(subject, clipper, offset, scale, corners, overlap)
+      real(wp), intent(in), contiguous :: subject(:, :)
+      real(wp), intent(in), contiguous :: clipper(:, :)
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: scale
+      integer(ip), intent(in) :: corners
+      type(overlap_t), intent(inout) :: overlap
+      real(wp) :: vertex(corners, 2, 2), depth(corners), level(corners)
+      logical :: on_clipper(corners, 2)
+
+      call clip_in(subject, clipper, offset, scale, corners, vertex, on_clipper, depth, level, overlap)
+   end subroutine clip_many
+
+   !> The same in given work arrays, whose last index tells the loop before a cut from the loop after it
+   pure subroutine clip_in(subject, clipper, offset, scale, corners, vertex, on_clipper, depth, level, &
+                           overlap)
+      real(wp), intent(in), contiguous :: subject(:, :)
+      real(wp), intent(in), contiguous :: clipper(:, :)
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: scale
+      !> Room for vertices
+      integer(ip), intent(in) :: corners
+      !> Vertices (corner, x or y, loop)
+      real(wp), intent(inout) :: vertex(corners, 2, 2)
+      !> Whether the edge that starts at a vertex lies on the clipper's outline
+      logical, intent(inout) :: on_clipper(corners, 2)
+      !> Depth of each vertex below the clip line, times the length of the edge
+      real(wp), intent(inout) :: depth(corners)
+      !> Depth of the subject's centre below each clip line, likewise
+      real(wp), intent(inout) :: level(corners)
+      type(overlap_t), intent(inout) :: overlap
+      integer(ip) :: i, k, m, n, now
+      real(wp) :: edge(2), lowest, highest
+
+      n = size(subject, 2, kind=ip)
+      m = size(clipper, 2, kind=ip)
+      do i = 1_ip, n
+         vertex(i, 1, 1) = subject(1, i)
+         vertex(i, 2, 1) = subject(2, i)
+         on_clipper(i, 1) = .false.
+      end do
+      now = 1_ip
+      call find_levels(clipper, offset, scale, level, k)
+      do i = 1_ip, m
+         edge = clipper(:, merge(1_ip, k + 1_ip, k == m)) - clipper(:, k)
+         if (level(k) <= 1.01_wp*scale*max(abs(edge(1)), abs(edge(2)))) then
+            call measure(n, corners, vertex(:, :, now), edge, level(k), scale, depth, lowest, highest)
+            if (.not. highest > 0.0_wp) return
+            if (lowest < 0.0_wp) then
+               call cut(n, corners, vertex(:, :, now), on_clipper(:, now), depth, &
+                        vertex(:, :, 3_ip - now), on_clipper(:, 3_ip - now))
+               now = 3_ip - now
+            else if (.not. lowest > 0.0_wp) then
+               call claim(n, depth, on_clipper(:, now))
+            end if
+         end if
+         k = merge(1_ip, k + 1_ip, k == m)
+      end do
+      call integrate_loop(n, corners, vertex(:, :, now), on_clipper(:, now), offset, overlap)
+   end subroutine clip_in
+
+   !> Depth of the subject's centre below all edges of the clipper
+   pure subroutine find_levels(clipper, offset, scale, level, lowest)
+      real(wp), intent(in), contiguous :: clipper(:, :)
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: scale
+      real(wp), intent(inout) :: level(:)
+      !> Edge of the least of them; to begin with it leaves little of the subject for the others
+      integer(ip), intent(out) :: lowest
+      real(wp) :: least
+      integer(ip) :: k, m
+
+      m = size(clipper, 2, kind=ip)
+      least = huge(1.0_wp)
+      lowest = 1_ip
+      do k = 1_ip, m
+         level(k) = depth_of(-offset, clipper(:, k), clipper(:, merge(1_ip, k + 1_ip, k == m)), scale)
+         if (level(k) < least) lowest = k
+         least = min(least, level(k))
+      end do
+   end subroutine find_levels
+
+   !> Depth of all vertices below a clip line; zero for those on it
+   pure subroutine measure(n, corners, vertex, edge, level, scale, depth, lowest, highest)
+      integer(ip), intent(in) :: n
+      integer(ip), intent(in) :: corners
+      real(wp), intent(in) :: vertex(corners, 2)
+      real(wp), intent(in) :: edge(2)
+      !> Depth of the origin
+      real(wp), intent(in) :: level
+      real(wp), intent(in) :: scale
+      real(wp), intent(inout) :: depth(n)
+      !> Least depth
+      real(wp), intent(out) :: lowest
+      !> Greatest depth
+      real(wp), intent(out) :: highest
+      real(wp) :: tolerance
+      integer(ip) :: i
+
+      tolerance = roundoff*scale*(abs(edge(1)) + abs(edge(2)))
+      lowest = huge(1.0_wp)
+      highest = -huge(1.0_wp)
+      do i = 1_ip, n
+         depth(i) = (edge(1)*vertex(i, 2) - edge(2)*vertex(i, 1)) + level
+         depth(i) = merge(0.0_wp, depth(i), abs(depth(i)) <= tolerance)
+         lowest = min(lowest, depth(i))
+         highest = max(highest, depth(i))
+      end do
+   end subroutine measure
+
+   !> Give edges that lie on the clip line to the clipper.
+   pure subroutine claim(n, depth, on_clipper)
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: depth(n)
+      logical, intent(inout) :: on_clipper(n)
+      integer(ip) :: i
+
+      do i = 1_ip, n
+         if (max(depth(i), depth(merge(1_ip, i + 1_ip, i == n))) <= 0.0_wp) on_clipper(i) = .true.
+      end do
+   end subroutine claim
+
+   !> Keep the vertices around the deepest one up to the clip line, and close the loop along that line.
+   !>
+   !> The vertices kept are consecutive, whatever rounding does to a convex loop, so that a cut adds two
+   !> vertices and drops one at least.
+   pure subroutine cut(n, corners, vertex, on_clipper, depth, vertex_cut, on_clipper_cut)
+      !> Number of vertices before and after
+      integer(ip), intent(inout) :: n
+      integer(ip), intent(in) :: corners
+      real(wp), intent(in) :: vertex(corners, 2)
+      logical, intent(in) :: on_clipper(corners)
+      real(wp), intent(in) :: depth(n)
+      real(wp), intent(inout) :: vertex_cut(corners, 2)
+      logical, intent(inout) :: on_clipper_cut(corners)
+      integer(ip) :: i, m, before, after
+
+      before = maxloc(depth, dim=1)
+      do while (depth(before) >= 0.0_wp)
+         before = merge(n, before - 1_ip, before == 1_ip)
+      end do
+      i = merge(1_ip, before + 1_ip, before == n)
+      m = 0_ip
+      if (depth(i) > 0.0_wp) then
+         m = 1_ip
+         vertex_cut(m, :) = crossing(i, before)
+         on_clipper_cut(m) = on_clipper(before)
+      end if
+      do
+         m = m + 1_ip
+         vertex_cut(m, 1) = vertex(i, 1)
+         vertex_cut(m, 2) = vertex(i, 2)
+         after = merge(1_ip, i + 1_ip, i == n)
+         on_clipper_cut(m) = on_clipper(i) .or. max(depth(i), depth(after)) <= 0.0_wp
+         if (depth(after) < 0.0_wp) exit
+         i = after
+      end do
+      if (depth(i) > 0.0_wp) then
+         m = m + 1_ip
+         vertex_cut(m, :) = crossing(i, after)
+         on_clipper_cut(m) = .true.
+      end if
+      n = m
+
+   contains
+
+      !> Where the edge from a vertex below the line to one above it crosses the line
+      pure function crossing(below, above) result(point)
+         integer(ip), intent(in) :: below
+         integer(ip), intent(in) :: above
+         real(wp) :: point(2)
+         real(wp) :: share
+
+         share = depth(below)/(depth(below) - depth(above))
+         point(1) = vertex(below, 1) + share*(vertex(above, 1) - vertex(below, 1))
+         point(2) = vertex(below, 2) + share*(vertex(above, 2) - vertex(below, 2))
+      end function crossing
+   end subroutine cut
+
+   !> Exchange two numbers.
+   elemental subroutine swap(a, b)
+      real(wp), intent(inout) :: a
+      real(wp), intent(inout) :: b
+      real(wp) :: a_before
+
+      a_before = a
+      a = b
+      b = a_before
+   end subroutine swap
+
+end module polydem_convex_overlap

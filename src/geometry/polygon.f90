@@ -1,0 +1,258 @@
+!> Single polygons: checking and cleaning of input, mass properties, size, clipping.
+!>
+!> Nothing here has a length of its own: every tolerance is a share of the size of the polygon, or of the
+!> spacing of the numbers in which its vertices were given.
+module polydem_polygon
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use polydem_kinds, only: ip, wp
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: clean_polygon, mass_properties, diameter, clip_half_plane
+
+   !> Vertices closer together, or closer to the line of their neighbours, than this share of the size are
+   !> dropped: far above the digits lost in a text file, far below anything that changes a result.
+   real(wp), parameter :: idle_share = 1.0e-9_wp
+
+contains
+
+   !> Bring a polygon into standard form, or say why that cannot be done.
+   !>
+   !> Standard form is strictly convex and anticlockwise, without repeated vertices and without vertices on
+   !> the line of their neighbours. The vertices that stay keep their bits and their cyclic order, which is
+   !> reversed if the input is clockwise.
+   pure subroutine clean_polygon(vertices, cleaned, problem)
+      !> Vertices in order, either way round, (2, n) [m]
+      real(wp), intent(in) :: vertices(:, :)
+      !> Vertices in standard form, (2, m) [m]; not allocated if rejected
+      real(wp), allocatable, intent(out) :: cleaned(:, :)
+      !> What is wrong, to be read after the name of the body; not allocated if all is well
+      character(len=:), allocatable, intent(out) :: problem
+      integer(ip), allocatable :: kept(:)
+      integer(ip) :: n, m, k
+      real(wp) :: extent, tolerance, area
+
+      n = size(vertices, 2, kind=ip)
+      do k = 1_ip, n
+         if (.not. (ieee_is_finite(vertices(1, k)) .and. ieee_is_finite(vertices(2, k)))) then
+            problem = 'has a coordinate that is not a finite number at vertex '//to_text(k)
+            return
+         end if
+      end do
+      if (n < 3_ip) then
+         problem = 'has '//to_text(n)//' vertices, but a polygon needs at least 3'
+         return
+      end if
+
+      extent = diameter(vertices)
+      tolerance = idle_share*extent + 16.0_wp*epsilon(1.0_wp)*maxval(abs(vertices))
+      area = signed_area(vertices)
+      if (abs(area) <= tolerance*extent) then
+         problem = 'has no area, or crosses itself so that its parts cancel'
+         return
+      end if
+      allocate (kept(n))
+      do k = 1_ip, n
+         kept(k) = merge(k, 1_ip + modulo(1_ip - k, n), area > 0.0_wp)
+      end do
+
+      m = n
+      call drop_idle(vertices, tolerance, kept, m)
+      call check_convex(vertices, kept(1:m), problem)
+      if (allocated(problem)) return
+      cleaned = vertices(:, kept(1:m))
+   end subroutine clean_polygon
+
+   !> Drop vertices that repeat a neighbour or lie between their neighbours on one line.
+   pure subroutine drop_idle(vertices, tolerance, kept, m)
+      real(wp), intent(in) :: vertices(:, :)
+      real(wp), intent(in) :: tolerance
+      integer(ip), intent(inout) :: kept(:)
+      integer(ip), intent(inout) :: m
+      integer(ip) :: k, in_order
+      logical :: idle
+
+      k = 1_ip
+      in_order = 0_ip
+      do while (in_order < m .and. m > 2_ip)
+         associate (before => vertices(:, kept(1_ip + modulo(k - 2_ip, m))), here => vertices(:, kept(k)), &
+                    after => vertices(:, kept(1_ip + modulo(k, m))))
+            idle = is_idle(here - before, after - here, tolerance)
+         end associate
+         if (idle) then
+            kept(k:m - 1_ip) = kept(k + 1_ip:m)
+            m = m - 1_ip
+            in_order = 0_ip
+            k = 1_ip + modulo(k - 1_ip, m)
+         else
+            in_order = in_order + 1_ip
+            k = 1_ip + modulo(k, m)
+         end if
+      end do
+   end subroutine drop_idle
+
+   !> Whether a vertex adds nothing to the outline; the tip of a spike, where it turns back, does
+   pure logical function is_idle(arriving, leaving, tolerance)
+      real(wp), intent(in) :: arriving(2)
+      real(wp), intent(in) :: leaving(2)
+      real(wp), intent(in) :: tolerance
+
+      if (hypot(leaving(1), leaving(2)) <= tolerance) then
+         is_idle = .true.
+      else
+         is_idle = abs(cross(arriving, leaving)) <= &
+                   tolerance*hypot(arriving(1) + leaving(1), arriving(2) + leaving(2)) .and. &
+                   arriving(1)*leaving(1) + arriving(2)*leaving(2) > 0.0_wp
+      end if
+   end function is_idle
+
+   !> Complain unless the outline always turns left and goes round once.
+   pure subroutine check_convex(vertices, kept, problem)
+      real(wp), intent(in) :: vertices(:, :)
+      integer(ip), intent(in) :: kept(:)
+      character(len=:), allocatable, intent(inout) :: problem
+      integer(ip) :: k, m, rounds
+      real(wp) :: arriving(2), leaving(2)
+
+      m = size(kept, kind=ip)
+      if (m < 3_ip) then
+         problem = 'has no area'
+         return
+      end if
+      rounds = 0_ip
+      do k = 1_ip, m
+         arriving = vertices(:, kept(k)) - vertices(:, kept(1_ip + modulo(k - 2_ip, m)))
+         leaving = vertices(:, kept(1_ip + modulo(k, m))) - vertices(:, kept(k))
+         if (cross(arriving, leaving) <= 0.0_wp) then
+            problem = 'is not convex at vertex '//to_text(kept(k))
+            return
+         end if
+         if (points_down(arriving) .and. .not. points_down(leaving)) rounds = rounds + 1_ip
+      end do
+      if (rounds /= 1_ip) problem = 'crosses itself: its outline goes round '//to_text(rounds)//' times'
+   end subroutine check_convex
+
+   !> Whether a direction lies in the half turn from pi (inclusive) to 2 pi
+   pure logical function points_down(direction)
+      real(wp), intent(in) :: direction(2)
+
+      points_down = direction(2) < 0.0_wp .or. (.not. abs(direction(2)) > 0.0_wp .and. direction(1) < 0.0_wp)
+   end function points_down
+
+   !> Area, centroid and second moment of area of an anticlockwise polygon.
+   !>
+   !> Sums over the triangles of a fan from the first vertex: all have a positive area if it is convex, and
+   !> coordinates are differences of vertices, so no digits cancel, however far from the origin it lies.
+   pure subroutine mass_properties(vertices, area, centroid, second_moment)
+      !> Vertices, anticlockwise, (2, n) [m]
+      real(wp), intent(in) :: vertices(:, :)
+      !> Area [m2]
+      real(wp), intent(out) :: area
+      !> Centroid [m]
+      real(wp), intent(out) :: centroid(2)
+      !> Polar second moment of area about the centroid [m4]
+      real(wp), intent(out) :: second_moment
+      real(wp) :: p(2), q(2), arm(2), middle(2), part
+      integer(ip) :: k
+
+      area = 0.0_wp
+      arm = 0.0_wp
+      do k = 2_ip, size(vertices, 2, kind=ip) - 1_ip
+         p = vertices(:, k) - vertices(:, 1)
+         q = vertices(:, k + 1_ip) - vertices(:, 1)
+         part = 0.5_wp*cross(p, q)
+         area = area + part
+         arm = arm + part*(p + q)/3.0_wp
+      end do
+      arm = arm/area
+      centroid = vertices(:, 1) + arm
+
+      second_moment = 0.0_wp
+      do k = 2_ip, size(vertices, 2, kind=ip) - 1_ip
+         p = vertices(:, k) - vertices(:, 1)
+         q = vertices(:, k + 1_ip) - vertices(:, 1)
+         middle = (p + q)/3.0_wp
+         second_moment = second_moment + 0.5_wp*cross(p, q)*(square(middle - arm) &
+                         + (square(middle) + square(p - middle) + square(q - middle))/12.0_wp)
+      end do
+   end subroutine mass_properties
+
+   !> Greatest distance of two vertices [m]
+   pure real(wp) function diameter(vertices)
+      !> Vertices in any order, (2, n) [m]
+      real(wp), intent(in) :: vertices(:, :)
+      integer(ip) :: j, k
+
+      diameter = 0.0_wp
+      do k = 2_ip, size(vertices, 2, kind=ip)
+         do j = 1_ip, k - 1_ip
+            diameter = max(diameter, hypot(vertices(1, k) - vertices(1, j), vertices(2, k) - vertices(2, j)))
+         end do
+      end do
+   end function diameter
+
+   !> The part of a convex polygon on one side of a line: where (r - point) . normal <= 0.
+   !>
+   !> I. E. Sutherland and G. W. Hodgman, Commun. ACM 17 (1974) 32.
+   pure subroutine clip_half_plane(vertices, point, normal, clipped)
+      !> Vertices in order, (2, n) [m]
+      real(wp), intent(in) :: vertices(:, :)
+      !> A point on the line [m]
+      real(wp), intent(in) :: point(2)
+      !> Normal of the line, of any length, towards the part that is cut away
+      real(wp), intent(in) :: normal(2)
+      !> What is left, (2, m) [m]; m = 0 if that has no area
+      real(wp), allocatable, intent(out) :: clipped(:, :)
+      real(wp) :: outside(size(vertices, 2)), work(2, 2*size(vertices, 2)), share
+      integer(ip) :: j, k, n, m
+
+      n = size(vertices, 2, kind=ip)
+      do k = 1_ip, n
+         outside(k) = (vertices(1, k) - point(1))*normal(1) + (vertices(2, k) - point(2))*normal(2)
+      end do
+      m = 0_ip
+      if (any(outside < 0.0_wp)) then
+         do k = 1_ip, n
+            j = 1_ip + modulo(k, n)
+            if (outside(k) <= 0.0_wp) then
+               m = m + 1_ip
+               work(:, m) = vertices(:, k)
+            end if
+            if (min(outside(k), outside(j)) < 0.0_wp .and. max(outside(k), outside(j)) > 0.0_wp) then
+               m = m + 1_ip
+               share = outside(k)/(outside(k) - outside(j))
+               work(:, m) = vertices(:, k) + share*(vertices(:, j) - vertices(:, k))
+            end if
+         end do
+      end if
+      clipped = work(:, 1:m)
+   end subroutine clip_half_plane
+
+   !> Area, positive if anticlockwise [m2]
+   pure real(wp) function signed_area(vertices)
+      real(wp), intent(in) :: vertices(:, :)
+      integer(ip) :: k
+
+      signed_area = 0.0_wp
+      do k = 2_ip, size(vertices, 2, kind=ip) - 1_ip
+         signed_area = signed_area &
+                       + 0.5_wp*cross(vertices(:, k) - vertices(:, 1), vertices(:, k + 1_ip) - vertices(:, 1))
+      end do
+   end function signed_area
+
+   !> Third component of the cross product
+   pure real(wp) function cross(p, q)
+      real(wp), intent(in) :: p(2)
+      real(wp), intent(in) :: q(2)
+
+      cross = p(1)*q(2) - p(2)*q(1)
+   end function cross
+
+   !> Square of the length
+   pure real(wp) function square(p)
+      real(wp), intent(in) :: p(2)
+
+      square = p(1)*p(1) + p(2)*p(2)
+   end function square
+
+end module polydem_polygon

@@ -1,0 +1,279 @@
+!> From pairs of bodies to contacts: which polygons overlap, where, by how much, and how fast that changes.
+!>
+!> A contact without a direction (|N| vanishes against the square root of the area: one body inside the other,
+!> or bars that cross) is *degenerate*. So that a run can go on, or stop with a message, it gets the direction
+!> of the line of centres (of the x axis if they coincide) and the length of a square of the same area, a
+!> length at which no force or stiffness overflows. `normal`, `moment` and `rate` stay as they are.
+module polydem_find_contacts
+   use omp_lib, only: omp_get_max_threads, omp_get_num_threads, omp_get_thread_num
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contact_memory_t, contacts_t, reserve_contacts
+   use polydem_convex_overlap, only: overlap_polygons, overlap_t
+   use polydem_kinds, only: bp, ip, lp, wp
+   implicit none
+   private
+   public :: find_contacts
+
+   !> Share of the square root of the area below which a length is rounding
+   real(wp), parameter :: no_length = 4096.0_wp*epsilon(1.0_wp)
+   !> More threads than this are not used
+   integer(ip), parameter :: most_threads = 1024_ip
+   !> A thread is not worth its start for fewer pairs than this
+   integer(ip), parameter :: least_pairs = 64_ip
+
+   !> The pairs of one thread
+   type :: run_t
+      !> The pair before the first
+      integer(ip) :: start = 0_ip
+      !> The last pair
+      integer(ip) :: end = 0_ip
+      !> Number of contacts among them
+      integer(ip) :: n = 0_ip
+      !> Number of degenerate ones
+      integer(ip) :: n_degenerate = 0_ip
+   end type run_t
+
+contains
+
+   !> Find the contacts of this step, in the order of the pairs.
+   !>
+   !> Each thread takes one run of consecutive pairs and writes its contacts to the places of these pairs;
+   !> then the runs are moved together. The result does not depend on the number of threads.
+   subroutine find_contacts(bodies, n_pairs, first, second, memory, contacts)
+      !> Bodies with their polygons turned
+      type(bodies_t), intent(in) :: bodies
+      !> Number of pairs
+      integer(ip), intent(in) :: n_pairs
+      !> Lower slot of each pair, at least (n_pairs)
+      integer(ip), intent(in) :: first(:)
+      !> Higher slot of each pair, at least (n_pairs)
+      integer(ip), intent(in) :: second(:)
+      !> Memory of the pairs: `touching` and `separating_edge` are brought up to date, `tangential` and `area`
+      !> are cleared where the polygons are apart; any column may be missing
+      type(contact_memory_t), intent(inout) :: memory
+      !> Contacts; the columns that forces fill are left alone
+      type(contacts_t), intent(inout) :: contacts
+      type(run_t) :: runs(0:most_threads - 1_ip)
+      integer(ip) :: threads, me
+
+      call reserve_contacts(contacts, n_pairs)
+      threads = min(int(omp_get_max_threads(), ip), most_threads, 1_ip + n_pairs/least_pairs)
+      !$omp parallel num_threads(threads) default(none) private(me) &
+      !$omp shared(bodies, n_pairs, first, second, memory, contacts, runs, threads)
+      !$omp single
+      threads = int(omp_get_num_threads(), ip)
+      !$omp end single
+      me = int(omp_get_thread_num(), ip)
+      runs(me) = run_t(start=share(n_pairs, me, threads), end=share(n_pairs, me + 1_ip, threads))
+      call find_in_run(bodies, first, second, memory, contacts, runs(me))
+      !$omp end parallel
+      call close_gaps(runs(0:threads - 1_ip), contacts)
+   end subroutine find_contacts
+
+   !> Number of items dealt out before a thread's turn
+   pure integer(ip) function share(n, thread, threads)
+      integer(ip), intent(in) :: n
+      integer(ip), intent(in) :: thread
+      integer(ip), intent(in) :: threads
+
+      share = int(int(n, lp)*int(thread, lp)/int(threads, lp), ip)
+   end function share
+
+   !> Find the contacts of a run of pairs, and write them to the places after its start.
+   subroutine find_in_run(bodies, first, second, memory, contacts, run)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: first(:)
+      integer(ip), intent(in) :: second(:)
+      type(contact_memory_t), intent(inout) :: memory
+      type(contacts_t), intent(inout) :: contacts
+      type(run_t), intent(inout) :: run
+      type(overlap_t) :: overlap
+      real(wp) :: offset(2)
+      integer(ip) :: p, i, j, edge, n, n_degenerate
+      logical :: degenerate
+
+      n = 0_ip
+      n_degenerate = 0_ip
+      edge = 0_ip
+      associate (start => bodies%vertex_start, turned => bodies%turned)
+         do p = run%start + 1_ip, run%end
+            i = first(p)
+            j = second(p)
+            offset = bodies%position(:, j) - bodies%position(:, i)
+            if (allocated(memory%separating_edge)) edge = memory%separating_edge(p)
+            call overlap_polygons(turned(:, start(i):start(i + 1_ip) - 1_ip), &
+                                  turned(:, start(j):start(j + 1_ip) - 1_ip), offset, edge, overlap)
+            call remember(p, overlap, memory)
+            if (overlap%area > 0.0_wp) then
+               n = n + 1_ip
+               call store(bodies, p, i, j, offset, overlap, run%start + n, contacts, degenerate)
+               if (degenerate) n_degenerate = n_degenerate + 1_ip
+            end if
+         end do
+      end associate
+      run%n = n
+      run%n_degenerate = n_degenerate
+   end subroutine find_in_run
+
+   !> Bring the memory of a pair up to date.
+   subroutine remember(p, overlap, memory)
+      integer(ip), intent(in) :: p
+      type(overlap_t), intent(in) :: overlap
+      type(contact_memory_t), intent(inout) :: memory
+
+      if (allocated(memory%separating_edge)) memory%separating_edge(p) = overlap%separating_edge
+      if (overlap%area > 0.0_wp) then
+         if (allocated(memory%touching)) memory%touching(p) = 1_bp
+      else
+         if (allocated(memory%touching)) memory%touching(p) = 0_bp
+         if (allocated(memory%tangential)) memory%tangential(p) = 0.0_wp
+         if (allocated(memory%area)) memory%area(p) = 0.0_wp
+      end if
+   end subroutine remember
+
+   !> Write one contact.
+   subroutine store(bodies, p, i, j, offset, overlap, c, contacts, degenerate)
+      type(bodies_t), intent(in) :: bodies
+      !> Place in the pair list
+      integer(ip), intent(in) :: p
+      !> First body
+      integer(ip), intent(in) :: i
+      !> Second body
+      integer(ip), intent(in) :: j
+      !> Centre of the second minus centre of the first
+      real(wp), intent(in) :: offset(2)
+      type(overlap_t), intent(in) :: overlap
+      !> Place in the table of contacts
+      integer(ip), intent(in) :: c
+      type(contacts_t), intent(inout) :: contacts
+      !> Whether it has no direction of its own
+      logical, intent(out) :: degenerate
+
+      contacts%pair(c) = p
+      contacts%first(c) = i
+      contacts%second(c) = j
+      contacts%area(c) = overlap%area
+      contacts%rate(c) = overlap%normal(1)*(bodies%velocity(1, i) - bodies%velocity(1, j)) &
+                         + overlap%normal(2)*(bodies%velocity(2, i) - bodies%velocity(2, j)) &
+                         + (overlap%moment_a*bodies%angular_velocity(i) &
+                            - overlap%moment_b*bodies%angular_velocity(j))
+      contacts%normal(:, c) = overlap%normal
+      contacts%moment(1, c) = overlap%moment_a
+      contacts%moment(2, c) = overlap%moment_b
+      contacts%arm_first(:, c) = overlap%centroid
+      contacts%arm_second(:, c) = overlap%centroid - offset
+      call find_direction(overlap, offset, contacts%direction(:, c), contacts%length(c), degenerate)
+   end subroutine store
+
+   !> Direction from the second body to the first, and length of the contact.
+   pure subroutine find_direction(overlap, offset, direction, length, degenerate)
+      type(overlap_t), intent(in) :: overlap
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(out) :: direction(2)
+      real(wp), intent(out) :: length
+      logical, intent(out) :: degenerate
+      real(wp) :: side, distance
+
+      side = sqrt(overlap%area)
+      length = length_of(overlap%normal)
+      degenerate = length <= no_length*side
+      if (.not. degenerate) then
+         direction = -overlap%normal/length
+         return
+      end if
+      length = side
+      distance = length_of(offset)
+      if (distance > no_length*side) then
+         direction = -offset/distance
+      else
+         direction = [1.0_wp, 0.0_wp]
+      end if
+   end subroutine find_direction
+
+   !> Length of a vector; unlike hypot the same bits everywhere
+   pure real(wp) function length_of(vector)
+      real(wp), intent(in) :: vector(2)
+
+      length_of = sqrt(vector(1)*vector(1) + vector(2)*vector(2))
+   end function length_of
+
+   !> Move the contacts of all runs together, each column by one thread, and count them.
+   subroutine close_gaps(runs, contacts)
+      type(run_t), intent(in) :: runs(:)
+      type(contacts_t), intent(inout) :: contacts
+      integer(ip) :: k, n
+
+      n = 0_ip
+      contacts%n_degenerate = 0_ip
+      do k = 1_ip, size(runs, kind=ip)
+         n = n + runs(k)%n
+         contacts%n_degenerate = contacts%n_degenerate + runs(k)%n_degenerate
+      end do
+      contacts%n = n
+      if (size(runs) == 1) return
+      !$omp parallel sections default(none) shared(runs, contacts)
+      !$omp section
+      call move_numbers(runs, contacts%pair)
+      call move_numbers(runs, contacts%first)
+      call move_numbers(runs, contacts%second)
+      call move_column(runs, contacts%area)
+      call move_column(runs, contacts%rate)
+      !$omp section
+      call move_vectors(runs, contacts%normal)
+      call move_column(runs, contacts%length)
+      !$omp section
+      call move_vectors(runs, contacts%moment)
+      call move_vectors(runs, contacts%direction)
+      !$omp section
+      call move_vectors(runs, contacts%arm_first)
+      call move_vectors(runs, contacts%arm_second)
+      !$omp end parallel sections
+   end subroutine close_gaps
+
+   !> Close the gaps of a column of whole numbers.
+   pure subroutine move_numbers(runs, column)
+      type(run_t), intent(in) :: runs(:)
+      integer(ip), intent(inout), contiguous :: column(:)
+      integer(ip) :: k, c, n
+
+      n = runs(1)%n
+      do k = 2_ip, size(runs, kind=ip)
+         do c = 1_ip, runs(k)%n
+            column(n + c) = column(runs(k)%start + c)
+         end do
+         n = n + runs(k)%n
+      end do
+   end subroutine move_numbers
+
+   !> Close the gaps of a column of real numbers.
+   pure subroutine move_column(runs, column)
+      type(run_t), intent(in) :: runs(:)
+      real(wp), intent(inout), contiguous :: column(:)
+      integer(ip) :: k, c, n
+
+      n = runs(1)%n
+      do k = 2_ip, size(runs, kind=ip)
+         do c = 1_ip, runs(k)%n
+            column(n + c) = column(runs(k)%start + c)
+         end do
+         n = n + runs(k)%n
+      end do
+   end subroutine move_column
+
+   !> Close the gaps of a column of vectors.
+   pure subroutine move_vectors(runs, column)
+      type(run_t), intent(in) :: runs(:)
+      real(wp), intent(inout), contiguous :: column(:, :)
+      integer(ip) :: k, c, n
+
+      n = runs(1)%n
+      do k = 2_ip, size(runs, kind=ip)
+         do c = 1_ip, runs(k)%n
+            column(1, n + c) = column(1, runs(k)%start + c)
+            column(2, n + c) = column(2, runs(k)%start + c)
+         end do
+         n = n + runs(k)%n
+      end do
+   end subroutine move_vectors
+
+end module polydem_find_contacts

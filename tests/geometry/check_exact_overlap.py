@@ -1,0 +1,311 @@
+"""Compare overlaps computed by the program overlap_stream with exact rational arithmetic.
+
+    check_exact_overlap.py PROGRAM [PAIRS_PER_KIND [SEED]]
+
+The exact side knows nothing of clipping loops: every edge of one polygon is cut to the interval that lies in
+the other (Cyrus & Beck), in integers, and the area follows from Green's theorem. Only the standard library
+is used. Exit status 1 if any pair misses its bound:
+
+    |A - A*| <= max(1e-12 A*, 16 u p s),  p perimeter and s size of the smaller body, u = 2^-53
+    A = 0 where A* = 0
+    |N - N*| <= 1e-10 s and |M - M*| <= 1e-10 s (s + |offset|) for polygons without common edges, unless A* < 1e-4 s^2
+    every remembered edge gives the same bits
+"""
+
+import math
+import os
+import random
+import struct
+import subprocess
+import sys
+import tempfile
+from fractions import Fraction
+
+UNIT_ROUNDOFF = 2.0**-53
+
+
+# --- exact overlap ------------------------------------------------------------------------------------------
+
+
+def to_integers(points, offset, bits):
+    """Points plus offset as integers in units of 2^-bits; exact."""
+    return [
+        (int(Fraction(x) * 2**bits) + int(Fraction(offset[0]) * 2**bits),
+         int(Fraction(y) * 2**bits) + int(Fraction(offset[1]) * 2**bits))
+        for x, y in points
+    ]
+
+
+def edges_of(polygon):
+    return [
+        (p[0], p[1], q[0] - p[0], q[1] - p[1]) for p, q in zip(polygon, polygon[1:] + polygon[:1])
+    ]
+
+
+def intervals(edges, other_edges, keep_common):
+    """For each edge the interval (t0, t1) inside the other polygon; None in the list's place if apart.
+
+    An edge on a line of the other's outline counts if the directions agree and `keep_common` is set. If the
+    directions are opposite the polygons lie on opposite sides of that line: no overlap at all.
+    """
+    found = []
+    for x, y, dx, dy in edges:
+        t0, t1 = Fraction(0), Fraction(1)
+        for ox, oy, ex, ey in other_edges:
+            start = ex * (y - oy) - ey * (x - ox)
+            slope = ex * dy - ey * dx
+            if slope == 0:
+                if start < 0 or (start == 0 and ex * dx + ey * dy > 0 and not keep_common):
+                    t1 = t0
+                elif start == 0 and ex * dx + ey * dy < 0:
+                    return None
+            elif start >= 0 and start + slope >= 0:
+                continue
+            elif start <= 0 and start + slope <= 0:
+                t1 = t0
+            elif slope > 0:
+                t0 = max(t0, Fraction(-start, slope))
+            else:
+                t1 = min(t1, Fraction(-start, slope))
+            if t0 >= t1:
+                break
+        if t0 < t1:
+            found.append((t0, t1, x, y, dx, dy))
+    return found
+
+
+def exact_overlap(a, b, offset):
+    """Area of the overlap as a fraction, and (N, M_a, M_b) as real numbers."""
+    exponents = [math.frexp(v)[1] for v in sum(map(list, a + b + [offset]), []) if v != 0.0]
+    bits = 54 - min(exponents)
+    a_edges = edges_of(to_integers(a, (0.0, 0.0), bits))
+    b_edges = edges_of(to_integers(b, offset, bits))
+    on_a = intervals(a_edges, b_edges, True)
+    on_b = intervals(b_edges, a_edges, False)
+    if on_a is None or on_b is None:
+        return Fraction(0), None
+    twice = sum((t1 - t0) * (x * dy - y * dx) for t0, t1, x, y, dx, dy in on_a + on_b)
+    unit = Fraction(1, 2**bits)
+    cx, cy = int(Fraction(offset[0]) * 2**bits), int(Fraction(offset[1]) * 2**bits)
+    normal = [sum((t1 - t0) * dy for t0, t1, x, y, dx, dy in on_a),
+              -sum((t1 - t0) * dx for t0, t1, x, y, dx, dy in on_a)]
+
+    def moment(centre_x, centre_y):
+        return -sum((t1 - t0) * (dx * (x - centre_x + dx * (t0 + t1) / 2) + dy * (y - centre_y + dy * (t0 + t1) / 2))
+                    for t0, t1, x, y, dx, dy in on_a)
+
+    integrals = [float(normal[0] * unit), float(normal[1] * unit),
+                 float(moment(0, 0) * unit**2), float(moment(cx, cy) * unit**2)]
+    return twice * unit**2 / 2, integrals
+
+
+# --- pairs --------------------------------------------------------------------------------------------------
+
+
+def hull(points):
+    """Strictly convex hull, anticlockwise (Andrew's monotone chain)."""
+    points = sorted(set(points))
+
+    def chain(sequence):
+        kept = []
+        for p in sequence:
+            while len(kept) > 1 and ((kept[-1][0] - kept[-2][0]) * (p[1] - kept[-2][1])
+                                     - (kept[-1][1] - kept[-2][1]) * (p[0] - kept[-2][0])) <= 0:
+                kept.pop()
+            kept.append(p)
+        return kept[:-1]
+
+    return chain(points) + chain(points[::-1])
+
+
+def grain(rng, corners, size, aspect=1.0):
+    """Convex polygon in an ellipse, about its centre."""
+    turn = rng.uniform(0, 2 * math.pi)
+    angles = sorted(2 * math.pi * (k + 0.7 * rng.random()) / corners for k in range(corners))
+    return turned([(0.5 * size * math.cos(t), 0.5 * size / aspect * math.sin(t)) for t in angles], turn)
+
+
+def turned(points, angle):
+    c, s = math.cos(angle), math.sin(angle)
+    return [(c * x - s * y, s * x + c * y) for x, y in points]
+
+
+def support(points, direction):
+    return max(x * direction[0] + y * direction[1] for x, y in points)
+
+
+def corner_on_edge(rng, a, b, depth):
+    """b turned and moved so that a corner of a lies on an edge of b, then pushed in by a depth."""
+    i = rng.randrange(len(a))
+    before, corner, after = a[i - 1], a[i], a[(i + 1) % len(a)]
+    share = rng.uniform(0.05, 0.95)
+    along = math.atan2(corner[1] - before[1], corner[0] - before[0])
+    corner_turn = (math.atan2(after[1] - corner[1], after[0] - corner[0]) - along) % (2 * math.pi)
+    normal = along + share * corner_turn - math.pi / 2
+    p, q = b[0], b[1]
+    b = turned(b, normal + math.pi / 2 + math.pi - math.atan2(q[1] - p[1], q[0] - p[0]))
+    share = rng.uniform(0, 1)
+    point = [v + share * (w - v) for v, w in zip(b[0], b[1])]
+    return a, b, (corner[0] - point[0] - depth * math.cos(normal), corner[1] - point[1] - depth * math.sin(normal))
+
+
+def swapped(rng, pair):
+    a, b, offset = pair
+    return pair if rng.random() < 0.5 else (b, a, (-offset[0], -offset[1]))
+
+
+def pair_of_grains(rng):
+    a = grain(rng, rng.randint(3, 12), 0.008)
+    b = grain(rng, rng.randint(3, 12), 0.008 * 10 ** rng.uniform(-1, 1))
+    return corner_on_edge(rng, a, b, 0.004 * 10 ** rng.uniform(-13, 0) * rng.choice([-1, 1, 1, 1]))
+
+
+def grain_on_wall(rng):
+    tilt = rng.uniform(0, 2 * math.pi)
+    wall = turned([(-0.8, -0.02), (0.8, -0.02), (0.8, 0.02), (-0.8, 0.02)], tilt)
+    g = grain(rng, rng.randint(3, 12), 0.008, rng.uniform(1, 3))
+    side = (-math.sin(tilt), math.cos(tilt))
+    if rng.random() < 0.3:  # a face of the grain flush with the wall
+        p, q = g[0], g[1]
+        g = turned(g, tilt + math.pi - math.atan2(q[1] - p[1], q[0] - p[0]))
+    depth = rng.choice([0.0, 0.008 * 10 ** rng.uniform(-14, 0)])
+    distance = 0.02 + support(g, (-side[0], -side[1])) - depth
+    along = rng.uniform(-0.79, 0.79)
+    offset = (side[0] * distance + side[1] * along, side[1] * distance - side[0] * along)
+    return swapped(rng, (wall, g, offset))
+
+
+def grain_at_end_of_wall(rng):
+    wall, g, _ = grain_on_wall(rng)
+    if len(wall) != 4 or abs(wall[0][0]) + abs(wall[0][1]) < 0.5:
+        wall, g = g, wall
+    return swapped(rng, corner_on_edge(rng, wall, g, 0.008 * 10 ** rng.uniform(-14, 0)))
+
+
+def lattice_polygon(rng, span):
+    while True:
+        polygon = hull([(rng.randint(-span, span), rng.randint(-span, span)) for _ in range(rng.randint(3, 12))])
+        edges = edges_of(polygon)
+        if len(polygon) > 2 and all(-x * dy + y * dx < 0 for x, y, dx, dy in edges):
+            return polygon
+
+
+def lattice_pair(rng):
+    """Vertices on vertices and on edges, common edges, containment, copies: all of it exact."""
+    a = lattice_polygon(rng, rng.choice([2, 3, 5]))
+    b = rng.choice([a, lattice_polygon(rng, 3), lattice_polygon(rng, 2)])
+    unit = rng.choice([1.0, 0.125, 2.0**-30])
+    offset = (rng.randint(-6, 6), rng.randint(-6, 6))
+    return ([(x * unit, y * unit) for x, y in a], [(x * unit, y * unit) for x, y in b],
+            (offset[0] * unit, offset[1] * unit))
+
+
+def turned_lattice_pair(rng):
+    """The same, degenerate up to rounding only."""
+    a, b, offset = lattice_pair(rng)
+    angle = rng.uniform(0, 2 * math.pi)
+    return turned(a, angle), turned(b, angle), turned([offset], angle)[0]
+
+
+def needles(rng):
+    a = grain(rng, rng.randint(3, 8), 1.0, 50.0)
+    b = grain(rng, rng.randint(3, 8), 1.0, rng.choice([1.0, 50.0, 500.0]))
+    return corner_on_edge(rng, a, b, 0.1 * 10 ** rng.uniform(-13, 0))
+
+
+def nearly_parallel(rng):
+    a = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+    angle = 10 ** rng.uniform(-16, -3) * rng.choice([-1, 1])
+    depth = 10 ** rng.uniform(-16, -1) * rng.choice([-1, 0, 1])
+    turn = rng.uniform(0, 2 * math.pi)
+    return (turned(a, turn), turned(a, turn + angle), turned([(rng.uniform(-1, 1), 2.0 - depth)], turn)[0])
+
+
+def many_corners(rng):
+    a = grain(rng, rng.randint(40, 70), 1.0, rng.uniform(1, 2))
+    b = grain(rng, rng.randint(3, 70), 1.0, rng.uniform(1, 4))
+    return a, b, (rng.uniform(-1, 1), rng.uniform(-1, 1))
+
+
+KINDS = [pair_of_grains, grain_on_wall, grain_at_end_of_wall, lattice_pair, turned_lattice_pair, needles,
+         nearly_parallel, many_corners]
+# kinds whose polygons share no part of an edge: there N is a matter of convention
+GENERIC = [pair_of_grains, grain_at_end_of_wall, needles, many_corners]
+
+
+# --- comparison ---------------------------------------------------------------------------------------------
+
+
+def computed(program, pairs):
+    with tempfile.TemporaryDirectory() as folder:
+        source, target = os.path.join(folder, "pairs"), os.path.join(folder, "results")
+        with open(source, "wb") as file:
+            for a, b, offset, edge in pairs:
+                numbers = [len(a), len(b), edge, *offset] + [v for p in a + b for v in p]
+                file.write(struct.pack(f"={len(numbers)}d", *numbers))
+        subprocess.run([program, source, target], check=True)
+        with open(target, "rb") as file:
+            return list(struct.iter_unpack("=8d", file.read()))
+
+
+def allowed_error(a, b, exact):
+    def size(p):
+        return max(math.dist(v, w) for v in p for w in p)
+
+    smaller = min(a, b, key=size)
+    perimeter = sum(math.dist(v, w) for v, w in zip(smaller, smaller[1:] + smaller[:1]))
+    return max(1e-12 * float(exact), 16 * UNIT_ROUNDOFF * perimeter * size(smaller))
+
+
+def integral_error(a, b, offset, exact, integrals, result):
+    """Greatest relative error of N, M_a and M_b; 0 for slivers, whose ends rounding moves along the edges."""
+    size = min(max(math.dist(v, w) for v in p for w in p) for p in (a, b))
+    if exact < 1e-4 * size**2:
+        return 0.0
+    scales = [size, size] + 2 * [size * (size + math.hypot(*offset))]
+    return max(abs(x - y) / scale for x, y, scale in zip(integrals, result[3:7], scales))
+
+
+def check(program, kind, count, seed):
+    """Compare one kind of pairs; print one line; return the number of misses."""
+    rng = random.Random(f"{kind.__name__} {seed}")
+    pairs = [kind(rng) for _ in range(count)]
+    results = computed(program, [(a, b, o, 0) for a, b, o in pairs])
+    again = computed(program, [(a, b, o, rng.choice([r[7], rng.randint(1, len(a)), -rng.randint(1, len(b))]))
+                               for (a, b, o), r in zip(pairs, results)])
+    misses, worst, contacts = 0, 0.0, 0
+    for (a, b, offset), result, other in zip(pairs, results, again):
+        exact, integrals = exact_overlap(a, b, offset)
+        error = float(abs(Fraction(result[0]) - exact)) / allowed_error(a, b, exact)
+        worst = max(worst, error)
+        contacts += result[0] > 0.0
+        miss = []
+        if not error <= 1.0:
+            miss.append(f"error {error:.2f} of what is allowed")
+        if kind in GENERIC and integral_error(a, b, offset, exact, integrals, result) > 1e-10:
+            miss.append(f"integrals {result[3:7]} instead of {integrals}")
+        if exact == 0 and result[0] != 0.0:
+            miss.append("false contact")
+        if result[:7] != other[:7]:
+            miss.append("depends on the remembered edge")
+        if not all(map(math.isfinite, result)):
+            miss.append("not finite")
+        if miss:
+            misses += 1
+            if misses <= 3:
+                print(f"  {kind.__name__}: {', '.join(miss)}: A* = {float(exact):.6e}, A = {result[0]:.6e}, "
+                      f"a = {a}, b = {b}, offset = {offset}")
+    print(f"{kind.__name__:24s} {count:6d} pairs {contacts:6d} contacts, worst error {worst:8.2e} of the allowed, "
+          f"{misses} misses")
+    return misses
+
+
+def main():
+    program = sys.argv[1]
+    count = int(sys.argv[2]) if len(sys.argv) > 2 else 250
+    seed = sys.argv[3] if len(sys.argv) > 3 else "1"
+    sys.exit(1 if sum(check(program, kind, count, seed) for kind in KINDS) else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,220 @@
+!> Shapes for the tests of overlaps, and one call that computes a case in many positions.
+module overlap_cases
+   use polydem_convex_overlap, only: overlap_polygons, overlap_t
+   use polydem_kinds, only: ip, wp
+   use polydem_polygon, only: diameter
+   use polydem_random, only: random_t
+   implicit none
+   private
+   public :: rectangle, regular, grain, turned, overlap_of, worst_area, worst_normal, worst_centroid, roundoff
+   public :: two_pi
+
+   !> Full turn [rad]
+   real(wp), parameter :: two_pi = 6.283185307179586476925286766559_wp
+   !> Angles at which every case is computed: none, odd ones, a quarter, a half [rad]
+   real(wp), parameter :: angles(8) = [0.0_wp, 0.1_wp, 0.7853981_wp, 1.0_wp, 0.25_wp*two_pi, 2.3_wp, &
+                                       0.5_wp*two_pi, 5.77_wp]
+
+contains
+
+   !> Rectangle about its centre
+   pure function rectangle(width, height) result(vertices)
+      !> Side along x
+      real(wp), intent(in) :: width
+      !> Side along y
+      real(wp), intent(in) :: height
+      real(wp) :: vertices(2, 4)
+
+      vertices = reshape(0.5_wp*[-width, -height, width, -height, width, height, -width, height], [2, 4])
+   end function rectangle
+
+   !> Regular polygon about its centre, one vertex at an angle
+   pure function regular(corners, radius, angle) result(vertices)
+      !> Number of vertices
+      integer(ip), intent(in) :: corners
+      !> Radius of the circle around it
+      real(wp), intent(in) :: radius
+      !> Angle of the first vertex [rad]
+      real(wp), intent(in) :: angle
+      real(wp) :: vertices(2, corners)
+      integer(ip) :: k
+
+      do k = 1_ip, corners
+         vertices(1, k) = radius*cos(angle + two_pi*real(k - 1_ip, wp)/real(corners, wp))
+         vertices(2, k) = radius*sin(angle + two_pi*real(k - 1_ip, wp)/real(corners, wp))
+      end do
+   end function regular
+
+   !> Irregular polygon in a circle about its centre
+   function grain(random, corners, radius) result(vertices)
+      !> Source of its irregularity
+      type(random_t), intent(inout) :: random
+      !> Number of vertices
+      integer(ip), intent(in) :: corners
+      !> Radius of the circle around it
+      real(wp), intent(in) :: radius
+      real(wp) :: vertices(2, corners), angle, start
+      integer(ip) :: k
+
+      start = random%between(0.0_wp, two_pi)
+      do k = 1_ip, corners
+         angle = start + two_pi*(real(k, wp) + random%between(0.0_wp, 0.6_wp))/real(corners, wp)
+         vertices(:, k) = radius*[cos(angle), sin(angle)]
+      end do
+   end function grain
+
+   !> Points turned about the origin
+   pure function turned(points, angle) result(image)
+      !> Points, (2, n)
+      real(wp), intent(in) :: points(:, :)
+      !> Angle, anticlockwise [rad]
+      real(wp), intent(in) :: angle
+      real(wp) :: image(2, size(points, 2)), c, s
+
+      c = cos(angle)
+      s = sin(angle)
+      if (.not. abs(angle) > 0.0_wp) s = 0.0_wp
+      image(1, :) = c*points(1, :) - s*points(2, :)
+      image(2, :) = s*points(1, :) + c*points(2, :)
+   end function turned
+
+   !> Overlap of two polygons without a remembered edge
+   pure function overlap_of(a, b, offset) result(overlap)
+      !> First polygon
+      real(wp), intent(in), contiguous :: a(:, :)
+      !> Second polygon
+      real(wp), intent(in), contiguous :: b(:, :)
+      !> Centre of b minus centre of a
+      real(wp), intent(in) :: offset(2)
+      type(overlap_t) :: overlap
+
+      call overlap_polygons(a, b, offset, 0_ip, overlap)
+   end function overlap_of
+
+   !> The rounding that is allowed: 16 u times perimeter times diameter of the smaller polygon
+   pure real(wp) function roundoff(a, b)
+      !> First polygon
+      real(wp), intent(in) :: a(:, :)
+      !> Second polygon
+      real(wp), intent(in) :: b(:, :)
+
+      if (diameter(a) <= diameter(b)) then
+         roundoff = 8.0_wp*epsilon(1.0_wp)*diameter(a)*perimeter(a)
+      else
+         roundoff = 8.0_wp*epsilon(1.0_wp)*diameter(b)*perimeter(b)
+      end if
+   end function roundoff
+
+   !> Length of an outline
+   pure real(wp) function perimeter(vertices)
+      real(wp), intent(in) :: vertices(:, :)
+      integer(ip) :: k, n
+
+      n = size(vertices, 2, kind=ip)
+      perimeter = 0.0_wp
+      do k = 1_ip, n
+         perimeter = perimeter + norm2(vertices(:, 1_ip + modulo(k, n)) - vertices(:, k))
+      end do
+   end function perimeter
+
+   !> Greatest error of the area over all angles and both orders
+   pure real(wp) function worst_area(a, b, offset, area)
+      !> First polygon
+      real(wp), intent(in) :: a(:, :)
+      !> Second polygon
+      real(wp), intent(in) :: b(:, :)
+      !> Centre of b minus centre of a
+      real(wp), intent(in) :: offset(2)
+      !> True area
+      real(wp), intent(in) :: area
+      type(overlap_t) :: overlap
+      integer :: k
+
+      worst_area = 0.0_wp
+      do k = 1, 2*size(angles)
+         overlap = placed(a, b, offset, k)
+         worst_area = worse(worst_area, abs(overlap%area - area))
+      end do
+   end function worst_area
+
+   !> Greatest error of the normal vector over all angles and both orders
+   pure real(wp) function worst_normal(a, b, offset, normal)
+      !> First polygon
+      real(wp), intent(in) :: a(:, :)
+      !> Second polygon
+      real(wp), intent(in) :: b(:, :)
+      !> Centre of b minus centre of a
+      real(wp), intent(in) :: offset(2)
+      !> True integral of the outward normal of a over its outline inside b
+      real(wp), intent(in) :: normal(2)
+      type(overlap_t) :: overlap
+      real(wp) :: image(2, 1)
+      integer :: k
+
+      worst_normal = 0.0_wp
+      do k = 1, 2*size(angles)
+         overlap = placed(a, b, offset, k)
+         image = turned(reshape(normal, [2, 1]), angle_of(k))
+         if (modulo(k, 2) == 0) image = -image
+         worst_normal = worse(worst_normal, norm2(overlap%normal - image(:, 1)))
+      end do
+   end function worst_normal
+
+   !> Greatest error of the centroid over all angles and both orders
+   pure real(wp) function worst_centroid(a, b, offset, centroid)
+      !> First polygon
+      real(wp), intent(in) :: a(:, :)
+      !> Second polygon
+      real(wp), intent(in) :: b(:, :)
+      !> Centre of b minus centre of a
+      real(wp), intent(in) :: offset(2)
+      !> True centroid relative to the centre of a
+      real(wp), intent(in) :: centroid(2)
+      type(overlap_t) :: overlap
+      real(wp) :: image(2, 1)
+      integer :: k
+
+      worst_centroid = 0.0_wp
+      do k = 1, 2*size(angles)
+         overlap = placed(a, b, offset, k)
+         image(:, 1) = centroid
+         if (modulo(k, 2) == 0) image(:, 1) = centroid - offset
+         image = turned(image, angle_of(k))
+         worst_centroid = worse(worst_centroid, norm2(overlap%centroid - image(:, 1)))
+      end do
+   end function worst_centroid
+
+   !> The larger of two errors; an error that is not a number is the largest
+   pure real(wp) function worse(a, b)
+      real(wp), intent(in) :: a
+      real(wp), intent(in) :: b
+
+      worse = merge(max(a, b), huge(1.0_wp), a >= 0.0_wp .and. b >= 0.0_wp)
+   end function worse
+
+   !> The angle of a position: two positions, one for each order, share an angle
+   pure real(wp) function angle_of(k)
+      integer, intent(in) :: k
+
+      angle_of = angles(1 + ishft(k - 1, -1))
+   end function angle_of
+
+   !> Overlap at one of the angles: odd k in the order given, even k in the other
+   pure function placed(a, b, offset, k) result(overlap)
+      real(wp), intent(in) :: a(:, :)
+      real(wp), intent(in) :: b(:, :)
+      real(wp), intent(in) :: offset(2)
+      integer, intent(in) :: k
+      type(overlap_t) :: overlap
+      real(wp) :: arm(2, 1), angle
+
+      angle = angle_of(k)
+      arm = turned(reshape(offset, [2, 1]), angle)
+      if (modulo(k, 2) == 1) then
+         overlap = overlap_of(turned(a, angle), turned(b, angle), arm(:, 1))
+      else
+         overlap = overlap_of(turned(b, angle), turned(a, angle), -arm(:, 1))
+      end if
+   end function placed
+
+end module overlap_cases
