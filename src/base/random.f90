@@ -55,7 +55,8 @@ contains
       self%s2 = [self%s2(2), self%s2(3), p2]
       difference = p1 - p2
       if (difference <= 0_lp) difference = difference + m1
-      uniform = real(difference, wp)/real(m1 + 1_lp, wp)
+      ! In single precision the quotient could be rounded to 1.
+      uniform = min(real(difference, wp)/real(m1 + 1_lp, wp), 1.0_wp - epsilon(1.0_wp))
    end function uniform
 
    !> A number between two bounds, uniformly distributed

@@ -25,15 +25,25 @@ module polydem_bodies_file
 
    !> What the file says, complete and consistent once it is read
    type :: table_t
+      !> Number of bodies
       integer(ip) :: n = 0_ip
+      !> Corners of all bodies in the world, (2, corner) [m]
       real(dp), allocatable :: vertex(:, :)
+      !> First corner of each body from 0, and one past the last, (n + 1)
       integer(ip), allocatable :: vertex_start(:)
+      !> Whether each body is fixed (1) or free (0)
       integer(ip), allocatable :: fixed(:)
+      !> Velocities, (2, body) [m/s]
       real(dp), allocatable :: velocity(:, :)
+      !> Angular velocities [rad/s]
       real(dp), allocatable :: angular_velocity(:)
+      !> Densities [kg/m3]
       real(dp), allocatable :: density(:)
+      !> Masses [kg/m]
       real(dp), allocatable :: mass(:)
+      !> Moments of inertia [kg m]
       real(dp), allocatable :: inertia(:)
+      !> Identifiers
       integer(ip), allocatable :: id(:)
    end type table_t
 

@@ -1,0 +1,90 @@
+!> What a run consists of, in words: for `check` and for the head of the log.
+module polydem_description
+   use polydem_kinds, only: ip, wp
+   use polydem_log, only: log_t
+   use polydem_simulation, only: simulation_t
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: describe
+
+contains
+
+   !> Write the parts that the scene uses, its counts, and the step against its bound.
+   subroutine describe(simulation, log)
+      !> A simulation at time 0
+      type(simulation_t), intent(in) :: simulation
+      !> Log
+      type(log_t), intent(inout) :: log
+
+      associate (s => simulation)
+         call log%write_line('bodies     '//to_text(size(s%bodies%free, kind=ip))//' free, '// &
+                             to_text(s%bodies%n - size(s%bodies%free, kind=ip))//' fixed')
+         call log%write_line('boxes      '//to_text(s%boxes%n)//', of which '// &
+                             to_text(count(s%boxes%fixed, kind=ip))//' of fixed bodies')
+         call log%write_line('parts      '//s%settings%neighbours%finder//', '//s%law%description//gravity_text(s)// &
+                             ', '//s%settings%integrate%scheme//motion_text(s)//ledger_text(s))
+         call log%write_line('step       dt = '//to_text(s%dt)//' s, '// &
+                             to_text(s%dt/s%expected_stable_step, 3)//' of the stable step '// &
+                             to_text(s%expected_stable_step)//' s expected from the shapes')
+         call log%write_line('duration   '//to_text(s%settings%integrate%duration)//' s, '//to_text(s%n_steps)// &
+                             ' steps')
+         if (s%contacts%n > 0_ip) then
+            call log%write_line('at start   '//to_text(s%contacts%n)//' contacts, the deepest '//deepest(s))
+         end if
+      end associate
+   end subroutine describe
+
+   function gravity_text(simulation) result(text)
+      type(simulation_t), intent(in) :: simulation
+      character(len=:), allocatable :: text
+
+      text = ''
+      associate (gravity => simulation%settings%forces%gravity)
+         if (abs(gravity(1)) + abs(gravity(2)) > 0.0_wp) text = ', gravity'
+      end associate
+   end function gravity_text
+
+   function motion_text(simulation) result(text)
+      type(simulation_t), intent(in) :: simulation
+      character(len=:), allocatable :: text
+      integer :: k
+
+      text = ''
+      do k = 1, size(simulation%motions)
+         text = text//', '//trim(simulation%motions(k)%kind)//' of '// &
+            to_text(size(simulation%motions(k)%slots, kind=ip))//' walls'
+      end do
+   end function motion_text
+
+   function ledger_text(simulation) result(text)
+      type(simulation_t), intent(in) :: simulation
+      character(len=:), allocatable :: text
+
+      text = ''
+      if (simulation%settings%output%ledger) text = ', ledger'
+   end function ledger_text
+
+   !> The contact with the greatest area over length
+   function deepest(simulation) result(text)
+      type(simulation_t), intent(in) :: simulation
+      character(len=:), allocatable :: text
+      real(wp) :: depth, greatest
+      integer(ip) :: c, worst
+
+      worst = 1_ip
+      greatest = -1.0_wp
+      associate (contacts => simulation%contacts)
+         do c = 1_ip, contacts%n
+            depth = contacts%area(c)/contacts%length(c)
+            if (depth > greatest) then
+               greatest = depth
+               worst = c
+            end if
+         end do
+         text = to_text(greatest, 3)//' m between the bodies '//to_text(simulation%bodies%id(contacts%first(worst)))// &
+            ' and '//to_text(simulation%bodies%id(contacts%second(worst)))
+      end associate
+   end function deepest
+
+end module polydem_description

@@ -1,0 +1,112 @@
+!> What this program is, and what a result holds.
+module polydem_info
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_hdf5_file, only: hdf5_file_t
+   use polydem_kinds, only: dp, ip, lp
+   use polydem_log, only: log_t
+   use polydem_log_tables, only: write_header
+   use polydem_paths, only: exists
+   use polydem_provenance, only: collect_provenance, provenance_t
+   use polydem_result_folder, only: holds_result, open_suffix, profile_path, segment_path
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: describe_program, describe_result
+
+   character(len=*), parameter :: facts(*) = [character(len=16) :: 'version', 'revision', 'build_type', 'compiler', &
+                                              'options', 'precision', 'host', 'processor', 'caches', 'input_file', &
+                                              'started', 'written']
+
+contains
+
+   !> Print version, compiler, options and machine.
+   subroutine describe_program(error)
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      type(provenance_t) :: provenance
+      type(log_t) :: log
+
+      call collect_provenance(provenance, '-', '', '', 0_ip)
+      call log%open('', error)
+      call write_header(log, provenance, '-')
+   end subroutine describe_program
+
+   !> Print what a result folder, a profile or a segment says of itself.
+   subroutine describe_result(path, error)
+      !> Folder of a result, or one of its HDF5 files
+      character(len=*), intent(in) :: path
+      !> Allocated if there is no such result
+      type(error_t), allocatable, intent(inout) :: error
+      type(log_t) :: log
+      integer(ip) :: number
+
+      call log%open('', error)
+      if (.not. exists(path)) then
+         call raise(error, input_error, path//': there is no such file or folder')
+      else if (exists(profile_path(path))) then
+         call describe_file(profile_path(path), log, error)
+      else if (.not. holds_result(path)) then
+         call describe_file(path, log, error)
+         return
+      end if
+      number = 1_ip
+      do
+         if (allocated(error)) return
+         if (.not. exists(segment_path(path, number))) exit
+         call describe_file(segment_path(path, number), log, error)
+         number = number + 1_ip
+      end do
+      if (exists(segment_path(path, number)//open_suffix)) then
+         call describe_file(segment_path(path, number)//open_suffix, log, error)
+      end if
+   end subroutine describe_result
+
+   subroutine describe_file(path, log, error)
+      character(len=*), intent(in) :: path
+      type(log_t), intent(inout) :: log
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+      character(len=:), allocatable :: text
+      real(dp), allocatable :: times(:)
+      integer(lp), allocatable :: shape(:)
+      logical :: is_profile
+      integer :: k
+
+      call file%open(path, error)
+      if (allocated(error)) return
+      call log%write_line(path)
+      is_profile = file%has('/state_hash')
+      do k = 1, size(facts)
+         if (allocated(error)) return
+         if (k > 2 .and. .not. is_profile) cycle
+         if (.not. file%has('/provenance/'//trim(facts(k)))) cycle
+         call file%read('/provenance/'//trim(facts(k)), text, error)
+         if (.not. allocated(error)) call log%write_line('   '//facts(k)//text)
+      end do
+      if (allocated(error)) return
+      if (file%has('/frames/time')) then
+         call file%read('/frames/time', times, error)
+         call file%shape_of('/frames/position', shape, error)
+         if (.not. allocated(error) .and. size(times) > 0) then
+            call log%write_line('   frames          '//to_text(size(times, kind=ip))//' of '//to_text(shape(2))// &
+                                ' bodies, from '//to_text(times(1))//' s to '//to_text(times(size(times)))//' s')
+         end if
+      end if
+      if (is_profile) call describe_end(file, log, error)
+      call file%close(error)
+   end subroutine describe_file
+
+   subroutine describe_end(file, log, error)
+      type(hdf5_file_t), intent(inout) :: file
+      type(log_t), intent(inout) :: log
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: text
+
+      if (allocated(error)) return
+      call file%read('/status', text, error)
+      if (.not. allocated(error)) call log%write_line('   status          '//text)
+      call file%read('/state_hash', text, error)
+      if (.not. allocated(error)) call log%write_line('   state hash      '//text)
+   end subroutine describe_end
+
+end module polydem_info

@@ -1,0 +1,231 @@
+!> A run from its settings to its result.
+module polydem_run
+   use polydem_bodies, only: state_hash
+   use polydem_books, only: fill_row, write_books
+   use polydem_clock, only: wall_seconds
+   use polydem_counters, only: counters_t
+   use polydem_description, only: describe
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_kinds, only: dp, lp, wp
+   use polydem_ledger, only: balance_t
+   use polydem_ledger_row, only: ledger_row_t
+   use polydem_log, only: log_t
+   use polydem_log_tables, only: write_counters, write_hash, write_header, write_timings
+   use polydem_paths, only: make_folder
+   use polydem_profile, only: write_profile
+   use polydem_provenance, only: collect_provenance, provenance_t
+   use polydem_result_folder, only: clear_result, holds_result
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: advance, check_stability, new_simulation, report_counters, simulation_t, time_of
+   use polydem_strings, only: to_text
+   use polydem_timers, only: stage_output
+   use polydem_trajectory, only: trajectory_t
+   implicit none
+   private
+   public :: run_simulation
+
+   !> Steps between two looks at the stable step
+   integer(lp), parameter :: stability_interval = 100_lp
+   !> Lines of the log if no interval is given
+   integer(lp), parameter :: default_lines = 20_lp
+
+   !> A run under way
+   type :: run_t
+      !> What is simulated
+      type(simulation_t) :: simulation
+      !> Frames
+      type(trajectory_t) :: trajectory
+      !> Log on the screen and in the folder
+      type(log_t) :: log
+      !> Where the result comes from
+      type(provenance_t) :: provenance
+      !> Ledger of the last frame or line
+      type(ledger_row_t) :: row
+      !> Energy and momentum at the last frame or line
+      type(balance_t) :: balance
+      !> Folder of the result
+      character(len=:), allocatable :: folder
+      !> Steps between two frames, 0 for none
+      integer(lp) :: frame_steps = 0_lp
+      !> Steps between two lines of the log
+      integer(lp) :: log_steps = 0_lp
+      !> Greatest share of the stable step that was warned of
+      real(wp) :: warned = 0.0_wp
+      !> Greatest share of the stable step seen
+      real(wp) :: greatest_share = 0.0_wp
+   end type run_t
+
+contains
+
+   !> Run a simulation, and leave trajectory, profile and log in its folder.
+   subroutine run_simulation(settings, force, error)
+      !> Checked settings
+      type(settings_t), intent(in) :: settings
+      !> Whether an older result may be overwritten
+      logical, intent(in) :: force
+      !> Why the run could not start or go on
+      type(error_t), allocatable, intent(inout) :: error
+      type(run_t) :: run
+      real(dp) :: began
+
+      began = wall_seconds()
+      call prepare(settings, force, run, error)
+      if (allocated(error)) return
+      do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
+         call advance(run%simulation, error)
+         if (.not. allocated(error)) call watch(run, error)
+         call run%simulation%timers%lap(stage_output)
+         call run%simulation%timers%end_step()
+      end do
+      call finish(run, wall_seconds() - began, error)
+   end subroutine run_simulation
+
+   !> Folder, log, scene, first frame.
+   subroutine prepare(settings, force, run, error)
+      type(settings_t), intent(in) :: settings
+      logical, intent(in) :: force
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+
+      run%folder = result_folder(settings)
+      if (holds_result(run%folder) .and. .not. force) then
+         call raise(error, input_error, run%folder//' holds a result; give --force to overwrite it, or another '// &
+                    'folder with --set output.folder=NAME')
+         return
+      end if
+      call new_simulation(settings, run%simulation, error)
+      if (allocated(error)) return
+      call make_folder(run%folder, error)
+      if (allocated(error)) return
+      call clear_result(run%folder, error)
+      call run%log%open(run%folder, error)
+      if (allocated(error)) return
+      call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
+      call write_header(run%log, run%provenance, run%folder)
+      call describe(run%simulation, run%log)
+      call choose_intervals(run)
+      call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error)
+      call watch(run, error)
+   end subroutine prepare
+
+   !> Frame, line and look at the stable step, when it is time for them.
+   subroutine watch(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: frame_due, line_due
+
+      associate (s => run%simulation)
+         frame_due = s%step == s%n_steps .or. is_due(s%step, run%frame_steps)
+         line_due = s%step == s%n_steps .or. is_due(s%step, run%log_steps)
+         if (line_due .or. is_due(s%step, stability_interval)) call look_at_step(run, error)
+         if (allocated(error)) return
+         if ((frame_due .or. line_due) .and. s%settings%output%ledger) call fill_row(s, run%balance, run%row)
+         if (line_due) then
+            call run%log%write_interval(s%step, s%n_steps, time_of(s), s%dt, run%balance%kinetic, &
+                                        run%balance%potential, s%contacts%n)
+         end if
+         if (frame_due) call write_frame(run, error)
+         call run%log%show_progress(s%step, s%n_steps)
+      end associate
+   end subroutine watch
+
+   subroutine write_frame(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (s => run%simulation, output => run%simulation%settings%output)
+         if (output%contacts .and. output%ledger) then
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, row=run%row)
+         else if (output%contacts) then
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts)
+         else if (output%ledger) then
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, row=run%row)
+         else
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error)
+         end if
+      end associate
+   end subroutine write_frame
+
+   !> Compare the step with the stable step of the contacts, and warn when the share has grown by a tenth.
+   subroutine look_at_step(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: warning
+      real(wp) :: stable, share
+
+      call check_stability(run%simulation, stable, warning, error)
+      share = run%simulation%dt/stable
+      run%greatest_share = max(run%greatest_share, share)
+      if (.not. allocated(warning) .or. share <= 1.1_wp*run%warned) return
+      run%warned = share
+      call run%log%write_line('warning: '//warning)
+   end subroutine look_at_step
+
+   !> Close the trajectory, write the profile and the end of the log, also after a failure.
+   subroutine finish(run, seconds, error)
+      type(run_t), intent(inout) :: run
+      real(dp), intent(in) :: seconds
+      type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: late_error
+      type(counters_t) :: counters
+      character(len=:), allocatable :: status
+      integer(lp) :: hash
+
+      status = 'finished'
+      if (allocated(error)) status = error%message
+      associate (s => run%simulation)
+         hash = state_hash(s%bodies)
+         call report_counters(s, counters)
+         call run%trajectory%close(late_error)
+         call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, status, late_error)
+         call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n)
+         call write_counters(run%log, counters)
+         if (s%settings%output%ledger) call write_books(s, run%log)
+         call run%log%write_line('greatest share of the stable step of the contacts: '//to_text(run%greatest_share, 3))
+      end associate
+      if (allocated(error)) call run%log%write_line('stopped: '//status)
+      call write_hash(run%log, hash)
+      call run%log%close()
+      if (.not. allocated(error) .and. allocated(late_error)) call move_alloc(late_error, error)
+   end subroutine finish
+
+   subroutine choose_intervals(run)
+      type(run_t), intent(inout) :: run
+
+      associate (s => run%simulation, output => run%simulation%settings%output)
+         run%frame_steps = in_steps(output%frame_interval, s%dt)
+         run%log_steps = in_steps(output%log_interval, s%dt)
+         if (run%log_steps == 0_lp) run%log_steps = max(1_lp, s%n_steps/default_lines)
+      end associate
+   end subroutine choose_intervals
+
+   !> An interval in steps, at least one; 0 for none
+   pure integer(lp) function in_steps(interval, dt)
+      real(wp), intent(in) :: interval, dt
+
+      in_steps = 0_lp
+      if (interval > 0.0_wp) in_steps = max(1_lp, nint(interval/dt, lp))
+   end function in_steps
+
+   pure logical function is_due(step, interval)
+      integer(lp), intent(in) :: step, interval
+
+      is_due = step == 0_lp
+      if (interval > 0_lp) is_due = mod(step, interval) == 0_lp
+   end function is_due
+
+   !> The folder of the settings, or results/<name of the input without path and suffix>
+   pure function result_folder(settings) result(folder)
+      type(settings_t), intent(in) :: settings
+      character(len=:), allocatable :: folder
+      integer :: first, last
+
+      folder = settings%output%folder
+      if (folder /= '') return
+      first = index(settings%file, '/', back=.true.) + 1
+      last = index(settings%file, '.', back=.true.) - 1
+      if (last < first) last = len(settings%file)
+      folder = 'results/'//settings%file(first:last)
+   end function result_folder
+
+end module polydem_run

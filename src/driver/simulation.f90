@@ -1,0 +1,301 @@
+!> A simulation and its time step.
+module polydem_simulation
+   use polydem_assemble, only: assemble_forces, incidence_t, index_contacts
+   use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_boxes, only: boxes_t
+   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_counters, only: counters_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_find_contacts, only: find_contacts
+   use polydem_force_law, only: evaluate_law, force_law_t, new_force_law
+   use polydem_guards, only: check_contacts, check_motion, check_step, greatest_move
+   use polydem_integrator, only: integrator_t
+   use polydem_integrator_factory, only: new_integrator
+   use polydem_kinds, only: bp, ip, lp, wp
+   use polydem_ledger, only: book_step, ledger_t, open_ledger
+   use polydem_make_boxes, only: box_maker_t, new_box_maker, update_boxes
+   use polydem_motion, only: motion_t, move_bodies
+   use polydem_neighbours, only: neighbours_t, new_neighbours
+   use polydem_scene, only: build_scene
+   use polydem_settings, only: settings_t
+   use polydem_stable_step, only: stable_step_of_contacts, stable_step_of_shapes
+   use polydem_timers, only: stage_boxes, stage_forces, stage_integrate, stage_neighbours, stage_overlap, timers_t
+   implicit none
+   private
+   public :: simulation_t, new_simulation, start_simulation, advance, time_of, report_counters, check_stability
+
+   !> Everything that a run consists of
+   type :: simulation_t
+      !> Settings of the run
+      type(settings_t) :: settings
+      !> Bodies
+      type(bodies_t) :: bodies
+      !> Prescribed motions of fixed bodies
+      type(motion_t), allocatable :: motions(:)
+      !> How the boxes are made
+      type(box_maker_t) :: maker
+      !> Bounding boxes
+      type(boxes_t) :: boxes
+      !> Pairs of bodies whose boxes overlap
+      type(neighbours_t) :: neighbours
+      !> Contacts of the last step
+      type(contacts_t) :: contacts
+      !> What is remembered of the pairs
+      type(contact_memory_t) :: memory
+      !> Contacts of each body
+      type(incidence_t) :: incidence
+      !> Force law
+      type(force_law_t) :: law
+      !> Integrator
+      class(integrator_t), allocatable :: integrator
+      !> Books of energy and momentum
+      type(ledger_t) :: ledger
+      !> Seconds per stage
+      type(timers_t) :: timers
+      !> Steps done
+      integer(lp) :: step = 0_lp
+      !> Steps to do
+      integer(lp) :: n_steps = 0_lp
+      !> Time step [s]
+      real(wp) :: dt = 0.0_wp
+      !> Stable step expected from the shapes [s]
+      real(wp) :: expected_stable_step = 0.0_wp
+      !> Greatest move of a body in one step [m]
+      real(wp), private :: move_limit = 0.0_wp
+      !> Slots that may move: free bodies, then those of motions; the first n_free of them are the free ones
+      integer(ip), allocatable, private :: moving(:)
+      !> Sums over all steps: pairs, contacts, pairs that began, pairs that ended, degenerate contacts
+      integer(lp), private :: sums(5) = 0_lp
+   end type simulation_t
+
+contains
+
+   !> Build the scene that the settings ask for and everything else.
+   subroutine new_simulation(settings, self, error)
+      !> Checked settings
+      type(settings_t), intent(in) :: settings
+      !> The simulation, ready to advance
+      type(simulation_t), intent(out) :: self
+      !> Bad input
+      type(error_t), allocatable, intent(inout) :: error
+      type(bodies_t) :: bodies
+      type(motion_t), allocatable :: motions(:)
+
+      call build_scene(settings, bodies, motions, error)
+      if (allocated(error)) return
+      call start_simulation(settings, bodies, motions, self, error)
+   end subroutine new_simulation
+
+   !> Start from given bodies, and compute the forces at time 0.
+   subroutine start_simulation(settings, bodies, motions, self, error)
+      !> Checked settings; the group &scene is not used
+      type(settings_t), intent(in) :: settings
+      !> Bodies at the start
+      type(bodies_t), intent(in) :: bodies
+      !> Prescribed motions of fixed bodies
+      type(motion_t), intent(in) :: motions(:)
+      !> The simulation, ready to advance
+      type(simulation_t), intent(out) :: self
+      !> Bad input
+      type(error_t), allocatable, intent(inout) :: error
+
+      self%settings = settings
+      self%bodies = bodies
+      self%motions = motions
+      call new_force_law(settings%forces, self%law)
+      call new_integrator(settings%integrate, self%integrator)
+      call choose_step(self, error)
+      if (allocated(error)) return
+      self%move_limit = greatest_move(self%bodies)
+      call list_moving(self)
+      call new_box_maker(self%maker, self%bodies, settings%boxes%largest_ratio, self%boxes)
+      call new_neighbours(self%neighbours, settings%neighbours%finder, self%boxes, error)
+      if (allocated(error)) return
+      call allocate_memory(self)
+      call move_walls(self, 0.0_wp)
+      call find_and_push(self, 0.0_wp, error)
+      if (allocated(error)) return
+      call start_integration(self)
+      if (settings%output%ledger) call open_ledger(self%ledger, settings%forces%gravity, self%bodies, self%contacts)
+      self%timers = timers_t()
+   end subroutine start_simulation
+
+   !> One time step.
+   subroutine advance(self, error)
+      !> The simulation
+      type(simulation_t), intent(inout) :: self
+      !> The run cannot go on; names body, position and step
+      type(error_t), allocatable, intent(inout) :: error
+
+      self%step = self%step + 1_lp
+      call self%timers%start()
+      call self%integrator%predict(self%dt, self%bodies)
+      call move_walls(self, time_of(self))
+      call turn_bodies(self%bodies, self%moving)
+      call self%timers%lap(stage_integrate)
+      call find_and_push(self, self%dt, error)
+      if (allocated(error)) return
+      if (self%settings%output%ledger) then
+         call book_step(self%ledger, self%dt, self%settings%forces%gravity, self%bodies, self%contacts)
+         call self%timers%lap(stage_forces)
+      end if
+      call self%integrator%correct(self%dt, self%bodies)
+      call check_motion(self%bodies, self%step, self%dt, self%move_limit, error)
+      call self%timers%lap(stage_integrate)
+   end subroutine advance
+
+   !> Simulated time [s]: a product, so that it does not drift.
+   pure real(wp) function time_of(self)
+      !> The simulation
+      type(simulation_t), intent(in) :: self
+
+      time_of = real(self%step, wp)*self%dt
+   end function time_of
+
+   !> Compare the step with the stable step of the present contacts.
+   subroutine check_stability(self, stable, warning, error)
+      !> The simulation
+      type(simulation_t), intent(in) :: self
+      !> Stable step of the present contacts [s], huge if there are none
+      real(wp), intent(out) :: stable
+      !> Set if the step is large
+      character(len=:), allocatable, intent(out) :: warning
+      !> Set if the step is unstable
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: critical
+
+      call stable_step_of_contacts(self%settings%forces, self%integrator%stability(), self%bodies, self%incidence, &
+                                   self%contacts, stable, critical)
+      call check_step(self%bodies, self%contacts, self%step, self%dt, stable, critical, warning, error)
+   end subroutine check_stability
+
+   !> Exact counts of the work done so far.
+   subroutine report_counters(self, counters)
+      !> The simulation
+      type(simulation_t), intent(in) :: self
+      !> List to set them in
+      type(counters_t), intent(inout) :: counters
+
+      call counters%set('steps', self%step)
+      call counters%set('bodies', int(self%bodies%n, lp))
+      call counters%set('boxes', int(self%boxes%n, lp))
+      call counters%set('pairs', self%sums(1))
+      call counters%set('pairs began', self%sums(3))
+      call counters%set('pairs ended', self%sums(4))
+      call counters%set('contacts', self%sums(2))
+      call counters%set('contacts without direction', self%sums(5))
+      call self%neighbours%report(counters)
+   end subroutine report_counters
+
+   !> From the poses of the bodies to the forces on them: the middle of the step.
+   subroutine find_and_push(self, dt, error)
+      type(simulation_t), intent(inout) :: self
+      real(wp), intent(in) :: dt
+      type(error_t), allocatable, intent(inout) :: error
+
+      call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
+      call self%timers%lap(stage_boxes)
+      call self%neighbours%update(self%boxes)
+      call carry_memory(self)
+      call self%timers%lap(stage_neighbours)
+      associate (pairs => self%neighbours%pairs)
+         call find_contacts(self%bodies, pairs%n, pairs%first, pairs%second, self%memory, self%contacts)
+         self%sums = self%sums + int([pairs%n, self%contacts%n, pairs%n_began, pairs%n_ended, &
+                                      self%contacts%n_degenerate], lp)
+      end associate
+      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%contacts, self%step, error)
+      call self%timers%lap(stage_overlap)
+      call evaluate_law(self%law, self%bodies, dt, self%contacts, self%memory)
+      call index_contacts(self%bodies%n, self%contacts, self%incidence)
+      call assemble_forces(self%settings%forces%gravity, self%incidence, self%contacts, self%bodies)
+      call self%timers%lap(stage_forces)
+   end subroutine find_and_push
+
+   !> Move the columns of memory along with the pair list.
+   subroutine carry_memory(self)
+      type(simulation_t), intent(inout) :: self
+
+      associate (pairs => self%neighbours%pairs, memory => self%memory)
+         call pairs%carry(memory%touching, 0_bp)
+         call pairs%carry(memory%separating_edge, 0_ip)
+         if (allocated(memory%tangential)) call pairs%carry(memory%tangential, 0.0_wp)
+         if (allocated(memory%area)) call pairs%carry(memory%area, 0.0_wp)
+      end associate
+   end subroutine carry_memory
+
+   subroutine allocate_memory(self)
+      type(simulation_t), intent(inout) :: self
+
+      allocate (self%memory%touching(0), self%memory%separating_edge(0))
+      if (self%law%needs_tangential) allocate (self%memory%tangential(0))
+      if (self%law%needs_area) allocate (self%memory%area(0))
+   end subroutine allocate_memory
+
+   subroutine move_walls(self, time)
+      type(simulation_t), intent(inout) :: self
+      real(wp), intent(in) :: time
+      integer :: k
+
+      do k = 1, size(self%motions)
+         if (time >= self%motions(k)%start) call move_bodies(self%motions(k), time, self%bodies)
+      end do
+   end subroutine move_walls
+
+   subroutine list_moving(self)
+      type(simulation_t), intent(inout) :: self
+      integer :: k
+
+      self%moving = self%bodies%free
+      do k = 1, size(self%motions)
+         self%moving = [self%moving, self%motions(k)%slots]
+      end do
+   end subroutine list_moving
+
+   !> Accelerations at time 0: from the forces, or from gravity alone if the scheme wants it so.
+   subroutine start_integration(self)
+      type(simulation_t), intent(inout) :: self
+      integer(ip) :: k
+
+      associate (bodies => self%bodies)
+         do k = 1_ip, size(bodies%free, kind=ip)
+            associate (s => bodies%free(k))
+               if (self%integrator%starts_from_forces) then
+                  bodies%acceleration(:, s) = bodies%force(:, s)*bodies%inverse_mass(s)
+                  bodies%angular_acceleration(s) = bodies%torque(s)*bodies%inverse_inertia(s)
+               else
+                  bodies%acceleration(:, s) = self%settings%forces%gravity
+                  bodies%angular_acceleration(s) = 0.0_wp
+               end if
+            end associate
+         end do
+         call self%integrator%start(bodies)
+      end associate
+      ! A scheme that does not look at the forces at time 0 knows no contacts from before its first step.
+      if (.not. self%integrator%starts_from_forces .and. allocated(self%memory%area)) self%memory%area = 0.0_wp
+   end subroutine start_integration
+
+   !> Take the step of the settings, or a fraction of the stable step that divides the duration.
+   subroutine choose_step(self, error)
+      type(simulation_t), intent(inout) :: self
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: critical
+      real(wp) :: steps
+
+      call stable_step_of_shapes(self%settings%forces, self%integrator%stability(), self%bodies, &
+                                 self%expected_stable_step, critical)
+      associate (settings => self%settings%integrate)
+         self%dt = settings%dt
+         if (self%dt <= 0.0_wp .and. critical == 0_ip) then
+            call raise(error, input_error, self%settings%file//': there is no free body to choose a step for; '// &
+                       'give dt in &integrate')
+            return
+         end if
+         if (self%dt <= 0.0_wp) then
+            steps = real(ceiling(settings%duration/(settings%fraction*self%expected_stable_step), lp), wp)
+            self%dt = settings%duration/max(1.0_wp, steps)
+         end if
+         self%n_steps = nint(settings%duration/self%dt, lp)
+      end associate
+   end subroutine choose_step
+
+end module polydem_simulation

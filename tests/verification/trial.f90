@@ -1,0 +1,76 @@
+!> Simulations of a few bodies for the tests: from a namelist text and a list of polygons.
+module trial
+   use polydem_bodies, only: bodies_t
+   use polydem_body_list, only: body_list_t, new_bodies
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: ip, wp
+   use polydem_motion, only: motion_t
+   use polydem_read_settings, only: read_settings_text
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: advance, simulation_t, start_simulation
+   implicit none
+   private
+   public :: begin, steps, block_at
+
+contains
+
+   !> Start from a list of bodies and a namelist without the group &scene.
+   subroutine begin(text, list, simulation, error)
+      !> Groups of the namelist
+      character(len=*), intent(in) :: text
+      !> Bodies
+      type(body_list_t), intent(in) :: list
+      !> Ready to advance
+      type(simulation_t), intent(out) :: simulation
+      !> What went wrong
+      type(error_t), allocatable, intent(inout) :: error
+      type(settings_t) :: settings
+      type(bodies_t) :: bodies
+      type(motion_t) :: motions(0)
+      character(len=1) :: no_overrides(0)
+
+      call read_settings_text('trial.nml', "&scene name = 'file' bodies_file = 'none' /"//new_line('a')//text, &
+                              no_overrides, settings, error)
+      if (allocated(error)) return
+      call new_bodies(list, bodies, error)
+      if (allocated(error)) return
+      call start_simulation(settings, bodies, motions, simulation, error)
+   end subroutine begin
+
+   !> Advance by a number of steps, or until something goes wrong.
+   subroutine steps(simulation, n, error)
+      !> The simulation
+      type(simulation_t), intent(inout) :: simulation
+      !> Number of steps
+      integer, intent(in) :: n
+      !> What went wrong
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      do k = 1, n
+         call advance(simulation, error)
+         if (allocated(error)) return
+      end do
+   end subroutine steps
+
+   !> Corners of a rectangle around a centre, turned by an angle, (2, 4) [m]
+   pure function block_at(x, y, width, height, angle) result(vertices)
+      !> Centre [m]
+      real(wp), intent(in) :: x, y
+      !> Sides [m]
+      real(wp), intent(in) :: width, height
+      !> Angle [rad]
+      real(wp), intent(in) :: angle
+      real(wp) :: vertices(2, 4)
+      real(wp) :: corner(2)
+      integer(ip) :: k
+
+      do k = 1_ip, 4_ip
+         corner(1) = merge(0.5_wp, -0.5_wp, k == 2_ip .or. k == 3_ip)*width
+         corner(2) = merge(0.5_wp, -0.5_wp, k >= 3_ip)*height
+         vertices(1, k) = x + cos(angle)*corner(1) - sin(angle)*corner(2)
+         vertices(2, k) = y + sin(angle)*corner(1) + cos(angle)*corner(2)
+      end do
+   end function block_at
+
+end module trial
