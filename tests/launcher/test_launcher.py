@@ -1,0 +1,226 @@
+"""Tests of ./polydem on a toy project, in a folder with a blank in its name.
+
+usage: test_launcher.py LAUNCHER
+
+The toy has the files that the launcher knows of and a program that prints its arguments. A made-up folder of
+commands and a made-up apt-get, which links the real commands, stand for a machine with nothing installed.
+"""
+
+import os
+import shutil
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+LAUNCHER = ""
+
+CMAKE_LISTS = """\
+cmake_minimum_required(VERSION 3.25)
+project(toy LANGUAGES Fortran)
+add_subdirectory(src/app)
+enable_testing()
+add_test(NAME good COMMAND ${CMAKE_COMMAND} -E true)
+add_test(NAME bad COMMAND ${CMAKE_COMMAND} -E false)
+add_test(NAME odd COMMAND ${CMAKE_COMMAND} -E false)
+set_tests_properties(good odd PROPERTIES LABELS "fine;c.d")
+set_tests_properties(bad PROPERTIES LABELS broken)
+set_tests_properties(odd PROPERTIES SKIP_RETURN_CODE 1)
+"""
+
+PRESETS = """\
+{"version": 6, "configurePresets": [
+  {"name": "release", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"},
+  {"name": "debug", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"}]}
+"""
+
+PROGRAM = """\
+program polydem
+   implicit none
+   character(len=80) :: word
+   integer :: k
+   do k = 1, command_argument_count()
+      call get_command_argument(k, word)
+      print '(a)', '<'//trim(word)//'>'
+   end do
+end program polydem
+"""
+
+APT_GET = """\
+#!/bin/bash
+echo "apt-get $*" >>"$APT_LOG"
+[ "$1" = install ] || exit 0
+[ -z "$APT_FAILS" ] || { echo "no such package"; exit 100; }
+for name in gfortran cmake ninja git h5fc; do ln -sf "$(PATH=$REAL_PATH command -v $name)" "$COMMANDS/$name"; done
+"""
+
+# What the launcher and the tools may call on a bare machine.
+COMMANDS = ("ar as bash cat cp dirname env find flock grep head id ld ln mkdir mv nproc ranlib readlink rm sed "
+            "sh tail").split()
+
+
+class Toy(unittest.TestCase):
+    """A fresh toy project for each test."""
+
+    def setUp(self):
+        self.folder = os.path.realpath(tempfile.mkdtemp(prefix="a toy "))
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.launcher = os.path.join(self.folder, "polydem")
+        shutil.copy(LAUNCHER, self.launcher)
+        self.write("CMakeLists.txt", CMAKE_LISTS)
+        self.write("CMakePresets.json", PRESETS)
+        self.write("src/app/CMakeLists.txt", "add_executable(polydem main.f90)\n")
+        self.write("src/app/main.f90", PROGRAM)
+        self.write("postproc/pyproject.toml", "")
+        self.write(".venv/.made", self.folder + "\n")
+        self.environment = {name: value for name, value in os.environ.items()
+                            if not name.startswith(("OMPI_", "POLYDEM_", "HDF5_", "CTEST_"))}
+
+    def write(self, path, text):
+        path = os.path.join(self.folder, path)
+        os.makedirs(os.path.dirname(path), exist_ok=True)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+
+    def call(self, *arguments, launcher=None, **environment):
+        """Exit code, output and messages of a call."""
+        result = subprocess.run([launcher or self.launcher, *arguments], capture_output=True, text=True, check=False,
+                                env={**self.environment, **environment}, cwd="/")
+        return result.returncode, result.stdout, result.stderr
+
+    def bare_machine(self):
+        """Environment in which only the shell's own tools and the made-up apt-get are found."""
+        commands = os.path.join(self.folder, "commands")
+        os.mkdir(commands)
+        for name in COMMANDS:
+            found = shutil.which(name)
+            if found:
+                os.symlink(found, os.path.join(commands, name))
+        self.write("commands/apt-get", APT_GET)
+        self.write("commands/sudo", '#!/bin/bash\nexec "$@"\n')
+        for name in ("apt-get", "sudo"):
+            os.chmod(os.path.join(commands, name), 0o755)
+        return {"PATH": commands, "REAL_PATH": os.environ["PATH"], "COMMANDS": commands,
+                "APT_LOG": os.path.join(self.folder, "apt.log")}
+
+
+class Words(Toy):
+    """What needs no preparation."""
+
+    def test_help_needs_no_build(self):
+        code, output, _ = self.call("--help")
+        self.assertEqual(code, 0)
+        for verb in ("run", "check", "info", "plot", "replay", "test", "--no-install"):
+            self.assertIn(f"\n  {verb} ", output)
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
+
+    def test_wrong_verbs_and_options_give_2(self):
+        self.assertEqual(self.call()[0], 2)
+        self.assertEqual(self.call("fly"), (2, "", "polydem: there is no verb fly; see ./polydem --help\n"))
+        self.assertEqual(self.call("test", "a", "b")[0], 2)
+        self.assertEqual(self.call("test", "--quick")[0], 2)
+
+    def test_inside_mpirun_nothing_is_prepared(self):
+        code, _, messages = self.call("run", "x.nml", OMPI_COMM_WORLD_SIZE="2")
+        self.assertEqual(code, 1)
+        self.assertIn("not built", messages)
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
+
+
+class Build(Toy):
+    """What builds the toy."""
+
+    def test_builds_once_and_passes_arguments_on(self):
+        arguments = ["run", "my drum.nml", "--set", "time.dt=1e-5", "--threads", "2", "--force"]
+        code, output, messages = self.call(*arguments)
+        self.assertEqual((code, output), (0, "".join(f"<{word}>\n" for word in arguments)))
+        self.assertEqual(messages, "polydem: building program in build/release\n")
+        link = os.path.join(self.folder, "another name")
+        os.symlink(self.launcher, link)
+        self.assertEqual(self.call("--version", launcher=link), (0, "<--version>\n", ""))
+        seconds = []
+        for _ in range(9):
+            start = time.perf_counter()
+            self.assertEqual(self.call("info"), (0, "<info>\n", ""))
+            seconds.append(time.perf_counter() - start)
+        self.assertLess(statistics.median(seconds), 0.2)
+
+    def test_a_changed_source_is_built_and_an_error_shown(self):
+        self.call("--version")
+        self.write("src/app/main.f90", PROGRAM.replace("'<'", "'['"))
+        code, output, messages = self.call("--version")
+        self.assertEqual((code, output), (0, "[--version>\n"))
+        self.assertIn("building", messages)
+        self.write("src/app/main.f90", PROGRAM.replace("integer :: k", ""))
+        for _ in range(2):
+            code, output, messages = self.call("--version")
+            self.assertEqual((code, output), (1, ""))
+            self.assertIn("Error: Symbol", messages)
+
+    def test_the_preset_chooses_the_folder_and_a_moved_project_is_built_anew(self):
+        self.assertEqual(self.call("info", POLYDEM_PRESET="debug")[0], 0)
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build", "release")))
+        moved = self.folder + " moved"
+        shutil.copytree(self.folder, moved, symlinks=True)
+        self.addCleanup(shutil.rmtree, moved)
+        code, output, messages = self.call("info", launcher=os.path.join(moved, "polydem"), POLYDEM_PRESET="debug")
+        self.assertEqual((code, output), (0, "<info>\n"))
+        self.assertIn("building", messages)
+
+    def test_simultaneous_first_calls_build_once(self):
+        calls = [subprocess.Popen([self.launcher, "info"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                  env=self.environment) for _ in range(3)]
+        results = [call.communicate() for call in calls]
+        self.assertEqual([output for output, _ in results], 3*["<info>\n"])
+        self.assertEqual("".join(messages for _, messages in results).count("building"), 1)
+
+    def test_tests_are_chosen_by_label_and_counted_in_the_last_line(self):
+        code, output, _ = self.call("test")
+        self.assertNotEqual(code, 0)
+        self.assertEqual(output.splitlines()[-1], "1 passed, 1 failed, 1 skipped")
+        code, output, _ = self.call("test", "c.d")
+        self.assertEqual((code, output.splitlines()[-1]), (0, "1 passed, 0 failed, 1 skipped"))
+        code, output, _ = self.call("test", "broken")
+        self.assertNotEqual(code, 0)
+        self.assertEqual(output.splitlines()[-1], "0 passed, 1 failed")
+        for label in ("fin", "c-d", "unheard_of"):
+            code, _, messages = self.call("test", label)
+            self.assertEqual(code, 2)
+            self.assertIn(f"no test has the label {label}", messages)
+
+
+class BareMachine(Toy):
+    """What happens where the tools are missing."""
+
+    def test_no_install_only_lists(self):
+        machine = self.bare_machine()
+        code, output, _ = self.call("run", "x.nml", "--no-install", **machine)
+        self.assertEqual(code, 1)
+        for package in ("gfortran", "cmake", "ninja-build", "git", "libhdf5-dev"):
+            self.assertIn(package, output.split())
+        self.assertFalse(os.path.exists(machine["APT_LOG"]))
+
+    def test_says_what_is_missing_installs_it_and_runs(self):
+        machine = self.bare_machine()
+        code, output, messages = self.call("info", **machine)
+        self.assertEqual((code, output), (0, "<info>\n"), messages)
+        said = messages.splitlines()
+        self.assertEqual(said[0], "polydem: missing Debian packages: gfortran cmake ninja-build git libhdf5-dev")
+        self.assertIn("building", said[-1])
+        with open(machine["APT_LOG"], encoding="utf-8") as file:
+            self.assertEqual(file.read().splitlines(), [
+                "apt-get update",
+                "apt-get install -y --no-install-recommends gfortran cmake ninja-build git libhdf5-dev"])
+        self.assertEqual(self.call("--no-install", **machine)[0], 0)
+
+    def test_shows_why_the_installation_failed(self):
+        code, output, messages = self.call("info", APT_FAILS="yes", **self.bare_machine())
+        self.assertEqual((code, output), (1, ""))
+        self.assertIn("no such package", messages)
+
+
+if __name__ == "__main__":
+    LAUNCHER = os.path.abspath(sys.argv.pop(1))
+    unittest.main()

@@ -1,0 +1,281 @@
+"""The house rules that a machine can check.
+
+usage: check_style.py ROOT      prints file:line: what is wrong, and ends with code 1 if anything is
+"""
+
+import os
+import re
+import sys
+
+from fortran_source import Source, split_commas
+
+WIDEST = {".f90": 120, ".pf": 124, ".py": 120}  # columns; 124: what pFUnit can take
+LONGEST_FILE = 400
+LONGEST_PROCEDURE = 60
+TEXTS = (".f90", ".in", ".pf", ".py", ".cmake", ".txt", ".md", ".json", ".toml", ".nml", ".cff")
+TREES = ("src", "tests", "postproc", "inputs")
+REAL_LITERAL = re.compile(r"(?<![\w.])(?:\d+\.\d*|\.\d+)(?:[ed][+-]?\d+)?(?![\w.])|(?<![\w.])\d+[ed][+-]?\d+\b")
+
+
+# --- rules of one line -------------------------------------------------------------------------------------------
+
+def check_lines(path, lines):
+    """Rules of every text file."""
+    widest = WIDEST.get(os.path.splitext(path)[1])
+    for number, text in enumerate(lines, 1):
+        if text != text.rstrip():
+            yield number, "blanks at the end of the line"
+        if "\t" in text:
+            yield number, "a tabulator"
+        if re.search(r"\b(TO" r"DO|FIX" r"ME|X" r"XX)\b", text):
+            yield number, "an open issue belongs to the issues, not to the sources"
+        if widest and len(text) > widest:
+            yield number, f"{len(text)} columns, more than {widest}"
+    if lines[-1] != "" or lines[-2:] == ["", ""]:
+        yield len(lines), "the file must end with one newline"
+
+
+# --- rules of one statement --------------------------------------------------------------------------------------
+
+def check_statements(source, room):
+    """Rules that need to see a statement and its scopes."""
+    for statement in source.statements:
+        for message in [*of_any(statement, room), *of_declaration(statement), *of_directive(statement)]:
+            yield statement.line, message
+        if is_pointer(statement) and not any("c_f_pointer" in other.code
+                                             for other in source.inside(statement.scopes[-1])):
+            yield statement.line, "no pointers: use allocatables and integer links (only c_f_pointer needs one)"
+
+
+def is_pointer(statement):
+    """Whether a statement declares a pointer."""
+    return statement.is_declaration and statement.scopes and re.search(r",\s*pointer\b", statement.attributes)
+
+
+def of_any(statement, room):
+    """Statements that are nowhere allowed, or only in one room."""
+    code = statement.code
+    if re.match(r"use\b", code) and not re.search(r",\s*only\s*:", code):
+        yield "use without only"
+    if re.match(r"use\b.*\b(hdf5|h5lt|h5ds)\b\s*,", code) and room != "files":
+        yield "hdf5 is used in src/files only"
+    if re.match(r"(if\s*\(.*\)\s*)?(error\s+)?stop\b(?!\s*[=%(])", code) and room != "app":
+        yield "only the program in src/app stops"
+    if re.match(r"(if\s*\(.*\)\s*)?call\s+(exit|abort)\b", code) and room != "app":
+        yield "only the program in src/app stops"
+    if re.match(r"(save|common|equivalence|data|include)\b(?!\s*[=%(])", code) or re.match(r"(save|common)\s*/", code):
+        yield f"{code.split()[0]} is not used here"
+    if code.startswith("#"):
+        yield "no preprocessor: CMake chooses files"
+    if re.search(r"\bgo\s*to\b", code):
+        yield "go to is not used here"
+    if not code.startswith("!$omp"):
+        for literal in REAL_LITERAL.findall(code):
+            yield f"the real number {literal} has no kind"
+    if re.search(r"\b(integer|real|logical|complex)\s*\(\s*(kind\s*=\s*)?\d|_[48]\b|\bdouble\s+precision\b", code):
+        yield "kinds come from base/kinds.f90"
+
+
+def of_declaration(statement):
+    """Declarations: no hidden or shared state."""
+    if not statement.is_declaration or not statement.scopes:
+        return
+    attributes, scope = statement.attributes, statement.scopes[-1]
+    if re.search(r",\s*save\b", attributes):
+        yield "no save: state lives in arguments"
+        return
+    if "parameter" in attributes:
+        return
+    if scope.kind in ("module", "submodule") and not attributes.startswith("procedure"):
+        yield "a variable of a module: state lives in arguments"
+    if scope.kind == "procedure":
+        for part in split_commas(statement.code.split("::", 1)[1]):
+            if re.search(r"(?<![=<>/])=(?!=)", re.sub(r"\([^()]*\)", "", part)):
+                yield "a local variable with an initial value keeps its value between calls: assign it below"
+
+
+def of_directive(statement):
+    """OpenMP: everything said, nothing that depends on the number of threads."""
+    code = statement.code
+    if not code.startswith("!$omp"):
+        return
+    if re.match(r"!\$omp (parallel|task|teams)\b", code) and not re.search(r"default\s*\(\s*none\s*\)", code):
+        yield "an OpenMP region without default(none)"
+    if re.search(r"\breduction\s*\(\s*[-+*]", code):
+        yield "a sum by reduction depends on the number of threads"
+    if re.match(r"!\$omp (atomic|critical|ordered)\b", code):
+        yield f"{code.split()[1]}: write disjointly and sum in a fixed order"
+
+
+# --- rules of one file -------------------------------------------------------------------------------------------
+
+def check_scopes(source):
+    """Rules of modules and procedures."""
+    if len(source.lines) - 1 > LONGEST_FILE:
+        yield len(source.lines) - 1, f"{len(source.lines) - 1} lines, more than {LONGEST_FILE}"
+    units = [scope for scope in source.scopes if not scope.first.scopes]
+    if len(units) != 1:
+        yield 1, "one module or program per file"
+    for unit in units:
+        codes = [statement.code for statement in source.inside(unit)]
+        if unit.kind not in ("module", "submodule", "program"):
+            yield unit.first.line, "procedures stand in modules"
+        elif "implicit none" not in codes:
+            yield unit.first.line, f"{unit.kind} {unit.name} without implicit none"
+        if unit.kind == "module" and "private" not in codes:
+            yield unit.first.line, f"module {unit.name} without private"
+        if not source.has_comment_above(unit.first):
+            yield unit.first.line, f"no comment !> above {unit.kind} {unit.name}"
+    for scope in source.scopes:
+        length = scope.last.line - scope.first.line + 1 if scope.last else 0
+        if scope.kind == "procedure" and length > LONGEST_PROCEDURE:
+            yield scope.first.line, f"{scope.name} has {length} lines, more than {LONGEST_PROCEDURE}"
+
+
+def check_documentation(source):
+    """A comment !> above what others see."""
+    public = public_names(source)
+    inherited = bound_names(source, extending=True)
+    for scope in source.scopes:
+        outer = scope.first.scopes[-1] if scope.first.scopes else None
+        in_interface = outer is not None and outer.kind == "interface"
+        if scope.kind == "type":
+            if not source.has_comment_above(scope.first):
+                yield scope.first.line, f"no comment !> above type {scope.name}"
+            yield from undocumented(source, scope, None)
+        elif scope.kind == "procedure" and (scope.name in public or in_interface):
+            if not source.has_comment_above(scope.first):
+                yield scope.first.line, f"no comment !> above {scope.name}"
+            # The arguments are explained once: by the manual of a C function, by the abstract type of an extension.
+            if "bind(c" not in scope.first.code.replace(" ", "") and scope.name not in inherited:
+                yield from undocumented(source, scope, arguments_of(scope.first.code))
+
+
+def undocumented(source, scope, wanted):
+    """Components of a type, or arguments (`wanted`) of a procedure, without a comment."""
+    in_bindings = False
+    for statement in source.inside(scope):
+        in_bindings = in_bindings or statement.code == "contains"
+        if in_bindings or not statement.is_declaration:
+            continue
+        names = [name for name in statement.names if wanted is None or name in wanted]
+        hidden = wanted is None and re.search(r",\s*private\b", statement.attributes)
+        hidden = hidden or any(inner.code == "private" for inner in source.inside(scope) if wanted is None)
+        if names and names != ["self"] and not hidden and not source.has_comment_above(statement):
+            yield statement.line, f"no comment !> above {', '.join(names)}"
+
+
+def arguments_of(code):
+    """Names of the dummy arguments in the first statement of a procedure."""
+    match = re.search(r"(?:subroutine|function)\s+\w+\s*\(([^)]*)\)", code)
+    return [name.strip() for name in match.group(1).split(",")] if match else []
+
+
+def public_names(source):
+    """Procedures that others can call: by name or bound to a type; of a generic the first, which speaks for all."""
+    names = bound_names(source)
+    for statement in source.statements:
+        if re.match(r"public\s*::", statement.code):
+            names.update(statement.names)
+    for statement in source.statements:
+        match = re.match(r"module\s+procedure\s*(?:::)?\s*(.*)", statement.code)
+        if match and statement.scopes and statement.scopes[-1].name in names:
+            names.add(match.group(1).split(",")[0].strip())
+        match = re.match(r"generic\b[^:]*::[^=]*=>\s*(\w+)", statement.code)
+        if match:
+            names.add(match.group(1))
+    return names
+
+
+def bound_names(source, extending=False):
+    """Procedures that are publicly bound to a type, or to a type that extends another."""
+    names = set()
+    for statement in source.statements:
+        scope = statement.scopes[-1] if statement.scopes else None
+        if not scope or scope.kind != "type" or not re.match(r"procedure\b.*::", statement.code):
+            continue
+        if scope.contains and "private" not in statement.attributes and (
+                not extending or "extends" in scope.first.code):
+            names.update(target.split("=>")[-1].strip() for target in split_commas(statement.code.split("::", 1)[1]))
+    return names
+
+
+# --- rules of the tree -------------------------------------------------------------------------------------------
+
+def check_names(sources):
+    """Module polydem_x stands in x.f90; where CMake chooses between files, in x_*.f90."""
+    found = []
+    for source in sources:
+        units = [scope for scope in source.scopes if scope.kind == "module" and not scope.first.scopes]
+        found.extend((unit.name, os.path.dirname(source.path), source, unit.first.line) for unit in units)
+    for name, folder, source, line in found:
+        stem = os.path.splitext(os.path.basename(source.path))[0]
+        twins = sum((name, folder) == (other, there) for other, there, _, _ in found)
+        if name != f"polydem_{stem}" and not (twins > 1 and f"polydem_{stem}".startswith(name + "_")):
+            yield source.path, line, f"module {name} should be polydem_{stem}, as its file"
+
+
+def check_stages(sources):
+    """Timed stages are folders of src and groups of the namelist."""
+    folders = {os.path.basename(os.path.dirname(source.path)) for source in sources}
+    groups = set()
+    for source in sources:
+        if os.path.basename(os.path.dirname(source.path)) == "config":
+            groups.update(re.findall(r"\bentry_t\('(\w+)'", "\n".join(source.lines)))
+    for source in sources:
+        if not source.path.endswith(os.path.join("base", "timers.f90")):
+            continue
+        match = re.search(r"stage_names\(n_stages\)[^\[]*\[([^\]]*)\]", "\n".join(source.lines))
+        for name in re.findall(r"'(\w+)'", match.group(1)) if match else ["(none found)"]:
+            if name not in folders:
+                yield source.path, 1, f"stage {name} is not a folder of src"
+            if groups and name not in groups:
+                yield source.path, 1, f"stage {name} is not a group of the namelist"
+
+
+def check_source(path, room, text):
+    """All rules of one Fortran source of src."""
+    source = Source(path, text)
+    return sorted({*check_statements(source, room), *check_scopes(source), *check_documentation(source)})
+
+
+def check_tree(root):
+    """All rules: file, line and message of each breach."""
+    sources = []
+    for path in text_files(root):
+        name = os.path.relpath(path, root)
+        if path.endswith((".F90", ".f", ".F", ".for")):
+            yield name, 1, "free-form .f90 without preprocessor only"
+        with open(path, encoding="utf-8", newline="") as file:
+            text = file.read()
+        yield from ((name, *found) for found in check_lines(name, text.split("\n")))
+        if name.startswith("src" + os.sep) and name.endswith(".f90"):
+            sources.append(Source(name, text))
+            yield from ((name, *found) for found in check_source(name, name.split(os.sep)[1], text))
+    if not sources:
+        yield "src", 1, "no sources found"
+    yield from check_names(sources)
+    yield from check_stages(sources)
+
+
+def text_files(root):
+    """Paths of the files that the rules are for."""
+    paths = [os.path.join(root, name) for name in os.listdir(root) if name.endswith(TEXTS) or name == "polydem"]
+    for tree in TREES:
+        for folder, folders, names in os.walk(os.path.join(root, tree)):
+            folders[:] = [name for name in folders if name != "__pycache__" and not name.startswith(".")
+                          and not name.endswith(".egg-info")]
+            paths += [os.path.join(folder, name) for name in names
+                      if name.endswith(TEXTS) or name.endswith((".F90", ".f", ".F", ".for"))]
+    return sorted(paths)
+
+
+def main():
+    breaches = list(check_tree(sys.argv[1]))
+    for path, line, message in breaches:
+        print(f"{path}:{line}: {message}")
+    sys.exit(1 if breaches else 0)
+
+
+if __name__ == "__main__":
+    main()

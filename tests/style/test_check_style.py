@@ -1,0 +1,215 @@
+"""Test of the house rules: a good file passes, and each bad change of it is found on its line."""
+
+import os
+import tempfile
+import unittest
+
+from check_style import check_lines, check_source, check_tree
+
+GOOD = """\
+!> A good module.
+module polydem_good
+   use polydem_kinds, only: ip, wp
+   implicit none
+   private
+   public :: good_t, halve, double
+
+   !> Greatest number
+   integer(ip), parameter :: greatest = 10_ip
+
+   !> A good type
+   type :: good_t
+      !> Length [m]
+      real(wp) :: length = 1.0_wp
+   contains
+      procedure :: grow
+      procedure :: stop => grow
+   end type good_t
+
+   !> Twice something
+   interface double
+      module procedure double_real, double_whole
+   end interface double
+
+contains
+
+   !> Make it longer.
+   subroutine grow(self, by)
+      class(good_t), intent(inout) :: self
+      !> How much [m]
+      real(wp), intent(in) :: by
+
+      self%length = self%length + by
+   end subroutine grow
+
+   !> Half of numbers
+   pure function halve(x) result(half)
+      !> Numbers
+      real(wp), intent(in) :: x(:)
+      real(wp) :: half(size(x))
+      integer :: k
+
+      half = x
+      !$omp parallel do default(none) shared(half) private(k) &
+      !$omp    schedule(static)
+      do k = 1, size(x)
+         half(k) = half(k)/2.0_wp ! stop 'here' = never
+      end do
+      !$omp end parallel do
+   end function halve
+
+   !> Twice a number
+   pure real(wp) function double_real(x)
+      !> Number
+      real(wp), intent(in) :: x
+
+      double_real = 2.0_wp*x
+   end function double_real
+
+   pure integer(ip) function double_whole(x)
+      integer(ip), intent(in) :: x
+
+      double_whole = 2_ip*x
+   end function double_whole
+
+end module polydem_good
+"""
+
+CLOCK = """\
+!> The time [s]
+integer(c_int) function clock(kind) bind(C, name='clock')
+import :: c_int
+integer(c_int), value :: kind
+end function clock
+"""
+
+# What replaces what in GOOD, the line that must be named, and words of the message.
+BAD = [
+    ("!> A good module.\n", "\n", 2, "no comment !> above module"),
+    ("   implicit none\n", "\n", 2, "without implicit none"),
+    ("   private\n", "\n", 2, "without private"),
+    ("polydem_kinds, only: ip, wp", "polydem_kinds", 3, "use without only"),
+    ("polydem_kinds, only", "hdf5, only", 3, "hdf5 is used in src/files only"),
+    ("polydem_kinds, only", "h5lt, only", 3, "hdf5 is used in src/files only"),
+    ("integer(ip), parameter ::", "integer(ip) ::", 9, "a variable of a module"),
+    ("integer(ip), parameter ::", "integer(ip), save ::", 9, "no save"),
+    ("integer(ip), parameter ::", "integer(4), parameter ::", 9, "kinds come from"),
+    ("   !> A good type\n", "\n", 12, "no comment !> above type good_t"),
+    ("      !> Length [m]\n", "\n", 14, "no comment !> above length"),
+    ("      !> Length [m]\n", "      ! Length [m]\n", 14, "no comment !> above length"),
+    ("real(wp) :: length = 1.0_wp", "real(wp), pointer :: length(:)", 14, "no pointers"),
+    ("1.0_wp", "1.0", 14, "the real number 1.0 has no kind"),
+    ("1.0_wp", "1e3", 14, "the real number 1e3 has no kind"),
+    ("1.0_wp", "1.0d0", 14, "the real number 1.0d0 has no kind"),
+    ("   !> Make it longer.\n", "\n", 28, "no comment !> above grow"),
+    ("      !> How much [m]\n", "\n", 31, "no comment !> above by"),
+    ("      self%length = self%length + by\n", "      stop 1\n", 33, "only the program"),
+    ("      self%length = self%length + by\n", "      if (by > 0) error stop 'no'\n", 33, "only the program"),
+    ("      self%length = self%length + by\n", "      if (by > 0) call abort()\n", 33, "only the program"),
+    ("      self%length = self%length + by\n", "      go to 10\n", 33, "go to"),
+    ("      self%length = self%length + by\n", "#endif\n", 33, "no preprocessor"),
+    ("      self%length = self%length + by\n", 61*"\n", 28, "grow has 67 lines, more than 60"),
+    ("   !> Half of numbers\n", "\n", 37, "no comment !> above halve"),
+    ("      !> Numbers\n", "\n", 39, "no comment !> above x"),
+    ("      integer :: k\n", "      integer :: k = 0\n", 41, "keeps its value between calls"),
+    ("      integer :: k\n", "      save\n", 41, "save is not used"),
+    ("default(none) ", "", 44, "without default(none)"),
+    ("schedule(static)", "reduction(+:total)", 44, "a sum by reduction"),
+    ("half(k)/2.0_wp", "half(k)\n      !$omp atomic", 48, "atomic: write disjointly"),
+    ("half(k)/2.0_wp", "half(k)\n      !$omp critical", 48, "critical: write disjointly"),
+    ("   !> Twice a number\n", "\n", 53, "no comment !> above double_real"),
+    ("end module polydem_good\n", "end module polydem_good\n!> More\nmodule b\nimplicit none\nprivate\nend module b\n",
+     1, "one module or program per file"),
+    ("end module polydem_good\n", 340*"\n" + "end module polydem_good\n", 406, "406 lines, more than 400"),
+]
+
+
+def found_in(text, room="state"):
+    return [*check_source("polydem_good.f90", room, text), *check_lines("good.f90", text.split("\n"))]
+
+
+class Rules(unittest.TestCase):
+    def test_a_good_file_passes(self):
+        self.assertEqual(found_in(GOOD), [])
+
+    def test_bad_files_are_found_on_their_line(self):
+        for old, new, line, words in BAD:
+            with self.subTest(new=new):
+                self.assertEqual(GOOD.count(old), 1)
+                found = found_in(GOOD.replace(old, new))
+                self.assertEqual([place for place, _ in found], [line], found)
+                self.assertIn(words, found[0][1])
+
+    def test_bad_lines_of_any_file(self):
+        for text, words in (("a \n", "blanks"), ("\ta\n", "tabulator"), ("a\r\n", "blanks"), ("a", "newline"),
+                            ("a\n\n", "newline"), ("! TO" "DO: a\n", "issue"), (121*"a" + "\n", "121 columns")):
+            with self.subTest(text=text):
+                found = list(check_lines("a.f90", text.split("\n")))
+                self.assertEqual(len(found), 1)
+                self.assertIn(words, found[0][1])
+
+    def test_what_a_room_alone_may_do(self):
+        self.assertEqual(found_in(GOOD.replace("polydem_kinds, only", "hdf5, only"), "files"), [])
+        self.assertEqual(found_in(GOOD.replace("self%length + by", "by\n      if (by < 0.0_wp) stop"), "app"), [])
+
+    def test_arguments_of_foreign_and_inherited_procedures_are_explained_elsewhere(self):
+        foreign = GOOD.replace("\ncontains\n", "\ninterface\n" + CLOCK + "end interface\n\ncontains\n")
+        self.assertEqual(found_in(foreign), [])
+        self.assertEqual(len(found_in(foreign.replace(" bind(C, name='clock')", ""))), 1)
+        inherited = GOOD.replace("      !> How much [m]\n", "")
+        self.assertEqual(len(found_in(inherited)), 1)
+        self.assertEqual(found_in(inherited.replace("type :: good_t", "type, extends(better_t) :: good_t")), [])
+
+
+class Tree(unittest.TestCase):
+    """Rules of a whole tree, in a made-up one."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = folder.name
+        self.write("state/good.f90", GOOD)
+
+    def write(self, path, text):
+        path = os.path.join(self.root, "src", path)
+        os.makedirs(os.path.dirname(path), exist_ok=True)
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(text)
+
+    def messages(self):
+        return [f"{path}:{line}: {message}" for path, line, message in check_tree(self.root)]
+
+    def test_a_good_tree_passes(self):
+        self.assertEqual(self.messages(), [])
+
+    def test_modules_are_named_as_their_files(self):
+        self.write("state/better.f90", GOOD)
+        self.assertEqual(self.messages(),
+                         ["src/state/better.f90:2: module polydem_good should be polydem_better, as its file"])
+
+    def test_files_that_cmake_chooses_between_share_a_module(self):
+        self.write("state/good_double.f90", GOOD)
+        self.write("state/good_single.f90", GOOD)
+        self.assertEqual(self.messages(), [])
+
+    def test_files_for_the_preprocessor_are_refused(self):
+        self.write("state/good.F90", GOOD)
+        self.assertEqual(self.messages(), ["src/state/good.F90:1: free-form .f90 without preprocessor only"])
+
+    def test_stages_are_folders_and_groups(self):
+        type_comment = "   !> A good type\n"
+        names = "   integer, parameter :: stage_names(n_stages) = &\n      [character(len=5) :: 'state', 'flow']\n"
+        timers = GOOD.replace("_good\n", "_timers\n").replace(type_comment, names + type_comment)
+        entries = GOOD.replace("_good\n", "_entries\n").replace("2_ip*x", "entry_t('state', 'size')")
+        self.write("base/timers.f90", timers)
+        self.write("config/entries.f90", entries)
+        self.assertEqual(self.messages(), ["src/base/timers.f90:1: stage flow is not a folder of src",
+                                           "src/base/timers.f90:1: stage flow is not a group of the namelist"])
+
+    def test_an_empty_tree_is_not_praised(self):
+        with tempfile.TemporaryDirectory() as empty:
+            self.assertEqual(list(check_tree(empty)), [("src", 1, "no sources found")])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,63 @@
+# polydem_unit_test(ROOM SOURCES test_a.pf ... [HELPERS helper.f90 ...] [USES polydem::room ...])
+#
+# The tests of one room: the program test_ROOM, and in ctest ROOM with the label ROOM, and unit if ROOM is a room of
+# src. Built with an
+# installed pFUnit if CMake finds one, else with the stand-in of this folder. A test finds files of the repository
+# through the environment variable POLYDEM_SOURCE_DIR, and may write into its working directory.
+find_package(PFUNIT QUIET)
+
+# pFUnit up to 4.12 ends with code 0 after failures; undefined behaviour does not end a program at all.
+set(polydem_words_of_failure "Encountered 1 or more failures" "[(]0 tests?[)]" "runtime error:" "Sanitizer")
+
+function(polydem_unit_test room)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HELPERS;USES")
+  if(arg_UNPARSED_ARGUMENTS OR NOT arg_SOURCES)
+    message(FATAL_ERROR "polydem_unit_test(${room}): give SOURCES, HELPERS and USES only")
+  endif()
+  if(PFUNIT_FOUND)
+    add_pfunit_ctest(test_${room} TEST_SOURCES ${arg_SOURCES} OTHER_SOURCES ${arg_HELPERS}
+      LINK_LIBRARIES ${arg_USES} polydem::flags)
+    # The main program that pFUnit writes calls its suites without interfaces.
+    set_source_files_properties("${CMAKE_CURRENT_BINARY_DIR}/test_${room}_driver.F90" PROPERTIES
+      COMPILE_OPTIONS "-w;-Wno-error=implicit-interface")
+    set(name test_${room})
+  else()
+    polydem_stand_in_test(test_${room} "${arg_SOURCES}" "${arg_HELPERS}" "${arg_USES}")
+    add_test(NAME ${room} COMMAND test_${room} --verbose)
+    set(name ${room})
+  endif()
+  set(labels ${room})
+  if(TARGET polydem::${room} OR room STREQUAL "support")
+    list(APPEND labels unit)
+  endif()
+  set_tests_properties(${name} PROPERTIES
+    LABELS "${labels}"
+    FAIL_REGULAR_EXPRESSION "${polydem_words_of_failure}"
+    ENVIRONMENT "POLYDEM_SOURCE_DIR=${PROJECT_SOURCE_DIR};OMP_NUM_THREADS=2"
+    WORKING_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}"
+    PROCESSORS 2
+    TIMEOUT 600)
+endfunction()
+
+# One executable of translated test files.
+function(polydem_stand_in_test target sources helpers uses)
+  set(support "${PROJECT_SOURCE_DIR}/tests/support")
+  foreach(source IN LISTS sources)
+    cmake_path(GET source STEM stem)
+    set(translated "${CMAKE_CURRENT_BINARY_DIR}/${stem}.f90")
+    add_custom_command(OUTPUT "${translated}"
+      COMMAND "${Python3_EXECUTABLE}" "${support}/translate.py" "${CMAKE_CURRENT_SOURCE_DIR}/${source}" "${translated}"
+      DEPENDS "${source}" "${support}/translate.py"
+      COMMENT "Translating ${source}" VERBATIM)
+    list(APPEND generated "${translated}")
+    string(APPEND suite_uses "   use ${stem}_suite, only: add_${stem} => add_tests\n")
+    string(APPEND suite_calls "   call add_${stem}(runner)\n")
+  endforeach()
+  configure_file("${support}/driver.f90.in" "${target}_driver.f90" @ONLY)
+  add_executable(${target} ${helpers} ${generated} "${CMAKE_CURRENT_BINARY_DIR}/${target}_driver.f90")
+  set_target_properties(${target} PROPERTIES
+    Fortran_MODULE_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}/${target}_modules")
+  # A translated assert is one line, however long.
+  target_compile_options(${target} PRIVATE -ffree-line-length-none)
+  target_link_libraries(${target} PRIVATE ${uses} funit_stand_in polydem::flags)
+endfunction()
