@@ -1,0 +1,162 @@
+!> Moving boxes for tests of neighbour finders, and the pairs that a direct search finds.
+module crowd
+   use polydem_boxes, only: boxes_t
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: ip, wp
+   use polydem_neighbours, only: neighbours_t, new_neighbours
+   use polydem_random, only: random_t, new_random
+   implicit none
+   private
+   public :: new_boxes, scatter, wrong_steps, count_wrong, direct_pairs, grow_reach
+
+   !> The finders to be tested
+   character(len=14), parameter :: finders(3) = &
+      [character(len=14) :: 'all_pairs', 'sort_and_sweep', 'quadtree']
+
+contains
+
+   !> Boxes of given bounds, one per body, all free.
+   subroutine new_boxes(boxes, bounds)
+      type(boxes_t), intent(out) :: boxes
+      real(wp), intent(in) :: bounds(:, :)
+      integer(ip) :: k
+
+      boxes%n = size(bounds, 2, kind=ip)
+      boxes%n_bodies = boxes%n
+      boxes%bounds = bounds
+      boxes%body = [(k, k=1_ip, boxes%n)]
+      allocate (boxes%fixed(boxes%n), source=.false.)
+      boxes%reach = 0.5_wp*max(bounds(3, :) - bounds(1, :), bounds(4, :) - bounds(2, :))
+   end subroutine new_boxes
+
+   !> Let the reach of the boxes be enough for all frames.
+   subroutine grow_reach(boxes, frames)
+      type(boxes_t), intent(inout) :: boxes
+      real(wp), intent(in) :: frames(:, :, :)
+      integer :: s
+
+      do s = 1, size(frames, 3)
+         boxes%reach = max(boxes%reach, 0.5_wp*max(frames(3, :, s) - frames(1, :, s), &
+                                                  frames(4, :, s) - frames(2, :, s)))
+      end do
+   end subroutine grow_reach
+
+   !> Boxes strewn over a square, with sides between two values.
+   subroutine scatter(seed, n, width, side_min, side_max, bounds)
+      integer(ip), intent(in) :: seed, n
+      real(wp), intent(in) :: width, side_min, side_max
+      real(wp), allocatable, intent(out) :: bounds(:, :)
+      type(random_t) :: random
+      integer(ip) :: k
+
+      allocate (bounds(4, n))
+      random = new_random(seed)
+      do k = 1_ip, n
+         bounds(1, k) = random%between(0.0_wp, width)
+         bounds(2, k) = random%between(0.0_wp, width)
+         bounds(3, k) = bounds(1, k) + random%between(side_min, side_max)
+         bounds(4, k) = bounds(2, k) + random%between(side_min, side_max)
+      end do
+   end subroutine scatter
+
+   !> Pairs of bodies that overlap, ascending, as keys first*(bodies + 1) + second.
+   subroutine direct_pairs(boxes, keys)
+      type(boxes_t), intent(in) :: boxes
+      integer(ip), allocatable, intent(out) :: keys(:)
+      logical, allocatable :: touch(:, :)
+      integer(ip) :: i, j, a, b, n
+
+      allocate (touch(boxes%n_bodies, boxes%n_bodies), source=.false.)
+      do j = 1_ip, boxes%n
+         do i = 1_ip, boxes%n
+            a = boxes%body(i)
+            b = boxes%body(j)
+            if (a >= b .or. (boxes%fixed(i) .and. boxes%fixed(j))) cycle
+            if (boxes%bounds(1, i) > boxes%bounds(3, j) .or. boxes%bounds(1, j) > boxes%bounds(3, i)) cycle
+            if (boxes%bounds(2, i) > boxes%bounds(4, j) .or. boxes%bounds(2, j) > boxes%bounds(4, i)) cycle
+            touch(b, a) = .true.
+         end do
+      end do
+      n = count(touch, kind=ip)
+      allocate (keys(n))
+      n = 0_ip
+      do a = 1_ip, boxes%n_bodies
+         do b = a + 1_ip, boxes%n_bodies
+            if (.not. touch(b, a)) cycle
+            n = n + 1_ip
+            keys(n) = a*(boxes%n_bodies + 1_ip) + b
+         end do
+      end do
+   end subroutine direct_pairs
+
+   !> Steps, over all finders, at which the list or what rides on it is not as it must be.
+   integer(ip) function wrong_steps(boxes, frames)
+      type(boxes_t), intent(in) :: boxes
+      !> Bounds, (4, box, step)
+      real(wp), intent(in) :: frames(:, :, :)
+      integer :: f
+
+      wrong_steps = 0_ip
+      do f = 1, size(finders)
+         wrong_steps = wrong_steps + count_wrong(trim(finders(f)), boxes, frames)
+      end do
+   end function wrong_steps
+
+   !> The same for one finder.
+   integer(ip) function count_wrong(finder, boxes, frames)
+      character(len=*), intent(in) :: finder
+      type(boxes_t), intent(in) :: boxes
+      real(wp), intent(in) :: frames(:, :, :)
+      type(boxes_t) :: now
+      type(neighbours_t) :: neighbours
+      type(error_t), allocatable :: error
+      integer(ip), allocatable :: expected(:), before(:), rider(:)
+      integer(ip) :: s
+
+      now = boxes
+      allocate (before(0), rider(0))
+      call new_neighbours(neighbours, finder, now, error)
+      count_wrong = merge(1_ip, 0_ip, allocated(error))
+      do s = 1_ip, size(frames, 3, kind=ip)
+         now%bounds = frames(:, :, s)
+         call neighbours%update(now)
+         call direct_pairs(now, expected)
+         if (.not. as_expected(neighbours, now%n_bodies, expected, before, rider)) &
+            count_wrong = count_wrong + 1_ip
+         before = expected
+      end do
+   end function count_wrong
+
+   !> Whether the list is the expected one, its changes lead there, and riders stayed with their pairs.
+   logical function as_expected(neighbours, n_bodies, expected, before, rider)
+      type(neighbours_t), intent(in) :: neighbours
+      integer(ip), intent(in) :: n_bodies
+      integer(ip), intent(in) :: expected(:), before(:)
+      !> Key of each pair, carried along since it began
+      integer(ip), allocatable, intent(inout) :: rider(:)
+      integer(ip), allocatable :: keys(:)
+      integer(ip) :: n, k
+
+      associate (pairs => neighbours%pairs)
+         n = pairs%n
+         keys = pairs%first(1:n)*(n_bodies + 1_ip) + pairs%second(1:n)
+         as_expected = size(expected) == n .and. pairs%contradictions == 0
+         if (as_expected) as_expected = all(keys == expected)
+         as_expected = as_expected .and. size(before) + pairs%n_began - pairs%n_ended == n
+         if (.not. as_expected) return
+         do k = 1_ip, pairs%n_ended
+            as_expected = as_expected .and. .not. any(expected == before(pairs%ended(k)))
+         end do
+         do k = 1_ip, pairs%n_began
+            as_expected = as_expected .and. .not. any(before == expected(pairs%began(k)))
+         end do
+         call pairs%carry(rider, -1_ip)
+         do k = 1_ip, pairs%n_began
+            as_expected = as_expected .and. rider(pairs%began(k)) == -1_ip
+            rider(pairs%began(k)) = keys(pairs%began(k))
+         end do
+         as_expected = as_expected .and. all(rider(1:n) == keys)
+      end associate
+   end function as_expected
+
+end module crowd
