@@ -1,0 +1,67 @@
+!> The program: understands the command line, does what it says, and is the only place that stops.
+program polydem
+   use, intrinsic :: iso_c_binding, only: c_int
+   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+   use omp_lib, only: omp_set_num_threads
+   use polydem_build_info, only: git_revision, program_version
+   use polydem_check, only: check_simulation
+   use polydem_command_line, only: command_t, read_command_line, usage
+   use polydem_errors, only: error_t
+   use polydem_info, only: describe_program, describe_result
+   use polydem_read_settings, only: read_settings
+   use polydem_replay, only: replay_trace
+   use polydem_run, only: run_simulation
+   use polydem_settings, only: settings_t
+   implicit none
+
+   interface
+      !> C exit: ends the program with a code and without a word
+      subroutine c_exit(code) bind(C, name='exit')
+         import :: c_int
+         integer(c_int), value :: code
+      end subroutine c_exit
+   end interface
+
+   type(command_t) :: command
+   type(error_t), allocatable :: error
+
+   call read_command_line(command, error)
+   if (.not. allocated(error)) call obey(command, error)
+   flush (output_unit)
+   if (allocated(error)) then
+      write (error_unit, '(2a)') 'polydem: ', error%message
+      flush (error_unit)
+      call c_exit(int(error%code, c_int))
+   end if
+
+contains
+
+   !> Do what the command line says.
+   subroutine obey(command, error)
+      type(command_t), intent(in) :: command
+      type(error_t), allocatable, intent(inout) :: error
+      type(settings_t) :: settings
+
+      if (command%help) then
+         write (output_unit, '(a)') usage(command%verb)
+         return
+      else if (command%version) then
+         write (output_unit, '(5a)') 'polydem ', program_version, ' (git ', git_revision, ')'
+         return
+      end if
+      if (command%threads > 0) call omp_set_num_threads(command%threads)
+      select case (command%verb)
+      case ('run', 'check')
+         call read_settings(command%file, command%overrides, settings, error)
+         if (allocated(error)) return
+         if (command%verb == 'check') call check_simulation(settings, error)
+         if (command%verb == 'run') call run_simulation(settings, command%force, error)
+      case ('replay')
+         call replay_trace(command%file, command%finder, command%threads, command%repeat, error)
+      case default
+         if (command%file == '') call describe_program(error)
+         if (command%file /= '') call describe_result(command%file, error)
+      end select
+   end subroutine obey
+
+end program polydem

@@ -1,0 +1,366 @@
+!> Data sets of an open HDF5 file, by address and type: what `polydem_hdf5_file` is made of.
+!>
+!> Shapes are in the order of Fortran, the fastest dimension first; the file and h5py show them reversed.
+!> HDF5's own messages are silenced; every status goes through `expect`, whose message names file and
+!> data set.
+!> All calls must come from one thread.
+module polydem_hdf5_dataset
+   use, intrinsic :: iso_c_binding, only: c_ptr
+   use hdf5, only: h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, &
+      h5dset_extent_f, h5dwrite_f, h5eset_auto_f, h5get_libversion_f, h5kind_to_type, h5lexists_f, h5open_f, &
+      h5pclose_f, h5pcreate_f, h5pset_chunk_f, h5pset_create_inter_group_f, h5sclose_f, h5screate_simple_f, &
+      h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, h5tclose_f, &
+      h5tget_class_f, h5tget_size_f
+   use hdf5, only: h5_integer_kind, h5_real_kind, h5p_dataset_create_f, h5p_link_create_f, h5s_select_set_f, &
+      h5s_unlimited_f, h5t_enum_f, h5t_float_f, h5t_integer_f, hid_t, hsize_t, size_t
+   use polydem_errors, only: error_t, input_error, io_error, raise
+   use polydem_kinds, only: bp, dp, ip, lp
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: place_t, start_library, library_version, expect
+   public :: write_dataset, create_dataset, append_rows_to, read_dataset, dataset_shape, has_link
+   public :: holds_reals, holds_integers, double_type, integer_type, long_type, byte_type
+
+   !> A data set may hold real or whole numbers when real ones are wanted
+   integer, parameter :: holds_reals = 1
+   !> A data set must hold whole numbers (of any width, or h5py's booleans)
+   integer, parameter :: holds_integers = 2
+
+   !> Chunks of growing data sets hold about this many bytes
+   integer(hsize_t), parameter :: chunk_bytes = 32768_hsize_t
+
+   !> Where a data set is, for calls and for messages
+   type :: place_t
+      !> HDF5's number of the open file
+      integer(hid_t) :: file = -1_hid_t
+      !> Path of the file
+      character(len=:), allocatable :: path
+      !> Name of the data set, like /frames/position
+      character(len=:), allocatable :: name
+   end type place_t
+
+contains
+
+   !> Make the library ready; may be called again.
+   subroutine start_library(error)
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: status
+
+      call h5open_f(status)
+      if (status == 0) call h5eset_auto_f(0, status)
+      if (status /= 0) call raise(error, io_error, 'the HDF5 library does not start')
+   end subroutine start_library
+
+   !> Version of the HDF5 library, like 1.10.8
+   function library_version() result(version)
+      character(len=:), allocatable :: version
+      integer :: major, minor, release, status
+
+      call h5get_libversion_f(major, minor, release, status)
+      version = to_text(int(major, ip))//'.'//to_text(int(minor, ip))//'.'//to_text(int(release, ip))
+   end function library_version
+
+   !> Type of real(dp) in memory and in files
+   integer(hid_t) function double_type()
+      double_type = h5kind_to_type(dp, h5_real_kind)
+   end function double_type
+
+   !> Type of integer(ip) in memory and in files
+   integer(hid_t) function integer_type()
+      integer_type = h5kind_to_type(ip, h5_integer_kind)
+   end function integer_type
+
+   !> Type of integer(lp) in memory and in files
+   integer(hid_t) function long_type()
+      long_type = h5kind_to_type(lp, h5_integer_kind)
+   end function long_type
+
+   !> Type of integer(bp) in memory and in files
+   integer(hid_t) function byte_type()
+      byte_type = h5kind_to_type(bp, h5_integer_kind)
+   end function byte_type
+
+   !> Turn a failed status of HDF5 into an error that names file and data set.
+   pure subroutine expect(status, action, place, error)
+      !> Status of an HDF5 call, negative on failure
+      integer, intent(in) :: status
+      !> What was tried, like 'write'
+      character(len=*), intent(in) :: action
+      !> File and data set
+      type(place_t), intent(in) :: place
+      !> Allocated if the call failed
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (status >= 0) return
+      call raise(error, io_error, place%path//': cannot '//action//' '//place%name)
+   end subroutine expect
+
+   !> Whether a name exists; every group on the way is looked up, as HDF5 demands.
+   logical function has_link(place)
+      !> File and name
+      type(place_t), intent(in) :: place
+      integer :: k, status
+
+      has_link = .false.
+      do k = 2, len(place%name) + 1
+         if (k <= len(place%name)) then
+            if (place%name(k:k) /= '/') cycle
+         end if
+         call h5lexists_f(place%file, place%name(:k - 1), has_link, status)
+         if (status /= 0) has_link = .false.
+         if (.not. has_link) return
+      end do
+   end function has_link
+
+   !> Write a new data set of fixed shape.
+   subroutine write_dataset(place, kind_in_file, extent, address, error)
+      !> File and name
+      type(place_t), intent(in) :: place
+      !> HDF5 type in memory and in the file
+      integer(hid_t), intent(in) :: kind_in_file
+      !> Shape, fastest dimension first; empty for a scalar
+      integer(hsize_t), intent(in) :: extent(:)
+      !> Address of the first of the contiguous values
+      type(c_ptr), intent(in) :: address
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: space, dataset
+      integer :: status
+
+      call h5screate_simple_f(size(extent), extent, space, status)
+      call expect(status, 'make room for', place, error)
+      if (allocated(error)) return
+      call create_dataset(place, kind_in_file, space, dataset, error)
+      if (.not. allocated(error)) then
+         if (product(extent) > 0_hsize_t) then
+            call h5dwrite_f(dataset, kind_in_file, address, status)
+            call expect(status, 'write', place, error)
+         end if
+         call h5dclose_f(dataset, status)
+         call expect(status, 'finish', place, error)
+      end if
+      call h5sclose_f(space, status)
+   end subroutine write_dataset
+
+   !> Create a data set, and the groups above it where they are missing; the caller closes it.
+   subroutine create_dataset(place, kind_in_file, space, dataset, error, properties)
+      !> File and name
+      type(place_t), intent(in) :: place
+      !> HDF5 type in the file
+      integer(hid_t), intent(in) :: kind_in_file
+      !> Its data space
+      integer(hid_t), intent(in) :: space
+      !> HDF5's number of the open data set
+      integer(hid_t), intent(out) :: dataset
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      !> Creation properties, for chunks
+      integer(hid_t), intent(in), optional :: properties
+      integer(hid_t) :: links
+      integer :: status, ignored
+
+      dataset = -1_hid_t
+      call h5pcreate_f(h5p_link_create_f, links, status)
+      if (status >= 0) call h5pset_create_inter_group_f(links, 1, status)
+      if (status >= 0) then
+         if (present(properties)) then
+            call h5dcreate_f(place%file, place%name, kind_in_file, space, dataset, status, &
+                             dcpl_id=properties, lcpl_id=links)
+         else
+            call h5dcreate_f(place%file, place%name, kind_in_file, space, dataset, status, lcpl_id=links)
+         end if
+      end if
+      call expect(status, 'create', place, error)
+      call h5pclose_f(links, ignored)
+   end subroutine create_dataset
+
+   !> Add rows along the slowest dimension, which is unlimited; the data set is created at the first call.
+   subroutine append_rows_to(place, kind_in_file, row, n_rows, address, error)
+      !> File and name
+      type(place_t), intent(in) :: place
+      !> HDF5 type in memory and in the file
+      integer(hid_t), intent(in) :: kind_in_file
+      !> Shape of one row, fastest dimension first; empty for a scalar
+      integer(hsize_t), intent(in) :: row(:)
+      !> Number of rows to add
+      integer(hsize_t), intent(in) :: n_rows
+      !> Address of the first of the contiguous values
+      type(c_ptr), intent(in) :: address
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: dataset
+      integer :: status
+
+      if (.not. has_link(place)) call create_growing(place, kind_in_file, row, error)
+      if (allocated(error)) return
+      call h5dopen_f(place%file, place%name, dataset, status)
+      call expect(status, 'open', place, error)
+      if (allocated(error)) return
+      call grow(dataset, place, kind_in_file, row, n_rows, address, error)
+      call h5dclose_f(dataset, status)
+      call expect(status, 'finish', place, error)
+   end subroutine append_rows_to
+
+   subroutine create_growing(place, kind_in_file, row, error)
+      type(place_t), intent(in) :: place
+      integer(hid_t), intent(in) :: kind_in_file
+      integer(hsize_t), intent(in) :: row(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: space, properties, dataset
+      integer(hsize_t) :: extent(size(row) + 1), limit(size(row) + 1), chunk(size(row) + 1)
+      integer(size_t) :: bytes
+      integer :: n, status, ignored
+
+      n = size(row) + 1
+      extent = [row, 0_hsize_t]
+      limit = [row, h5s_unlimited_f]
+      call h5tget_size_f(kind_in_file, bytes, status)
+      chunk(:n - 1) = max(1_hsize_t, row)
+      chunk(n) = max(1_hsize_t, chunk_bytes/(product(chunk(:n - 1))*int(bytes, hsize_t)))
+      call h5screate_simple_f(n, extent, space, status, limit)
+      if (status >= 0) call h5pcreate_f(h5p_dataset_create_f, properties, status)
+      if (status >= 0) call h5pset_chunk_f(properties, n, chunk, status)
+      call expect(status, 'make room for', place, error)
+      if (allocated(error)) return
+      call create_dataset(place, kind_in_file, space, dataset, error, properties)
+      if (.not. allocated(error)) call h5dclose_f(dataset, ignored)
+      call h5pclose_f(properties, ignored)
+      call h5sclose_f(space, ignored)
+   end subroutine create_growing
+
+   subroutine grow(dataset, place, kind_in_file, row, n_rows, address, error)
+      integer(hid_t), intent(in) :: dataset, kind_in_file
+      type(place_t), intent(in) :: place
+      integer(hsize_t), intent(in) :: row(:), n_rows
+      type(c_ptr), intent(in) :: address
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+      integer :: n, status
+
+      call dataset_shape(place, extent, error)
+      if (allocated(error)) return
+      n = size(extent)
+      if (n /= size(row) + 1) status = -1
+      if (n == size(row) + 1) status = merge(0, -1, all(extent(:n - 1) == row))
+      call expect(status, 'add rows of another shape to', place, error)
+      if (allocated(error) .or. n_rows == 0_hsize_t) return
+      extent(n) = extent(n) + n_rows
+      call h5dset_extent_f(dataset, extent, status)
+      call expect(status, 'extend', place, error)
+      if (allocated(error) .or. product(row) == 0_hsize_t) return
+      call transfer_slab(dataset, place, kind_in_file, [0_hsize_t*row, extent(n) - n_rows], [row, n_rows], &
+                         address, .true., error)
+   end subroutine grow
+
+   !> Copy a slab between memory and a data set.
+   subroutine transfer_slab(dataset, place, kind_in_memory, start, extent, address, writing, error)
+      integer(hid_t), intent(in) :: dataset, kind_in_memory
+      type(place_t), intent(in) :: place
+      integer(hsize_t), intent(in) :: start(:), extent(:)
+      type(c_ptr), intent(in) :: address
+      logical, intent(in) :: writing
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: file_space, memory_space
+      type(c_ptr) :: buffer
+      integer :: status, ignored
+
+      buffer = address
+      call h5screate_simple_f(size(extent), extent, memory_space, status)
+      if (status >= 0) call h5dget_space_f(dataset, file_space, status)
+      if (status >= 0) call h5sselect_hyperslab_f(file_space, h5s_select_set_f, start, extent, status)
+      if (status >= 0 .and. writing) then
+         call h5dwrite_f(dataset, kind_in_memory, buffer, status, memory_space, file_space)
+      else if (status >= 0) then
+         call h5dread_f(dataset, kind_in_memory, buffer, status, memory_space, file_space)
+      end if
+      if (writing) call expect(status, 'write', place, error)
+      if (.not. writing) call expect(status, 'read', place, error)
+      call h5sclose_f(file_space, ignored)
+      call h5sclose_f(memory_space, ignored)
+   end subroutine transfer_slab
+
+   !> Shape of a data set, fastest dimension first.
+   subroutine dataset_shape(place, extent, error)
+      !> File and name
+      type(place_t), intent(in) :: place
+      !> Its shape; empty for a scalar
+      integer(hsize_t), allocatable, intent(out) :: extent(:)
+      !> Allocated if there is no such data set
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: limit(:)
+      integer(hid_t) :: dataset, space
+      integer :: n, status, ignored
+
+      if (.not. has_link(place)) then
+         call raise(error, input_error, place%path//': there is no '//place%name)
+         return
+      end if
+      call h5dopen_f(place%file, place%name, dataset, status)
+      call expect(status, 'open the data set', place, error)
+      if (allocated(error)) return
+      call h5dget_space_f(dataset, space, status)
+      if (status >= 0) call h5sget_simple_extent_ndims_f(space, n, status)
+      if (status >= 0) then
+         allocate (extent(n), limit(n))
+         if (n > 0) call h5sget_simple_extent_dims_f(space, extent, limit, status)
+      end if
+      call expect(status, 'find the shape of', place, error)
+      call h5sclose_f(space, ignored)
+      call h5dclose_f(dataset, ignored)
+   end subroutine dataset_shape
+
+   !> Read a slab of a data set into memory.
+   subroutine read_dataset(place, wanted, kind_in_memory, start, extent, address, error)
+      !> File and name
+      type(place_t), intent(in) :: place
+      !> holds_reals or holds_integers
+      integer, intent(in) :: wanted
+      !> HDF5 type in memory; HDF5 converts
+      integer(hid_t), intent(in) :: kind_in_memory
+      !> First place of the slab, counted from 0, fastest dimension first
+      integer(hsize_t), intent(in) :: start(:)
+      !> Shape of the slab
+      integer(hsize_t), intent(in) :: extent(:)
+      !> Address of enough contiguous room
+      type(c_ptr), intent(in) :: address
+      !> Allocated on failure, or if the data set holds something else
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: dataset
+      integer :: status
+
+      if (product(extent) == 0_hsize_t) return
+      call h5dopen_f(place%file, place%name, dataset, status)
+      call expect(status, 'open', place, error)
+      if (allocated(error)) return
+      call check_class(dataset, place, wanted, error)
+      if (.not. allocated(error)) then
+         call transfer_slab(dataset, place, kind_in_memory, start, extent, address, .false., error)
+      end if
+      call h5dclose_f(dataset, status)
+   end subroutine read_dataset
+
+   subroutine check_class(dataset, place, wanted, error)
+      integer(hid_t), intent(in) :: dataset
+      type(place_t), intent(in) :: place
+      integer, intent(in) :: wanted
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: kind_in_file
+      integer :: class, status, ignored
+
+      call h5dget_type_f(dataset, kind_in_file, status)
+      if (status >= 0) call h5tget_class_f(kind_in_file, class, status)
+      call expect(status, 'find the type of', place, error)
+      call h5tclose_f(kind_in_file, ignored)
+      if (allocated(error)) return
+      if (wanted == holds_reals .and. (class == h5t_float_f .or. class == h5t_integer_f)) return
+      if (wanted == holds_integers .and. (class == h5t_integer_f .or. class == h5t_enum_f)) return
+      if (wanted == holds_reals) then
+         call raise(error, input_error, place%path//': '//place%name//' does not hold numbers')
+      else
+         call raise(error, input_error, place%path//': '//place%name//' does not hold whole numbers')
+      end if
+   end subroutine check_class
+
+end module polydem_hdf5_dataset

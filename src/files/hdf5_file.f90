@@ -1,0 +1,174 @@
+!> HDF5 files, the module for everybody else: named numbers and texts in, the same out.
+!>
+!> Names are like /frames/position; groups on the way are made. Real numbers in files are always double
+!> precision. An array (2, n) is (n, 2) to h5py: the fastest dimension, first in Fortran, is last there.
+!> The format is HDF5's default one, so that what was flushed can be read after the program was killed.
+!> All calls must come from one thread.
+module polydem_hdf5_file
+   use, intrinsic :: iso_c_binding, only: c_loc
+   use hdf5, only: hsize_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_hdf5_dataset, only: dataset_shape, double_type, holds_integers, holds_reals, library_version, &
+      long_type, place_t, read_dataset
+   use polydem_hdf5_text, only: read_text
+   use polydem_hdf5_writer, only: hdf5_writer_t
+   use polydem_kinds, only: dp, ip, lp
+   use polydem_strings, only: join, to_text
+   implicit none
+   private
+   public :: hdf5_file_t, library_version
+
+   !> An HDF5 file: create, open (to read), flush, close, has, shape_of, write, append, append_rows,
+   !> write_attribute, read, read_step
+   type, extends(hdf5_writer_t) :: hdf5_file_t
+   contains
+      !> Read a data set, allocating the values: read(name, values, error). Whole numbers may have any width,
+      !> or be h5py's booleans.
+      generic :: read => read_reals, read_real_table, read_real_block, read_integers, read_longs, &
+         read_one_text
+      procedure :: read_step
+      procedure, private :: read_reals, read_real_table, read_real_block, read_integers, read_longs
+      procedure, private :: read_one_text
+   end type hdf5_file_t
+
+contains
+
+   !> Read the slab [step, :, :] (as h5py writes it) of a data set of three dimensions.
+   !>
+   !> HDF5 unpacks all chunks that the slab touches; of a data set whose chunks reach over many steps, read
+   !> all steps at once instead.
+   subroutine read_step(self, name, step, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      !> Name of the data set
+      character(len=*), intent(in) :: name
+      !> Which slab, counted from 0
+      integer(ip), intent(in) :: step
+      !> The slab, fastest dimension first
+      real(dp), allocatable, target, intent(out) :: values(:, :)
+      !> Allocated on failure, or if there is no such slab
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+      type(place_t) :: place
+
+      place = self%place_of(name)
+      call expect_rank(place, 3, extent, error)
+      if (allocated(error)) return
+      if (step < 0_ip .or. int(step, hsize_t) >= extent(3)) then
+         call raise(error, input_error, place%path//': '//name//' has no step '//to_text(step)// &
+                    ', only 0 to '//to_text(int(extent(3) - 1, lp)))
+         return
+      end if
+      allocate (values(extent(1), extent(2)))
+      call read_dataset(place, holds_reals, double_type(), [0_hsize_t, 0_hsize_t, int(step, hsize_t)], &
+                        [extent(1), extent(2), 1_hsize_t], c_loc(values), error)
+   end subroutine read_step
+
+   subroutine read_reals(self, name, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), allocatable, target, intent(out) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call expect_rank(self%place_of(name), 1, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1)))
+      call read_dataset(self%place_of(name), holds_reals, double_type(), 0*extent, extent, &
+                        c_loc(values), error)
+   end subroutine read_reals
+
+   subroutine read_real_table(self, name, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), allocatable, target, intent(out) :: values(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call expect_rank(self%place_of(name), 2, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1), extent(2)))
+      call read_dataset(self%place_of(name), holds_reals, double_type(), 0*extent, extent, &
+                        c_loc(values), error)
+   end subroutine read_real_table
+
+   subroutine read_real_block(self, name, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), allocatable, target, intent(out) :: values(:, :, :)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call expect_rank(self%place_of(name), 3, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1), extent(2), extent(3)))
+      call read_dataset(self%place_of(name), holds_reals, double_type(), 0*extent, extent, &
+                        c_loc(values), error)
+   end subroutine read_real_block
+
+   subroutine read_longs(self, name, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(lp), allocatable, target, intent(out) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call expect_rank(self%place_of(name), 1, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1)))
+      call read_dataset(self%place_of(name), holds_integers, long_type(), 0*extent, extent, &
+                        c_loc(values), error)
+   end subroutine read_longs
+
+   !> Read by way of 64 bits, since HDF5 would cut what does not fit into 32 without a word.
+   subroutine read_integers(self, name, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(ip), allocatable, intent(out) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp), allocatable :: wide(:)
+      type(place_t) :: place
+
+      place = self%place_of(name)
+      call self%read_longs(name, wide, error)
+      if (allocated(error)) return
+      if (any(wide > huge(1_ip) .or. wide < -huge(1_ip))) then
+         call raise(error, input_error, place%path//': '//name//' holds numbers beyond 32 bits')
+         return
+      end if
+      values = int(wide, ip)
+   end subroutine read_integers
+
+   subroutine read_one_text(self, name, text, error)
+      class(hdf5_file_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable, intent(out) :: text
+      type(error_t), allocatable, intent(inout) :: error
+
+      call read_text(self%place_of(name), text, error)
+   end subroutine read_one_text
+
+   !> Find the shape of a data set and insist on its number of dimensions.
+   subroutine expect_rank(place, rank, extent, error)
+      !> File and name
+      type(place_t), intent(in) :: place
+      !> Number of dimensions it must have
+      integer, intent(in) :: rank
+      !> Its shape, fastest dimension first
+      integer(hsize_t), allocatable, intent(out) :: extent(:)
+      !> Allocated if there is no such data set or it has another rank
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=24), allocatable :: words(:)
+      integer :: k
+
+      call dataset_shape(place, extent, error)
+      if (allocated(error)) return
+      if (size(extent) == rank) return
+      allocate (words(size(extent)))
+      do k = 1, size(extent)
+         words(k) = to_text(int(extent(size(extent) + 1 - k), lp))
+      end do
+      call raise(error, input_error, place%path//': '//place%name//' has the shape ('//join(words, ', ')// &
+                 ') but must have '//to_text(int(rank, ip))//' dimensions')
+   end subroutine expect_rank
+
+end module polydem_hdf5_file

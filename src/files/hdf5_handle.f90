@@ -1,0 +1,138 @@
+!> An HDF5 file that is opened, flushed, asked and closed; what is in it is read and written by extensions.
+module polydem_hdf5_handle
+   use hdf5, only: h5f_acc_rdonly_f, h5f_acc_trunc_f, h5f_scope_global_f, h5fclose_f, h5fcreate_f, &
+      h5fflush_f, h5fopen_f, hid_t, hsize_t
+   use polydem_errors, only: error_t, io_error, raise
+   use polydem_hdf5_dataset, only: dataset_shape, has_link, place_t, start_library
+   use polydem_kinds, only: lp
+   use polydem_paths, only: exists
+   implicit none
+   private
+   public :: hdf5_handle_t
+
+   !> An open HDF5 file
+   type :: hdf5_handle_t
+      private
+      !> HDF5's number of the file, negative if it is closed
+      integer(hid_t) :: id = -1_hid_t
+      !> Its path
+      character(len=:), allocatable :: path
+   contains
+      procedure :: create
+      procedure :: open => open_file
+      procedure :: flush => flush_file
+      procedure :: close => close_file
+      procedure :: has
+      procedure :: shape_of
+      procedure :: place_of
+   end type hdf5_handle_t
+
+   !> What to try if a file cannot be opened although it is there
+   character(len=*), parameter :: locking_hint = &
+      '; another program may be writing it; on a network file system try HDF5_USE_FILE_LOCKING=FALSE'
+
+contains
+
+   !> Create a file for writing; a file of the same name is lost.
+   subroutine create(self, path, error)
+      class(hdf5_handle_t), intent(inout) :: self
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: status
+
+      call start_library(error)
+      if (allocated(error)) return
+      self%path = path
+      call h5fcreate_f(path, h5f_acc_trunc_f, self%id, status)
+      if (status >= 0) return
+      self%id = -1_hid_t
+      call raise(error, io_error, path//': cannot be created; is there such a folder, room and '// &
+                 'permission?'//locking_hint)
+   end subroutine create
+
+   !> Open a file for reading.
+   subroutine open_file(self, path, error)
+      class(hdf5_handle_t), intent(inout) :: self
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: status
+
+      if (.not. exists(path)) then
+         call raise(error, io_error, path//': there is no such file')
+         return
+      end if
+      call start_library(error)
+      if (allocated(error)) return
+      self%path = path
+      call h5fopen_f(path, h5f_acc_rdonly_f, self%id, status)
+      if (status >= 0) return
+      self%id = -1_hid_t
+      call raise(error, io_error, path//': cannot be opened as an HDF5 file'//locking_hint)
+   end subroutine open_file
+
+   !> Hand everything written so far to the operating system, so that it outlives this program.
+   subroutine flush_file(self, error)
+      class(hdf5_handle_t), intent(in) :: self
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: status
+
+      call h5fflush_f(self%id, h5f_scope_global_f, status)
+      if (status < 0) call raise(error, io_error, self%path//': cannot be flushed; is the disk full?')
+   end subroutine flush_file
+
+   !> Close the file; nothing happens if it is closed.
+   subroutine close_file(self, error)
+      class(hdf5_handle_t), intent(inout) :: self
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: status
+
+      if (self%id < 0_hid_t) return
+      call h5fclose_f(self%id, status)
+      self%id = -1_hid_t
+      if (status < 0) call raise(error, io_error, self%path//': cannot be closed; is the disk full?')
+   end subroutine close_file
+
+   !> Whether the file has a group or data set of this name
+   logical function has(self, name)
+      class(hdf5_handle_t), intent(in) :: self
+      !> Name like /frames/position
+      character(len=*), intent(in) :: name
+
+      has = has_link(self%place_of(name))
+   end function has
+
+   !> Shape of a data set as h5py shows it, the slowest dimension first.
+   subroutine shape_of(self, name, shape, error)
+      class(hdf5_handle_t), intent(in) :: self
+      !> Name of the data set
+      character(len=*), intent(in) :: name
+      !> Its shape; empty for a scalar
+      integer(lp), allocatable, intent(out) :: shape(:)
+      !> Allocated if there is no such data set
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call dataset_shape(self%place_of(name), extent, error)
+      if (allocated(error)) return
+      shape = int(extent(size(extent):1:-1), lp)
+   end subroutine shape_of
+
+   !> Where a data set is, for the procedures of `polydem_hdf5_dataset`
+   function place_of(self, name) result(place)
+      class(hdf5_handle_t), intent(in) :: self
+      !> Name of the data set
+      character(len=*), intent(in) :: name
+      type(place_t) :: place
+
+      place%file = self%id
+      place%path = self%path
+      place%name = name
+   end function place_of
+
+end module polydem_hdf5_handle

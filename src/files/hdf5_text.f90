@@ -1,0 +1,188 @@
+!> Texts in HDF5 files: data sets and attributes of variable length in UTF-8, which h5py shows as `str`.
+!>
+!> HDF5 handles them as addresses of texts that end with a null character.
+module polydem_hdf5_text
+   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_loc, c_null_char, c_null_ptr, c_ptr, c_size_t
+   use hdf5, only: h5aclose_f, h5acreate_f, h5adelete_f, h5aexists_f, h5awrite_f, h5dclose_f, &
+      h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dvlen_reclaim_f, h5oclose_f, h5oopen_f, &
+      h5sclose_f, h5screate_f, h5tclose_f, h5tcopy_f, h5tis_variable_str_f, h5tset_cset_f
+   use hdf5, only: h5p_default_f, h5s_scalar_f, h5t_cset_utf8_f, h5t_string, hid_t, hsize_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_hdf5_dataset, only: dataset_shape, expect, place_t, write_dataset
+   implicit none
+   private
+   public :: write_texts, read_text, write_attribute_value, write_text_attribute
+
+   interface
+      !> C strlen
+      integer(c_size_t) function c_strlen(text) bind(C, name='strlen')
+         import :: c_ptr, c_size_t
+         type(c_ptr), value :: text
+      end function c_strlen
+   end interface
+
+contains
+
+   !> Write a new data set of texts.
+   subroutine write_texts(place, extent, texts, error)
+      !> File and name
+      type(place_t), intent(in) :: place
+      !> Shape: empty for one text, else the number of texts
+      integer(hsize_t), intent(in) :: extent(:)
+      !> Texts; blanks at their ends are left out if there are several
+      character(len=*), intent(in) :: texts(:)
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      character(kind=c_char), allocatable, target :: letters(:)
+      type(c_ptr), allocatable, target :: addresses(:)
+      integer(hid_t) :: kind_in_file
+      integer :: status
+
+      call lay_out(texts, size(extent) > 0, letters, addresses)
+      call text_type(place, kind_in_file, error)
+      if (allocated(error)) return
+      call write_dataset(place, kind_in_file, extent, c_loc(addresses), error)
+      call h5tclose_f(kind_in_file, status)
+   end subroutine write_texts
+
+   !> Put texts one after the other with null characters between, and note where each begins.
+   subroutine lay_out(texts, trimmed, letters, addresses)
+      character(len=*), intent(in) :: texts(:)
+      logical, intent(in) :: trimmed
+      character(kind=c_char), allocatable, target, intent(out) :: letters(:)
+      type(c_ptr), allocatable, intent(out) :: addresses(:)
+      integer :: i, k, n, length
+
+      allocate (letters(size(texts)*(len(texts) + 1) + 1), addresses(max(1, size(texts))))
+      addresses = c_null_ptr
+      n = 0
+      do i = 1, size(texts)
+         length = len(texts)
+         if (trimmed) length = len_trim(texts(i))
+         addresses(i) = c_loc(letters(n + 1))
+         do k = 1, length
+            letters(n + k) = texts(i) (k:k)
+         end do
+         n = n + length + 1
+         letters(n) = c_null_char
+      end do
+   end subroutine lay_out
+
+   subroutine text_type(place, kind_in_file, error)
+      type(place_t), intent(in) :: place
+      integer(hid_t), intent(out) :: kind_in_file
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: status
+
+      call h5tcopy_f(h5t_string, kind_in_file, status)
+      if (status >= 0) call h5tset_cset_f(kind_in_file, h5t_cset_utf8_f, status)
+      call expect(status, 'make the type of', place, error)
+   end subroutine text_type
+
+   !> Read a data set of one text.
+   subroutine read_text(place, text, error)
+      !> File and name
+      type(place_t), intent(in) :: place
+      !> The text
+      character(len=:), allocatable, intent(out) :: text
+      !> Allocated on failure, or if the data set holds something else
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+      type(c_ptr), target :: address
+      type(c_ptr) :: buffer
+      integer(hid_t) :: dataset, space, kind_in_file
+      logical :: variable
+      integer :: status, ignored
+
+      call dataset_shape(place, extent, error)
+      if (allocated(error)) return
+      call h5dopen_f(place%file, place%name, dataset, status)
+      if (status >= 0) call h5dget_type_f(dataset, kind_in_file, status)
+      call expect(status, 'open', place, error)
+      if (allocated(error)) return
+      call h5tis_variable_str_f(kind_in_file, variable, status)
+      if (status < 0 .or. size(extent) > 0) variable = .false.
+      if (variable) then
+         buffer = c_loc(address)
+         call h5dread_f(dataset, kind_in_file, buffer, status)
+         call expect(status, 'read', place, error)
+         if (.not. allocated(error)) then
+            call copy_text(address, text)
+            call h5dget_space_f(dataset, space, ignored)
+            call h5dvlen_reclaim_f(kind_in_file, space, h5p_default_f, buffer, ignored)
+            call h5sclose_f(space, ignored)
+         end if
+      else
+         call raise(error, input_error, place%path//': '//place%name// &
+                    ' does not hold one text of variable length')
+      end if
+      call h5tclose_f(kind_in_file, ignored)
+      call h5dclose_f(dataset, ignored)
+   end subroutine read_text
+
+   subroutine copy_text(address, text)
+      type(c_ptr), intent(in) :: address
+      character(len=:), allocatable, intent(out) :: text
+      character(kind=c_char), pointer :: letters(:)
+      integer :: k
+
+      call c_f_pointer(address, letters, [c_strlen(address)])
+      allocate (character(len=size(letters)) :: text)
+      do k = 1, size(letters)
+         text(k:k) = letters(k)
+      end do
+   end subroutine copy_text
+
+   !> Attach a text to a group or data set; a former one of the same name is replaced.
+   subroutine write_text_attribute(place, name, text, error)
+      !> File and the name of the group or data set
+      type(place_t), intent(in) :: place
+      !> Name of the attribute
+      character(len=*), intent(in) :: name
+      !> The text
+      character(len=*), intent(in) :: text
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      character(kind=c_char), allocatable, target :: letters(:)
+      type(c_ptr), allocatable, target :: addresses(:)
+      integer(hid_t) :: kind_in_file
+      integer :: status
+
+      call lay_out([text], .false., letters, addresses)
+      call text_type(place, kind_in_file, error)
+      if (allocated(error)) return
+      call write_attribute_value(place, name, kind_in_file, c_loc(addresses), error)
+      call h5tclose_f(kind_in_file, status)
+   end subroutine write_text_attribute
+
+   !> Attach one value to a group or data set; a former one of the same name is replaced.
+   subroutine write_attribute_value(place, name, kind_in_file, address, error)
+      !> File and the name of the group or data set
+      type(place_t), intent(in) :: place
+      !> Name of the attribute
+      character(len=*), intent(in) :: name
+      !> HDF5 type in memory and in the file
+      integer(hid_t), intent(in) :: kind_in_file
+      !> Address of the value
+      type(c_ptr), intent(in) :: address
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: object, space, attribute
+      logical :: there
+      integer :: status, ignored
+
+      call h5oopen_f(place%file, place%name, object, status)
+      call expect(status, 'open', place, error)
+      if (allocated(error)) return
+      call h5aexists_f(object, name, there, status)
+      if (status >= 0 .and. there) call h5adelete_f(object, name, status)
+      if (status >= 0) call h5screate_f(h5s_scalar_f, space, status)
+      if (status >= 0) call h5acreate_f(object, name, kind_in_file, space, attribute, status)
+      if (status >= 0) call h5awrite_f(attribute, kind_in_file, address, status)
+      call expect(status, "write the attribute '"//name//"' of", place, error)
+      call h5aclose_f(attribute, ignored)
+      call h5sclose_f(space, ignored)
+      call h5oclose_f(object, ignored)
+   end subroutine write_attribute_value
+
+end module polydem_hdf5_text

@@ -1,0 +1,309 @@
+!> Writing to an HDF5 file: new data sets, rows added to growing ones, attributes.
+!>
+!> Every procedure takes the name of the data set and the values, and allocates `error` on failure, with the
+!> file and the data set in its message. `unit` and `meaning` become attributes of the data set.
+module polydem_hdf5_writer
+   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
+   use hdf5, only: hid_t, hsize_t
+   use polydem_errors, only: error_t
+   use polydem_hdf5_dataset, only: append_rows_to, byte_type, double_type, integer_type, long_type, &
+      write_dataset
+   use polydem_hdf5_handle, only: hdf5_handle_t
+   use polydem_hdf5_text, only: write_attribute_value, write_text_attribute, write_texts
+   use polydem_kinds, only: bp, dp, ip, lp
+   implicit none
+   private
+   public :: hdf5_writer_t
+
+   !> A file that can be written to
+   type, extends(hdf5_handle_t) :: hdf5_writer_t
+   contains
+      !> Write a new data set: write(name, values, error, unit, meaning)
+      generic :: write => write_real, write_reals, write_real_table, write_integer, write_integers, &
+         write_long, write_longs, write_bytes, write_text, write_text_list
+      !> Add one row along the slowest dimension: append(name, values, error, unit, meaning)
+      generic :: append => append_real, append_reals, append_real_table, append_integer, append_integers, &
+         append_long
+      !> Add a row for each place of the last dimension: append_rows(name, values, error, unit, meaning)
+      generic :: append_rows => append_rows_reals, append_rows_table, append_rows_integers
+      !> Attach a value to a group or data set: write_attribute(object, name, value, error)
+      generic :: write_attribute => attach_text, attach_integer, attach_real
+      procedure, private :: write_real, write_reals, write_real_table, write_integer, write_integers
+      procedure, private :: write_long, write_longs, write_bytes, write_text, write_text_list
+      procedure, private :: append_real, append_reals, append_real_table, append_integer, append_integers
+      procedure, private :: append_long, append_rows_reals, append_rows_table, append_rows_integers
+      procedure, private :: attach_text, attach_integer, attach_real
+      procedure, private :: put, add, describe
+   end type hdf5_writer_t
+
+contains
+
+   !> Write contiguous values as a new data set with its attributes.
+   subroutine put(self, name, type, extent, address, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(hid_t), intent(in) :: type
+      integer, intent(in) :: extent(:)
+      type(c_ptr), intent(in) :: address
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      if (allocated(error)) return
+      call write_dataset(self%place_of(name), type, int(extent, hsize_t), address, error)
+      call self%describe(name, error, unit, meaning)
+   end subroutine put
+
+   !> Add contiguous rows to a growing data set, which gets its attributes when it is made.
+   subroutine add(self, name, type, row, n_rows, address, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(hid_t), intent(in) :: type
+      integer, intent(in) :: row(:), n_rows
+      type(c_ptr), intent(in) :: address
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+      logical :: known
+
+      if (allocated(error)) return
+      known = self%has(name)
+      call append_rows_to(self%place_of(name), type, int(row, hsize_t), int(n_rows, hsize_t), address, error)
+      if (.not. known) call self%describe(name, error, unit, meaning)
+   end subroutine add
+
+   subroutine describe(self, name, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      if (allocated(error)) return
+      if (present(unit)) call write_text_attribute(self%place_of(name), 'unit', unit, error)
+      if (allocated(error)) return
+      if (present(meaning)) call write_text_attribute(self%place_of(name), 'meaning', meaning, error)
+   end subroutine describe
+
+   subroutine write_real(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), intent(in), target :: values
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%put(name, double_type(), [integer ::], c_loc(values), error, unit, meaning)
+   end subroutine write_real
+
+   subroutine write_reals(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%put(name, double_type(), shape(values), c_loc(values), error, unit, meaning)
+   end subroutine write_reals
+
+   subroutine write_real_table(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), intent(in), target, contiguous :: values(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%put(name, double_type(), shape(values), c_loc(values), error, unit, meaning)
+   end subroutine write_real_table
+
+   subroutine write_integer(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(ip), intent(in), target :: values
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%put(name, integer_type(), [integer ::], c_loc(values), error, unit, meaning)
+   end subroutine write_integer
+
+   subroutine write_integers(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(ip), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%put(name, integer_type(), shape(values), c_loc(values), error, unit, meaning)
+   end subroutine write_integers
+
+   subroutine write_long(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(lp), intent(in), target :: values
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%put(name, long_type(), [integer ::], c_loc(values), error, unit, meaning)
+   end subroutine write_long
+
+   subroutine write_longs(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(lp), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%put(name, long_type(), shape(values), c_loc(values), error, unit, meaning)
+   end subroutine write_longs
+
+   subroutine write_bytes(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(bp), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%put(name, byte_type(), shape(values), c_loc(values), error, unit, meaning)
+   end subroutine write_bytes
+
+   subroutine write_text(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      character(len=*), intent(in) :: values
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      if (allocated(error)) return
+      call write_texts(self%place_of(name), [integer(hsize_t) ::], [values], error)
+      call self%describe(name, error, unit, meaning)
+   end subroutine write_text
+
+   subroutine write_text_list(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      character(len=*), intent(in) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      if (allocated(error)) return
+      call write_texts(self%place_of(name), [size(values, kind=hsize_t)], values, error)
+      call self%describe(name, error, unit, meaning)
+   end subroutine write_text_list
+
+   subroutine append_real(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), intent(in), target :: values
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, double_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
+   end subroutine append_real
+
+   subroutine append_reals(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, double_type(), shape(values), 1, c_loc(values), error, unit, meaning)
+   end subroutine append_reals
+
+   subroutine append_real_table(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), intent(in), target, contiguous :: values(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, double_type(), shape(values), 1, c_loc(values), error, unit, meaning)
+   end subroutine append_real_table
+
+   subroutine append_integer(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(ip), intent(in), target :: values
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, integer_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
+   end subroutine append_integer
+
+   subroutine append_integers(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(ip), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, integer_type(), shape(values), 1, c_loc(values), error, unit, meaning)
+   end subroutine append_integers
+
+   subroutine append_long(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(lp), intent(in), target :: values
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, long_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
+   end subroutine append_long
+
+   subroutine append_rows_reals(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, double_type(), [integer ::], size(values, 1), c_loc(values), error, unit, meaning)
+   end subroutine append_rows_reals
+
+   subroutine append_rows_table(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), intent(in), target, contiguous :: values(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, double_type(), [size(values, 1)], size(values, 2), c_loc(values), error, &
+                    unit, meaning)
+   end subroutine append_rows_table
+
+   subroutine append_rows_integers(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(ip), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, integer_type(), [integer ::], size(values, 1), c_loc(values), error, unit, meaning)
+   end subroutine append_rows_integers
+
+   subroutine attach_text(self, object, name, value, error)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: object, name, value
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      call write_text_attribute(self%place_of(object), name, value, error)
+   end subroutine attach_text
+
+   subroutine attach_integer(self, object, name, value, error)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      integer(ip), intent(in), target :: value
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      call write_attribute_value(self%place_of(object), name, integer_type(), c_loc(value), error)
+   end subroutine attach_integer
+
+   subroutine attach_real(self, object, name, value, error)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: object, name
+      real(dp), intent(in), target :: value
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      call write_attribute_value(self%place_of(object), name, double_type(), c_loc(value), error)
+   end subroutine attach_real
+
+end module polydem_hdf5_writer

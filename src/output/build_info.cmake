@@ -1,0 +1,15 @@
+# Script: fill build_info.f90.in. Without git, or outside a clone, the revision is 'unknown'.
+set(REVISION "unknown")
+find_package(Git QUIET)
+if(Git_FOUND AND EXISTS "${SOURCE_DIR}/.git")
+  execute_process(COMMAND "${GIT_EXECUTABLE}" describe --always --dirty --tags
+    WORKING_DIRECTORY "${SOURCE_DIR}" OUTPUT_VARIABLE described RESULT_VARIABLE status
+    OUTPUT_STRIP_TRAILING_WHITESPACE ERROR_QUIET)
+  if(status EQUAL 0)
+    set(REVISION "${described}")
+  endif()
+endif()
+if(NATIVE)
+  string(APPEND BUILD_TYPE " native")
+endif()
+configure_file("${TEMPLATE}" "${RESULT}" @ONLY)

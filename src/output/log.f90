@@ -1,0 +1,192 @@
+!> The log of a run, on the screen and in log.txt, flushed line by line so that it survives a crash.
+module polydem_log
+   use, intrinsic :: iso_fortran_env, only: output_unit
+   use polydem_clock, only: wall_seconds
+   use polydem_errors, only: error_t, io_error, raise
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_machine, only: terminal_watches
+   use polydem_result_folder, only: log_path
+   implicit none
+   private
+   public :: log_t, line_width
+
+   !> No line of the log is longer
+   integer, parameter :: line_width = 110
+   !> Shortest time between two changes of the live line [s]
+   real(dp), parameter :: live_interval = 0.2_dp
+
+   !> A log that is being written
+   type :: log_t
+      private
+      !> Unit of log.txt, if there is one
+      integer :: unit = 0
+      !> Whether there is a log.txt
+      logical :: has_file = .false.
+      !> Whether the screen is written to
+      logical :: on_screen = .true.
+      !> Whether a person watches a terminal
+      logical :: live = .false.
+      !> Length of the live line now on the screen
+      integer :: live_length = 0
+      !> When the live line was written [s]
+      real(dp) :: live_moment = 0.0_dp
+      !> Whether the heading of the interval lines is written
+      logical :: has_heading = .false.
+      !> Step and moment of the last interval line
+      integer(lp) :: last_step = 0_lp
+      real(dp) :: last_moment = 0.0_dp
+   contains
+      procedure :: open => open_log
+      procedure :: write_line
+      procedure :: write_interval
+      procedure :: show_progress
+      procedure :: close => close_log
+   end type log_t
+
+contains
+
+   !> Begin a log.
+   subroutine open_log(self, folder, error, quiet)
+      class(log_t), intent(inout) :: self
+      !> Folder of the result, which must be there; empty: no log.txt
+      character(len=*), intent(in) :: folder
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      !> Whether the screen stays silent; no if absent
+      logical, intent(in), optional :: quiet
+      integer :: status
+      character(len=256) :: reason
+
+      if (present(quiet)) self%on_screen = .not. quiet
+      self%live = terminal_watches()
+      self%live = self%live .and. self%on_screen
+      self%has_heading = .false.
+      if (folder == '') return
+      open (newunit=self%unit, file=log_path(folder), status='replace', action='write', iostat=status, &
+            iomsg=reason)
+      self%has_file = status == 0
+      if (status /= 0) call raise(error, io_error, log_path(folder)//': '//trim(reason))
+   end subroutine open_log
+
+   !> Write a line on the screen and into the file.
+   subroutine write_line(self, text)
+      class(log_t), intent(inout) :: self
+      !> The line
+      character(len=*), intent(in) :: text
+
+      if (self%live_length > 0) call write_live(self, repeat(' ', self%live_length))
+      if (self%live_length > 0) write (output_unit, '(a)', advance='no') achar(13)
+      self%live_length = 0
+      if (self%on_screen) then
+         write (output_unit, '(a)') text
+         flush (output_unit)
+      end if
+      if (self%has_file) then
+         write (self%unit, '(a)') text
+         flush (self%unit)
+      end if
+   end subroutine write_line
+
+   !> Write the line of an interval, with the rate since the last one and the time to the end at that rate.
+   subroutine write_interval(self, step, n_steps, time, dt, kinetic, potential, contacts)
+      class(log_t), intent(inout) :: self
+      !> Step
+      integer(lp), intent(in) :: step
+      !> Steps of the whole run
+      integer(lp), intent(in) :: n_steps
+      !> Simulated time [s]
+      real(wp), intent(in) :: time
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Kinetic energy [J/m]
+      real(wp), intent(in) :: kinetic
+      !> Potential energy of gravity [J/m]
+      real(wp), intent(in) :: potential
+      !> Contacts
+      integer(ip), intent(in) :: contacts
+      character(len=line_width) :: line
+      character(len=12) :: rate_text
+      real(dp) :: rate, now
+
+      if (.not. self%has_heading) then
+         write (line, '(a10,6a12,a10,a11)') 'step', 'time [s]', 'dt [s]', 'kin. [J/m]', 'pot. [J/m]', &
+            'contacts', 'steps/s', 'to go', 'done'
+         call self%write_line(trim(line))
+         self%last_step = step
+      end if
+      now = wall_seconds()
+      rate_text = '-'
+      rate = 0.0_dp
+      if (step > self%last_step .and. now > self%last_moment) then
+         rate = real(step - self%last_step, dp)/(now - self%last_moment)
+         write (rate_text, '(f12.1)') min(rate, 9.9e8_dp)
+      end if
+      write (line, '(i10,es12.4,es12.3,2es12.4,i12,a12,a10,f10.1,a)') step, time, dt, kinetic, potential, &
+         contacts, adjustr(rate_text), time_to_go(n_steps - step, rate), percent(step, n_steps), '%'
+      call self%write_line(trim(line))
+      self%has_heading = .true.
+      self%last_step = step
+      self%last_moment = now
+   end subroutine write_interval
+
+   !> Show how far the run is; nothing happens unless a person watches, and then only a few times a second.
+   subroutine show_progress(self, step, n_steps)
+      class(log_t), intent(inout) :: self
+      !> Step
+      integer(lp), intent(in) :: step
+      !> Steps of the whole run
+      integer(lp), intent(in) :: n_steps
+      character(len=64) :: text
+      real(dp) :: now, rate
+
+      if (.not. self%live) return
+      now = wall_seconds()
+      if (now - self%live_moment < live_interval) return
+      rate = 0.0_dp
+      if (self%has_heading .and. now > self%last_moment) then
+         rate = real(step - self%last_step, dp)/(now - self%last_moment)
+      end if
+      write (text, '(i10,a,i0,a,f5.1,2a)') step, ' of ', n_steps, ' steps,', percent(step, n_steps), &
+         '%, to go', time_to_go(n_steps - step, rate)
+      call write_live(self, trim(text))
+      self%live_moment = now
+   end subroutine show_progress
+
+   !> End the log.
+   subroutine close_log(self)
+      class(log_t), intent(inout) :: self
+
+      if (self%has_file) close (self%unit)
+      self%has_file = .false.
+   end subroutine close_log
+
+   subroutine write_live(self, text)
+      type(log_t), intent(inout) :: self
+      character(len=*), intent(in) :: text
+
+      write (output_unit, '(a)', advance='no') achar(13)//text//repeat(' ', max(0, self%live_length - len(text)))
+      flush (output_unit)
+      self%live_length = len(text)
+   end subroutine write_live
+
+   pure real(dp) function percent(step, n_steps)
+      integer(lp), intent(in) :: step, n_steps
+
+      percent = 100.0_dp*real(step, dp)/real(max(1_lp, n_steps), dp)
+   end function percent
+
+   !> Hours, minutes and seconds, or '-' if the rate is not known
+   pure function time_to_go(steps, rate) result(text)
+      integer(lp), intent(in) :: steps
+      real(dp), intent(in) :: rate
+      character(len=10) :: text
+      integer(lp) :: seconds
+
+      text = '         -'
+      if (rate <= 0.0_dp) return
+      seconds = nint(min(real(steps, dp)/rate, 3.59e6_dp), lp)
+      write (text, '(i4,a,i2.2,a,i2.2)') seconds/3600_lp, ':', mod(seconds/60_lp, 60_lp), ':', &
+         mod(seconds, 60_lp)
+   end function time_to_go
+
+end module polydem_log

@@ -1,0 +1,156 @@
+!> The standard parts of a log: its header, the table of times, the counters, the hash of the last state.
+module polydem_log_tables
+   use polydem_counters, only: counters_t
+   use polydem_hash, only: hexadecimal
+   use polydem_kinds, only: dp, ip, lp
+   use polydem_log, only: line_width, log_t
+   use polydem_provenance, only: provenance_t
+   use polydem_strings, only: to_text
+   use polydem_timers, only: n_stages, stage_names, timers_t
+   implicit none
+   private
+   public :: write_header, write_timings, write_counters, write_hash
+
+contains
+
+   !> Write what ran where, on what input.
+   subroutine write_header(log, provenance, folder)
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Where the result comes from
+      type(provenance_t), intent(in) :: provenance
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+
+      associate (p => provenance)
+         call write_wrapped(log, 'polydem '//p%version//' (git '//p%revision//'), '//p%build_type//', '// &
+                            p%precision//' precision, '//p%compiler//', HDF5 '//p%hdf5_version)
+         call write_wrapped(log, 'options    '//p%options)
+         call write_wrapped(log, 'machine    '//p%host//', '//p%processor)
+         call write_wrapped(log, 'caches     '//p%caches)
+         call write_wrapped(log, 'threads    '//to_text(p%threads)//' on '//to_text(p%processors)// &
+                            ' processors')
+         if (p%threads > p%processors) then
+            call write_wrapped(log, 'warning: more threads than processors; the run will be slow')
+         end if
+         call write_wrapped(log, 'input      '//p%input_file//', seed '//to_text(p%seed))
+         call write_wrapped(log, 'result     '//folder)
+         call write_wrapped(log, 'started    '//p%started)
+      end associate
+   end subroutine write_header
+
+   !> Write the seconds of each stage that ran, per step and in all, and the speed of the run.
+   subroutine write_timings(log, timers, seconds, steps, bodies)
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Seconds per stage
+      type(timers_t), intent(in) :: timers
+      !> Elapsed time of the whole run [s]
+      real(dp), intent(in) :: seconds
+      !> Steps done
+      integer(lp), intent(in) :: steps
+      !> Number of bodies
+      integer(ip), intent(in) :: bodies
+      character(len=line_width) :: line
+      character(len=12) :: name
+      integer :: k
+
+      call log%write_line('')
+      write (line, '(a12,a12,3a14,a14,a10)') 'stage       ', 'steps', 'least [us]', 'mean [us]', &
+         'most [us]', 'total [s]', 'share'
+      call log%write_line(trim(line))
+      do k = 1, n_stages
+         if (timers%calls(k) == 0_lp) cycle
+         name = stage_names(k)
+         write (line, '(a12,i12,3f14.2,f14.3,f9.1,a)') name, timers%calls(k), &
+            1.0e6_dp*timers%least(k), 1.0e6_dp*timers%total(k)/real(timers%calls(k), dp), &
+            1.0e6_dp*timers%most(k), timers%total(k), share(timers%total(k), seconds), '%'
+         call log%write_line(trim(line))
+      end do
+      call write_sum(log, 'other', seconds - sum(timers%total), seconds)
+      call write_sum(log, 'all', seconds, seconds)
+      if (seconds <= 0.0_dp .or. steps < 1_lp .or. bodies < 1_ip) return
+      call log%write_line('')
+      call log%write_line(to_text(steps)//' steps of '//to_text(bodies)//' bodies in '// &
+                          decimal(seconds, 3)//' s: '//decimal(real(steps, dp)/seconds, 1)//' steps/s, '// &
+                          decimal(1.0e6_dp*seconds/(real(steps, dp)*real(bodies, dp)), 4)// &
+                          ' us per step and body')
+   end subroutine write_timings
+
+   !> Write the counters, one per line.
+   subroutine write_counters(log, counters)
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Exact counts
+      type(counters_t), intent(in) :: counters
+      character(len=line_width) :: line
+      integer :: k
+
+      if (.not. allocated(counters%name)) return
+      call log%write_line('')
+      do k = 1, size(counters%name)
+         write (line, '(a,i20)') counters%name(k), counters%value(k)
+         call log%write_line(trim(line))
+      end do
+   end subroutine write_counters
+
+   !> Write the hash of the last state, the last line of a log.
+   subroutine write_hash(log, state_hash)
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Hash of the last state
+      integer(lp), intent(in) :: state_hash
+
+      call log%write_line('state hash: '//hexadecimal(state_hash))
+   end subroutine write_hash
+
+   subroutine write_sum(log, name, part, whole)
+      type(log_t), intent(inout) :: log
+      character(len=*), intent(in) :: name
+      real(dp), intent(in) :: part, whole
+      character(len=line_width) :: line
+      character(len=12) :: padded
+
+      padded = name
+      write (line, '(a12,54x,f14.3,f9.1,a)') padded, part, share(part, whole), '%'
+      call log%write_line(trim(line))
+   end subroutine write_sum
+
+   !> Number with so many digits after the point
+   pure function decimal(number, digits) result(text)
+      real(dp), intent(in) :: number
+      integer, intent(in) :: digits
+      character(len=:), allocatable :: text
+      character(len=32) :: form, buffer
+
+      write (form, '(a,i0,a)') '(f32.', digits, ')'
+      write (buffer, form) number
+      text = trim(adjustl(buffer))
+   end function decimal
+
+   pure real(dp) function share(part, whole)
+      real(dp), intent(in) :: part, whole
+
+      share = 0.0_dp
+      if (whole > 0.0_dp) share = 100.0_dp*part/whole
+   end function share
+
+   !> Write a text in as many lines as it takes, broken at blanks; later lines are indented.
+   subroutine write_wrapped(log, text)
+      type(log_t), intent(inout) :: log
+      character(len=*), intent(in) :: text
+      character(len=*), parameter :: indent = '           '
+      character(len=:), allocatable :: rest
+      integer :: cut
+
+      rest = text
+      do while (len(rest) > line_width)
+         cut = index(rest(:line_width + 1), ' ', back=.true.)
+         if (cut <= len(indent) + 1) cut = line_width
+         call log%write_line(trim(rest(:cut)))
+         rest = indent//adjustl(rest(cut + 1:))
+      end do
+      call log%write_line(trim(rest))
+   end subroutine write_wrapped
+
+end module polydem_log_tables

@@ -1,0 +1,136 @@
+!> The machine a run is on (Linux): its name, processor and caches, the time, and whether a person watches.
+module polydem_machine
+   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_long, c_null_char, c_null_ptr, c_ptr, c_size_t
+   implicit none
+   private
+   public :: host_name, processor_name, cache_sizes, utc_now, terminal_watches
+
+   interface
+      !> POSIX gethostname(2)
+      integer(c_int) function gethostname(name, length) bind(C, name='gethostname')
+         import :: c_char, c_int, c_size_t
+         character(kind=c_char), intent(out) :: name(*)
+         integer(c_size_t), value :: length
+      end function gethostname
+
+      !> POSIX isatty(3)
+      integer(c_int) function isatty(descriptor) bind(C, name='isatty')
+         import :: c_int
+         integer(c_int), value :: descriptor
+      end function isatty
+
+      !> C time
+      integer(c_long) function c_time(place) bind(C, name='time')
+         import :: c_long, c_ptr
+         type(c_ptr), value :: place
+      end function c_time
+
+      !> C gmtime
+      type(c_ptr) function gmtime(seconds) bind(C, name='gmtime')
+         import :: c_long, c_ptr
+         integer(c_long), intent(in) :: seconds
+      end function gmtime
+
+      !> C strftime
+      integer(c_size_t) function strftime(text, length, form, broken_down) bind(C, name='strftime')
+         import :: c_char, c_ptr, c_size_t
+         character(kind=c_char), intent(out) :: text(*)
+         integer(c_size_t), value :: length
+         character(kind=c_char), intent(in) :: form(*)
+         type(c_ptr), value :: broken_down
+      end function strftime
+   end interface
+
+   !> What is said of facts that the system does not tell
+   character(len=*), parameter :: unknown = 'unknown'
+   !> Enough for a line of a file of /sys
+   integer, parameter :: line_length = 64
+   !> File descriptor of standard output
+   integer(c_int), parameter :: standard_output = 1_c_int
+
+contains
+
+   !> Name of the machine in its network
+   function host_name() result(name)
+      character(len=:), allocatable :: name
+      character(len=256, kind=c_char) :: buffer
+
+      buffer = c_null_char
+      name = unknown
+      if (gethostname(buffer, len(buffer, kind=c_size_t) - 1_c_size_t) /= 0_c_int) return
+      name = buffer(:index(buffer, c_null_char) - 1)
+   end function host_name
+
+   !> Model of the processor, from /proc/cpuinfo
+   function processor_name() result(name)
+      character(len=:), allocatable :: name
+      character(len=512) :: line
+      integer :: unit, status
+
+      name = unknown
+      open (newunit=unit, file='/proc/cpuinfo', status='old', action='read', iostat=status)
+      if (status /= 0) return
+      do
+         read (unit, '(a)', iostat=status) line
+         if (status /= 0) exit
+         if (index(line, 'model name') /= 1) cycle
+         name = trim(adjustl(line(index(line, ':') + 1:)))
+         exit
+      end do
+      close (unit)
+   end function processor_name
+
+   !> Caches that the first processor sees, like 'L1d 48K, L1i 32K, L2 2048K, L3 107520K', from /sys
+   function cache_sizes() result(text)
+      character(len=:), allocatable :: text
+      character(len=:), allocatable :: folder
+      character(len=line_length) :: level, kind, size
+      integer :: k
+
+      text = ''
+      do k = 0, 9
+         folder = '/sys/devices/system/cpu/cpu0/cache/index'//achar(iachar('0') + k)//'/'
+         level = first_line(folder//'level')
+         if (level == '') exit
+         kind = first_line(folder//'type')
+         size = first_line(folder//'size')
+         if (k > 0) text = text//', '
+         text = text//'L'//trim(level)
+         if (kind == 'Data') text = text//'d'
+         if (kind == 'Instruction') text = text//'i'
+         text = text//' '//trim(size)
+      end do
+      if (text == '') text = unknown
+   end function cache_sizes
+
+   !> First line of a file, empty if it cannot be read
+   function first_line(path) result(text)
+      character(len=*), intent(in) :: path
+      character(len=line_length) :: text
+      integer :: unit, status
+
+      text = ''
+      open (newunit=unit, file=path, status='old', action='read', iostat=status)
+      if (status /= 0) return
+      read (unit, '(a)', iostat=status) text
+      text = adjustl(text)
+      close (unit)
+   end function first_line
+
+   !> The present time, like 2025-03-01T12:00:00Z
+   function utc_now() result(text)
+      character(len=:), allocatable :: text
+      character(len=32, kind=c_char) :: buffer
+      integer(c_size_t) :: length
+
+      length = strftime(buffer, len(buffer, kind=c_size_t), '%Y-%m-%dT%H:%M:%SZ'//c_null_char, &
+                        gmtime(c_time(c_null_ptr)))
+      text = buffer(:length)
+   end function utc_now
+
+   !> Whether standard output is a terminal
+   logical function terminal_watches()
+      terminal_watches = isatty(standard_output) == 1_c_int
+   end function terminal_watches
+
+end module polydem_machine

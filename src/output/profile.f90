@@ -1,0 +1,79 @@
+!> The profile of a run: seconds per stage, counters, provenance, the hash of the last state. Written at its
+!> end, whole or not at all.
+module polydem_profile
+   use polydem_counters, only: counters_t
+   use polydem_errors, only: error_t
+   use polydem_hash, only: hexadecimal
+   use polydem_hdf5_file, only: hdf5_file_t
+   use polydem_kinds, only: dp, lp
+   use polydem_paths, only: rename_file, sync_file
+   use polydem_provenance, only: provenance_t, write_provenance
+   use polydem_result_folder, only: profile_path
+   use polydem_segment, only: schema_version
+   use polydem_timers, only: stage_names, timers_t
+   implicit none
+   private
+   public :: write_profile
+
+   !> End of the name of a profile that is not complete
+   character(len=*), parameter :: unfinished = '.unfinished'
+
+contains
+
+   !> Write profile.h5 into the folder of a result.
+   subroutine write_profile(folder, timers, seconds, counters, provenance, state_hash, status, error)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      !> Seconds per stage
+      type(timers_t), intent(in) :: timers
+      !> Elapsed time of the whole run [s]
+      real(dp), intent(in) :: seconds
+      !> Exact counts
+      type(counters_t), intent(in) :: counters
+      !> Where the result comes from
+      type(provenance_t), intent(in) :: provenance
+      !> Hash of the last state
+      integer(lp), intent(in) :: state_hash
+      !> How the run ended: 'finished', or why it stopped
+      character(len=*), intent(in) :: status
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+      character(len=:), allocatable :: path
+
+      path = profile_path(folder)
+      call file%create(path//unfinished, error)
+      if (allocated(error)) return
+      call file%write_attribute('/', 'content', 'profile of a run by polydem', error)
+      call file%write_attribute('/', 'schema_version', schema_version, error)
+      call write_timers(file, timers, seconds, error)
+      if (allocated(counters%name)) then
+         call file%write('/counters/name', counters%name, error, '1', 'what was counted')
+         call file%write('/counters/value', counters%value, error, '1', 'how often')
+      end if
+      call file%write('/state_hash', hexadecimal(state_hash), error, '1', &
+                      'hash of the bits of identifiers, positions, angles and velocities at the end')
+      call file%write('/status', status, error, '1', 'how the run ended')
+      call write_provenance(provenance, file, error)
+      call file%close(error)
+      if (.not. allocated(error)) call sync_file(path//unfinished, error)
+      if (.not. allocated(error)) call rename_file(path//unfinished, path, error)
+      if (.not. allocated(error)) call sync_file(folder, error)
+   end subroutine write_profile
+
+   subroutine write_timers(file, timers, seconds, error)
+      type(hdf5_file_t), intent(inout) :: file
+      type(timers_t), intent(in) :: timers
+      real(dp), intent(in) :: seconds
+      type(error_t), allocatable, intent(inout) :: error
+
+      call file%write('/profile/stage', stage_names, error, '1', 'stages of the time step')
+      call file%write('/profile/calls', timers%calls, error, '1', 'steps in which each stage ran')
+      call file%write('/profile/total', timers%total, error, 's', 'time spent in each stage')
+      call file%write('/profile/least', merge(timers%least, 0.0_dp, timers%calls > 0_lp), error, 's', &
+                      'shortest time in a step')
+      call file%write('/profile/most', timers%most, error, 's', 'longest time in a step')
+      call file%write('/profile/seconds', seconds, error, 's', 'elapsed time of the whole run')
+   end subroutine write_timers
+
+end module polydem_profile

@@ -1,0 +1,101 @@
+!> Names of the files of a result, which is a folder.
+!>
+!>     trajectory_0001.h5, ...    closed segments of the trajectory, in order
+!>     trajectory_0007.h5.open    the segment being written
+!>     profile.h5                 times, counters, provenance; its presence says that the run ended
+!>     log.txt                    what the run printed
+module polydem_result_folder
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: ip
+   use polydem_paths, only: exists, remove_file
+   implicit none
+   private
+   public :: segment_path, profile_path, log_path, holds_result, clear_result, open_suffix
+
+   !> End of the name of a segment that is being written
+   character(len=*), parameter :: open_suffix = '.open'
+   !> Segments are looked for until so many numbers in a row are missing
+   integer(ip), parameter :: greatest_gap = 100_ip
+
+contains
+
+   !> Path of a closed segment
+   pure function segment_path(folder, number) result(path)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      !> Its number, from 1
+      integer(ip), intent(in) :: number
+      character(len=:), allocatable :: path
+      character(len=16) :: digits
+
+      write (digits, '(i0.4)') number
+      path = folder//'/trajectory_'//trim(digits)//'.h5'
+   end function segment_path
+
+   !> Path of the profile
+   pure function profile_path(folder) result(path)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      character(len=:), allocatable :: path
+
+      path = folder//'/profile.h5'
+   end function profile_path
+
+   !> Path of the log
+   pure function log_path(folder) result(path)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      character(len=:), allocatable :: path
+
+      path = folder//'/log.txt'
+   end function log_path
+
+   !> Whether a folder holds a result that a run would overwrite
+   logical function holds_result(folder)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      integer(ip) :: number
+
+      holds_result = exists(profile_path(folder))
+      if (.not. holds_result) holds_result = exists(log_path(folder))
+      do number = 1_ip, greatest_gap
+         if (.not. holds_result) holds_result = has_segment(folder, number)
+      end do
+   end function holds_result
+
+   !> Remove a former result, so that its segments do not mix with new ones; other files stay.
+   subroutine clear_result(folder, error)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: number, last
+
+      call remove_if_there(profile_path(folder), error)
+      call remove_if_there(log_path(folder), error)
+      last = 0_ip
+      number = 1_ip
+      do while (number <= last + greatest_gap)
+         if (has_segment(folder, number)) last = number
+         call remove_if_there(segment_path(folder, number), error)
+         call remove_if_there(segment_path(folder, number)//open_suffix, error)
+         number = number + 1_ip
+      end do
+   end subroutine clear_result
+
+   logical function has_segment(folder, number)
+      character(len=*), intent(in) :: folder
+      integer(ip), intent(in) :: number
+
+      has_segment = exists(segment_path(folder, number))
+      if (.not. has_segment) has_segment = exists(segment_path(folder, number)//open_suffix)
+   end function has_segment
+
+   subroutine remove_if_there(path, error)
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (exists(path)) call remove_file(path, error)
+   end subroutine remove_if_there
+
+end module polydem_result_folder

@@ -1,0 +1,67 @@
+!> Writes a small result, for the tests of the reader.
+!>
+!>     write_sample FOLDER FRAMES PER_SEGMENT end     close the last segment and write the profile
+!>     write_sample FOLDER FRAMES PER_SEGMENT wait    after each frame print its number; at the end wait to be killed
+!>
+!> Frame k is that of step k + 1.
+program write_sample
+   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contacts_t
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_ledger_row, only: ledger_row_t
+   use polydem_provenance, only: provenance_t
+   use polydem_trajectory, only: trajectory_t
+   use sample, only: sample_bodies, sample_contacts, sample_provenance, sample_row, write_sample_profile
+   implicit none
+   type(error_t), allocatable :: error
+   character(len=1024) :: folder, word
+   integer(ip) :: frames, per_segment
+
+   call get_command_argument(1, folder)
+   call get_command_argument(2, word)
+   read (word, *) frames
+   call get_command_argument(3, word)
+   read (word, *) per_segment
+   call get_command_argument(4, word)
+   call write_all(trim(folder), error)
+   if (allocated(error)) then
+      write (error_unit, '(a)') error%message
+      stop 1
+   end if
+
+contains
+
+   subroutine write_all(folder, error)
+      character(len=*), intent(in) :: folder
+      type(error_t), allocatable, intent(inout) :: error
+      type(trajectory_t) :: trajectory
+      type(provenance_t) :: provenance
+      type(bodies_t) :: bodies
+      type(contacts_t) :: contacts
+      type(ledger_row_t) :: row
+      integer(lp) :: step
+      character(len=1) :: answer
+
+      call sample_provenance(provenance)
+      call trajectory%open(folder, per_segment, provenance, error)
+      do step = 1_lp, int(frames, lp)
+         call sample_bodies(step, bodies)
+         call sample_contacts(step, contacts)
+         call sample_row(step, row)
+         call trajectory%write_frame(step, 0.5_wp*real(step, wp), bodies, error, contacts, row)
+         if (allocated(error)) return
+         if (word /= 'wait') cycle
+         write (output_unit, '(i0)') step
+         flush (output_unit)
+      end do
+      if (word == 'wait') then
+         read (*, *) answer
+      else
+         call trajectory%close(error)
+         call write_sample_profile(folder, error)
+      end if
+   end subroutine write_all
+
+end program write_sample

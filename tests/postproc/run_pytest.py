@@ -1,0 +1,32 @@
+"""Run the tests of the Python package: run_pytest.py ROOT TESTS WRITE_SAMPLE.
+
+Takes the Python of ROOT/.venv, which the launcher makes, or else the Python that runs this file.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+NEEDED = "import h5py, matplotlib, numpy, pytest"
+
+
+def main() -> int:
+    root, tests, write_sample = (Path(word) for word in sys.argv[1:4])
+    python = root / ".venv" / "bin" / "python"
+    if not python.exists():
+        python = Path(sys.executable)
+    if subprocess.run([str(python), "-c", NEEDED], stderr=subprocess.DEVNULL).returncode != 0:
+        print(f"{python} lacks one of h5py, matplotlib, numpy and pytest. Let the launcher make the environment:")
+        print("    ./polydem test")
+        return 1
+    environment = dict(os.environ)
+    environment["PYTHONPATH"] = str(root / "postproc" / "src")
+    environment["PYTHONDONTWRITEBYTECODE"] = "1"
+    environment["POLYDEM_WRITE_SAMPLE"] = str(write_sample)
+    command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests)]
+    return subprocess.run(command, env=environment).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,82 @@
+"""The command line: pictures, tables, errors."""
+
+import pytest
+from matplotlib.image import imread
+from polydem_post import Trajectory
+from polydem_post.__main__ import main
+from polydem_post.plot import plot_frames
+
+
+def test_draws_the_last_frame_into_the_result(finished, capsys):
+    assert main(["plot", str(finished)]) == 0
+    path = finished / "frame_0006.png"
+    assert capsys.readouterr().out.strip() == str(path)
+    pixels = imread(path)
+    assert min(pixels.shape[:2]) > 200
+    assert pixels[..., :3].std() > 0.02
+    path.unlink()
+
+
+@pytest.mark.parametrize("colour", ["speed", "angle", "id", "none"])
+def test_draws_frames_side_by_side(finished, tmp_path, colour):
+    one, three = tmp_path / "one.png", tmp_path / "three.png"
+    assert main(["plot", str(finished), "--frame", "0", "--colour", colour, "--output", str(one)]) == 0
+    command = ["plot", str(finished), "--frames", "0,3,-1", "--contacts", "--colour", colour, "--output", str(three)]
+    assert main(command) == 0
+    assert imread(three).shape[1] > 2 * imread(one).shape[1]
+
+
+def test_pictures_are_reproducible(finished, tmp_path):
+    paths = [tmp_path / name for name in ("first.png", "second.png")]
+    for path in paths:
+        assert main(["plot", str(finished), "--output", str(path)]) == 0
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_figures_say_time_and_units(finished):
+    figure = plot_frames(Trajectory(finished), [1, 4], contacts=True)
+    left, right, bar = figure.axes
+    assert (left.get_title(), right.get_title()) == ("t = 1 s", "t = 2.5 s")
+    assert (left.get_xlabel(), left.get_ylabel()) == ("x [m]", "y [m]")
+    assert left.get_aspect() == 1.0
+    assert bar.get_ylabel() == "speed [m/s]"
+    walls, grains, forces = right.collections
+    assert (len(walls.get_paths()), len(grains.get_paths()), len(forces.get_paths())) == (1, 2, 2)
+
+
+@pytest.mark.parametrize(
+    "form, line",
+    [
+        ("text", "boxes           4   125000.00  250000.00  500000.00      1.000       50.0"),
+        ("markdown", "| boxes | 4 | 125000.00 | 250000.00 | 500000.00 | 1.000 | 50.0 |"),
+        ("latex", r"boxes & 4 & 125000.00 & 250000.00 & 500000.00 & 1.000 & 50.0 \\"),
+        ("csv", "boxes,4,125000.00,250000.00,500000.00,1.000,50.0"),
+    ],
+)
+def test_prints_the_table_of_times(finished, capsys, form, line):
+    assert main(["table", str(finished), "--format", form]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert line in lines
+    assert not any("overlap" in text for text in lines)
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["plot", "no/such/folder"], "no/such/folder: there is no such file or folder"),
+        (["table", "no/such/folder"], "no/such/folder: there is no such file or folder"),
+        (["plot", "RESULT", "--frame", "7"], "there is no frame 7, only 7 frames"),
+        (["plot", "RESULT", "--output", "no/such/folder/x.png"], "no/such/folder/x.png: cannot be written"),
+        (["plot", "RESULT", "--output", "x.unknown"], "x.unknown: cannot be written"),
+    ],
+)
+def test_explains_errors_and_ends_with_code_2(finished, capsys, arguments, message):
+    assert main([str(finished) if word == "RESULT" else word for word in arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [[], ["paint", "x"], ["plot"], ["plot", "x", "--frames", "1,b"]])
+def test_a_wrong_command_line_ends_with_code_2(arguments):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code == 2
