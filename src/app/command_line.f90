@@ -70,7 +70,7 @@ module polydem_command_line
       option_t('--set', 'GROUP.KEY=VALUE', 'run check', &
       'override an entry of the namelist; may be repeated'), &
       option_t('--threads', 'T', 'run check replay', &
-      'number of threads (default: all that the system offers)'), &
+      'number of threads (default: all that the system offers; replay: one)'), &
       option_t('--force', '', 'run', 'overwrite results that are there already'), &
       option_t('--finder', 'NAME', 'replay', 'neighbour finder (default: quadtree)'), &
       option_t('--repeat', 'R', 'replay', 'how often the trace is replayed (default: 1)'), &

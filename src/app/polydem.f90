@@ -57,7 +57,7 @@ contains
          if (command%verb == 'check') call check_simulation(settings, error)
          if (command%verb == 'run') call run_simulation(settings, command%force, error)
       case ('replay')
-         call replay_trace(command%file, command%finder, command%threads, command%repeat, error)
+         call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error)
       case default
          if (command%file == '') call describe_program(error)
          if (command%file /= '') call describe_result(command%file, error)

@@ -2,7 +2,7 @@
 module polydem_info
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_file, only: hdf5_file_t
-   use polydem_kinds, only: dp, ip, lp
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_header
    use polydem_paths, only: exists
@@ -89,7 +89,8 @@ contains
          call file%shape_of('/frames/position', shape, error)
          if (.not. allocated(error) .and. size(times) > 0) then
             call log%write_line('   frames          '//to_text(size(times, kind=ip))//' of '//to_text(shape(2))// &
-                                ' bodies, from '//to_text(times(1))//' s to '//to_text(times(size(times)))//' s')
+                                ' bodies, from '//to_text(real(times(1), wp))//' s to '// &
+                                to_text(real(times(size(times)), wp))//' s')
          end if
       end if
       if (is_profile) call describe_end(file, log, error)

@@ -19,54 +19,27 @@ module polydem_hdf5_file
    public :: hdf5_file_t, library_version
 
    !> An HDF5 file: create, open (to read), flush, close, has, shape_of, write, append, append_rows,
-   !> write_attribute, read, read_step
+   !> write_attribute, read
    type, extends(hdf5_writer_t) :: hdf5_file_t
    contains
       !> Read a data set, allocating the values: read(name, values, error). Whole numbers may have any width,
       !> or be h5py's booleans.
       generic :: read => read_reals, read_real_table, read_real_block, read_integers, read_longs, &
          read_one_text
-      procedure :: read_step
       procedure, private :: read_reals, read_real_table, read_real_block, read_integers, read_longs
       procedure, private :: read_one_text
    end type hdf5_file_t
 
 contains
 
-   !> Read the slab [step, :, :] (as h5py writes it) of a data set of three dimensions.
-   !>
-   !> HDF5 unpacks all chunks that the slab touches; of a data set whose chunks reach over many steps, read
-   !> all steps at once instead.
-   subroutine read_step(self, name, step, values, error)
+   !> Read real numbers; the other forms of `read` differ in kind and shape only.
+   subroutine read_reals(self, name, values, error)
       class(hdf5_file_t), intent(in) :: self
       !> Name of the data set
       character(len=*), intent(in) :: name
-      !> Which slab, counted from 0
-      integer(ip), intent(in) :: step
-      !> The slab, fastest dimension first
-      real(dp), allocatable, target, intent(out) :: values(:, :)
-      !> Allocated on failure, or if there is no such slab
-      type(error_t), allocatable, intent(inout) :: error
-      integer(hsize_t), allocatable :: extent(:)
-      type(place_t) :: place
-
-      place = self%place_of(name)
-      call expect_rank(place, 3, extent, error)
-      if (allocated(error)) return
-      if (step < 0_ip .or. int(step, hsize_t) >= extent(3)) then
-         call raise(error, input_error, place%path//': '//name//' has no step '//to_text(step)// &
-                    ', only 0 to '//to_text(int(extent(3) - 1, lp)))
-         return
-      end if
-      allocate (values(extent(1), extent(2)))
-      call read_dataset(place, holds_reals, double_type(), [0_hsize_t, 0_hsize_t, int(step, hsize_t)], &
-                        [extent(1), extent(2), 1_hsize_t], c_loc(values), error)
-   end subroutine read_step
-
-   subroutine read_reals(self, name, values, error)
-      class(hdf5_file_t), intent(in) :: self
-      character(len=*), intent(in) :: name
+      !> What it holds, fastest dimension first
       real(dp), allocatable, target, intent(out) :: values(:)
+      !> Allocated on failure, or if the data set has another number of dimensions
       type(error_t), allocatable, intent(inout) :: error
       integer(hsize_t), allocatable :: extent(:)
 

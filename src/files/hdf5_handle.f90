@@ -2,7 +2,7 @@
 module polydem_hdf5_handle
    use hdf5, only: h5f_acc_rdonly_f, h5f_acc_trunc_f, h5f_scope_global_f, h5fclose_f, h5fcreate_f, &
       h5fflush_f, h5fopen_f, hid_t, hsize_t
-   use polydem_errors, only: error_t, io_error, raise
+   use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_dataset, only: dataset_shape, has_link, place_t, start_library
    use polydem_kinds, only: lp
    use polydem_paths, only: exists
@@ -62,7 +62,7 @@ contains
       integer :: status
 
       if (.not. exists(path)) then
-         call raise(error, io_error, path//': there is no such file')
+         call raise(error, input_error, path//': there is no such file')
          return
       end if
       call start_library(error)

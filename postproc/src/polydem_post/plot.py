@@ -18,6 +18,8 @@ COLOURS = ("speed", "angle", "id", "none")
 WALL_COLOUR = "0.55"
 PLAIN_COLOUR = "#d9b98a"
 CONTACT_COLOUR = "#a01020"
+#: Bodies slower than this are at rest: the scale of speeds does not end below it [m/s]
+REST_SPEED = 1e-6
 #: Longest side of the picture of one frame [inch]
 LONGEST_SIDE = 7.0
 
@@ -114,7 +116,7 @@ def _scale(frames: list[Frame], colour: str) -> Normalize:
     if colour == "speed":
         speeds = np.concatenate([_values(frame, colour)[~frame.fixed] for frame in frames])
         greatest = np.percentile(speeds, 99.5) if len(speeds) else 0.0
-        return Normalize(0.0, greatest if greatest > 0.0 else 1.0)
+        return Normalize(0.0, max(greatest, REST_SPEED))
     return Normalize(-0.5, 19.5)
 
 
