@@ -1,5 +1,6 @@
 !> Numbers as text, for messages and logs.
 module polydem_strings
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_kinds, only: ip, lp, wp
    implicit none
    private
@@ -45,8 +46,10 @@ contains
       n = 6
       if (present(digits)) n = digits
       write (form, '(a,i0,a,i0,a)') '(es', n + 9, '.', n - 1, ')'
-      if (abs(number) > 0.0_wp .and. (abs(number) < 1.0e-30_wp .or. abs(number) > 1.0e30_wp)) then
-         write (form, '(a,i0,a,i0,a)') '(es', n + 11, '.', n - 1, 'e4)'
+      if (ieee_is_finite(number)) then
+         if (abs(number) > 0.0_wp .and. (abs(number) < 1.0e-30_wp .or. abs(number) > 1.0e30_wp)) then
+            write (form, '(a,i0,a,i0,a)') '(es', n + 11, '.', n - 1, 'e4)'
+         end if
       end if
       write (buffer, form) number
       text = trim(adjustl(buffer))

@@ -27,13 +27,23 @@ contains
          call log%write_line('step       dt = '//to_text(s%dt)//' s, '// &
                              to_text(s%dt/s%expected_stable_step, 3)//' of the stable step '// &
                              to_text(s%expected_stable_step)//' s expected from the shapes')
-         call log%write_line('duration   '//to_text(s%settings%integrate%duration)//' s, '//to_text(s%n_steps)// &
-                             ' steps')
+         call log%write_line('duration   '//to_text(real(s%n_steps, wp)*s%dt)//' s, '//to_text(s%n_steps)// &
+                             ' steps'//rounding_text(real(s%n_steps, wp)*s%dt, s%settings%integrate%duration))
          if (s%contacts%n > 0_ip) then
             call log%write_line('at start   '//to_text(s%contacts%n)//' contacts, the deepest '//deepest(s))
          end if
       end associate
    end subroutine describe
+
+   !> A remark if a whole number of steps does not make the duration that was asked for
+   function rounding_text(duration, wanted) result(text)
+      real(wp), intent(in) :: duration, wanted
+      character(len=:), allocatable :: text
+
+      text = ''
+      if (abs(duration - wanted) > 1.0e-6_wp*wanted) text = ' (not the '//to_text(wanted)// &
+                                                            ' s asked for: no whole number of steps)'
+   end function rounding_text
 
    function gravity_text(simulation) result(text)
       type(simulation_t), intent(in) :: simulation

@@ -1,86 +1,121 @@
 !> What stops or warns a run before its results become nonsense.
 module polydem_guards
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contacts_t
+   use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: ip, lp, wp, worth_threads
-   use polydem_polygon, only: diameter
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: check_motion, check_step, check_contacts, greatest_move
+   public :: motion_guard_t, new_motion_guard, check_motion, check_step, check_contacts
 
-   !> Greatest move in one step, as a share of the smallest free body; beyond it bodies could pass through each other
+   !> What is needed to see whether bodies move too far in a step
+   type :: motion_guard_t
+      !> Greatest distance that a point of a body may move in a step [m]
+      real(wp) :: limit = 0.0_wp
+      !> Greatest distance of a vertex from the centre of each body [m]
+      real(wp), allocatable :: radius(:)
+      !> Slots of the bodies that may move
+      integer(ip), allocatable :: moving(:)
+   end type motion_guard_t
+
+   !> Greatest move in a step, as a share of the thinnest body
    real(wp), parameter :: move_share = 0.25_wp
    !> Share of the stable step above which a run warns
    real(wp), parameter :: warn_share = 0.5_wp
 
 contains
 
-   !> Greatest distance that a body may move in one step [m].
-   pure real(wp) function greatest_move(bodies)
-      !> Bodies
+   !> Prepare to watch bodies.
+   subroutine new_motion_guard(guard, bodies, moving)
+      !> The guard
+      type(motion_guard_t), intent(out) :: guard
+      !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
-      integer(ip) :: k
+      !> Slots of the bodies that may move
+      integer(ip), intent(in) :: moving(:)
+      real(wp) :: thickness
+      integer(ip) :: s
 
-      greatest_move = huge(1.0_wp)
-      do k = 1_ip, size(bodies%free, kind=ip)
-         associate (s => bodies%free(k))
-            greatest_move = min(greatest_move, move_share* &
-                                diameter(bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip)))
-         end associate
+      guard%moving = moving
+      guard%limit = huge(1.0_wp)
+      allocate (guard%radius(bodies%n))
+      do s = 1_ip, bodies%n
+         call measure(bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip), thickness, &
+                      guard%radius(s))
+         guard%limit = min(guard%limit, move_share*thickness)
       end do
-   end function greatest_move
+   end subroutine new_motion_guard
 
-   !> Stop if a free body has left the finite numbers or is too fast for the step.
-   subroutine check_motion(bodies, step, dt, limit, error)
+   !> Stop if a body has left the finite numbers or moves too far in a step.
+   subroutine check_motion(guard, bodies, step, dt, error)
+      !> The guard
+      type(motion_guard_t), intent(in) :: guard
       !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies
       !> Number of the step
       integer(lp), intent(in) :: step
       !> Step [s]
       real(wp), intent(in) :: dt
-      !> greatest_move(bodies) [m]
-      real(wp), intent(in) :: limit
       !> Names body, position, velocity and step
       type(error_t), allocatable, intent(inout) :: error
-      real(wp) :: fastest
       integer(ip) :: k, s
       logical :: good
 
-      fastest = (limit/dt)**2
       good = .true.
       !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
-      !$omp    shared(bodies, fastest) private(k, s) reduction(.and.:good)
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
-         good = good .and. is_good(bodies, s, fastest)
+      !$omp    shared(guard, bodies, dt) private(k) reduction(.and.:good)
+      do k = 1_ip, size(guard%moving, kind=ip)
+         good = good .and. is_good(guard, bodies, guard%moving(k), dt)
       end do
       !$omp end parallel do
       if (good) return
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
-         if (is_good(bodies, s, fastest)) cycle
+      do k = 1_ip, size(guard%moving, kind=ip)
+         s = guard%moving(k)
+         if (is_good(guard, bodies, s, dt)) cycle
          call raise(error, run_error, 'step '//to_text(step)//': body '//to_text(bodies%id(s))//' at ('// &
                     to_text(bodies%position(1, s))//', '//to_text(bodies%position(2, s))//') m has the velocity ('// &
                     to_text(bodies%velocity(1, s))//', '//to_text(bodies%velocity(2, s))// &
                     ') m/s and the angular velocity '//to_text(bodies%angular_velocity(s))// &
-                    ' 1/s; it may move at most '//to_text(limit)// &
-                    ' m in a step. Take a smaller dt, or look for deep overlaps at the start')
+                    ' 1/s; no point of it may move more than '//to_text(guard%limit)// &
+                    ' m in a step, or bodies could pass through each other. Take a smaller dt, or look for deep '// &
+                    'overlaps at the start')
          return
       end do
    end subroutine check_motion
 
-   pure logical function is_good(bodies, s, fastest)
+   !> Whether a body is finite and none of its points moves too far in a step; false for NaN
+   pure logical function is_good(guard, bodies, s, dt)
+      type(motion_guard_t), intent(in) :: guard
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
-      real(wp), intent(in) :: fastest
-      real(wp) :: size
+      real(wp), intent(in) :: dt
+      real(wp) :: move
 
-      size = abs(bodies%position(1, s)) + abs(bodies%position(2, s)) + abs(bodies%angle(s)) &
-         + abs(bodies%angular_velocity(s))
-      is_good = size <= huge(size) .and. bodies%velocity(1, s)**2 + bodies%velocity(2, s)**2 <= fastest
+      move = dt*(abs(bodies%velocity(1, s)) + abs(bodies%velocity(2, s)) &
+                 + guard%radius(s)*abs(bodies%angular_velocity(s)))
+      is_good = ieee_is_finite(move + (bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s)))
+      if (is_good) is_good = move <= guard%limit
    end function is_good
+
+   !> Twice the least distance of an edge from the centre, and the greatest distance of a vertex [m].
+   pure subroutine measure(shape, thickness, radius)
+      real(wp), intent(in) :: shape(:, :)
+      real(wp), intent(out) :: thickness, radius
+      real(wp) :: edge(2)
+      integer(ip) :: v, w
+
+      thickness = huge(1.0_wp)
+      radius = 0.0_wp
+      w = size(shape, 2, kind=ip)
+      do v = 1_ip, size(shape, 2, kind=ip)
+         edge = shape(:, v) - shape(:, w)
+         thickness = min(thickness, 2.0_wp*abs(edge(1)*shape(2, w) - edge(2)*shape(1, w))/hypot(edge(1), edge(2)))
+         radius = max(radius, hypot(shape(1, v), shape(2, v)))
+         w = v
+      end do
+   end subroutine measure
 
    !> Compare the step with the stable step of the contacts: a warning above a half, an error above one.
    subroutine check_step(bodies, contacts, step, dt, stable, critical, warning, error)
@@ -128,9 +163,13 @@ contains
       integer(lp), intent(in) :: step
       !> Says how many there are
       type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: worst
 
       if (contacts%n_degenerate == 0_ip .or. degenerate == 'push') return
-      associate (i => contacts%first(contacts%first_degenerate), j => contacts%second(contacts%first_degenerate))
+      do worst = 1_ip, contacts%n
+         if (is_degenerate(contacts, worst)) exit
+      end do
+      associate (i => contacts%first(worst), j => contacts%second(worst))
          call raise(error, run_error, 'step '//to_text(step)//': '//to_text(contacts%n_degenerate)// &
                     ' contacts have no direction, the first of the bodies '//to_text(bodies%id(i))//' and '// &
                     to_text(bodies%id(j))//' near ('//to_text(bodies%position(1, i))//', '// &

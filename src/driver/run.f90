@@ -154,7 +154,8 @@ contains
       real(wp) :: stable, share
 
       call check_stability(run%simulation, stable, warning, error)
-      share = run%simulation%dt/stable
+      share = 0.0_wp
+      if (stable < huge(stable)) share = run%simulation%dt/stable
       run%greatest_share = max(run%greatest_share, share)
       if (.not. allocated(warning) .or. share <= 1.1_wp*run%warned) return
       run%warned = share
@@ -181,7 +182,8 @@ contains
          call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n)
          call write_counters(run%log, counters)
          if (s%settings%output%ledger) call write_books(s, run%log)
-         call run%log%write_line('greatest share of the stable step of the contacts: '//to_text(run%greatest_share, 3))
+         if (run%greatest_share > 0.0_wp) call run%log%write_line( &
+            'greatest share of the stable step of the contacts: '//to_text(run%greatest_share, 3))
       end associate
       if (allocated(error)) call run%log%write_line('stopped: '//status)
       call write_hash(run%log, hash)
@@ -196,6 +198,10 @@ contains
          run%frame_steps = in_steps(output%frame_interval, s%dt)
          run%log_steps = in_steps(output%log_interval, s%dt)
          if (run%log_steps == 0_lp) run%log_steps = max(1_lp, s%n_steps/default_lines)
+         if (abs(real(run%frame_steps, wp)*s%dt - output%frame_interval) > 1.0e-2_wp*output%frame_interval) then
+            call run%log%write_line('frames     every '//to_text(run%frame_steps)//' steps, '// &
+                                    to_text(real(run%frame_steps, wp)*s%dt)//' s')
+         end if
       end associate
    end subroutine choose_intervals
 

@@ -5,13 +5,13 @@ module polydem_simulation
    use polydem_boxes, only: boxes_t
    use polydem_contacts, only: contact_memory_t, contacts_t
    use polydem_counters, only: counters_t
-   use polydem_errors, only: error_t, input_error, raise
+   use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_find_contacts, only: find_contacts
    use polydem_force_law, only: evaluate_law, force_law_t, new_force_law
-   use polydem_guards, only: check_contacts, check_motion, check_step, greatest_move
+   use polydem_guards, only: check_contacts, check_motion, check_step, motion_guard_t, new_motion_guard
    use polydem_integrator, only: integrator_t
    use polydem_integrator_factory, only: new_integrator
-   use polydem_kinds, only: bp, ip, lp, wp
+   use polydem_kinds, only: ip, lp, wp
    use polydem_ledger, only: book_step, ledger_t, open_ledger
    use polydem_make_boxes, only: box_maker_t, new_box_maker, update_boxes
    use polydem_motion, only: motion_t, move_bodies
@@ -19,6 +19,7 @@ module polydem_simulation
    use polydem_scene, only: build_scene
    use polydem_settings, only: settings_t
    use polydem_stable_step, only: stable_step_of_contacts, stable_step_of_shapes
+   use polydem_strings, only: to_text
    use polydem_timers, only: stage_boxes, stage_forces, stage_integrate, stage_neighbours, stage_overlap, timers_t
    implicit none
    private
@@ -60,13 +61,16 @@ module polydem_simulation
       real(wp) :: dt = 0.0_wp
       !> Stable step expected from the shapes [s]
       real(wp) :: expected_stable_step = 0.0_wp
-      !> Greatest move of a body in one step [m]
-      real(wp), private :: move_limit = 0.0_wp
+      !> Watches how far bodies move
+      type(motion_guard_t), private :: guard
       !> Slots that may move: free bodies, then those of motions; the first n_free of them are the free ones
       integer(ip), allocatable, private :: moving(:)
       !> Sums over all steps: pairs, contacts, pairs that began, pairs that ended, degenerate contacts
       integer(lp), private :: sums(5) = 0_lp
    end type simulation_t
+
+   !> More steps than any run can do
+   real(wp), parameter :: most_steps = 1.0e15_wp
 
 contains
 
@@ -106,8 +110,8 @@ contains
       call new_integrator(settings%integrate, self%integrator)
       call choose_step(self, error)
       if (allocated(error)) return
-      self%move_limit = greatest_move(self%bodies)
       call list_moving(self)
+      call new_motion_guard(self%guard, self%bodies, self%moving)
       call new_box_maker(self%maker, self%bodies, settings%boxes%largest_ratio, self%boxes)
       call new_neighbours(self%neighbours, settings%neighbours%finder, self%boxes, error)
       if (allocated(error)) return
@@ -140,7 +144,7 @@ contains
          call self%timers%lap(stage_forces)
       end if
       call self%integrator%correct(self%dt, self%bodies)
-      call check_motion(self%bodies, self%step, self%dt, self%move_limit, error)
+      call check_motion(self%guard, self%bodies, self%step, self%dt, error)
       call self%timers%lap(stage_integrate)
    end subroutine advance
 
@@ -196,6 +200,12 @@ contains
       call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
       call self%timers%lap(stage_boxes)
       call self%neighbours%update(self%boxes)
+      if (self%neighbours%pairs%contradictions > 0_lp) then
+         call raise(error, run_error, 'step '//to_text(self%step)//': the finder '// &
+                    self%settings%neighbours%finder//' reported changes that contradict its list. This is a '// &
+                    'mistake in the program; all_pairs can take its place')
+         return
+      end if
       call carry_memory(self)
       call self%timers%lap(stage_neighbours)
       associate (pairs => self%neighbours%pairs)
@@ -216,7 +226,6 @@ contains
       type(simulation_t), intent(inout) :: self
 
       associate (pairs => self%neighbours%pairs, memory => self%memory)
-         call pairs%carry(memory%touching, 0_bp)
          call pairs%carry(memory%separating_edge, 0_ip)
          if (allocated(memory%tangential)) call pairs%carry(memory%tangential, 0.0_wp)
          if (allocated(memory%area)) call pairs%carry(memory%area, 0.0_wp)
@@ -226,7 +235,7 @@ contains
    subroutine allocate_memory(self)
       type(simulation_t), intent(inout) :: self
 
-      allocate (self%memory%touching(0), self%memory%separating_edge(0))
+      allocate (self%memory%separating_edge(0))
       if (self%law%needs_tangential) allocate (self%memory%tangential(0))
       if (self%law%needs_area) allocate (self%memory%area(0))
    end subroutine allocate_memory
@@ -285,16 +294,24 @@ contains
                                  self%expected_stable_step, critical)
       associate (settings => self%settings%integrate)
          self%dt = settings%dt
-         if (self%dt <= 0.0_wp .and. critical == 0_ip) then
-            call raise(error, input_error, self%settings%file//': there is no free body to choose a step for; '// &
-                       'give dt in &integrate')
+         if (self%dt <= 0.0_wp .and. (critical == 0_ip .or. .not. self%expected_stable_step > 0.0_wp)) then
+            call raise(error, input_error, self%settings%file//': no step can be chosen, since there is no free '// &
+                       'body, or stiffness and masses are beyond all measure; give dt in &integrate')
             return
          end if
          if (self%dt <= 0.0_wp) then
-            steps = real(ceiling(settings%duration/(settings%fraction*self%expected_stable_step), lp), wp)
-            self%dt = settings%duration/max(1.0_wp, steps)
+            steps = settings%duration/(settings%fraction*self%expected_stable_step)
+            self%dt = settings%fraction*self%expected_stable_step
+            if (steps < most_steps) self%dt = settings%duration/real(max(1_lp, ceiling(steps, lp)), wp)
          end if
-         self%n_steps = nint(settings%duration/self%dt, lp)
+         steps = settings%duration/self%dt
+         if (.not. (steps >= 0.5_wp .and. steps < most_steps)) then
+            call raise(error, input_error, self%settings%file//': a duration of '//to_text(settings%duration)// &
+                       ' s in steps of '//to_text(self%dt)//' s makes '//to_text(steps)//' steps; 1 to '// &
+                       to_text(most_steps)//' are possible. Give another dt or duration in &integrate')
+            return
+         end if
+         self%n_steps = nint(steps, lp)
       end associate
    end subroutine choose_step
 

@@ -5,7 +5,7 @@
 !> centres of mass, so that two equal squares face to face have the stiffness E.
 module polydem_area_law
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contacts, only: contact_memory_t, contacts_t, is_degenerate
    use polydem_force_part, only: force_part_t
    use polydem_kinds, only: ip, wp, worth_threads
    implicit none
@@ -20,8 +20,8 @@ module polydem_area_law
       procedure :: add
    end type area_law_t
 
-   !> Least characteristic length as a share of the square root of the area. It only acts where the force
-   !> point falls on a centre of mass, which no contact of bodies that are not inside each other does.
+   !> Least characteristic length as a share of the square root of the area, which only acts where the force point
+   !> falls on a centre of mass; in contacts without a direction, where it often does, the whole square root.
    real(wp), parameter :: least_length = 1.0e-3_wp
 
 contains
@@ -47,7 +47,9 @@ contains
       do c = 1_ip, contacts%n
          r1 = sqrt(contacts%arm_first(1, c)**2 + contacts%arm_first(2, c)**2)
          r2 = sqrt(contacts%arm_second(1, c)**2 + contacts%arm_second(2, c)**2)
-         length = max(4.0_wp*r1*r2/(r1 + r2), least_length*sqrt(contacts%area(c)))
+         length = least_length*sqrt(contacts%area(c))
+         if (is_degenerate(contacts, c)) length = contacts%length(c)
+         if (r1 + r2 > 0.0_wp) length = max(length, 4.0_wp*r1*r2/(r1 + r2))
          contacts%inverse_length(c) = 1.0_wp/length
          force = self%stiffness*contacts%area(c)*contacts%inverse_length(c)
          contacts%elastic(c) = contacts%elastic(c) + force

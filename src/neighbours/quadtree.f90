@@ -316,8 +316,8 @@ contains
       do while (node /= tree%root)
          low = real(tree%node(node)%low, dp)
          high = low + real(shiftl(1_ip, tree%node(node)%level), dp)
-         if (all(low <= window(1:2) - tree%greatest_reach .and. &
-                 window(3:4) + tree%greatest_reach <= high)) exit
+         ! Formed as the grown cells are, and strict, because grown cells that touch make candidates.
+         if (all(low + tree%greatest_reach < window(1:2) .and. window(3:4) < high - tree%greatest_reach)) exit
          node = tree%node(node)%parent
       end do
    end function ancestor_around

@@ -9,7 +9,7 @@ module polydem_find_contacts
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contact_memory_t, contacts_t, reserve_contacts
    use polydem_convex_overlap, only: overlap_polygons, overlap_t
-   use polydem_kinds, only: bp, ip, lp, wp
+   use polydem_kinds, only: ip, lp, wp
    implicit none
    private
    public :: find_contacts
@@ -122,13 +122,9 @@ contains
       type(contact_memory_t), intent(inout) :: memory
 
       if (allocated(memory%separating_edge)) memory%separating_edge(p) = overlap%separating_edge
-      if (overlap%area > 0.0_wp) then
-         if (allocated(memory%touching)) memory%touching(p) = 1_bp
-      else
-         if (allocated(memory%touching)) memory%touching(p) = 0_bp
-         if (allocated(memory%tangential)) memory%tangential(p) = 0.0_wp
-         if (allocated(memory%area)) memory%area(p) = 0.0_wp
-      end if
+      if (overlap%area > 0.0_wp) return
+      if (allocated(memory%tangential)) memory%tangential(p) = 0.0_wp
+      if (allocated(memory%area)) memory%area(p) = 0.0_wp
    end subroutine remember
 
    !> Write one contact.

@@ -6,10 +6,10 @@
 !> Memory rides on the pair list: entry `p` belongs to pair `p`, follows it when the list changes, and is
 !> cleared when the polygons part. A column that no model of the scene needs is never allocated.
 module polydem_contacts
-   use polydem_kinds, only: ip, wp, bp
+   use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: contacts_t, contact_memory_t, reserve_contacts
+   public :: contacts_t, contact_memory_t, reserve_contacts, is_degenerate
 
    !> Structure of arrays over contacts 1..n; the arrays may be longer
    type :: contacts_t
@@ -17,8 +17,6 @@ module polydem_contacts
       integer(ip) :: n = 0_ip
       !> Number of contacts without a direction (one body inside the other, or crossing bars)
       integer(ip) :: n_degenerate = 0_ip
-      !> The first of them, 0 if there is none
-      integer(ip) :: first_degenerate = 0_ip
       !> Place in the pair list
       integer(ip), allocatable :: pair(:)
       !> Slot of the body with the lower identifier
@@ -39,7 +37,7 @@ module polydem_contacts
       real(wp), allocatable :: arm_second(:, :)
       !> Unit vector from the second body to the first, (2, contact): -normal/|normal|
       real(wp), allocatable :: direction(:, :)
-      !> Length of the contact |normal| [m]
+      !> Length of the contact |normal|, or the square root of the area if degenerate [m]
       real(wp), allocatable :: length(:)
       !> Reciprocal of the characteristic length of the force law [1/m]
       real(wp), allocatable :: inverse_length(:)
@@ -55,8 +53,6 @@ module polydem_contacts
 
    !> Columns that ride on the pair list; unallocated where no model asks for them
    type :: contact_memory_t
-      !> Whether the polygons overlapped at the last step (1) or not (0)
-      integer(bp), allocatable :: touching(:)
       !> Edge that separated the pair last: +k of the first body, -k of the second, 0 unknown
       integer(ip), allocatable :: separating_edge(:)
       !> Stored tangential spring force [N/m]
@@ -66,6 +62,16 @@ module polydem_contacts
    end type contact_memory_t
 
 contains
+
+   !> Whether a contact has no direction of its own: its `normal` vanishes, and its `length` is made up.
+   pure logical function is_degenerate(contacts, c)
+      !> Table of contacts
+      type(contacts_t), intent(in) :: contacts
+      !> Place in the table
+      integer(ip), intent(in) :: c
+
+      is_degenerate = contacts%normal(1, c)**2 + contacts%normal(2, c)**2 < 0.25_wp*contacts%length(c)**2
+   end function is_degenerate
 
    !> Make room for at least `capacity` contacts; contents are lost when the arrays grow.
    subroutine reserve_contacts(contacts, capacity)
