@@ -18,6 +18,10 @@ module polydem_ledger
    private
    public :: ledger_t, balance_t, open_ledger, book_step, balance_of
 
+   !> Rates: power of elastic, damping and friction forces and of walls; force along x and y and torque from outside; the
+   !> sums of the absolute values of all forces and torques from outside
+   integer, parameter :: n_rates = 9
+
    !> Accumulated work and impulses
    type :: ledger_t
       !> Work of the elastic normal forces on both bodies [J/m]
@@ -34,8 +38,8 @@ module polydem_ledger
       real(wp) :: angular_impulse = 0.0_wp
       !> Energy, momentum and angular momentum at the start
       real(wp), private :: start(4) = 0.0_wp
-      !> Rates at the last evaluation: elastic, damping, friction, wall, force x, force y, torque
-      real(wp), private :: rate(7) = 0.0_wp
+      !> Rates at the last evaluation, in the order of the constants below
+      real(wp), private :: rate(n_rates) = 0.0_wp
       !> Greatest kinetic energy so far, the scale of the residual [J/m]
       real(wp), private :: energy_scale = 0.0_wp
       !> Sums of absolute impulses so far, the scales of the residuals
@@ -57,7 +61,7 @@ module polydem_ledger
       !> The same over the energy turned over: the greatest kinetic energy or work done, but at least a billionth of
       !> the potential, below which there is nothing but rounding
       real(wp) :: relative_energy_residual = 0.0_wp
-      !> Momentum that the books cannot explain, over the sum of absolute impulses
+      !> Momentum that the books cannot explain, over the sum of absolute impulses from outside
       real(wp) :: relative_momentum_residual = 0.0_wp
       !> Angular momentum that the books cannot explain, over the sum of absolute angular impulses
       real(wp) :: relative_angular_residual = 0.0_wp
@@ -102,7 +106,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Contacts with the forces of this step
       type(contacts_t), intent(in) :: contacts
-      real(wp) :: now(7), change(7)
+      real(wp) :: now(n_rates), change(n_rates)
 
       now = rates(gravity, bodies, contacts)
       change = (0.5_wp*dt)*(ledger%rate + now)
@@ -112,8 +116,8 @@ contains
       ledger%wall_work = ledger%wall_work + change(4)
       ledger%impulse = ledger%impulse + change(5:6)
       ledger%angular_impulse = ledger%angular_impulse + change(7)
-      ledger%impulse_scale = ledger%impulse_scale + abs(change(5)) + abs(change(6))
-      ledger%angular_scale = ledger%angular_scale + abs(change(7))
+      ledger%impulse_scale = ledger%impulse_scale + change(8)
+      ledger%angular_scale = ledger%angular_scale + change(9)
       ledger%rate = now
    end subroutine book_step
 
@@ -149,12 +153,12 @@ contains
       if (whole > 0.0_wp) share = abs(part)/whole
    end function share
 
-   !> Power of elastic, damping and friction forces and of walls; force and torque on the free bodies from outside.
+   !> All rates of this moment.
    function rates(gravity, bodies, contacts) result(rate)
       real(wp), intent(in) :: gravity(2)
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
-      real(wp) :: rate(7)
+      real(wp) :: rate(n_rates), torque
       real(wp), allocatable :: partial(:, :)
       integer(ip) :: b, n_blocks, s
 
@@ -174,13 +178,18 @@ contains
          if (bodies%fixed(s)) then
             rate(4) = rate(4) - bodies%force(1, s)*bodies%velocity(1, s) - bodies%force(2, s)*bodies%velocity(2, s) &
                - bodies%torque(s)*bodies%angular_velocity(s)
+            torque = bodies%torque(s) &
+               + (bodies%position(1, s)*bodies%force(2, s) - bodies%position(2, s)*bodies%force(1, s))
             rate(5:6) = rate(5:6) - bodies%force(:, s)
-            rate(7) = rate(7) - bodies%torque(s) &
-               - (bodies%position(1, s)*bodies%force(2, s) - bodies%position(2, s)*bodies%force(1, s))
+            rate(7) = rate(7) - torque
+            rate(8) = rate(8) + abs(bodies%force(1, s)) + abs(bodies%force(2, s))
+            rate(9) = rate(9) + abs(torque)
          else
+            torque = bodies%mass(s)*(bodies%position(1, s)*gravity(2) - bodies%position(2, s)*gravity(1))
             rate(5:6) = rate(5:6) + bodies%mass(s)*gravity
-            rate(7) = rate(7) &
-               + bodies%mass(s)*(bodies%position(1, s)*gravity(2) - bodies%position(2, s)*gravity(1))
+            rate(7) = rate(7) + torque
+            rate(8) = rate(8) + bodies%mass(s)*(abs(gravity(1)) + abs(gravity(2)))
+            rate(9) = rate(9) + abs(torque)
          end if
       end do
    end function rates
