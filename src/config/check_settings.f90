@@ -1,12 +1,22 @@
 !> Checks across entries, which a single row of the table cannot make.
 module polydem_check_settings
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_kinds, only: wp
    use polydem_namelist_entries, only: first_row
    use polydem_namelist_values, only: value_t
-   use polydem_settings, only: settings_t
+   use polydem_settings, only: scene_settings_t, settings_t
    implicit none
    private
    public :: check_settings
+
+   !> Greatest speed of a wall, as in the table [m/s]
+   real(wp), parameter :: speed_limit = 1.0e6_wp
+   !> Greatest length of a container in grains; more are neither counted nor boxed in a reasonable time
+   real(wp), parameter :: length_limit = 1.0e5_wp
+   real(wp), parameter :: two_pi = 6.283185307179586_wp
+
+   !> Scenes of grains in a container whose width is not that of a block
+   character(len=*), parameter :: grain_scenes(4) = [character(len=6) :: 'hopper', 'gas', 'bed', 'heap']
 
 contains
 
@@ -26,6 +36,13 @@ contains
             'must not exceed', 'short_axis', 'long_axis_min', values, error)
          call require(scene%long_axis_min <= scene%long_axis_max, &
             'must not exceed', 'long_axis_min', 'long_axis_max', values, error)
+         call check_container(scene%radius, 'radius', scene, values, error)
+         call check_container(scene%opening, 'opening', scene, values, error)
+         if (any(scene%name == grain_scenes)) call check_container(scene%width, 'width', scene, values, error)
+         associate (fastest => two_pi*scene%motion_frequency*maxval(abs(scene%motion_amplitude)))
+            call require(scene%motion /= 'oscillation' .or. fastest < speed_limit, &
+               'gives a speed of 1e6 m/s or more with', 'motion_amplitude', 'motion_frequency', values, error)
+         end associate
          if (scene%name == 'drum') then
             call require(scene%boxes > 0 .or. scene%bodies > 0, &
                'must be given, or else', 'boxes', 'bodies', values, error)
@@ -34,6 +51,18 @@ contains
          end if
       end associate
    end subroutine check_settings
+
+   !> Refuse containers that are too large for the grains; lengths that are not in force are 0.
+   pure subroutine check_container(length, key, scene, values, error)
+      real(wp), intent(in) :: length
+      character(len=*), intent(in) :: key
+      type(scene_settings_t), intent(in) :: scene
+      type(value_t), intent(in) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+
+      call require(length <= length_limit*scene%long_axis_max, 'must not exceed 1e5 times', key, 'long_axis_max', &
+         values, error)
+   end subroutine check_container
 
    !> Refuse two entries of &scene that do not go together.
    pure subroutine require(holds, relation, key, other, values, error)

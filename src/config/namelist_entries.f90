@@ -58,25 +58,25 @@ module polydem_namelist_entries
       'Least number of corners of a grain'), &
       entry_t('scene', 'corners_max', 'integer', 1, '12', '', '>= 3, <= 64', grains, &
       'Greatest number of corners of a grain'), &
-      entry_t('scene', 'short_axis', 'real', 1, '8e-3', 'm', '> 0', grains, &
+      entry_t('scene', 'short_axis', 'real', 1, '8e-3', 'm', '>= 1e-15, <= 1e12', grains, &
       'Short axis (full length) of the ellipse around a grain'), &
-      entry_t('scene', 'long_axis_min', 'real', 1, '8e-3', 'm', '> 0', grains, &
+      entry_t('scene', 'long_axis_min', 'real', 1, '8e-3', 'm', '>= 1e-15, <= 1e12', grains, &
       'Least long axis (full length) of the ellipse around a grain'), &
-      entry_t('scene', 'long_axis_max', 'real', 1, '11e-3', 'm', '> 0', grains, &
+      entry_t('scene', 'long_axis_max', 'real', 1, '11e-3', 'm', '>= 1e-15, <= 1e12', grains, &
       'Greatest long axis (full length) of the ellipse around a grain'), &
       entry_t('scene', 'density', 'real', 1, '2500', 'kg/m3', '> 0', '', &
       'Density of the bodies that have none of their own'), &
-      entry_t('scene', 'radius', 'real', 1, '0', 'm', '>= 0', 'name: drum', &
+      entry_t('scene', 'radius', 'real', 1, '0', 'm', '>= 0, <= 1e12', 'name: drum', &
       'Inner radius of the drum; 0: from the number of grains'), &
-      entry_t('scene', 'width', 'real', 1, '0', 'm', '>= 0', 'name: hopper gas bed', &
+      entry_t('scene', 'width', 'real', 1, '0', 'm', '>= 0, <= 1e12', 'name: hopper gas bed', &
       'Width of the container; 0: from the number of grains'), &
-      entry_t('scene', 'width', 'real', 1, '0', 'm', '>= 0', 'name: heap', &
+      entry_t('scene', 'width', 'real', 1, '0', 'm', '>= 0, <= 1e12', 'name: heap', &
       'Length of the floor; 0: from the number of grains'), &
-      entry_t('scene', 'width', 'real', 1, required, 'm', '> 0', 'name: incline stack', &
+      entry_t('scene', 'width', 'real', 1, required, 'm', '> 0, <= 1e12', 'name: incline stack', &
       'Width of a block'), &
-      entry_t('scene', 'height', 'real', 1, required, 'm', '> 0', 'name: incline stack', &
+      entry_t('scene', 'height', 'real', 1, required, 'm', '> 0, <= 1e12', 'name: incline stack', &
       'Height of a block'), &
-      entry_t('scene', 'opening', 'real', 1, required, 'm', '> 0', 'name: hopper', &
+      entry_t('scene', 'opening', 'real', 1, required, 'm', '> 0, <= 1e12', 'name: hopper', &
       'Width of the opening at the bottom'), &
       entry_t('scene', 'slope', 'real', 1, required, 'degree', '> 0, < 90', 'name: hopper', &
       'Angle of the inclined walls to the horizontal'), &
@@ -84,29 +84,29 @@ module polydem_namelist_entries
       'Angle of the incline to the horizontal'), &
       entry_t('scene', 'fraction', 'real', 1, '0.3', '', '> 0, < 1', 'name: gas', &
       'Share of the area that grains cover'), &
-      entry_t('scene', 'speed', 'real', 1, required, 'm/s', '> 0', 'name: gas', &
+      entry_t('scene', 'speed', 'real', 1, required, 'm/s', '> 0, < 1e6', 'name: gas', &
       'Root mean square speed of the grains at the start'), &
-      entry_t('scene', 'speed', 'real', 1, '0', 'm/s', '>= 0', 'name: drum hopper bed heap', &
+      entry_t('scene', 'speed', 'real', 1, '0', 'm/s', '>= 0, < 1e6', 'name: drum hopper bed heap', &
       'Root mean square speed of the grains at the start'), &
-      entry_t('scene', 'speed', 'real', 1, '0', 'm/s', '>= 0', 'name: incline', &
+      entry_t('scene', 'speed', 'real', 1, '0', 'm/s', '>= 0, < 1e6', 'name: incline', &
       'Speed of the block down the incline at the start'), &
       entry_t('scene', 'motion', 'word', 1, 'none', '', 'none rotation translation oscillation', '', &
       'Prescribed motion of fixed bodies'), &
       entry_t('scene', 'motion_bodies', 'integer', 0, '', '', '', moving, &
       'Identifiers of the fixed bodies that move; left out: all fixed bodies'), &
-      entry_t('scene', 'motion_pivot', 'real', 2, '0, 0', 'm', '', 'motion: rotation', &
+      entry_t('scene', 'motion_pivot', 'real', 2, '0, 0', 'm', '>= -1e12, <= 1e12', 'motion: rotation', &
       'Centre of the rotation'), &
-      entry_t('scene', 'motion_rate', 'real', 1, required, '1/s', '', 'motion: rotation', &
+      entry_t('scene', 'motion_rate', 'real', 1, required, '1/s', '> -1e9, < 1e9', 'motion: rotation', &
       'Revolutions per second, anticlockwise'), &
-      entry_t('scene', 'motion_velocity', 'real', 2, required, 'm/s', '', 'motion: translation', &
+      entry_t('scene', 'motion_velocity', 'real', 2, required, 'm/s', '> -1e6, < 1e6', 'motion: translation', &
       'Velocity of the translation'), &
-      entry_t('scene', 'motion_amplitude', 'real', 2, required, 'm', '', 'motion: oscillation', &
+      entry_t('scene', 'motion_amplitude', 'real', 2, required, 'm', '>= -1e12, <= 1e12', 'motion: oscillation', &
       'Amplitude of the oscillation'), &
-      entry_t('scene', 'motion_frequency', 'real', 1, required, 'Hz', '> 0', 'motion: oscillation', &
+      entry_t('scene', 'motion_frequency', 'real', 1, required, 'Hz', '> 0, < 1e12', 'motion: oscillation', &
       'Frequency of the oscillation'), &
-      entry_t('scene', 'motion_start', 'real', 1, '0', 's', '>= 0', moving, &
+      entry_t('scene', 'motion_start', 'real', 1, '0', 's', '>= 0, <= 1e12', moving, &
       'Time at which the motion starts'), &
-      entry_t('scene', 'motion_ramp', 'real', 1, '0', 's', '>= 0', moving, &
+      entry_t('scene', 'motion_ramp', 'real', 1, '0', 's', '>= 0, <= 1e12', moving, &
       'Time over which the motion smoothly gets to full speed')]
 
    !> Groups of the stages of a step, from boxes to forces
@@ -117,22 +117,22 @@ module polydem_namelist_entries
       'How pairs of overlapping boxes are found'), &
       entry_t('overlap', 'degenerate', 'word', 1, 'push', '', 'push stop', '', &
       'A contact without direction is pushed apart along the line of centres, or stops the run'), &
-      entry_t('forces', 'gravity', 'real', 2, '0, -9.81', 'm/s2', '', '', &
+      entry_t('forces', 'gravity', 'real', 2, '0, -9.81', 'm/s2', '> -1e12, < 1e12', '', &
       'Acceleration of gravity'), &
-      entry_t('forces', 'stiffness', 'real', 1, '1e7', 'N/m2', '> 0', '', &
+      entry_t('forces', 'stiffness', 'real', 1, '1e7', 'N/m2', '> 0, <= 1e30', '', &
       'Young''s modulus E in two dimensions'), &
       entry_t('forces', 'damping', 'word', 1, 'rate', '', 'rate book none', '', &
       'Normal damping by the exact rate of the area, by backward difference as in the book, or none'), &
-      entry_t('forces', 'damping_coefficient', 'real', 1, '0.0251', '', '>= 0', 'damping: rate book', &
+      entry_t('forces', 'damping_coefficient', 'real', 1, '0.0251', '', '>= 0, <= 1e6', 'damping: rate book', &
       'Damping coefficient gamma'), &
       entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack none', '', &
       'Friction law'), &
-      entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0', 'friction: cundall_strack', &
+      entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', 'friction: cundall_strack', &
       'Friction coefficient mu'), &
-      entry_t('forces', 'tangential_stiffness', 'real', 1, '0.2857142857142857', '', '> 0', &
+      entry_t('forces', 'tangential_stiffness', 'real', 1, '0.2857142857142857', '', '> 0, <= 1e6', &
       'friction: cundall_strack', &
       'Tangential stiffness as a share of E'), &
-      entry_t('forces', 'tangential_damping', 'real', 1, '0.25', '', '>= 0', 'friction: cundall_strack', &
+      entry_t('forces', 'tangential_damping', 'real', 1, '0.25', '', '>= 0, <= 1e6', 'friction: cundall_strack', &
       'Tangential damping as a share of sqrt(k_t m_t)')]
 
    !> Groups of the run

@@ -16,7 +16,7 @@ contains
       character(len=*), intent(in) :: file
       !> Its bytes
       character(len=:), allocatable, intent(out) :: text
-      !> File is missing (input_error), or a folder, too long or unreadable
+      !> File is missing, empty, a folder, a device or too long (input_error), or unreadable
       type(error_t), allocatable, intent(inout) :: error
       character(len=256) :: reason
       integer :: bytes, status, unit
@@ -33,6 +33,10 @@ contains
       else if (bytes < 0 .or. bytes > greatest_size) then
          call raise(error, input_error, &
             trim(file)//': is not a namelist file (longer than 1 MiB, or no plain file)')
+      else if (bytes == 0) then
+         ! To open a pipe would wait for somebody to write to it.
+         call raise(error, input_error, trim(file)//': is empty or no plain file (a pipe, a device); '// &
+            'a namelist file was expected')
       end if
       if (allocated(error)) return
 
@@ -40,7 +44,7 @@ contains
          iostat=status, iomsg=reason)
       if (status == 0) then
          allocate (character(len=bytes) :: text)
-         if (bytes > 0) read (unit, iostat=status, iomsg=reason) text
+         read (unit, iostat=status, iomsg=reason) text
          close (unit)
       end if
       if (status /= 0) call raise(error, io_error, trim(file)//': cannot be read ('//trim(reason)//')')

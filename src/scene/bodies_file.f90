@@ -11,17 +11,25 @@
 !>     mass, inertia     (n)      optional [kg/m, kg m]; 0, or absent: from the polygon if free,
 !>                                infinite if fixed
 !>     id                (n)      optional, 1 to n where absent
+!>
+!> Other data sets at the top level are errors, since they may be misspelt ones of these; groups are left alone.
 module polydem_bodies_file
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_file, only: hdf5_file_t
+   use polydem_hdf5_names, only: is_dataset, list_names
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_sort, only: sort_keys
    use polydem_strings, only: to_text
+   use polydem_words, only: quoted, suggestion
    implicit none
    private
    public :: read_bodies_file
+
+   !> Data sets that a bodies file may have
+   character(len=*), parameter :: known_names(9) = [character(len=16) :: 'vertex', 'vertex_start', 'fixed', &
+      'velocity', 'angular_velocity', 'density', 'mass', 'inertia', 'id']
 
    !> What the file says, complete and consistent once it is read
    type :: table_t
@@ -62,10 +70,19 @@ contains
       type(hdf5_file_t) :: file
       type(table_t) :: table
       type(error_t), allocatable :: ignored
+      integer :: bytes
+      logical :: there
 
+      ! To open a pipe would wait for somebody to write to it.
+      inquire (file=path, exist=there, size=bytes)
+      if (there .and. bytes == 0) then
+         call raise(error, input_error, path//': is empty or no plain file (a pipe, a device), not a bodies file')
+         return
+      end if
       call file%open(path, error)
       if (allocated(error)) return
-      call read_table(file, path, real(density, dp), table, error)
+      call check_names(file, path, error)
+      if (.not. allocated(error)) call read_table(file, path, real(density, dp), table, error)
       if (allocated(error)) then
          call file%close(ignored)
          return
@@ -74,6 +91,28 @@ contains
       if (allocated(error)) return
       call list_table(table, list)
    end subroutine read_bodies_file
+
+   !> Refuse data sets with unknown names, and other things with known ones.
+   subroutine check_names(file, path, error)
+      type(hdf5_file_t), intent(in) :: file
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: names(:)
+      integer :: k
+
+      call list_names(file%place_of('/'), names, error)
+      if (allocated(error)) return
+      do k = 1, size(names)
+         if (any(known_names == names(k)) .eqv. is_dataset(file%place_of(trim(names(k))))) cycle
+         if (any(known_names == names(k))) then
+            call raise(error, input_error, path//': '//trim(names(k))//' must be a data set, but is a group or a link')
+         else
+            call raise(error, input_error, path//': unknown data set '//quoted(trim(names(k)))// &
+                       suggestion(trim(names(k)), known_names))
+         end if
+         return
+      end do
+   end subroutine check_names
 
    subroutine list_table(table, list)
       type(table_t), intent(in) :: table
@@ -254,6 +293,9 @@ contains
          else if (values(k) < least) then
             call raise(error, input_error, path//': '//entry_text(name, k)//' is '// &
                        to_text(real(values(k), wp))//', but must '//bound_text(least))
+         else if (least >= 0.0_dp .and. values(k) > 0.0_dp .and. real(values(k), wp) < tiny(1.0_wp)) then
+            call raise(error, input_error, path//': '//entry_text(name, k)//' of body '//to_text(table%id(k))// &
+                       ' is positive, but too small for a number of this precision')
          end if
       end do
    end subroutine read_column

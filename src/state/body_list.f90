@@ -2,7 +2,7 @@
 module polydem_body_list
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_polygon, only: clean_polygon, mass_properties
    use polydem_sort, only: sort_keys
    use polydem_strings, only: to_text
@@ -12,6 +12,10 @@ module polydem_body_list
 
    !> Density where none is given [kg/m3]
    real(wp), parameter :: default_density = 2500.0_wp
+
+   !> Least mass [kg/m] and moment of inertia [kg m]; the greatest is its inverse. Products of two are normal numbers,
+   !> in single precision only the numbers themselves.
+   real(wp), parameter :: least_mass = real(max(1.0e-100_dp, real(tiny(1.0_wp), dp)), wp)
 
    !> What is known of one body before its masses are computed
    type :: entry_t
@@ -44,7 +48,8 @@ module polydem_body_list
 
 contains
 
-   !> Append a body. Without `mass` and `inertia` a free body gets those of its polygon, a fixed one infinite ones.
+   !> Append a body. Without `mass` a free body gets that of its polygon, without `inertia` that of its mass spread evenly
+   !> over the polygon; a fixed body is infinitely heavy in what it is not given.
    subroutine append(self, vertices, fixed, density, velocity, angular_velocity, id, mass, inertia)
       class(body_list_t), intent(inout) :: self
       !> Corners in the world, any orientation, (2, corner) [m]
@@ -161,6 +166,11 @@ contains
          call raise(error, input_error, 'body '//to_text(entry%id)//': the density must be positive')
          return
       end if
+      if (entry%fixed .and. any(abs([entry%velocity, entry%angular_velocity]) > 0.0_wp)) then
+         call raise(error, input_error, 'body '//to_text(entry%id)//': it is fixed and cannot have a velocity '// &
+                    'or an angular velocity; fixed bodies move as motion in &scene of the namelist says')
+         return
+      end if
       call mass_properties(cleaned, area, centroid, second_moment)
       bodies%id(s) = entry%id
       bodies%fixed(s) = entry%fixed
@@ -170,13 +180,29 @@ contains
       bodies%mass(s) = entry%mass
       bodies%inertia(s) = entry%inertia
       if (.not. entry%fixed .and. bodies%mass(s) <= 0.0_wp) bodies%mass(s) = entry%density*area
-      if (.not. entry%fixed .and. bodies%inertia(s) <= 0.0_wp) bodies%inertia(s) = entry%density*second_moment
+      if (.not. entry%fixed .and. bodies%inertia(s) <= 0.0_wp) bodies%inertia(s) = bodies%mass(s)*second_moment/area
+      call check_mass('mass', bodies%mass(s), entry, error)
+      call check_mass('moment of inertia', bodies%inertia(s), entry, error)
       call reserve_vertices(bodies, bodies%vertex_start(s), size(cleaned, 2, kind=ip))
       do k = 1_ip, size(cleaned, 2, kind=ip)
          bodies%shape(:, bodies%vertex_start(s) + k - 1_ip) = cleaned(:, k) - centroid
       end do
       bodies%vertex_start(s + 1_ip) = bodies%vertex_start(s) + size(cleaned, 2, kind=ip)
    end subroutine place
+
+   !> Refuse masses so small or large that their inverses or products leave the normal numbers; 0: infinite.
+   subroutine check_mass(name, mass, entry, error)
+      character(len=*), intent(in) :: name
+      real(wp), intent(in) :: mass
+      type(entry_t), intent(in) :: entry
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (mass >= least_mass .and. mass <= 1.0_wp/least_mass) return
+      if (entry%fixed .and. abs(mass) <= 0.0_wp) return
+      call raise(error, input_error, 'body '//to_text(entry%id)//': the '//name//' is '//to_text(mass)// &
+                 ', but must be between '//to_text(least_mass)//' and '//to_text(1.0_wp/least_mass)// &
+                 '; use units in which the bodies are neither so small nor so large')
+   end subroutine check_mass
 
    subroutine reserve_vertices(bodies, first, more)
       type(bodies_t), intent(inout) :: bodies
