@@ -1,9 +1,8 @@
 !> Bounding boxes of bodies.
 !>
 !> A body of particle size has one box, the bounds of its turned vertices. A larger one, a long wall say,
-!> would have a box that overlaps half the scene; it is cut into pieces of about the size of the median
-!> grain, each with its own box. Pieces are cut once, in the body frame, by a grid along the longest edge of
-!> the body and across; the body itself stays one polygon.
+!> would have a box that overlaps half the scene; it is cut into pieces that each have a box of their own
+!> (`polydem_cut_bodies`); the body itself stays one polygon.
 !>
 !> Two polygons that share a point always have boxes that share a point. For whole bodies this follows from
 !> rounding being monotonic. Boxes of pieces are padded by a few rounding errors of the size of the body, so
@@ -11,15 +10,20 @@
 module polydem_make_boxes
    use polydem_bodies, only: bodies_t
    use polydem_boxes, only: boxes_t
-   use polydem_kinds, only: ip, wp
-   use polydem_polygon, only: clip_half_plane, diameter
+   use polydem_cut_bodies, only: cut_body, pieces_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_kinds, only: ip, wp, worth_threads
+   use polydem_polygon, only: diameter
    use polydem_sort_reals, only: sort_reals
+   use polydem_strings, only: to_text
    implicit none
    private
    public :: box_maker_t, new_box_maker, update_boxes
 
    !> Room for rounding in units of epsilon times the diameter of a body
    real(wp), parameter :: roundings = 64.0_wp
+   !> Most pieces of all cut bodies together
+   integer(ip), parameter :: most_pieces = 200000_ip
 
    !> What it takes to make boxes
    type :: box_maker_t
@@ -34,22 +38,10 @@ module polydem_make_boxes
       real(wp), allocatable :: padding(:)
    end type box_maker_t
 
-   !> One piece of a body
-   type :: piece_t
-      !> Vertices, (2, n) [m]
-      real(wp), allocatable :: vertices(:, :)
-   end type piece_t
-
-   !> The pieces of a body; none if it stays whole
-   type :: cut_t
-      !> Pieces
-      type(piece_t), allocatable :: pieces(:)
-   end type cut_t
-
 contains
 
    !> Decide which bodies are cut, make room for all boxes and fill them.
-   subroutine new_box_maker(maker, bodies, largest_ratio, boxes)
+   subroutine new_box_maker(maker, bodies, largest_ratio, boxes, error)
       !> What `update_boxes` will need
       type(box_maker_t), intent(out) :: maker
       !> Bodies at their present place
@@ -58,58 +50,91 @@ contains
       real(wp), intent(in) :: largest_ratio
       !> Boxes of all bodies
       type(boxes_t), intent(out) :: boxes
-      type(cut_t), allocatable :: cuts(:)
-      real(wp) :: grain
-      integer(ip) :: s, n_vertices, all_slots(bodies%n)
+      !> Allocated if a body is so large that it had to be cut into too many pieces
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: s, all_slots(bodies%n)
 
-      grain = median_diameter(bodies)
-      allocate (cuts(bodies%n), maker%first_box(bodies%n + 1_ip))
-      maker%first_box(1) = 1_ip
-      n_vertices = 0_ip
-      do s = 1_ip, bodies%n
-         all_slots(s) = s
-         call cut(body_shape(bodies, s), grain, largest_ratio, cuts(s))
-         maker%first_box(s + 1_ip) = maker%first_box(s) + max(1_ip, size(cuts(s)%pieces, kind=ip))
-         n_vertices = n_vertices + count_vertices(cuts(s))
-      end do
+      call cut_bodies(maker, bodies, largest_ratio, error)
+      if (allocated(error)) return
       boxes%n = maker%first_box(bodies%n + 1_ip) - 1_ip
       boxes%n_bodies = bodies%n
       boxes%one_to_one = boxes%n == bodies%n
       allocate (boxes%bounds(4, boxes%n), boxes%body(boxes%n), boxes%fixed(boxes%n), boxes%reach(boxes%n))
-      allocate (maker%piece_start(boxes%n + 1_ip), maker%piece(2, n_vertices), maker%padding(boxes%n))
-      maker%piece_start(1) = 1_ip
+      allocate (maker%padding(boxes%n))
       do s = 1_ip, bodies%n
+         all_slots(s) = s
          boxes%body(maker%first_box(s):maker%first_box(s + 1_ip) - 1_ip) = s
          boxes%fixed(maker%first_box(s):maker%first_box(s + 1_ip) - 1_ip) = bodies%fixed(s)
-         call store(maker, s, body_shape(bodies, s), cuts(s), boxes%reach)
+         call set_reach(maker, s, body_shape(bodies, s), boxes%reach)
       end do
       call update_boxes(maker, bodies, all_slots, boxes)
    end subroutine new_box_maker
 
-   !> Store the pieces of a body and the reach of its boxes.
-   pure subroutine store(maker, s, vertices, pieces_of, reach)
+   !> Cut the bodies that are too large; the others have one piece without vertices.
+   subroutine cut_bodies(maker, bodies, largest_ratio, error)
+      type(box_maker_t), intent(inout) :: maker
+      type(bodies_t), intent(in) :: bodies
+      real(wp), intent(in) :: largest_ratio
+      type(error_t), allocatable, intent(inout) :: error
+      type(pieces_t) :: pieces
+      real(wp) :: grain, none(2, 0)
+      integer(ip) :: s, room
+      logical :: fits
+
+      grain = median_diameter(bodies)
+      room = most_pieces
+      allocate (maker%first_box(bodies%n + 1_ip))
+      maker%first_box(1) = 1_ip
+      do s = 1_ip, bodies%n
+         call cut_body(body_shape(bodies, s), grain, largest_ratio, room, pieces, fits)
+         if (.not. fits) then
+            call refuse(bodies%id(s), diameter(body_shape(bodies, s))/grain, error)
+            return
+         end if
+         room = room - (pieces%n + 1_ip - maker%first_box(s))
+         if (pieces%n < maker%first_box(s)) call pieces%append(none)
+         maker%first_box(s + 1_ip) = pieces%n + 1_ip
+      end do
+      if (bodies%n == 0_ip) then
+         maker%piece_start = [1_ip]
+         maker%piece = none
+         return
+      end if
+      maker%piece_start = pieces%start(1:pieces%n + 1_ip)
+      maker%piece = pieces%vertices(:, 1:pieces%start(pieces%n + 1_ip) - 1_ip)
+   end subroutine cut_bodies
+
+   pure subroutine refuse(id, ratio, error)
+      integer(ip), intent(in) :: id
+      !> Length of the body in grains
+      real(wp), intent(in) :: ratio
+      type(error_t), allocatable, intent(inout) :: error
+
+      call raise(error, input_error, 'body '//to_text(id)//' is '//to_text(ratio)//' times as long as the '// &
+                 'median grain, and cut to the size of grains it would make more than '//to_text(most_pieces)// &
+                 ' boxes together with the bodies before it; a largest_ratio above that in &boxes leaves it whole')
+   end subroutine refuse
+
+   !> Set the padding and the reach of the boxes of a body.
+   pure subroutine set_reach(maker, s, vertices, reach)
       type(box_maker_t), intent(inout) :: maker
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: vertices(:, :)
-      type(cut_t), intent(in) :: pieces_of
       !> Reach of all boxes [m]
       real(wp), intent(inout) :: reach(:)
-      integer(ip) :: b, k, start
+      real(wp) :: length
+      integer(ip) :: b, first, last
 
-      b = maker%first_box(s)
-      maker%padding(b) = 0.0_wp
-      maker%piece_start(b + 1_ip) = maker%piece_start(b)
-      reach(b) = 0.5_wp*diameter(vertices)
-      do k = 1_ip, size(pieces_of%pieces, kind=ip)
-         b = maker%first_box(s) + k - 1_ip
-         start = maker%piece_start(b)
-         maker%piece_start(b + 1_ip) = start + size(pieces_of%pieces(k)%vertices, 2, kind=ip)
-         maker%piece(:, start:maker%piece_start(b + 1_ip) - 1_ip) = pieces_of%pieces(k)%vertices
-         maker%padding(b) = roundings*epsilon(1.0_wp)*diameter(vertices)
-         reach(b) = 0.5_wp*diameter(pieces_of%pieces(k)%vertices) + maker%padding(b)
+      length = diameter(vertices)
+      do b = maker%first_box(s), maker%first_box(s + 1_ip) - 1_ip
+         first = maker%piece_start(b)
+         last = maker%piece_start(b + 1_ip) - 1_ip
+         maker%padding(b) = merge(roundings*epsilon(1.0_wp)*length, 0.0_wp, last >= first)
+         reach(b) = 0.5_wp*length
+         if (last >= first) reach(b) = 0.5_wp*diameter(maker%piece(:, first:last)) + maker%padding(b)
+         reach(b) = reach(b)*(1.0_wp + roundings*epsilon(1.0_wp))
       end do
-      reach(maker%first_box(s):b) = reach(maker%first_box(s):b)*(1.0_wp + roundings*epsilon(1.0_wp))
-   end subroutine store
+   end subroutine set_reach
 
    !> Bring the boxes of the given bodies up to date with their place; those of others are left alone.
    subroutine update_boxes(maker, bodies, moving, boxes)
@@ -123,7 +148,8 @@ contains
       type(boxes_t), intent(inout) :: boxes
       integer(ip) :: k, s, b
 
-      !$omp parallel do schedule(static) default(none) shared(maker, bodies, moving, boxes) private(k, s, b)
+      !$omp parallel do if (size(moving) > worth_threads) schedule(static) default(none) &
+      !$omp    shared(maker, bodies, moving, boxes) private(k, s, b)
       do k = 1_ip, size(moving, kind=ip)
          s = moving(k)
          b = maker%first_box(s)
@@ -199,102 +225,5 @@ contains
       call sort_reals(length, ranked)
       median_diameter = length(ranked((n + 1_ip)/2_ip))
    end function median_diameter
-
-   !> Cut a body by a grid along its longest edge and across; a small one is left whole.
-   pure subroutine cut(vertices, grain, largest_ratio, pieces_of)
-      real(wp), intent(in) :: vertices(:, :)
-      real(wp), intent(in) :: grain, largest_ratio
-      type(cut_t), intent(out) :: pieces_of
-      real(wp) :: along(2), across(2), from_along, from_across, length, width
-      real(wp), allocatable :: strip(:, :), cell(:, :)
-      type(piece_t), allocatable :: pieces(:)
-      integer(ip) :: i, j, n, n_along, n_across
-
-      allocate (pieces_of%pieces(0))
-      if (diameter(vertices)/grain <= largest_ratio) return
-      along = longest_edge(vertices)
-      across = [-along(2), along(1)]
-      call extent(vertices, along, from_along, length)
-      call extent(vertices, across, from_across, width)
-      n_along = parts(length, grain, largest_ratio)
-      n_across = parts(width, grain, largest_ratio)
-      if (n_along*n_across == 1_ip) return
-      allocate (pieces(n_along*n_across))
-      n = 0_ip
-      do i = 1_ip, n_along
-         call slice(vertices, along, from_along, length, i, n_along, strip)
-         do j = 1_ip, n_across
-            call slice(strip, across, from_across, width, j, n_across, cell)
-            if (size(cell, 2) == 0) cycle
-            n = n + 1_ip
-            call move_alloc(cell, pieces(n)%vertices)
-         end do
-      end do
-      pieces_of%pieces = pieces(1:n)
-   end subroutine cut
-
-   pure integer(ip) function count_vertices(pieces_of)
-      type(cut_t), intent(in) :: pieces_of
-      integer(ip) :: k
-
-      count_vertices = 0_ip
-      do k = 1_ip, size(pieces_of%pieces, kind=ip)
-         count_vertices = count_vertices + size(pieces_of%pieces(k)%vertices, 2, kind=ip)
-      end do
-   end function count_vertices
-
-   !> Unit vector along the longest edge
-   pure function longest_edge(vertices) result(direction)
-      real(wp), intent(in) :: vertices(:, :)
-      real(wp) :: direction(2), edge(2), longest
-      integer(ip) :: v, n
-
-      n = size(vertices, 2, kind=ip)
-      longest = -1.0_wp
-      direction = [1.0_wp, 0.0_wp]
-      do v = 1_ip, n
-         edge = vertices(:, 1_ip + modulo(v, n)) - vertices(:, v)
-         if (hypot(edge(1), edge(2)) <= longest) cycle
-         longest = hypot(edge(1), edge(2))
-         direction = edge/longest
-      end do
-   end function longest_edge
-
-   !> Where a polygon begins in some direction, and its length there
-   pure subroutine extent(vertices, direction, from, length)
-      real(wp), intent(in) :: vertices(:, :)
-      real(wp), intent(in) :: direction(2)
-      real(wp), intent(out) :: from, length
-      real(wp) :: along(size(vertices, 2))
-
-      along = vertices(1, :)*direction(1) + vertices(2, :)*direction(2)
-      from = minval(along)
-      length = maxval(along) - from
-   end subroutine extent
-
-   !> Number of parts into which a length is cut
-   pure integer(ip) function parts(length, grain, largest_ratio)
-      real(wp), intent(in) :: length, grain, largest_ratio
-
-      parts = 1_ip
-      if (length/grain > largest_ratio) parts = max(1_ip, ceiling(length/grain, ip))
-   end function parts
-
-   !> The k-th of n slices of a polygon in some direction
-   pure subroutine slice(vertices, direction, from, length, k, n, part)
-      real(wp), intent(in) :: vertices(:, :)
-      real(wp), intent(in) :: direction(2), from, length
-      integer(ip), intent(in) :: k, n
-      real(wp), allocatable, intent(out) :: part(:, :)
-      real(wp), allocatable :: lower(:, :)
-      real(wp) :: low, high
-
-      low = from + length*real(k - 1_ip, wp)/real(n, wp)
-      high = from + length*real(k, wp)/real(n, wp)
-      lower = vertices
-      if (k > 1_ip) call clip_half_plane(vertices, low*direction, -direction, lower)
-      part = lower
-      if (k < n) call clip_half_plane(lower, high*direction, direction, part)
-   end subroutine slice
 
 end module polydem_make_boxes

@@ -1,9 +1,5 @@
 !> Replay of recorded boxes through a neighbour finder: every step is checked and timed.
 !>
-!> A trace holds `aabb` (steps, boxes, 4), the bounds of every box at every step; `is_wall` (boxes), not zero
-!> for fixed ones; and may hold `npairs` (steps), the exact number of pairs, and the polygons `vertices` and
-!> `vertex_offset` (boxes + 1), from which the greatest extent of a box at any angle is known.
-!>
 !> What is timed begins with the boxes of a step in memory and ends with the complete list; ordering the
 !> changes is timed by itself. Per step the shortest of all repeats counts, then the mean over the steps,
 !> divided by the number of boxes, fixed ones included. One thread: its processor time; more: elapsed time.
@@ -13,29 +9,15 @@ module polydem_replay
    use polydem_boxes, only: boxes_t
    use polydem_clock, only: thread_cpu_seconds, wall_seconds
    use polydem_counters, only: counters_t
-   use polydem_errors, only: error_t, input_error, raise, run_error
+   use polydem_errors, only: error_t, raise, run_error
    use polydem_hash, only: add_modulo, hexadecimal, pair_hash
-   use polydem_hdf5_file, only: hdf5_file_t
-   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_kinds, only: dp, ip, lp
    use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_strings, only: to_text
+   use polydem_trace, only: read_trace, trace_t
    implicit none
    private
    public :: replay_trace
-
-   !> Recorded boxes
-   type :: trace_t
-      !> Number of steps
-      integer(ip) :: n_steps = 0_ip
-      !> Bounds, (4, box, step) [m]
-      real(wp), allocatable :: bounds(:, :, :)
-      !> Whether each box is fixed
-      logical, allocatable :: fixed(:)
-      !> Greatest half side of each box at any angle [m]
-      real(wp), allocatable :: reach(:)
-      !> Number of pairs of each step; not allocated if the trace has none
-      integer(ip), allocatable :: n_pairs(:)
-   end type trace_t
 
    !> What a replay measures and sums up
    type :: record_t
@@ -161,95 +143,6 @@ contains
       call raise(error, run_error, 'step '//to_text(step - 1_ip)//': '//neighbours%name//' found '// &
                  to_text(neighbours%pairs%n)//' pairs, all_pairs '//to_text(n)//', and not the same ones')
    end subroutine check_list
-
-   !> Read a trace and check that its parts fit together.
-   subroutine read_trace(path, trace, error)
-      character(len=*), intent(in) :: path
-      type(trace_t), intent(out) :: trace
-      type(error_t), allocatable, intent(inout) :: error
-      type(hdf5_file_t) :: file
-      real(dp), allocatable :: bounds(:, :, :)
-      integer(lp), allocatable :: extent(:)
-      integer(ip), allocatable :: is_wall(:)
-
-      call file%open(path, error)
-      if (allocated(error)) return
-      call file%shape_of('/aabb', extent, error)
-      if (.not. allocated(error)) call file%read('/is_wall', is_wall, error)
-      if (.not. allocated(error)) call check_shapes(path, extent, size(is_wall, kind=lp), error)
-      if (allocated(error)) return
-      trace%n_steps = int(extent(1), ip)
-      trace%fixed = is_wall /= 0_ip
-      ! All steps at once: in a compressed trace one step alone costs as much as all of its chunk.
-      call file%read('/aabb', bounds, error)
-      if (allocated(error)) return
-      trace%bounds = real(bounds, wp)
-      if (file%has('/npairs')) call file%read('/npairs', trace%n_pairs, error)
-      if (allocated(error)) return
-      if (allocated(trace%n_pairs)) then
-         if (size(trace%n_pairs) /= trace%n_steps) call raise(error, input_error, &
-                                               path//': npairs must have one entry per step of aabb')
-      end if
-      if (.not. allocated(error)) call read_reach(path, file, trace, error)
-      if (.not. allocated(error)) call file%close(error)
-   end subroutine read_trace
-
-   subroutine check_shapes(path, extent, n_walls, error)
-      character(len=*), intent(in) :: path
-      integer(lp), intent(in) :: extent(:), n_walls
-      type(error_t), allocatable, intent(inout) :: error
-
-      if (size(extent) == 3) then
-         if (extent(1) >= 1_lp .and. extent(2) == n_walls .and. extent(3) == 4_lp) return
-      end if
-      call raise(error, input_error, &
-                 path//': aabb must have the shape (steps, boxes, 4) and is_wall one entry per box')
-   end subroutine check_shapes
-
-   !> Greatest half sides, from the polygons if there are any, else from the boxes.
-   subroutine read_reach(path, file, trace, error)
-      character(len=*), intent(in) :: path
-      type(hdf5_file_t), intent(in) :: file
-      type(trace_t), intent(inout) :: trace
-      type(error_t), allocatable, intent(inout) :: error
-      real(dp), allocatable :: vertices(:, :)
-      integer(ip), allocatable :: offset(:)
-      integer(ip) :: b, n
-
-      n = size(trace%fixed, kind=ip)
-      allocate (trace%reach(n))
-      do b = 1_ip, n
-         trace%reach(b) = 0.5_wp*max(maxval(trace%bounds(3, b, :) - trace%bounds(1, b, :)), &
-                                     maxval(trace%bounds(4, b, :) - trace%bounds(2, b, :)))
-      end do
-      if (.not. file%has('/vertices')) return
-      call file%read('/vertices', vertices, error)
-      if (.not. allocated(error)) call file%read('/vertex_offset', offset, error)
-      if (allocated(error)) return
-      if (size(offset) /= n + 1_ip .or. offset(1) /= 0_ip .or. &
-          offset(size(offset)) /= size(vertices, 2) .or. any(offset(2:) < offset(:size(offset) - 1))) then
-         call raise(error, input_error, path//': vertex_offset must ascend from 0 to the number of vertices '// &
-                    'and have one entry more than there are boxes')
-         return
-      end if
-      do b = 1_ip, n
-         trace%reach(b) = max(trace%reach(b), &
-                              0.5_wp*real(diameter(vertices(:, offset(b) + 1_ip:offset(b + 1_ip))), wp))
-      end do
-   end subroutine read_reach
-
-   !> Greatest distance of two vertices [m]
-   pure real(dp) function diameter(vertices)
-      real(dp), intent(in) :: vertices(:, :)
-      integer(ip) :: j, k
-
-      diameter = 0.0_dp
-      do k = 2_ip, size(vertices, 2, kind=ip)
-         do j = 1_ip, k - 1_ip
-            diameter = max(diameter, hypot(vertices(1, k) - vertices(1, j), vertices(2, k) - vertices(2, j)))
-         end do
-      end do
-   end function diameter
 
    !> Boxes of the trace, at their first step; body k has box k.
    subroutine first_boxes(trace, boxes)

@@ -112,7 +112,8 @@ contains
       if (allocated(error)) return
       call list_moving(self)
       call new_motion_guard(self%guard, self%bodies, self%moving)
-      call new_box_maker(self%maker, self%bodies, settings%boxes%largest_ratio, self%boxes)
+      call new_box_maker(self%maker, self%bodies, settings%boxes%largest_ratio, self%boxes, error)
+      if (allocated(error)) return
       call new_neighbours(self%neighbours, settings%neighbours%finder, self%boxes, error)
       if (allocated(error)) return
       call allocate_memory(self)

@@ -18,8 +18,8 @@ module polydem_ledger
    private
    public :: ledger_t, balance_t, open_ledger, book_step, balance_of
 
-   !> Rates: power of elastic, damping and friction forces and of walls; force along x and y and torque from outside; the
-   !> sums of the absolute values of all forces and torques from outside
+   !> Rates: power of elastic, damping and friction forces and of walls; force along x and y and torque from outside;
+   !> the sums of the absolute values of all forces and torques from outside
    integer, parameter :: n_rates = 9
 
    !> Accumulated work and impulses
@@ -38,7 +38,7 @@ module polydem_ledger
       real(wp) :: angular_impulse = 0.0_wp
       !> Energy, momentum and angular momentum at the start
       real(wp), private :: start(4) = 0.0_wp
-      !> Rates at the last evaluation, in the order of the constants below
+      !> Rates at the last evaluation, in the order of n_rates
       real(wp), private :: rate(n_rates) = 0.0_wp
       !> Greatest kinetic energy so far, the scale of the residual [J/m]
       real(wp), private :: energy_scale = 0.0_wp

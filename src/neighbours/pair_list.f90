@@ -7,7 +7,7 @@
 !> Blocks may be moved in place because they keep their order: those that go down are moved from the
 !> front, those that go up from the back, and neither can run over a block that has yet to move.
 module polydem_pair_list
-   use polydem_kinds, only: bp, ip, lp, wp
+   use polydem_kinds, only: ip, lp, wp
    use polydem_pair_changes, only: pair_changes_t, pair_key
    implicit none
    private
@@ -47,10 +47,9 @@ module polydem_pair_list
       procedure :: start
       procedure :: forget
       procedure :: apply
-      generic :: carry => carry_wp, carry_ip, carry_bp
+      generic :: carry => carry_wp, carry_ip
       procedure, private :: carry_wp
       procedure, private :: carry_ip
-      procedure, private :: carry_bp
    end type pair_list_t
 
 contains
@@ -257,39 +256,6 @@ contains
          values(self%began(k)) = fill
       end do
    end subroutine carry_ip
-
-   !> Let small integers that ride on the pairs follow the last change.
-   pure subroutine carry_bp(self, values, fill)
-      class(pair_list_t), intent(in) :: self
-      !> One value per pair of the list before the change; afterwards per pair of the list now
-      integer(bp), allocatable, intent(inout) :: values(:)
-      !> Value of pairs that began
-      integer(bp), intent(in) :: fill
-      integer(bp), allocatable :: longer(:)
-      integer(ip) :: b, k
-
-      if (self%n_began == 0_ip .and. self%n_ended == 0_ip) return
-      if (size(values) < self%n) then
-         allocate (longer(self%n + self%n/2_ip))
-         longer(1:size(values)) = values
-         call move_alloc(longer, values)
-      end if
-      do b = 1_ip, self%n_blocks
-         if (self%block(3, b) > 0_ip) cycle
-         do k = self%block(1, b), self%block(2, b)
-            values(k + self%block(3, b)) = values(k)
-         end do
-      end do
-      do b = self%n_blocks, 1_ip, -1_ip
-         if (self%block(3, b) < 0_ip) cycle
-         do k = self%block(2, b), self%block(1, b), -1_ip
-            values(k + self%block(3, b)) = values(k)
-         end do
-      end do
-      do k = 1_ip, self%n_began
-         values(self%began(k)) = fill
-      end do
-   end subroutine carry_bp
 
    !> Move the blocks of the last change within an array.
    pure subroutine move_blocks(self, values)

@@ -23,7 +23,7 @@ module polydem_quadtree
    use polydem_candidates, only: candidates_t, meet, overlapping, places_t
    use polydem_counters, only: counters_t
    use polydem_finder, only: finder_t
-   use polydem_kinds, only: bp, dp, ip, lp, wp
+   use polydem_kinds, only: bp, dp, ip, lp, wp, worth_threads
    use polydem_pair_changes, only: pair_changes_t
    use polydem_quadtree_nodes, only: tree_t
    implicit none
@@ -177,7 +177,8 @@ contains
       integer(ip) :: k, i, low, high
       integer :: w
 
-      !$omp parallel do schedule(static, 1) default(none) shared(self, boxes) private(w, low, high)
+      !$omp parallel do if (boxes%n > worth_threads) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, size(self%worker)
          call part(boxes%n, size(self%worker), w, low, high)
          call find_leavers(self%tree, low, high, boxes%bounds, self%greatest_side, self%worker(w)%leavers)
@@ -239,7 +240,8 @@ contains
       integer(ip) :: low, high
       integer :: w
 
-      !$omp parallel do schedule(static, 1) default(none) shared(self, boxes) private(w, low, high)
+      !$omp parallel do if (self%candidates%n > worth_threads) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, size(self%worker)
          call part(self%candidates%n, size(self%worker), w, low, high)
          call self%candidates%compare(low, high, boxes%bounds, boxes%body, self%worker(w)%changes)
@@ -257,7 +259,8 @@ contains
       integer(ip) :: k, low, high
       integer :: w
 
-      !$omp parallel do schedule(static, 1) default(none) shared(self, boxes) private(w, k, low, high)
+      !$omp parallel do if (self%tree%n_changed > worth_threads) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes) private(w, k, low, high)
       do w = 1, size(self%worker)
          call part(self%tree%n_changed, size(self%worker), w, low, high)
          do k = low, high

@@ -21,7 +21,7 @@ module polydem_sort_and_sweep
    use polydem_boxes, only: boxes_t
    use polydem_counters, only: counters_t
    use polydem_finder, only: finder_t
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: ip, lp, wp, worth_threads
    use polydem_pair_changes, only: pair_changes_t
    use polydem_sort_reals, only: sort_reals
    implicit none
@@ -75,7 +75,7 @@ contains
       integer :: a
 
       if (.not. allocated(self%before)) call start(self, boxes)
-      !$omp parallel do schedule(static, 1) default(none) shared(self, boxes) private(a)
+      !$omp parallel do if (boxes%n > worth_threads) schedule(static, 1) default(none) shared(self, boxes) private(a)
       do a = 1, 2
          call self%axis(a)%changes%clear()
          call sort_axis(a, boxes, boxes%n, boxes%bounds, self%before, 2_ip*boxes%n, &

@@ -9,7 +9,7 @@ module polydem_find_contacts
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contact_memory_t, contacts_t, reserve_contacts
    use polydem_convex_overlap, only: overlap_polygons, overlap_t
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: ip, lp, wp, worth_threads
    implicit none
    private
    public :: find_contacts
@@ -207,7 +207,7 @@ contains
       end do
       contacts%n = n
       if (size(runs) == 1) return
-      !$omp parallel sections default(none) shared(runs, contacts)
+      !$omp parallel sections if (contacts%n > worth_threads) default(none) shared(runs, contacts)
       !$omp section
       call move_numbers(runs, contacts%pair)
       call move_numbers(runs, contacts%first)

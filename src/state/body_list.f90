@@ -48,8 +48,8 @@ module polydem_body_list
 
 contains
 
-   !> Append a body. Without `mass` a free body gets that of its polygon, without `inertia` that of its mass spread evenly
-   !> over the polygon; a fixed body is infinitely heavy in what it is not given.
+   !> Append a body. Without `mass` a free body gets that of its polygon, without `inertia` that of its mass spread
+   !> evenly over the polygon; a fixed body is infinitely heavy in what it is not given.
    subroutine append(self, vertices, fixed, density, velocity, angular_velocity, id, mass, inertia)
       class(body_list_t), intent(inout) :: self
       !> Corners in the world, any orientation, (2, corner) [m]
