@@ -38,7 +38,7 @@ contains
       call log%write_line('memory     '//to_text(after)//' KiB resident, of which '//to_text(after - before)// &
                           ' KiB for the scene, its boxes, pairs and contacts')
       call log%write_line('frames     '//to_text(48_lp*int(simulation%bodies%n, lp)/1024_lp + 1_lp)//' KiB each')
-      call log%close()
+      call log%close(error)
    end subroutine check_simulation
 
    subroutine write_lines(log, text)

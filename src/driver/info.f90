@@ -7,7 +7,7 @@ module polydem_info
    use polydem_log_tables, only: write_header
    use polydem_paths, only: exists
    use polydem_provenance, only: collect_provenance, provenance_t
-   use polydem_result_folder, only: holds_result, open_suffix, profile_path, segment_path
+   use polydem_result_folder, only: open_suffix, profile_path, segment_path
    use polydem_strings, only: to_text
    implicit none
    private
@@ -29,6 +29,7 @@ contains
       call collect_provenance(provenance, '-', '', '', 0_ip)
       call log%open('', error)
       call write_header(log, provenance, '-')
+      call log%close(error)
    end subroutine describe_program
 
    !> Print what a result folder, a profile or a segment says of itself.
@@ -38,17 +39,27 @@ contains
       !> Allocated if there is no such result
       type(error_t), allocatable, intent(inout) :: error
       type(log_t) :: log
-      integer(ip) :: number
 
       call log%open('', error)
       if (.not. exists(path)) then
          call raise(error, input_error, path//': there is no such file or folder')
-      else if (exists(profile_path(path))) then
-         call describe_file(profile_path(path), log, error)
-      else if (.not. holds_result(path)) then
+      else if (exists(path//'/.')) then
+         call describe_folder(path, log, error)
+      else
          call describe_file(path, log, error)
-         return
       end if
+      call log%close(error)
+   end subroutine describe_result
+
+   subroutine describe_folder(path, log, error)
+      character(len=*), intent(in) :: path
+      type(log_t), intent(inout) :: log
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: number
+      logical :: is_empty
+
+      is_empty = .not. exists(profile_path(path))
+      if (.not. is_empty) call describe_file(profile_path(path), log, error)
       number = 1_ip
       do
          if (allocated(error)) return
@@ -58,8 +69,10 @@ contains
       end do
       if (exists(segment_path(path, number)//open_suffix)) then
          call describe_file(segment_path(path, number)//open_suffix, log, error)
+      else if (is_empty .and. number == 1_ip) then
+         call raise(error, input_error, path//': this folder holds no result, neither profile.h5 nor a trajectory')
       end if
-   end subroutine describe_result
+   end subroutine describe_folder
 
    subroutine describe_file(path, log, error)
       character(len=*), intent(in) :: path

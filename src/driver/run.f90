@@ -15,6 +15,7 @@ module polydem_run
    use polydem_profile, only: write_profile
    use polydem_provenance, only: collect_provenance, provenance_t
    use polydem_result_folder, only: clear_result, holds_result
+   use polydem_run_lock, only: lock_result, unlock_result
    use polydem_settings, only: settings_t
    use polydem_simulation, only: advance, check_stability, new_simulation, report_counters, simulation_t, time_of
    use polydem_strings, only: to_text
@@ -66,11 +67,27 @@ contains
       !> Why the run could not start or go on
       type(error_t), allocatable, intent(inout) :: error
       type(run_t) :: run
+      character(len=:), allocatable :: note
       real(dp) :: began
 
       began = wall_seconds()
-      call prepare(settings, force, run, error)
+      run%folder = result_folder(settings)
+      call check_free(run%folder, force, error)
+      if (.not. allocated(error)) call new_simulation(settings, run%simulation, error)
+      if (.not. allocated(error)) call make_folder(run%folder, error)
+      if (.not. allocated(error)) call lock_result(run%folder, note, error)
       if (allocated(error)) return
+      call prepare(settings, force, note, run, error)
+      if (.not. allocated(error)) call go(run, began, error)
+      call unlock_result(run%folder)
+   end subroutine run_simulation
+
+   !> All steps, and the end.
+   subroutine go(run, began, error)
+      type(run_t), intent(inout) :: run
+      real(dp), intent(in) :: began
+      type(error_t), allocatable, intent(inout) :: error
+
       do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
          call advance(run%simulation, error)
          if (.not. allocated(error)) call watch(run, error)
@@ -78,30 +95,36 @@ contains
          call run%simulation%timers%end_step()
       end do
       call finish(run, wall_seconds() - began, error)
-   end subroutine run_simulation
+   end subroutine go
 
-   !> Folder, log, scene, first frame.
-   subroutine prepare(settings, force, run, error)
+   !> Refuse to overwrite a result unless that is wanted.
+   subroutine check_free(folder, force, error)
+      character(len=*), intent(in) :: folder
+      logical, intent(in) :: force
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (holds_result(folder) .and. .not. force) call raise(error, input_error, folder// &
+         ' holds a result; give --force to overwrite it, or another folder with --set output.folder=NAME')
+   end subroutine check_free
+
+   !> Log, description, first frame, in a folder that belongs to this run.
+   subroutine prepare(settings, force, note, run, error)
       type(settings_t), intent(in) :: settings
       logical, intent(in) :: force
+      !> A remark on how the folder was locked, if there is one
+      character(len=:), allocatable, intent(in) :: note
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
 
-      run%folder = result_folder(settings)
-      if (holds_result(run%folder) .and. .not. force) then
-         call raise(error, input_error, run%folder//' holds a result; give --force to overwrite it, or another '// &
-                    'folder with --set output.folder=NAME')
-         return
-      end if
-      call new_simulation(settings, run%simulation, error)
-      if (allocated(error)) return
-      call make_folder(run%folder, error)
+      ! Again, now that nobody else can write there.
+      call check_free(run%folder, force, error)
       if (allocated(error)) return
       call clear_result(run%folder, error)
       call run%log%open(run%folder, error)
       if (allocated(error)) return
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
       call write_header(run%log, run%provenance, run%folder)
+      if (allocated(note)) call run%log%write_line(note)
       call describe(run%simulation, run%log)
       call choose_intervals(run)
       call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error)
@@ -187,7 +210,7 @@ contains
       end associate
       if (allocated(error)) call run%log%write_line('stopped: '//status)
       call write_hash(run%log, hash)
-      call run%log%close()
+      call run%log%close(late_error)
       if (.not. allocated(error) .and. allocated(late_error)) call move_alloc(late_error, error)
    end subroutine finish
 

@@ -6,11 +6,11 @@
 !> All calls must come from one thread.
 module polydem_hdf5_dataset
    use, intrinsic :: iso_c_binding, only: c_ptr
-   use hdf5, only: h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, &
-      h5dset_extent_f, h5dwrite_f, h5eset_auto_f, h5get_libversion_f, h5kind_to_type, h5lexists_f, h5open_f, &
-      h5pclose_f, h5pcreate_f, h5pset_chunk_f, h5pset_create_inter_group_f, h5sclose_f, h5screate_simple_f, &
-      h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, h5tclose_f, &
-      h5tget_class_f, h5tget_size_f
+   use hdf5, only: h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dont_atexit_f, h5dopen_f, &
+      h5dread_f, h5dset_extent_f, h5dwrite_f, h5eset_auto_f, h5get_libversion_f, h5kind_to_type, h5lexists_f, &
+      h5open_f, h5pclose_f, h5pcreate_f, h5pset_chunk_f, h5pset_create_inter_group_f, h5sclose_f, &
+      h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, &
+      h5tclose_f, h5tget_class_f, h5tget_size_f
    use hdf5, only: h5_integer_kind, h5_real_kind, h5p_dataset_create_f, h5p_link_create_f, h5s_select_set_f, &
       h5s_unlimited_f, h5t_enum_f, h5t_float_f, h5t_integer_f, hid_t, hsize_t, size_t
    use polydem_errors, only: error_t, input_error, io_error, raise
@@ -43,11 +43,15 @@ module polydem_hdf5_dataset
 contains
 
    !> Make the library ready; may be called again.
+   !>
+   !> HDF5 does nothing when the program exits: it would try again to write files that could not be written, and crash.
+   !> All others are closed by then. It has to be told before its first work; told again, it only returns a status.
    subroutine start_library(error)
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer :: status
 
+      call h5dont_atexit_f(status)
       call h5open_f(status)
       if (status == 0) call h5eset_auto_f(0, status)
       if (status /= 0) call raise(error, io_error, 'the HDF5 library does not start')
@@ -58,6 +62,7 @@ contains
       character(len=:), allocatable :: version
       integer :: major, minor, release, status
 
+      call h5dont_atexit_f(status)
       call h5get_libversion_f(major, minor, release, status)
       version = to_text(int(major, ip))//'.'//to_text(int(minor, ip))//'.'//to_text(int(release, ip))
    end function library_version
@@ -139,7 +144,7 @@ contains
             call expect(status, 'write', place, error)
          end if
          call h5dclose_f(dataset, status)
-         call expect(status, 'finish', place, error)
+         call expect(status, 'finish writing', place, error)
       end if
       call h5sclose_f(space, status)
    end subroutine write_dataset
@@ -200,7 +205,7 @@ contains
       if (allocated(error)) return
       call grow(dataset, place, kind_in_file, row, n_rows, address, error)
       call h5dclose_f(dataset, status)
-      call expect(status, 'finish', place, error)
+      call expect(status, 'finish writing', place, error)
    end subroutine append_rows_to
 
    subroutine create_growing(place, kind_in_file, row, error)

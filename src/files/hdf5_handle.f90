@@ -5,7 +5,7 @@ module polydem_hdf5_handle
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_dataset, only: dataset_shape, has_link, place_t, start_library
    use polydem_kinds, only: lp
-   use polydem_paths, only: exists
+   use polydem_paths, only: exists, is_folder
    implicit none
    private
    public :: hdf5_handle_t
@@ -22,6 +22,7 @@ module polydem_hdf5_handle
       procedure :: open => open_file
       procedure :: flush => flush_file
       procedure :: close => close_file
+      procedure :: abandon
       procedure :: has
       procedure :: shape_of
       procedure :: place_of
@@ -30,6 +31,10 @@ module polydem_hdf5_handle
    !> What to try if a file cannot be opened although it is there
    character(len=*), parameter :: locking_hint = &
       '; another program may be writing it; on a network file system try HDF5_USE_FILE_LOCKING=FALSE'
+
+   !> What to do if a file cannot be written
+   character(len=*), parameter :: disk_hint = &
+      '. Is the disk full? Make room, or choose another folder, and run again; files that were closed before are whole'
 
 contains
 
@@ -65,6 +70,10 @@ contains
          call raise(error, input_error, path//': there is no such file')
          return
       end if
+      if (is_folder(path)) then
+         call raise(error, input_error, path//': is a folder, not a file')
+         return
+      end if
       call start_library(error)
       if (allocated(error)) return
       self%path = path
@@ -82,10 +91,10 @@ contains
       integer :: status
 
       call h5fflush_f(self%id, h5f_scope_global_f, status)
-      if (status < 0) call raise(error, io_error, self%path//': cannot be flushed; is the disk full?')
+      if (status < 0) call raise(error, io_error, self%path//': cannot be flushed')
    end subroutine flush_file
 
-   !> Close the file; nothing happens if it is closed.
+   !> Close the file; nothing happens if it is closed. A file that cannot be closed is given up.
    subroutine close_file(self, error)
       class(hdf5_handle_t), intent(inout) :: self
       !> Allocated on failure
@@ -94,9 +103,24 @@ contains
 
       if (self%id < 0_hid_t) return
       call h5fclose_f(self%id, status)
+      if (status < 0) then
+         call raise(error, io_error, self%path//': cannot be closed')
+         call self%abandon(error)
+      end if
       self%id = -1_hid_t
-      if (status < 0) call raise(error, io_error, self%path//': cannot be closed; is the disk full?')
    end subroutine close_file
+
+   !> Give up a file that could not be written, and say in the message what to do. The file is not closed, since HDF5
+   !> would try to write it again, and might crash; the operating system closes it when the program ends.
+   subroutine abandon(self, error)
+      class(hdf5_handle_t), intent(inout) :: self
+      !> Why the file could not be written
+      type(error_t), intent(inout) :: error
+
+      if (self%id < 0_hid_t) return
+      self%id = -1_hid_t
+      error%message = error%message//disk_hint
+   end subroutine abandon
 
    !> Whether the file has a group or data set of this name
    logical function has(self, name)

@@ -82,11 +82,16 @@ contains
       if (present(meaning)) call write_text_attribute(self%place_of(name), 'meaning', meaning, error)
    end subroutine describe
 
+   !> Write a new data set; the other forms of `write` differ in kind and shape only.
    subroutine write_real(self, name, values, error, unit, meaning)
       class(hdf5_writer_t), intent(in) :: self
+      !> Name of the data set, like /frames/position
       character(len=*), intent(in) :: name
+      !> What it holds
       real(dp), intent(in), target :: values
+      !> Allocated on failure; nothing happens if it is already
       type(error_t), allocatable, intent(inout) :: error
+      !> Attributes of the data set when it is made
       character(len=*), intent(in), optional :: unit, meaning
 
       call self%put(name, double_type(), [integer ::], c_loc(values), error, unit, meaning)
@@ -186,11 +191,16 @@ contains
       call self%describe(name, error, unit, meaning)
    end subroutine write_text_list
 
+   !> Add a row to a growing data set; the other forms of `append` differ in kind and shape only.
    subroutine append_real(self, name, values, error, unit, meaning)
       class(hdf5_writer_t), intent(in) :: self
+      !> Name of the data set, like /frames/position
       character(len=*), intent(in) :: name
+      !> The row
       real(dp), intent(in), target :: values
+      !> Allocated on failure; nothing happens if it is already
       type(error_t), allocatable, intent(inout) :: error
+      !> Attributes of the data set when it is made
       character(len=*), intent(in), optional :: unit, meaning
 
       call self%add(name, double_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
@@ -246,11 +256,16 @@ contains
       call self%add(name, long_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
    end subroutine append_long
 
+   !> Add several rows to a growing data set; the other forms of `append_rows` differ in kind and shape only.
    subroutine append_rows_reals(self, name, values, error, unit, meaning)
       class(hdf5_writer_t), intent(in) :: self
+      !> Name of the data set, like /frames/position
       character(len=*), intent(in) :: name
+      !> The rows, one for each place of the last dimension
       real(dp), intent(in), target, contiguous :: values(:)
+      !> Allocated on failure; nothing happens if it is already
       type(error_t), allocatable, intent(inout) :: error
+      !> Attributes of the data set when it is made
       character(len=*), intent(in), optional :: unit, meaning
 
       call self%add(name, double_type(), [integer ::], size(values, 1), c_loc(values), error, unit, meaning)
@@ -277,9 +292,12 @@ contains
       call self%add(name, integer_type(), [integer ::], size(values, 1), c_loc(values), error, unit, meaning)
    end subroutine append_rows_integers
 
+   !> Attach a value to a group or data set; the other forms of `write_attribute` differ in kind only.
    subroutine attach_text(self, object, name, value, error)
       class(hdf5_writer_t), intent(in) :: self
+      !> Group or data set, name of the attribute, and its value
       character(len=*), intent(in) :: object, name, value
+      !> Allocated on failure; nothing happens if it is already
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return

@@ -4,7 +4,7 @@ module polydem_paths
    use polydem_errors, only: error_t, io_error, raise
    implicit none
    private
-   public :: make_folder, exists, rename_file, remove_file, sync_file
+   public :: make_folder, exists, is_folder, rename_file, remove_file, sync_file, last_failure
 
    !> F_OK of access(2)
    integer(c_int), parameter :: existence = 0_c_int
@@ -87,6 +87,14 @@ contains
       exists = c_access(path//c_null_char, existence) == 0_c_int
    end function exists
 
+   !> Whether there is a folder of this name
+   logical function is_folder(path)
+      !> Path of the folder
+      character(len=*), intent(in) :: path
+
+      is_folder = exists(path//'/.')
+   end function is_folder
+
    !> Make a folder and the folders above it; nothing happens if it is there.
    subroutine make_folder(path, error)
       !> Path of the folder
@@ -104,7 +112,7 @@ contains
          if (exists(path(:k - 1))) cycle
          if (c_mkdir(path(:k - 1)//c_null_char, all_permissions) /= 0_c_int) reason = last_failure()
       end do
-      if (exists(path//'/.')) return
+      if (is_folder(path)) return
       if (exists(path)) reason = 'it is a file'
       call raise(error, io_error, "cannot make the folder '"//path//"': "//reason)
    end subroutine make_folder

@@ -1,9 +1,11 @@
-!> The log of a run, on the screen and in log.txt, flushed line by line so that it survives a crash.
+!> The log of a run, on the screen and in log.txt, written line by line so that it survives a crash.
+!>
+!> A line that cannot be written does not stop the run; `close` tells of it.
 module polydem_log
-   use, intrinsic :: iso_fortran_env, only: output_unit
    use polydem_clock, only: wall_seconds
-   use polydem_errors, only: error_t, io_error, raise
+   use polydem_errors, only: error_t
    use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_line_writer, only: line_writer_t
    use polydem_machine, only: terminal_watches
    use polydem_result_folder, only: log_path
    implicit none
@@ -18,12 +20,10 @@ module polydem_log
    !> A log that is being written
    type :: log_t
       private
-      !> Unit of log.txt, if there is one
-      integer :: unit = 0
-      !> Whether there is a log.txt
-      logical :: has_file = .false.
-      !> Whether the screen is written to
-      logical :: on_screen = .true.
+      !> The screen, unless it stays silent
+      type(line_writer_t) :: screen
+      !> The file log.txt, if there is one
+      type(line_writer_t) :: file
       !> Whether a person watches a terminal
       logical :: live = .false.
       !> Length of the live line now on the screen
@@ -54,18 +54,14 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Whether the screen stays silent; no if absent
       logical, intent(in), optional :: quiet
-      integer :: status
-      character(len=256) :: reason
+      logical :: on_screen
 
-      if (present(quiet)) self%on_screen = .not. quiet
-      self%live = terminal_watches()
-      self%live = self%live .and. self%on_screen
+      on_screen = .true.
+      if (present(quiet)) on_screen = .not. quiet
+      if (on_screen) call self%screen%open_screen()
+      self%live = terminal_watches() .and. on_screen
       self%has_heading = .false.
-      if (folder == '') return
-      open (newunit=self%unit, file=log_path(folder), status='replace', action='write', iostat=status, &
-            iomsg=reason)
-      self%has_file = status == 0
-      if (status /= 0) call raise(error, io_error, log_path(folder)//': '//trim(reason))
+      if (folder /= '') call self%file%open(log_path(folder), error)
    end subroutine open_log
 
    !> Write a line on the screen and into the file.
@@ -75,16 +71,10 @@ contains
       character(len=*), intent(in) :: text
 
       if (self%live_length > 0) call write_live(self, repeat(' ', self%live_length))
-      if (self%live_length > 0) write (output_unit, '(a)', advance='no') achar(13)
+      if (self%live_length > 0) call self%screen%put(achar(13))
       self%live_length = 0
-      if (self%on_screen) then
-         write (output_unit, '(a)') text
-         flush (output_unit)
-      end if
-      if (self%has_file) then
-         write (self%unit, '(a)') text
-         flush (self%unit)
-      end if
+      call self%screen%put_line(text)
+      call self%file%put_line(text)
    end subroutine write_line
 
    !> Write the line of an interval, with the rate since the last one and the time to the end at that rate.
@@ -153,19 +143,23 @@ contains
    end subroutine show_progress
 
    !> End the log.
-   subroutine close_log(self)
+   subroutine close_log(self, error)
       class(log_t), intent(inout) :: self
+      !> Allocated if a line could not be written to the file or the screen; not told if absent
+      type(error_t), allocatable, intent(inout), optional :: error
+      type(error_t), allocatable :: failure
 
-      if (self%has_file) close (self%unit)
-      self%has_file = .false.
+      call self%file%close(failure)
+      call self%screen%close(failure)
+      if (.not. present(error) .or. .not. allocated(failure)) return
+      if (.not. allocated(error)) call move_alloc(failure, error)
    end subroutine close_log
 
    subroutine write_live(self, text)
       type(log_t), intent(inout) :: self
       character(len=*), intent(in) :: text
 
-      write (output_unit, '(a)', advance='no') achar(13)//text//repeat(' ', max(0, self%live_length - len(text)))
-      flush (output_unit)
+      call self%screen%put(achar(13)//text//repeat(' ', max(0, self%live_length - len(text))))
       self%live_length = len(text)
    end subroutine write_live
 

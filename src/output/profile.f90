@@ -6,7 +6,7 @@ module polydem_profile
    use polydem_hash, only: hexadecimal
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, lp
-   use polydem_paths, only: rename_file, sync_file
+   use polydem_paths, only: exists, remove_file, rename_file, sync_file
    use polydem_provenance, only: provenance_t, write_provenance
    use polydem_result_folder, only: profile_path
    use polydem_segment, only: schema_version
@@ -39,11 +39,30 @@ contains
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
+      type(error_t), allocatable :: ignored
       character(len=:), allocatable :: path
 
       path = profile_path(folder)
       call file%create(path//unfinished, error)
-      if (allocated(error)) return
+      call fill_profile(file, timers, seconds, counters, state_hash, status, error)
+      if (.not. allocated(error)) call write_provenance(provenance, file, error)
+      if (allocated(error)) call file%abandon(error)
+      call file%close(error)
+      if (.not. allocated(error)) call sync_file(path//unfinished, error)
+      if (.not. allocated(error)) call rename_file(path//unfinished, path, error)
+      if (.not. allocated(error)) call sync_file(folder, error)
+      if (exists(path//unfinished)) call remove_file(path//unfinished, ignored)
+   end subroutine write_profile
+
+   subroutine fill_profile(file, timers, seconds, counters, state_hash, status, error)
+      type(hdf5_file_t), intent(inout) :: file
+      type(timers_t), intent(in) :: timers
+      real(dp), intent(in) :: seconds
+      type(counters_t), intent(in) :: counters
+      integer(lp), intent(in) :: state_hash
+      character(len=*), intent(in) :: status
+      type(error_t), allocatable, intent(inout) :: error
+
       call file%write_attribute('/', 'content', 'profile of a run by polydem', error)
       call file%write_attribute('/', 'schema_version', schema_version, error)
       call write_timers(file, timers, seconds, error)
@@ -54,12 +73,7 @@ contains
       call file%write('/state_hash', hexadecimal(state_hash), error, '1', &
                       'hash of the bits of identifiers, positions, angles and velocities at the end')
       call file%write('/status', status, error, '1', 'how the run ended')
-      call write_provenance(provenance, file, error)
-      call file%close(error)
-      if (.not. allocated(error)) call sync_file(path//unfinished, error)
-      if (.not. allocated(error)) call rename_file(path//unfinished, path, error)
-      if (.not. allocated(error)) call sync_file(folder, error)
-   end subroutine write_profile
+   end subroutine fill_profile
 
    subroutine write_timers(file, timers, seconds, error)
       type(hdf5_file_t), intent(inout) :: file

@@ -65,7 +65,8 @@ contains
       call make_folder(folder, error)
    end subroutine open_trajectory
 
-   !> Write a frame and flush it. Give `contacts` in all frames or in none, and so `row`.
+   !> Write a frame and flush it; after a failure its segment stays open as it is. Give `contacts` in all frames or
+   !> in none, and so `row`.
    subroutine write_frame(self, step, time, bodies, error, contacts, row)
       class(trajectory_t), intent(inout) :: self
       !> Number of the step
@@ -82,7 +83,7 @@ contains
       type(ledger_row_t), intent(in), optional :: row
 
       if (.not. self%is_open) call open_segment(self, bodies, error)
-      if (allocated(error)) return
+      if (allocated(error) .and. .not. self%is_open) return
       call add_frame(self%file, step, real(time, dp), bodies, error)
       call add_walls(self%file, bodies, error)
       if (present(contacts)) then
@@ -91,7 +92,11 @@ contains
       end if
       if (present(row)) call add_ledger(self%file, row, error)
       if (.not. allocated(error)) call self%file%flush(error)
-      if (allocated(error)) return
+      if (allocated(error)) then
+         call self%file%abandon(error)
+         self%is_open = .false.
+         return
+      end if
       self%n_frames = self%n_frames + 1_ip
       if (self%n_frames == self%capacity) call close_segment(self, error)
    end subroutine write_frame

@@ -3,8 +3,9 @@
 !>     write_sample FOLDER FRAMES PER_SEGMENT end     close the last segment and write the profile
 !>     write_sample FOLDER FRAMES PER_SEGMENT wait    after each frame print its number; at the end wait to be killed
 !>
-!> Frame k is that of step k + 1.
+!> Frame k is that of step k + 1. Ends like the program: with a message and the code of the error.
 program write_sample
+   use, intrinsic :: iso_c_binding, only: c_int
    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t
@@ -15,6 +16,15 @@ program write_sample
    use polydem_trajectory, only: trajectory_t
    use sample, only: sample_bodies, sample_contacts, sample_provenance, sample_row, write_sample_profile
    implicit none
+
+   interface
+      !> C exit: ends the program with a code and without a word
+      subroutine c_exit(code) bind(C, name='exit')
+         import :: c_int
+         integer(c_int), value :: code
+      end subroutine c_exit
+   end interface
+
    type(error_t), allocatable :: error
    character(len=1024) :: folder, word
    integer(ip) :: frames, per_segment
@@ -28,7 +38,8 @@ program write_sample
    call write_all(trim(folder), error)
    if (allocated(error)) then
       write (error_unit, '(a)') error%message
-      stop 1
+      flush (error_unit)
+      call c_exit(int(error%code, c_int))
    end if
 
 contains

@@ -17,6 +17,9 @@ SCHEMA_VERSION = 1
 #: Name of a segment: trajectory_0001.h5, or trajectory_0001.h5.open while it is written
 SEGMENT_NAME = re.compile(r"trajectory_(\d{4,})\.h5(\.open)?")
 
+#: End of the name of a segment that is being written
+OPEN_SUFFIX = ".open"
+
 #: What h5py raises for files that are incomplete or not what they should be
 UNREADABLE = (OSError, KeyError, RuntimeError, ValueError)
 
@@ -233,17 +236,17 @@ class Trajectory:
 
 def _find_segments(folder: Path) -> list[_Segment]:
     """Segments of a folder in order; of an open segment what can be read."""
-    found = []
-    for path in folder.iterdir():
+    found = {}
+    for path in sorted(folder.iterdir(), reverse=True):
         match = SEGMENT_NAME.fullmatch(path.name)
         if match:
-            found.append((int(match.group(1)), match.group(2) is not None, path))
+            found[int(match.group(1))] = path  # the name of a closed segment, if a renaming shows both, comes last
     segments = []
-    for _, is_open, path in sorted(found):
+    for _, path in sorted(found.items()):
         try:
             segments.append(_read_segment(path))
         except ResultError as error:
-            if not is_open:
+            if not _present_path(path).name.endswith(OPEN_SUFFIX):
                 raise
             warnings.warn(f"left out: {error}", stacklevel=3)
     return segments
@@ -282,13 +285,22 @@ def _complete_frames(file: h5py.File) -> int:
     return n
 
 
+def _present_path(path: Path) -> Path:
+    """The path, or that of the closed segment if a run has closed the segment since it was found."""
+    if path.name.endswith(OPEN_SUFFIX) and not path.exists():
+        return path.with_suffix("")
+    return path
+
+
 def _open(path: Path) -> h5py.File:
-    """Open a file, also one that a run is still writing."""
+    """Open a file, also one that a run is still writing or has just closed and renamed."""
     try:
         try:
-            file = h5py.File(path, "r", locking=False)
-        except (TypeError, ValueError):
-            file = h5py.File(path, "r")
+            file = _open_hdf5(path)
+        except OSError:
+            if _present_path(path) == path:
+                raise
+            file = _open_hdf5(_present_path(path))
     except OSError as error:
         raise ResultError(f"{path}: cannot be read ({error})") from error
     version = int(file.attrs.get("schema_version", 0))
@@ -296,6 +308,13 @@ def _open(path: Path) -> h5py.File:
         file.close()
         raise ResultError(f"{path}: is not a file of polydem, or of a newer version than this reader")
     return file
+
+
+def _open_hdf5(path: Path) -> h5py.File:
+    try:
+        return h5py.File(path, "r", locking=False)
+    except (TypeError, ValueError):
+        return h5py.File(path, "r")
 
 
 def _plain(entry: h5py.Dataset):

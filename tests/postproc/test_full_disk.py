@@ -1,0 +1,37 @@
+"""Results of a writer that ran out of room."""
+
+import subprocess
+import warnings
+
+import pytest
+from conftest import WRITE_SAMPLE
+from numpy.testing import assert_array_equal
+from polydem_post import Trajectory
+
+
+def test_a_failed_write_ends_with_one_message_and_keeps_closed_segments(tmp_path):
+    folder = tmp_path / "result"
+    folder.mkdir()
+    (folder / "trajectory_0003.h5.open").symlink_to("/dev/full")
+    end = subprocess.run([WRITE_SAMPLE, str(folder), "20", "4", "end"], capture_output=True, text=True)
+    assert end.returncode == 3
+    lines = end.stderr.splitlines()
+    assert len(lines) == 1
+    assert "trajectory_0003.h5.open: cannot be created; is there such a folder, room and permission?" in lines[0]
+    with pytest.warns(UserWarning, match="left out: .*trajectory_0003.h5.open"):
+        run = Trajectory(folder)
+    assert_array_equal(run.steps, [1, 2, 3, 4, 5, 6, 7, 8])
+    assert_array_equal(run.frame(7).position, [[0, 0], [-8, 3], [8, 0.5]])
+
+
+def test_a_failed_profile_leaves_no_part_of_it(tmp_path):
+    folder = tmp_path / "result"
+    folder.mkdir()
+    (folder / "profile.h5.unfinished").symlink_to("/dev/full")
+    end = subprocess.run([WRITE_SAMPLE, str(folder), "5", "4", "end"], capture_output=True, text=True)
+    assert end.returncode == 3
+    assert "profile.h5.unfinished: cannot be " in end.stderr
+    assert sorted(path.name for path in folder.iterdir()) == ["trajectory_0001.h5", "trajectory_0002.h5"]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(Trajectory(folder)) == 5
