@@ -159,11 +159,10 @@ contains
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
       real(wp) :: rate(n_rates), torque
-      real(wp), allocatable :: partial(:, :)
+      real(wp) :: partial(3, (contacts%n + block - 1_ip)/block)
       integer(ip) :: b, n_blocks, s
 
-      n_blocks = (contacts%n + block - 1_ip)/block
-      allocate (partial(3, n_blocks))
+      n_blocks = size(partial, 2, kind=ip)
       !$omp parallel do if (n_blocks > 1_ip) schedule(static) default(none) &
       !$omp    shared(n_blocks, partial, bodies, contacts) private(b)
       do b = 1_ip, n_blocks
