@@ -2,7 +2,7 @@
 module polydem_body_list
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_kinds, only: ip, lp, wp
    use polydem_polygon, only: clean_polygon, mass_properties
    use polydem_sort, only: sort_keys
    use polydem_strings, only: to_text
@@ -15,7 +15,7 @@ module polydem_body_list
 
    !> Least mass [kg/m] and moment of inertia [kg m]; the greatest is its inverse. Products of two are normal numbers,
    !> in single precision only the numbers themselves.
-   real(wp), parameter :: least_mass = real(max(1.0e-100_dp, real(tiny(1.0_wp), dp)), wp)
+   real(wp), parameter :: least_mass = 10.0_wp**(-min(100, range(1.0_wp)))
 
    !> What is known of one body before its masses are computed
    type :: entry_t
