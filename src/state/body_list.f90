@@ -180,8 +180,9 @@ contains
       bodies%mass(s) = entry%mass
       bodies%inertia(s) = entry%inertia
       if (.not. entry%fixed .and. bodies%mass(s) <= 0.0_wp) bodies%mass(s) = entry%density*area
-      if (.not. entry%fixed .and. bodies%inertia(s) <= 0.0_wp) bodies%inertia(s) = bodies%mass(s)*second_moment/area
       call check_mass('mass', bodies%mass(s), entry, error)
+      if (allocated(error)) return
+      if (.not. entry%fixed .and. bodies%inertia(s) <= 0.0_wp) bodies%inertia(s) = bodies%mass(s)*(second_moment/area)
       call check_mass('moment of inertia', bodies%inertia(s), entry, error)
       call reserve_vertices(bodies, bodies%vertex_start(s), size(cleaned, 2, kind=ip))
       do k = 1_ip, size(cleaned, 2, kind=ip)
