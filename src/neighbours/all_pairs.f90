@@ -2,36 +2,38 @@
 !>
 !> The list of overlapping boxes comes out in ascending order; its differences to the list of the step
 !> before are the changes. Nothing is assumed, nothing is kept but that list.
+!>
+!> Threads compare strips of boxes, dealt out in turn, with all later boxes, block by block, so that the
+!> block stays in the cache while it is compared with the whole strip. The boxes above one box are found by one
+!> thread in ascending order; so joining what they found by the lower box gives the ordered list.
 module polydem_all_pairs
+   use omp_lib, only: omp_get_max_threads
+   use polydem_box_pairs, only: box_pairs_t, found_t, record_differences
    use polydem_boxes, only: boxes_t
-   use polydem_counters, only: counters_t
    use polydem_finder, only: finder_t
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: ip, lp, wp, worth_threads
    use polydem_pair_changes, only: pair_changes_t
+   use polydem_work, only: count_bytes, count_candidates, count_tests, phase_filter, phase_search
    implicit none
    private
    public :: all_pairs_t
 
-   !> Boxes that are compared in one go
-   integer(ip), parameter :: block_size = 128_ip
-
-   !> Ascending list of overlapping boxes
-   type :: box_pairs_t
-      !> Number of pairs
-      integer(ip) :: n = 0_ip
-      !> Boxes of each pair, lower first, (2, pair)
-      integer(ip), allocatable :: box(:, :)
-   end type box_pairs_t
+   !> Boxes of a strip, and boxes with which it is compared in one go
+   integer(ip), parameter :: strip_size = 64_ip, block_size = 128_ip
 
    !> Finder that compares all
    type, extends(finder_t) :: all_pairs_t
       private
-      type(box_pairs_t) :: now, before
+      !> Overlapping boxes of this step and of the step before; which is which alternates
+      type(box_pairs_t) :: list(2)
+      !> Place of this step in `list`
+      integer :: now = 1
+      !> Pairs that each thread found, not in order
+      type(found_t), allocatable :: found(:)
       real(wp), allocatable :: xmin(:), ymin(:), xmax(:), ymax(:)
-      integer(lp) :: steps = 0_lp, tests = 0_lp
    contains
       procedure :: find
-      procedure :: report
+      procedure :: survey
    end type all_pairs_t
 
 contains
@@ -41,101 +43,98 @@ contains
       class(all_pairs_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       type(pair_changes_t), intent(inout) :: changes
-      type(box_pairs_t) :: swap
-      integer(ip) :: i
+      integer :: before, w
 
-      call move_alloc(self%before%box, swap%box)
-      call move_alloc(self%now%box, self%before%box)
-      call move_alloc(swap%box, self%now%box)
-      self%before%n = self%now%n
-      self%now%n = 0_ip
-      if (.not. allocated(self%before%box)) allocate (self%before%box(2, 0))
-      if (.not. allocated(self%now%box)) allocate (self%now%box(2, 4_ip*boxes%n + block_size))
+      if (.not. allocated(self%xmin)) then
+         call self%list(1)%start(boxes%n)
+         call self%list(2)%start(boxes%n)
+      end if
+      before = self%now
+      self%now = 3 - before
       self%xmin = boxes%bounds(1, 1:boxes%n)
       self%ymin = boxes%bounds(2, 1:boxes%n)
       self%xmax = boxes%bounds(3, 1:boxes%n)
       self%ymax = boxes%bounds(4, 1:boxes%n)
-      do i = 1_ip, boxes%n - 1_ip
-         call partners_of(self, boxes, i)
+      if (allocated(self%found)) deallocate (self%found)
+      allocate (self%found(omp_get_max_threads()))
+      !$omp parallel do if (boxes%n > worth_threads) schedule(static, 1) default(none) shared(self, boxes) private(w)
+      do w = 1, size(self%found)
+         call search_strips(self, boxes, int(w, ip), size(self%found, kind=ip), self%found(w))
       end do
-      self%steps = self%steps + 1_lp
-      self%tests = self%tests + int(boxes%n, lp)*int(boxes%n - 1_ip, lp)/2_lp
-      call record_differences(self%before, self%now, boxes%body, changes)
+      !$omp end parallel do
+      call self%list(self%now)%gather(self%found)
+      call self%work%add(count_tests, int(boxes%n, lp)*int(boxes%n - 1_ip, lp)/2_lp)
+      call self%work%lap(phase_search)
+      call record_differences(self%list(before), self%list(self%now), 1_ip, boxes%n, boxes%body, changes)
+      call self%work%lap(phase_filter)
    end subroutine find
 
-   !> Append the pairs of box i with all later boxes.
-   subroutine partners_of(self, boxes, i)
-      type(all_pairs_t), intent(inout) :: self
+   !> Find the pairs of the boxes of every m-th strip, from strip w on, with all later boxes.
+   subroutine search_strips(self, boxes, w, m, found)
+      type(all_pairs_t), intent(in) :: self
       type(boxes_t), intent(in) :: boxes
-      integer(ip), intent(in) :: i
-      integer(ip) :: j, low, high, hit(block_size)
-      real(wp) :: xmin, ymin, xmax, ymax
+      integer(ip), intent(in) :: w, m
+      type(found_t), intent(inout) :: found
+      type(found_t) :: mine
+      integer(ip) :: first, last, low, i
+
+      ! What is written often stands on the stack of the thread; that of other threads is near in memory.
+      call mine%reserve(block_size)
+      do first = (w - 1_ip)*strip_size + 1_ip, boxes%n, m*strip_size
+         last = min(first + strip_size - 1_ip, boxes%n)
+         do low = first + 1_ip, boxes%n, block_size
+            do i = first, last
+               call compare(self, i, max(low, i + 1_ip), min(low + block_size - 1_ip, boxes%n), mine)
+            end do
+         end do
+      end do
+      call mine%keep_valid(boxes%body, boxes%fixed)
+      call move_alloc(mine%box, found%box)
+      found%n = mine%n
+   end subroutine search_strips
+
+   !> Compare box i with boxes low to high, at most a block. The sign of a difference is exact, so boxes overlap if and
+   !> only if the greatest of the four gaps between their sides is not positive.
+   subroutine compare(self, i, low, high, found)
+      type(all_pairs_t), intent(in) :: self
+      integer(ip), intent(in) :: i, low, high
+      type(found_t), intent(inout) :: found
+      integer(ip) :: j
+      real(wp) :: xmin, ymin, xmax, ymax, gap(block_size), least
 
       xmin = self%xmin(i)
       ymin = self%ymin(i)
       xmax = self%xmax(i)
       ymax = self%ymax(i)
-      do low = i + 1_ip, boxes%n, block_size
-         high = min(low + block_size - 1_ip, boxes%n)
-         hit = 0_ip
-         do j = low, high
-            hit(j - low + 1_ip) = merge(1_ip, 0_ip, xmin <= self%xmax(j) .and. self%xmin(j) <= xmax .and. &
-               ymin <= self%ymax(j) .and. self%ymin(j) <= ymax)
-         end do
-         if (sum(hit) == 0_ip) cycle
-         call reserve(self%now, self%now%n + block_size)
-         do j = low, high
-            if (hit(j - low + 1_ip) == 0_ip) cycle
-            if (boxes%body(i) == boxes%body(j) .or. (boxes%fixed(i) .and. boxes%fixed(j))) cycle
-            self%now%n = self%now%n + 1_ip
-            self%now%box(:, self%now%n) = [i, j]
-         end do
+      least = huge(1.0_wp)
+      do j = low, high
+         gap(j - low + 1_ip) = max(max(xmin - self%xmax(j), self%xmin(j) - xmax), &
+                                   max(ymin - self%ymax(j), self%ymin(j) - ymax))
+         least = min(least, gap(j - low + 1_ip))
       end do
-   end subroutine partners_of
-
-   !> Walk through two ascending lists side by side and record what only one of them has.
-   subroutine record_differences(before, now, body, changes)
-      type(box_pairs_t), intent(in) :: before, now
-      integer(ip), intent(in) :: body(:)
-      type(pair_changes_t), intent(inout) :: changes
-      integer(ip) :: a, b, order
-
-      a = 1_ip
-      b = 1_ip
-      do while (a <= before%n .or. b <= now%n)
-         if (a > before%n) then
-            order = 1_ip
-         else if (b > now%n) then
-            order = -1_ip
-         else
-            order = before%box(1, a) - now%box(1, b)
-            if (order == 0_ip) order = before%box(2, a) - now%box(2, b)
-         end if
-         if (order < 0_ip) call changes%record(body(before%box(1, a)), body(before%box(2, a)), -1_ip)
-         if (order > 0_ip) call changes%record(body(now%box(1, b)), body(now%box(2, b)), 1_ip)
-         if (order <= 0_ip) a = a + 1_ip
-         if (order >= 0_ip) b = b + 1_ip
+      if (least > 0.0_wp) return
+      call found%reserve(block_size)
+      do j = low, high
+         if (gap(j - low + 1_ip) > 0.0_wp) cycle
+         found%n = found%n + 1_ip
+         found%box(:, found%n) = [i, j]
       end do
-   end subroutine record_differences
+   end subroutine compare
 
-   subroutine reserve(pairs, n)
-      type(box_pairs_t), intent(inout) :: pairs
-      integer(ip), intent(in) :: n
-      integer(ip), allocatable :: longer(:, :)
+   !> Pairs kept from step to step, and memory.
+   subroutine survey(self)
+      class(all_pairs_t), intent(inout) :: self
+      integer(lp) :: bytes
+      integer :: w
 
-      if (size(pairs%box, 2) >= n) return
-      allocate (longer(2, 2_ip*n))
-      longer(:, 1:pairs%n) = pairs%box(:, 1:pairs%n)
-      call move_alloc(longer, pairs%box)
-   end subroutine reserve
-
-   !> Set the counters all_pairs_steps and all_pairs_tests.
-   subroutine report(self, counters)
-      class(all_pairs_t), intent(in) :: self
-      type(counters_t), intent(inout) :: counters
-
-      call counters%set('all_pairs_steps', self%steps)
-      call counters%set('all_pairs_tests', self%tests)
-   end subroutine report
+      if (.not. allocated(self%xmin)) return
+      bytes = self%list(1)%bytes() + self%list(2)%bytes() + &
+         4_lp*int(storage_size(self%xmin)/8, lp)*size(self%xmin, kind=lp)
+      do w = 1, size(self%found)
+         bytes = bytes + size(self%found(w)%box, kind=lp)*int(storage_size(self%found(w)%box)/8, lp)
+      end do
+      self%work%value(count_candidates) = int(self%list(self%now)%n(), lp)
+      self%work%value(count_bytes) = bytes
+   end subroutine survey
 
 end module polydem_all_pairs

@@ -5,7 +5,7 @@
 !> and is named by the number 2(k - 1) + s, its *link*. So dropping and adding cost the same however long
 !> the list is.
 module polydem_candidates
-   use polydem_kinds, only: bp, dp, ip, wp
+   use polydem_kinds, only: bp, dp, ip, lp, wp
    use polydem_pair_changes, only: pair_changes_t
    implicit none
    private
@@ -33,6 +33,7 @@ module polydem_candidates
       procedure :: add
       procedure :: compare
       procedure :: drop_parted
+      procedure :: bytes
    end type candidates_t
 
    !> A growing list of places in some array
@@ -164,6 +165,16 @@ contains
          link = next
       end do
    end subroutine drop_parted
+
+   !> Memory held [B]
+   pure integer(lp) function bytes(self)
+      class(candidates_t), intent(in) :: self
+
+      bytes = 0_lp
+      if (.not. allocated(self%box)) return
+      bytes = (int(storage_size(self%box), lp)*(3_lp*size(self%box, kind=lp) + size(self%first, kind=lp)) + &
+               int(storage_size(self%overlap), lp)*size(self%overlap, kind=lp))/8_lp
+   end function bytes
 
    !> Drop one candidate; the last takes its place.
    pure subroutine drop(self, k)

@@ -8,25 +8,30 @@
 !>
 !> What a finder remembers between steps is its own. Between steps boxes may move anywhere, but their
 !> number, bodies and fixedness stay.
+!>
+!> A finder counts its work exactly and books its time under the phases of `polydem_work`.
 module polydem_finder
    use polydem_boxes, only: boxes_t
-   use polydem_counters, only: counters_t
    use polydem_pair_changes, only: pair_changes_t
+   use polydem_work, only: work_t
    implicit none
    private
    public :: finder_t
 
    !> A neighbour finder
    type, abstract :: finder_t
+      !> Counts and seconds so far
+      type(work_t) :: work
    contains
       !> Record the changes of a step
       procedure(find), deferred :: find
-      !> Hand over the exact counts of the work done so far
-      procedure(report), deferred :: report
+      !> Set the counts that describe the present
+      procedure(survey), deferred :: survey
    end type finder_t
 
    abstract interface
-      !> Record which boxes began and which ceased to overlap since the last call.
+      !> Record which boxes began and which ceased to overlap since the last call. The clock of `work` runs when
+      !> this is called, and all time is booked when it returns.
       subroutine find(self, boxes, changes)
          import :: boxes_t, finder_t, pair_changes_t
          class(finder_t), intent(inout) :: self
@@ -36,13 +41,11 @@ module polydem_finder
          type(pair_changes_t), intent(inout) :: changes
       end subroutine find
 
-      !> Set the finder's counters (names begin with the finder's name).
-      subroutine report(self, counters)
-         import :: counters_t, finder_t
-         class(finder_t), intent(in) :: self
-         !> List to set them in
-         type(counters_t), intent(inout) :: counters
-      end subroutine report
+      !> Set those counts of `work` that describe the present: candidates, nodes, depth and bytes.
+      subroutine survey(self)
+         import :: finder_t
+         class(finder_t), intent(inout) :: self
+      end subroutine survey
    end interface
 
 end module polydem_finder

@@ -3,39 +3,82 @@ module polydem_finder_factory
    use polydem_all_pairs, only: all_pairs_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_finder, only: finder_t
-   use polydem_quadtree, only: quadtree_t
+   use polydem_hierarchical_grid, only: hierarchical_grid_t
+   use polydem_kinds, only: wp
+   use polydem_linked_cells, only: linked_cells_t
+   use polydem_partitioned_sweep, only: partitioned_sweep_t
+   use polydem_quadtree_called, only: quadtree_called_t => quadtree_t
+   use polydem_quadtree_inlined, only: quadtree_t
    use polydem_sort_and_sweep, only: sort_and_sweep_t
    use polydem_strings, only: join
+   use polydem_verlet, only: verlet_t
    implicit none
    private
    public :: new_finder, finder_names
 
    !> Names of all finders, as in the namelist and in results
-   character(len=*), parameter :: finder_names(3) = &
-      [character(len=14) :: 'all_pairs', 'sort_and_sweep', 'quadtree']
+   character(len=*), parameter :: finder_names(11) = &
+      [character(len=18) :: 'all_pairs', 'sort_and_sweep', 'unsorted_sweep', 'partitioned_sweep', 'quadtree', &
+       'quadtree_called', 'pruned_quadtree', 'binary_tree', 'linked_cells', 'verlet', 'hierarchical_grid']
 
 contains
 
    !> Make a finder that has seen no box yet.
-   subroutine new_finder(finder, name, error)
+   subroutine new_finder(finder, name, error, skin)
       !> Finder to make
       class(finder_t), allocatable, intent(out) :: finder
       !> One of `finder_names`
       character(len=*), intent(in) :: name
       !> Allocated if there is no such finder
       type(error_t), allocatable, intent(inout) :: error
+      !> Skin of a Verlet list [m]; 0 or left out: automatic
+      real(wp), intent(in), optional :: skin
+      type(verlet_t), allocatable :: list
+      type(sort_and_sweep_t), allocatable :: sweep
 
       select case (name)
       case ('all_pairs')
          allocate (all_pairs_t :: finder)
       case ('sort_and_sweep')
          allocate (sort_and_sweep_t :: finder)
+      case ('unsorted_sweep')
+         allocate (sweep)
+         sweep%centres_first = .false.
+         call move_alloc(sweep, finder)
+      case ('partitioned_sweep')
+         allocate (partitioned_sweep_t :: finder)
       case ('quadtree')
-         allocate (quadtree_t :: finder)
+         call new_tree(finder, equal_leaves=.false., one_axis=.false.)
+      case ('quadtree_called')
+         allocate (quadtree_called_t :: finder)
+      case ('pruned_quadtree')
+         call new_tree(finder, equal_leaves=.true., one_axis=.false.)
+      case ('binary_tree')
+         call new_tree(finder, equal_leaves=.false., one_axis=.true.)
+      case ('linked_cells')
+         allocate (linked_cells_t :: finder)
+      case ('verlet')
+         allocate (list)
+         if (present(skin)) list%skin = skin
+         call move_alloc(list, finder)
+      case ('hierarchical_grid')
+         allocate (hierarchical_grid_t :: finder)
       case default
          call raise(error, input_error, "there is no finder '"//trim(name)//"'; choose one of "// &
             join(finder_names, ', '))
       end select
    end subroutine new_finder
+
+   !> Make one of the tree finders that differ by a setting.
+   subroutine new_tree(finder, equal_leaves, one_axis)
+      class(finder_t), allocatable, intent(out) :: finder
+      logical, intent(in) :: equal_leaves, one_axis
+      type(quadtree_t), allocatable :: tree
+
+      allocate (tree)
+      tree%equal_leaves = equal_leaves
+      tree%one_axis = one_axis
+      call move_alloc(tree, finder)
+   end subroutine new_tree
 
 end module polydem_finder_factory

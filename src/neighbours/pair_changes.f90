@@ -26,6 +26,7 @@ module polydem_pair_changes
       procedure :: record
       procedure :: append
       procedure :: order
+      procedure :: bytes
    end type pair_changes_t
 
 contains
@@ -107,6 +108,17 @@ contains
       end do
       self%n = kept
    end subroutine order
+
+   !> Memory held [B]
+   pure integer(lp) function bytes(self)
+      class(pair_changes_t), intent(in) :: self
+
+      bytes = 0_lp
+      if (allocated(self%key)) bytes = &
+         size(self%key, kind=lp)*int((storage_size(self%key) + storage_size(self%step))/8, lp)
+      if (allocated(self%spare_key)) bytes = bytes + &
+         size(self%spare_key, kind=lp)*int((storage_size(self%spare_key) + storage_size(self%spare_step))/8, lp)
+   end function bytes
 
    pure subroutine reserve(self, capacity)
       type(pair_changes_t), intent(inout) :: self

@@ -17,15 +17,21 @@
 !>
 !> All but the repair runs on threads, each on a contiguous part of a list. The results are joined in the
 !> order of the list and so do not depend on the number of threads.
+!>
+!> The same source makes four finders: on the minimal quadtree compiled with and without inlining, on the pruned
+!> quadtree whose leaves are all equal, and on a binary tree along the longer axis for scenes that are
+!> nearly one-dimensional. So their differences are those of the trees, or of the compiler, alone.
 module polydem_quadtree
    use omp_lib, only: omp_get_max_threads
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t, meet, overlapping, places_t
-   use polydem_counters, only: counters_t
+   use polydem_candidates, only: candidates_t, overlapping, places_t
    use polydem_finder, only: finder_t
-   use polydem_kinds, only: bp, dp, ip, lp, wp, worth_threads
+   use polydem_kinds, only: dp, ip, lp, wp, worth_threads
    use polydem_pair_changes, only: pair_changes_t
    use polydem_quadtree_nodes, only: tree_t
+   use polydem_quadtree_search, only: grown_cells_t, search
+   use polydem_work, only: count_bytes, count_candidates, count_depth, count_leaf_changes, count_leavers, &
+      count_nodes, count_searches, count_tests, count_visits, phase_filter, phase_search, phase_structure
    implicit none
    private
    public :: quadtree_t
@@ -35,8 +41,6 @@ module polydem_quadtree
    real(dp), parameter :: typical_share = 1.2_dp
    !> Most levels below that one
    integer, parameter :: most_levels = 12
-   !> Cells that can wait to be searched: three per level and one
-   integer, parameter :: stack_size = 96
 
    !> What one thread finds in its part of the lists
    type :: worker_t
@@ -44,27 +48,28 @@ module polydem_quadtree
       type(places_t) :: leavers
       !> Boxes of new candidates, two entries each
       type(places_t) :: found
+      !> Nodes looked at in searches
+      integer(lp) :: visits = 0_lp
       !> Changes
       type(pair_changes_t) :: changes
    end type worker_t
 
-   !> Finder that keeps a minimal quadtree
+   !> Finder that keeps a tree
    type, extends(finder_t) :: quadtree_t
-      private
-      type(tree_t) :: tree
-      type(candidates_t) :: candidates
-      !> Grown cell of each box, (4, box) [finest cells]
-      real(dp), allocatable :: grown(:, :)
-      !> The same before the step
-      real(dp), allocatable :: grown_before(:, :)
+      !> Whether all leaves are on the finest level (pruned tree, Vemuri et al. 1998); set before the first step
+      logical :: equal_leaves = .false.
+      !> Whether only the longer axis of the scene is looked at (binary tree); set before the first step
+      logical :: one_axis = .false.
+      type(tree_t), private :: tree
+      type(candidates_t), private :: candidates
+      !> Grown cells of the boxes
+      type(grown_cells_t), private :: grown
       !> Greatest side that a box may have before its reach must be enlarged [m]
-      real(wp), allocatable :: greatest_side(:)
-      type(worker_t), allocatable :: worker(:)
-      integer(lp) :: steps = 0_lp, leavers = 0_lp, changed = 0_lp, searched = 0_lp
-      integer(lp) :: dropped = 0_lp, found = 0_lp
+      real(wp), allocatable, private :: greatest_side(:)
+      type(worker_t), allocatable, private :: worker(:)
    contains
       procedure :: find
-      procedure :: report
+      procedure :: survey
    end type quadtree_t
 
 contains
@@ -76,20 +81,22 @@ contains
       type(pair_changes_t), intent(inout) :: changes
 
       call prepare_workers(self)
-      if (allocated(self%grown)) then
+      if (allocated(self%grown%now)) then
          call update_tree(self, boxes)
       else
          call build_tree(self, boxes)
       end if
       call update_grown_cells(self)
+      call self%work%lap(phase_structure)
       call compare_candidates(self, boxes, changes)
+      call self%work%lap(phase_filter)
       if (self%tree%n_changed > 0_ip) then
          call search_changed(self, boxes)
          call replace_candidates(self, boxes, changes)
       end if
-      self%steps = self%steps + 1_lp
-      self%changed = self%changed + int(self%tree%n_changed, lp)
+      call self%work%add(count_leaf_changes, int(self%tree%n_changed, lp))
       call self%tree%settle()
+      call self%work%lap(phase_search)
    end subroutine find
 
    subroutine prepare_workers(self)
@@ -103,6 +110,7 @@ contains
       do w = 1, size(self%worker)
          self%worker(w)%leavers%n = 0_ip
          self%worker(w)%found%n = 0_ip
+         self%worker(w)%visits = 0_lp
          call self%worker(w)%changes%clear()
       end do
    end subroutine prepare_workers
@@ -125,11 +133,13 @@ contains
       real(dp) :: reach, origin(2)
 
       call self%candidates%start(boxes%n)
-      allocate (self%grown(4, boxes%n), self%grown_before(4, boxes%n), self%greatest_side(boxes%n))
-      self%grown = spread([1.0_dp, 1.0_dp, -1.0_dp, -1.0_dp]*huge(1.0_dp), 2, boxes%n)
-      self%grown_before = self%grown
+      allocate (self%grown%before(4, boxes%n), self%greatest_side(boxes%n))
+      self%grown%before = spread([1.0_dp, 1.0_dp, -1.0_dp, -1.0_dp]*huge(1.0_dp), 2, boxes%n)
+      self%grown%now = self%grown%before
       origin = 0.0_dp
       if (boxes%n > 0_ip) origin = real(boxes%bounds(1:2, 1), dp)
+      self%tree%equal_leaves = self%equal_leaves
+      if (self%one_axis) self%tree%ignored = shorter_axis(boxes)
       call self%tree%start(boxes%n, finest_cell(boxes), origin)
       do i = 1_ip, boxes%n
          self%greatest_side(i) = 2.0_wp*max(boxes%reach(i), half_side(boxes%bounds(:, i)))
@@ -164,6 +174,21 @@ contains
       end do
    end function finest_cell
 
+   !> The axis along which the boxes extend less far
+   pure integer function shorter_axis(boxes)
+      type(boxes_t), intent(in) :: boxes
+      real(wp) :: extent(2)
+      integer :: a
+
+      extent = 0.0_wp
+      if (boxes%n > 0_ip) then
+         do a = 1, 2
+            extent(a) = maxval(boxes%bounds(a + 2, 1:boxes%n)) - minval(boxes%bounds(a, 1:boxes%n))
+         end do
+      end if
+      shorter_axis = merge(1, 2, extent(1) < extent(2))
+   end function shorter_axis
+
    pure real(wp) function half_side(box)
       real(wp), intent(in) :: box(4)
 
@@ -193,7 +218,7 @@ contains
             end if
             call self%tree%move(i, boxes%bounds)
          end do
-         self%leavers = self%leavers + int(self%worker(w)%leavers%n, lp)
+         call self%work%add(count_leavers, int(self%worker(w)%leavers%n, lp))
       end do
    end subroutine update_tree
 
@@ -226,9 +251,9 @@ contains
       do k = 1_ip, self%tree%n_changed
          i = self%tree%changed(k)
          reach = self%tree%reach(i)
-         self%grown_before(:, i) = self%grown(:, i)
-         self%grown(1:2, i) = self%tree%cell(1:2, i) - reach
-         self%grown(3:4, i) = self%tree%cell(3:4, i) + reach
+         self%grown%before(:, i) = self%grown%now(:, i)
+         self%grown%now(1:2, i) = self%tree%cell(1:2, i) - reach
+         self%grown%now(3:4, i) = self%tree%cell(3:4, i) + reach
       end do
    end subroutine update_grown_cells
 
@@ -250,6 +275,7 @@ contains
       do w = 1, size(self%worker)
          call changes%append(self%worker(w)%changes)
       end do
+      call self%work%add(count_tests, int(self%candidates%n, lp))
    end subroutine compare_candidates
 
    !> Find the new candidates of all boxes whose leaf changed.
@@ -264,81 +290,19 @@ contains
       do w = 1, size(self%worker)
          call part(self%tree%n_changed, size(self%worker), w, low, high)
          do k = low, high
-            call search(self, boxes, self%tree%changed(k), self%worker(w)%found)
+            call search(self%tree, self%grown, boxes, self%tree%changed(k), self%worker(w)%found, &
+                        self%worker(w)%visits)
          end do
       end do
       !$omp end parallel do
       do k = 1_ip, self%tree%n_changed
-         self%grown_before(:, self%tree%changed(k)) = self%grown(:, self%tree%changed(k))
+         self%grown%before(:, self%tree%changed(k)) = self%grown%now(:, self%tree%changed(k))
       end do
-      self%searched = self%searched + int(self%tree%n_changed, lp)
+      call self%work%add(count_searches, int(self%tree%n_changed, lp))
+      do w = 1, size(self%worker)
+         call self%work%add(count_visits, self%worker(w)%visits)
+      end do
    end subroutine search_changed
-
-   !> Find the new candidates of one box.
-   subroutine search(self, boxes, i, found)
-      type(quadtree_t), intent(in) :: self
-      type(boxes_t), intent(in) :: boxes
-      integer(ip), intent(in) :: i
-      type(places_t), intent(inout) :: found
-      integer(ip) :: stack(stack_size), node, child, j
-      integer :: waiting, q
-      real(dp) :: window(4)
-
-      window = self%grown(:, i)
-      waiting = 1
-      stack(1) = ancestor_around(self%tree, i, window)
-      do while (waiting > 0)
-         node = stack(waiting)
-         waiting = waiting - 1
-         j = self%tree%node(node)%first
-         do while (j /= 0_ip)
-            if (is_new(self, boxes, i, j)) then
-               call found%push(i)
-               call found%push(j)
-            end if
-            j = self%tree%next(j)
-         end do
-         do q = 1, 4
-            child = self%tree%node(node)%child(q)
-            if (child == 0_ip) cycle
-            if (.not. meet(self%tree%node(child)%grown, window)) cycle
-            waiting = waiting + 1
-            stack(waiting) = child
-         end do
-      end do
-   end subroutine search
-
-   !> Lowest cell around the leaf of a box that holds the centre of every possible candidate
-   pure integer(ip) function ancestor_around(tree, i, window) result(node)
-      type(tree_t), intent(in) :: tree
-      integer(ip), intent(in) :: i
-      real(dp), intent(in) :: window(4)
-      real(dp) :: low(2), high(2)
-
-      node = tree%leaf(i)
-      do while (node /= tree%root)
-         low = real(tree%node(node)%low, dp)
-         high = low + real(shiftl(1_ip, tree%node(node)%level), dp)
-         ! Formed as the grown cells are, and strict, because grown cells that touch make candidates.
-         if (all(low + tree%greatest_reach < window(1:2) .and. window(3:4) < high - tree%greatest_reach)) exit
-         node = tree%node(node)%parent
-      end do
-   end function ancestor_around
-
-   !> Whether two boxes are candidates now and were none before, and this search has to say so
-   pure logical function is_new(self, boxes, i, j)
-      type(quadtree_t), intent(in) :: self
-      type(boxes_t), intent(in) :: boxes
-      integer(ip), intent(in) :: i, j
-
-      is_new = .false.
-      if (j <= i) then
-         if (j == i .or. self%tree%is_changed(j) /= 0_bp) return
-      end if
-      if (.not. meet(self%grown(:, i), self%grown(:, j))) return
-      if (meet(self%grown_before(:, i), self%grown_before(:, j))) return
-      is_new = boxes%body(i) /= boxes%body(j) .and. .not. (boxes%fixed(i) .and. boxes%fixed(j))
-   end function is_new
 
    !> Drop the candidates that parted and add those that the threads found, in the order of their parts.
    subroutine replace_candidates(self, boxes, changes)
@@ -350,8 +314,7 @@ contains
       logical :: overlap
 
       do k = 1_ip, self%tree%n_changed
-         call self%candidates%drop_parted(self%tree%changed(k), self%grown, dropped)
-         self%dropped = self%dropped + int(dropped, lp)
+         call self%candidates%drop_parted(self%tree%changed(k), self%grown%now, dropped)
       end do
       do w = 1, size(self%worker)
          do k = 1_ip, self%worker(w)%found%n, 2_ip
@@ -361,28 +324,20 @@ contains
             call self%candidates%add(i, j, overlap)
             if (overlap) call changes%record(boxes%body(i), boxes%body(j), 1_ip)
          end do
-         self%found = self%found + int(self%worker(w)%found%n/2_ip, lp)
       end do
    end subroutine replace_candidates
 
-   !> Set the counters of the quadtree.
-   !>
-   !> Sums over all steps: leavers (boxes whose centre left its leaf), leaf_changes (boxes whose leaf is
-   !> another, those split and merged by neighbours included), searches, dropped and found candidates. As
-   !> they are now: candidates, nodes, depth.
-   subroutine report(self, counters)
-      class(quadtree_t), intent(in) :: self
-      type(counters_t), intent(inout) :: counters
+   !> Candidates, nodes, levels and memory.
+   subroutine survey(self)
+      class(quadtree_t), intent(inout) :: self
 
-      call counters%set('quadtree_steps', self%steps)
-      call counters%set('quadtree_leavers', self%leavers)
-      call counters%set('quadtree_leaf_changes', self%changed)
-      call counters%set('quadtree_searches', self%searched)
-      call counters%set('quadtree_dropped', self%dropped)
-      call counters%set('quadtree_found', self%found)
-      call counters%set('quadtree_candidates', int(self%candidates%n, lp))
-      call counters%set('quadtree_nodes', int(self%tree%n_nodes, lp))
-      if (allocated(self%tree%leaf)) call counters%set('quadtree_depth', int(self%tree%depth(), lp))
-   end subroutine report
+      if (.not. allocated(self%grown%now)) return
+      self%work%value(count_candidates) = int(self%candidates%n, lp)
+      self%work%value(count_nodes) = int(self%tree%n_nodes, lp)
+      self%work%value(count_depth) = int(self%tree%depth(), lp)
+      self%work%value(count_bytes) = self%tree%bytes() + self%candidates%bytes() + &
+         (int(storage_size(self%grown%now), lp)*2_lp*size(self%grown%now, kind=lp) + &
+          int(storage_size(self%greatest_side), lp)*size(self%greatest_side, kind=lp))/8_lp
+   end subroutine survey
 
 end module polydem_quadtree

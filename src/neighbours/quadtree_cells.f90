@@ -31,35 +31,42 @@ module polydem_quadtree_cells
 contains
 
    !> Count one more box in.
-   pure subroutine count_in(node, reach)
+   pure subroutine count_in(node, reach, ignored)
       !> Node
       type(node_t), intent(inout) :: node
       !> Reach [finest cells]
       real(dp), intent(in) :: reach
+      !> As for `cell_bounds`
+      integer, intent(in) :: ignored
 
       node%count = node%count + 1_ip
-      if (reach > node%reach) call set_reach(node, reach)
+      if (reach > node%reach) call set_reach(node, reach, ignored)
    end subroutine count_in
 
    !> Set the greatest reach of a node and its grown bounds.
-   pure subroutine set_reach(node, reach)
+   pure subroutine set_reach(node, reach, ignored)
       !> Node
       type(node_t), intent(inout) :: node
       !> Reach [finest cells]
       real(dp), intent(in) :: reach
+      !> As for `cell_bounds`
+      integer, intent(in) :: ignored
 
       node%reach = reach
-      node%grown = cell_bounds(node) + [-reach, -reach, reach, reach]
+      node%grown = cell_bounds(node, ignored) + [-reach, -reach, reach, reach]
    end subroutine set_reach
 
    !> Bounds of a cell, xmin, ymin, xmax, ymax [finest cells]
-   pure function cell_bounds(node) result(bounds)
+   pure function cell_bounds(node, ignored) result(bounds)
       !> Node
       type(node_t), intent(in) :: node
+      !> Axis along which cells are endless (the tree is a binary one); 0: none
+      integer, intent(in) :: ignored
       real(dp) :: bounds(4)
 
       bounds(1:2) = real(node%low, dp)
       bounds(3:4) = bounds(1:2) + real(shiftl(1_ip, node%level), dp)
+      if (ignored > 0) bounds(ignored:ignored + 2:2) = [-huge(1.0_dp), huge(1.0_dp)]
    end function cell_bounds
 
    !> Whether a finest cell lies in a cell

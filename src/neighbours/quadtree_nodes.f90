@@ -4,13 +4,18 @@
 !> level, otherwise a leaf; leaves on the finest level may hold several boxes. So the tree is a function of
 !> where the centres of the boxes are, not of how they came there.
 !>
+!> Two variants share all of this. The *pruned* tree (Vemuri et al. 1998) has all its leaves on the finest
+!> level, however few boxes there are. The *binary* tree (Krengel et al. 2026, section 3.2) looks at one axis
+!> only: along the other one cells are endless, and of the four children of a node two are never used.
+!>
 !> Centres count in whole cells of the finest level, 0 .. 2^30 - 1 in each direction. The origin of the space
 !> lies near the cell whose index alternates 0 and 1 bits: its ancestors then extend to the left and to the
 !> right in turn, and the root can grow in every direction. Centres further away count as if they lay in
 !> the outermost cell. This brings them closer to others, never further, so no neighbour is lost.
 module polydem_quadtree_nodes
-   use polydem_kinds, only: bp, dp, ip, wp
-   use polydem_quadtree_cells, only: cell_bounds, count_in, holds, node_t, quadrant, set_reach, within
+   use polydem_kinds, only: bp, dp, ip, lp, wp
+   use polydem_quadtree_cells, only: cell_bounds, count_in, holds, quadrant, set_reach, within
+   use polydem_quadtree_pool, only: node_pool_t
    implicit none
    private
    public :: tree_t
@@ -21,13 +26,9 @@ module polydem_quadtree_nodes
    integer(ip), parameter :: middle = 357913941_ip
 
    !> The tree, where boxes are in it, and which of them changed leaf
-   type :: tree_t
-      !> Nodes, used and free
-      type(node_t), allocatable :: node(:)
+   type, extends(node_pool_t) :: tree_t
       !> Root; 0: no box yet
       integer(ip) :: root = 0_ip
-      !> Nodes in use
-      integer(ip) :: n_nodes = 0_ip
       !> Leaf of each box
       integer(ip), allocatable :: leaf(:)
       !> Next box in the same leaf, 0 for the last
@@ -50,10 +51,8 @@ module polydem_quadtree_nodes
       real(dp) :: shift(2) = 0.0_dp
       !> Room for rounding in a reach [finest cells]
       real(dp) :: slack = 0.0_dp
-      !> First free node, 0: none
-      integer(ip), private :: free = 0_ip
-      !> Nodes that were ever in use
-      integer(ip), private :: n_touched = 0_ip
+      !> Whether all leaves are on the finest level (pruned tree)
+      logical :: equal_leaves = .false.
    contains
       procedure :: start
       procedure :: insert
@@ -61,6 +60,7 @@ module polydem_quadtree_nodes
       procedure :: widen
       procedure :: settle
       procedure :: depth
+      procedure :: bytes
    end type tree_t
 
 contains
@@ -76,7 +76,8 @@ contains
       real(dp), intent(in) :: origin(2)
       real(dp), parameter :: off_border = 0.381966_dp
 
-      allocate (self%node(4_ip*n + 64_ip), self%leaf(n), self%next(n), self%cell(4, n), self%reach(n))
+      call self%reserve(4_ip*n + 64_ip)
+      allocate (self%leaf(n), self%next(n), self%cell(4, n), self%reach(n))
       allocate (self%changed(n), self%is_changed(n))
       self%leaf = 0_ip
       self%is_changed = 0_bp
@@ -94,19 +95,20 @@ contains
       real(dp), intent(in) :: reach
       !> Bounds of all boxes, (4, box) [m]
       real(wp), intent(in), contiguous :: bounds(:, :)
-      integer(ip) :: at(2)
+      integer(ip) :: at(2), root
 
       at = cell_of(self, bounds(:, box))
       self%reach(box) = padded(self, reach)
       self%greatest_reach = max(self%greatest_reach, self%reach(box))
       if (self%root == 0_ip) then
-         call new_node(self, 0_ip, 0_ip, at, self%root)
+         call self%new_node(0_ip, 0_ip, at, root)
+         self%root = root
       else
          do while (.not. holds(self%node(self%root), at))
             call grow_root(self)
          end do
       end if
-      call count_in(self%node(self%root), self%reach(box))
+      call count_in(self%node(self%root), self%reach(box), self%ignored)
       call descend(self, self%root, box, at, bounds)
    end subroutine insert
 
@@ -143,7 +145,7 @@ contains
       self%greatest_reach = max(self%greatest_reach, self%reach(box))
       node = self%leaf(box)
       do while (node /= 0_ip)
-         call set_reach(self%node(node), max(self%node(node)%reach, self%reach(box)))
+         call set_reach(self%node(node), max(self%node(node)%reach, self%reach(box)), self%ignored)
          node = self%node(node)%parent
       end do
       call mark(self, box)
@@ -172,6 +174,18 @@ contains
       end do
    end function depth
 
+   !> Memory held [B]
+   pure integer(lp) function bytes(self)
+      class(tree_t), intent(in) :: self
+
+      bytes = 0_lp
+      if (.not. allocated(self%leaf)) return
+      bytes = self%pool_bytes() + &
+         (int(storage_size(self%leaf), lp)*3_lp*size(self%leaf, kind=lp) + &
+          int(storage_size(self%is_changed), lp)*size(self%is_changed, kind=lp) + &
+          int(storage_size(self%cell), lp)*5_lp*size(self%reach, kind=lp))/8_lp
+   end function bytes
+
    !> Take a box down from a node that counts it already to its leaf, splitting an occupied one.
    subroutine descend(self, top, box, at, bounds)
       type(tree_t), intent(inout) :: self
@@ -180,16 +194,16 @@ contains
       integer(ip) :: node, child, resident
 
       node = top
-      do while (self%node(node)%count > 1_ip .and. self%node(node)%level > 0_ip)
+      do while (self%node(node)%level > 0_ip .and. (self%node(node)%count > 1_ip .or. self%equal_leaves))
          resident = self%node(node)%first
          if (resident /= 0_ip) then
             self%node(node)%first = 0_ip
             call find_child(self, node, within(self%node(node), cell_of(self, bounds(:, resident))), child)
-            call count_in(self%node(child), self%reach(resident))
+            call count_in(self%node(child), self%reach(resident), self%ignored)
             call settle_in(self, child, resident)
          end if
          call find_child(self, node, at, child)
-         call count_in(self%node(child), self%reach(box))
+         call count_in(self%node(child), self%reach(box), self%ignored)
          node = child
       end do
       call settle_in(self, node, box)
@@ -210,14 +224,14 @@ contains
          self%node(node)%count = self%node(node)%count - 1_ip
          if (self%node(node)%count == 0_ip) then
             where (self%node(parent)%child == node) self%node(parent)%child = 0_ip
-            call free_node(self, node)
+            call self%free_node(node)
          else
             if (self%node(node)%count == 1_ip) single = node
             if (self%node(node)%reach <= self%reach(box)) call shrink_reach(self, node)
          end if
          node = parent
       end do
-      if (single /= 0_ip) call merge_cells(self, single)
+      if (single /= 0_ip .and. .not. self%equal_leaves) call merge_cells(self, single)
    end subroutine remove_below
 
    !> Make a node with a single box below it a leaf.
@@ -231,11 +245,11 @@ contains
       self%node(top)%child = 0_ip
       do while (self%node(node)%first == 0_ip)
          below = maxval(self%node(node)%child)
-         call free_node(self, node)
+         call self%free_node(node)
          node = below
       end do
       below = self%node(node)%first
-      call free_node(self, node)
+      call self%free_node(node)
       call settle_in(self, top, below)
    end subroutine merge_cells
 
@@ -247,7 +261,7 @@ contains
       self%next(box) = self%node(leaf)%first
       self%node(leaf)%first = box
       self%leaf(box) = leaf
-      self%cell(:, box) = cell_bounds(self%node(leaf))
+      self%cell(:, box) = cell_bounds(self%node(leaf), self%ignored)
       call mark(self, box)
    end subroutine settle_in
 
@@ -280,24 +294,25 @@ contains
    !> Put a cell of twice the side above the root; a root with one box just becomes larger.
    subroutine grow_root(self)
       type(tree_t), intent(inout) :: self
-      integer(ip) :: old, level, low(2), box
+      integer(ip) :: old, root, level, low(2), box
 
       old = self%root
       level = self%node(old)%level + 1_ip
       low = shiftl(shiftr(self%node(old)%low, level), level)
-      if (self%node(old)%count == 1_ip) then
+      if (self%node(old)%count == 1_ip .and. .not. self%equal_leaves) then
          self%node(old)%level = level
          self%node(old)%low = low
-         call set_reach(self%node(old), self%node(old)%reach)
+         call set_reach(self%node(old), self%node(old)%reach, self%ignored)
          box = self%node(old)%first
          self%node(old)%first = 0_ip
          call settle_in(self, old, box)
          return
       end if
-      call new_node(self, 0_ip, level, low, self%root)
+      call self%new_node(0_ip, level, low, root)
+      self%root = root
       self%node(self%root)%child(quadrant(level, self%node(old)%low)) = old
       self%node(self%root)%count = self%node(old)%count
-      call set_reach(self%node(self%root), self%node(old)%reach)
+      call set_reach(self%node(self%root), self%node(old)%reach, self%ignored)
       self%node(old)%parent = self%root
    end subroutine grow_root
 
@@ -312,46 +327,9 @@ contains
       q = quadrant(level, at)
       child = self%node(node)%child(q)
       if (child /= 0_ip) return
-      call new_node(self, node, level - 1_ip, shiftl(shiftr(at, level - 1_ip), level - 1_ip), child)
+      call self%new_node(node, level - 1_ip, shiftl(shiftr(at, level - 1_ip), level - 1_ip), child)
       self%node(node)%child(q) = child
    end subroutine find_child
-
-   subroutine new_node(self, parent, level, low, node)
-      type(tree_t), intent(inout) :: self
-      integer(ip), intent(in) :: parent, level, low(2)
-      integer(ip), intent(out) :: node
-      type(node_t), allocatable :: longer(:)
-
-      if (self%free /= 0_ip) then
-         node = self%free
-         self%free = self%node(node)%parent
-      else
-         if (self%n_touched == size(self%node)) then
-            allocate (longer(2*size(self%node)))
-            longer(1:self%n_touched) = self%node
-            call move_alloc(longer, self%node)
-         end if
-         self%n_touched = self%n_touched + 1_ip
-         node = self%n_touched
-      end if
-      self%n_nodes = self%n_nodes + 1_ip
-      self%node(node)%child = 0_ip
-      self%node(node)%parent = parent
-      self%node(node)%level = level
-      self%node(node)%count = 0_ip
-      self%node(node)%first = 0_ip
-      self%node(node)%low = low
-      call set_reach(self%node(node), 0.0_dp)
-   end subroutine new_node
-
-   subroutine free_node(self, node)
-      type(tree_t), intent(inout) :: self
-      integer(ip), intent(in) :: node
-
-      self%node(node)%parent = self%free
-      self%free = node
-      self%n_nodes = self%n_nodes - 1_ip
-   end subroutine free_node
 
    !> Find the greatest reach of a node again after its box with the greatest one left.
    subroutine shrink_reach(self, node)
@@ -370,7 +348,7 @@ contains
       do q = 1, 4
          if (self%node(node)%child(q) /= 0_ip) reach = max(reach, self%node(self%node(node)%child(q))%reach)
       end do
-      if (reach < self%node(node)%reach) call set_reach(self%node(node), reach)
+      if (reach < self%node(node)%reach) call set_reach(self%node(node), reach, self%ignored)
    end subroutine shrink_reach
 
    !> Finest cell of the centre of a box; what is not a number lies in cell 0
@@ -384,6 +362,7 @@ contains
       do a = 1, 2
          place = (real(box(a), dp) + real(box(a + 2), dp))*self%half_scale + self%shift(a)
          at(a) = 0_ip
+         if (a == self%ignored) place = real(middle, dp)
          if (place > 0.0_dp) at(a) = int(min(place, 2.0_dp**top_level - 1.0_dp), ip)
       end do
    end function cell_of

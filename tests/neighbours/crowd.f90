@@ -2,16 +2,13 @@
 module crowd
    use polydem_boxes, only: boxes_t
    use polydem_errors, only: error_t
+   use polydem_finder_factory, only: finders => finder_names
    use polydem_kinds, only: ip, wp
    use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_random, only: random_t, new_random
    implicit none
    private
    public :: new_boxes, scatter, wrong_steps, count_wrong, direct_pairs, grow_reach
-
-   !> The finders to be tested
-   character(len=14), parameter :: finders(3) = &
-      [character(len=14) :: 'all_pairs', 'sort_and_sweep', 'quadtree']
 
 contains
 

@@ -1,0 +1,13 @@
+# Joins SOURCES into RESULT and appends _SUFFIX to the names of their modules.
+set(names "")
+set(text "")
+foreach(source IN LISTS SOURCES)
+  get_filename_component(name "${source}" NAME_WE)
+  list(APPEND names "${name}")
+  file(READ "${source}" content)
+  string(APPEND text "${content}\n")
+endforeach()
+foreach(name IN LISTS names)
+  string(REGEX REPLACE "polydem_${name}([^a-z_])" "polydem_${name}_${SUFFIX}\\1" text "${text}")
+endforeach()
+file(WRITE "${RESULT}" "${text}")

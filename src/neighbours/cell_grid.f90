@@ -1,0 +1,220 @@
+!> The cells of one grid: where they lie, how many there are, and which of them holds a point.
+!>
+!> Boxes are binned by their lower corner. Let no box be larger than a cell. The lower corners of two boxes
+!> that overlap are then less than a cell apart on both axes, so their cells are the same or neighbours.
+!> This holds with rounding too: the cell of a point is a monotonic function, its error is below
+!> 2^-12 cells (`most_columns`), and cells exceed the largest box by more than twice that (`slack`).
+!>
+!> The outermost cells reach to infinity: points outside are moved to the border of the grid. So the grid may cover
+!> less than all boxes, and does if a few of them lie so far away that covering them would take more than `most_cells`.
+!>
+!> Cells are numbered by rows. Behind each row and above the last row there are empty cells, so that the
+!> neighbours of a cell may be looked up without asking whether they exist.
+module polydem_cell_grid
+   use polydem_kinds, only: dp, ip, wp
+   use polydem_sort_reals, only: sort_reals
+   implicit none
+   private
+   public :: cell_grid_t, extent_t, measure, measure_levels, new_grid
+
+   !> Most cells per box
+   integer(ip), parameter :: most_cells = 4_ip
+   !> A grid that would have this many times as many cells leaves out boxes that lie far away
+   real(dp), parameter :: far_away = 16.0_dp
+   !> Boxes from which the place of the others is guessed then
+   integer(ip), parameter :: sample_size = 512_ip
+   !> Most columns or rows, so that rounding moves no point by 2^-12 cells
+   real(wp), parameter :: most_columns = min(2.0_wp**(-13)/epsilon(1.0_wp), 2.0_wp**28)
+   !> Share by which cells are larger than the largest box
+   real(wp), parameter :: slack = 2.0_wp**(-10)
+
+   !> What must be known of some boxes to lay out their grid
+   type :: extent_t
+      !> Number of boxes
+      integer(ip) :: n = 0_ip
+      !> Least and greatest lower corner [m]
+      real(wp) :: low(2) = huge(1.0_wp), high(2) = -huge(1.0_wp)
+      !> Greatest width and height of a box [m]
+      real(wp) :: side(2) = 0.0_wp
+   end type extent_t
+
+   !> One grid
+   type :: cell_grid_t
+      !> Corners of the region in which points are told apart [m]
+      real(wp) :: low(2) = 0.0_wp, high(2) = 0.0_wp
+      !> Cells per metre [1/m]
+      real(wp) :: scale(2) = 0.0_wp
+      !> Number of columns and rows
+      integer(ip) :: columns = 1_ip, rows = 1_ip
+      !> Cells of a row, the empty one behind it included
+      integer(ip) :: stride = 2_ip
+      !> Number of the first cell, less one
+      integer(ip) :: offset = 0_ip
+      !> First and last of the boxes of the grid, in the order of cells
+      integer(ip) :: first_box = 1_ip, last_box = 0_ip
+   contains
+      procedure :: n_cells
+   end type cell_grid_t
+
+contains
+
+   !> Find the extent of the free boxes, all of one level.
+   pure subroutine measure(n, bounds, level, extent)
+      !> Number of boxes
+      integer(ip), intent(in) :: n
+      !> Their bounds [m]
+      real(wp), intent(in) :: bounds(4, n)
+      !> Level of each box, 1 or 2 (fixed)
+      integer(ip), intent(in) :: level(n)
+      !> Extent of the free boxes; of the fixed ones the number
+      type(extent_t), intent(out) :: extent(2)
+      real(wp) :: xlow, ylow, xhigh, yhigh, width, height
+      integer(ip) :: i, n_free
+
+      n_free = 0_ip
+      xlow = huge(1.0_wp)
+      ylow = huge(1.0_wp)
+      xhigh = -huge(1.0_wp)
+      yhigh = -huge(1.0_wp)
+      width = 0.0_wp
+      height = 0.0_wp
+      do i = 1_ip, n
+         if (level(i) /= 1_ip) cycle
+         n_free = n_free + 1_ip
+         xlow = min(xlow, bounds(1, i))
+         ylow = min(ylow, bounds(2, i))
+         xhigh = max(xhigh, bounds(1, i))
+         yhigh = max(yhigh, bounds(2, i))
+         width = max(width, bounds(3, i) - bounds(1, i))
+         height = max(height, bounds(4, i) - bounds(2, i))
+      end do
+      extent(1) = extent_t(n_free, [xlow, ylow], [xhigh, yhigh], [width, height])
+      extent(2)%n = n - n_free
+   end subroutine measure
+
+   !> Find the extent of the boxes of each level.
+   pure subroutine measure_levels(n, bounds, level, extent)
+      !> Number of boxes
+      integer(ip), intent(in) :: n
+      !> Their bounds [m]
+      real(wp), intent(in) :: bounds(4, n)
+      !> Level of each box
+      integer(ip), intent(in) :: level(n)
+      !> Extent of the boxes of each level
+      type(extent_t), intent(out) :: extent(:)
+      integer(ip) :: i, l
+
+      do i = 1_ip, n
+         l = level(i)
+         extent(l)%n = extent(l)%n + 1_ip
+         extent(l)%low = min(extent(l)%low, bounds(1:2, i))
+         extent(l)%high = max(extent(l)%high, bounds(1:2, i))
+         extent(l)%side = max(extent(l)%side, bounds(3:4, i) - bounds(1:2, i))
+      end do
+   end subroutine measure_levels
+
+   !> Lay out a grid.
+   pure subroutine new_grid(self, extent, corner, n, offset)
+      !> Grid to make
+      type(cell_grid_t), intent(out) :: self
+      !> Extent of the boxes of the grid
+      type(extent_t), intent(in) :: extent
+      !> Bounds of all boxes, (4, box) [m]
+      real(wp), intent(in), contiguous :: corner(:, :)
+      !> Number of all boxes
+      integer(ip), intent(in) :: n
+      !> Number of cells in other grids before this one
+      integer(ip), intent(in) :: offset
+      real(wp) :: side(2), cells(2), span
+      real(dp) :: most
+      integer :: a
+
+      self%offset = offset
+      self%stride = 2_ip
+      if (extent%n == 0_ip) return
+      self%low = extent%low
+      self%high = extent%high
+      side = extent%side*(1.0_wp + slack)
+      most = real(most_cells, dp)*real(extent%n, dp) + 16.0_dp
+      cells = cells_that_fit(self, side)
+      if (real(cells(1), dp)*real(cells(2), dp) > far_away*most) then
+         call leave_out_far_boxes(self, corner(:, 1:n))
+         cells = cells_that_fit(self, side)
+      end if
+      call limit(cells, most)
+      do a = 1, 2
+         span = self%high(a) - self%low(a)
+         if (cells(a) < 2.0_wp) cycle
+         self%scale(a) = (cells(a) - 0.5_wp*slack)/span
+      end do
+      self%columns = int(cells(1), ip)
+      self%rows = int(cells(2), ip)
+      self%stride = self%columns + 1_ip
+   end subroutine new_grid
+
+   !> Columns and rows of cells of a given size in the region of a grid, whole numbers
+   pure function cells_that_fit(self, side) result(cells)
+      type(cell_grid_t), intent(in) :: self
+      real(wp), intent(in) :: side(2)
+      real(wp) :: cells(2), span
+      integer :: a
+
+      do a = 1, 2
+         span = self%high(a) - self%low(a)
+         cells(a) = 1.0_wp
+         ! Lengths whose reciprocal could overflow are not told apart.
+         if (span < 2.0_wp**40*tiny(1.0_wp)) cycle
+         if (span > most_columns*side(a)) then
+            cells(a) = aint(most_columns)
+         else
+            cells(a) = max(1.0_wp, aint(span/side(a)))
+         end if
+      end do
+   end function cells_that_fit
+
+   !> Make cells larger so that there are not more than `most`.
+   pure subroutine limit(cells, most)
+      real(wp), intent(inout) :: cells(2)
+      real(dp), intent(in) :: most
+      integer :: longer
+
+      if (real(cells(1), dp)*real(cells(2), dp) <= most) return
+      longer = 1
+      if (cells(2) > cells(1)) longer = 2
+      cells(3 - longer) = min(cells(3 - longer), aint(real(sqrt(most), wp)))
+      cells(longer) = min(cells(longer), aint(real(most/real(cells(3 - longer), dp), wp)))
+   end subroutine limit
+
+   !> Shrink the region of a grid to where nearly all boxes are: between the 32-quantiles of a sample, and some more.
+   pure subroutine leave_out_far_boxes(self, corner)
+      type(cell_grid_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: corner(:, :)
+      real(wp), allocatable :: sample(:)
+      integer(ip), allocatable :: ranked(:)
+      real(wp) :: low, high, margin
+      integer(ip) :: n, tail
+      integer :: a
+
+      do a = 1, 2
+         sample = corner(a, ::max(1, size(corner, 2)/sample_size))
+         n = size(sample, kind=ip)
+         allocate (ranked(n))
+         call sort_reals(sample, ranked)
+         tail = n/32_ip
+         low = sample(ranked(1_ip + tail))
+         high = sample(ranked(n - tail))
+         margin = 0.125_wp*(high - low)
+         self%low(a) = max(self%low(a), low - margin)
+         self%high(a) = max(self%low(a), min(self%high(a), high + margin))
+         deallocate (ranked)
+      end do
+   end subroutine leave_out_far_boxes
+
+   !> Number of cells, the empty ones behind rows and above the last row included
+   elemental integer(ip) function n_cells(self)
+      class(cell_grid_t), intent(in) :: self
+
+      n_cells = self%stride*(self%rows + 1_ip) + 1_ip
+   end function n_cells
+
+end module polydem_cell_grid

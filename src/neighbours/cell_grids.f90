@@ -1,0 +1,370 @@
+!> Boxes binned into the cells of one or several grids, and the search for overlapping pairs in them.
+!>
+!> Each free box belongs to one grid, its level; finer grids come first. With one grid this is the method of linked
+!> cells (Quentrec & Brot 1973; Hockney & Eastwood 1981), with several the hierarchical grid (Krijgsman, Ogarko &
+!> Luding 2014). In place of links the boxes are sorted by their cell, grid after grid, by counting; copies
+!> of their bounds stand in that order, one array for each bound. Boxes of neighbouring cells of a row
+!> then stand side by side, and a search runs over plain ranges:
+!>
+!>     in its own grid        the boxes behind it in its cell and those of the next cell of the row; three cells
+!>                            of the row above. Every pair of cells is visited from one side only.
+!>     in each coarser grid   the cells that its box covers, and one more to the left and below, since boxes are
+!>                            binned by their lower corner
+!>
+!> Fixed boxes, which are few and often large (walls), stand behind all grids in no cell, so that they do not make
+!> cells larger. Each of them looks in all grids, and none looks for them.
+!>
+!> Comparing writes each pair and moves on only if it overlaps, which needs no branch.
+module polydem_cell_grids
+   use omp_lib, only: omp_get_max_threads
+   use polydem_box_pairs, only: found_t
+   use polydem_boxes, only: boxes_t
+   use polydem_cell_grid, only: cell_grid_t, extent_t, measure, measure_levels, new_grid
+   use polydem_kinds, only: ip, lp, wp, worth_threads
+   implicit none
+   private
+   public :: cell_grids_t, part
+
+   !> Counts of one thread
+   type :: tally_t
+      !> Comparisons of two boxes
+      integer(lp) :: tests = 0_lp
+      !> Cells looked at
+      integer(lp) :: visits = 0_lp
+      !> Searches of a box in a grid
+      integer(lp) :: searches = 0_lp
+   end type tally_t
+
+   !> Boxes in the order of cells
+   type :: cell_grids_t
+      !> Number of grids
+      integer :: n_levels = 0
+      !> Grid of each box; n_levels + 1 if it is fixed
+      integer(ip), allocatable :: level(:)
+      !> Grids, the finest first; the last one is of one cell, for the fixed boxes
+      type(cell_grid_t), allocatable :: grid(:)
+      !> What was measured to lay them out
+      type(extent_t), allocatable :: extent(:)
+      !> Place of the first box of each cell, all grids one after the other
+      integer(ip), allocatable, private :: first(:)
+      !> Number of cells, empty ones at borders included
+      integer(ip) :: n_cells = 0_ip
+      !> Number of each box
+      integer(ip), allocatable, private :: box(:)
+      !> Cell of each box in this order, and in the order of numbers
+      integer(ip), allocatable, private :: cell(:), cell_of(:)
+      !> Bounds in this order [m]
+      real(wp), allocatable, private :: xmin(:), ymin(:), xmax(:), ymax(:)
+      !> Pairs that each thread found in the last search, lower box first
+      type(found_t), allocatable :: found(:)
+      !> Sums over all searches
+      type(tally_t) :: total
+   contains
+      procedure :: set_levels
+      procedure :: build
+      procedure :: search
+      procedure :: bytes
+   end type cell_grids_t
+
+contains
+
+   !> First and last of the w-th of m equal parts of low..high
+   pure subroutine part(low, high, m, w, from, to)
+      !> Range to be shared out
+      integer(ip), intent(in) :: low, high
+      !> Number of parts
+      integer, intent(in) :: m
+      !> Part that is wanted
+      integer, intent(in) :: w
+      !> First and last of it
+      integer(ip), intent(out) :: from, to
+      integer(lp) :: n
+
+      n = int(high, lp) - int(low, lp) + 1_lp
+      from = low + int((n*int(w - 1, lp))/int(m, lp), ip)
+      to = low + int((n*int(w, lp))/int(m, lp), ip) - 1_ip
+   end subroutine part
+
+   !> Say which box belongs to which grid.
+   subroutine set_levels(self, n_levels, level, fixed)
+      class(cell_grids_t), intent(inout) :: self
+      !> Number of grids
+      integer, intent(in) :: n_levels
+      !> Grid of each box, from 1 for the finest
+      integer(ip), intent(in) :: level(:)
+      !> Whether each box is fixed, and so in no grid
+      logical, intent(in) :: fixed(:)
+
+      self%n_levels = n_levels
+      self%level = merge(int(n_levels, ip) + 1_ip, level, fixed)
+      if (allocated(self%grid)) deallocate (self%grid, self%extent)
+      allocate (self%grid(n_levels + 1), self%extent(n_levels + 1))
+   end subroutine set_levels
+
+   !> Bin the boxes.
+   subroutine build(self, n, bounds)
+      class(cell_grids_t), intent(inout) :: self
+      !> Number of boxes
+      integer(ip), intent(in) :: n
+      !> Their bounds, (4, box) [m]
+      real(wp), intent(in), contiguous :: bounds(:, :)
+      integer(ip) :: place
+      integer :: l
+
+      call reserve_boxes(self, n)
+      if (self%n_levels == 1) then
+         call measure(n, bounds, self%level, self%extent)
+      else
+         call measure_levels(n, bounds, self%level, self%extent)
+      end if
+      self%n_cells = 0_ip
+      place = 1_ip
+      do l = 1, self%n_levels + 1
+         if (l <= self%n_levels) then
+            call new_grid(self%grid(l), self%extent(l), bounds, n, self%n_cells)
+         else
+            self%grid(l) = cell_grid_t(offset=self%n_cells)
+         end if
+         self%grid(l)%first_box = place
+         self%grid(l)%last_box = place + self%extent(l)%n - 1_ip
+         place = self%grid(l)%last_box + 1_ip
+         self%n_cells = self%n_cells + self%grid(l)%n_cells()
+      end do
+      call reserve_cells(self, self%n_cells + 2_ip)
+      call find_cells(n, bounds, self%grid, self%level, self%cell_of)
+      call sort_by_cell(n, self%n_cells, bounds, self%cell_of, self%first, self%box, self%cell, &
+                        self%xmin, self%ymin, self%xmax, self%ymax)
+   end subroutine build
+
+   !> Column of a point, from 0 on
+   elemental integer(ip) function column(grid, x)
+      type(cell_grid_t), intent(in) :: grid
+      real(wp), intent(in) :: x
+
+      column = int((min(max(x, grid%low(1)), grid%high(1)) - grid%low(1))*grid%scale(1), ip)
+   end function column
+
+   !> Row of a point, from 0 on
+   elemental integer(ip) function row(grid, y)
+      type(cell_grid_t), intent(in) :: grid
+      real(wp), intent(in) :: y
+
+      row = int((min(max(y, grid%low(2)), grid%high(2)) - grid%low(2))*grid%scale(2), ip)
+   end function row
+
+   !> Find the cell of each box.
+   pure subroutine find_cells(n, bounds, grid, level, cell_of)
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: bounds(4, n)
+      type(cell_grid_t), intent(in) :: grid(:)
+      integer(ip), intent(in) :: level(n)
+      integer(ip), intent(out) :: cell_of(n)
+      integer(ip) :: i
+
+      do i = 1_ip, n
+         associate (g => grid(level(i)))
+            cell_of(i) = g%offset + row(g, bounds(2, i))*g%stride + column(g, bounds(1, i)) + 1_ip
+         end associate
+      end do
+   end subroutine find_cells
+
+   !> Sort the boxes by their cell, equal cells by number.
+   pure subroutine sort_by_cell(n, n_cells, bounds, cell_of, first, box, cell, xmin, ymin, xmax, ymax)
+      integer(ip), intent(in) :: n, n_cells
+      real(wp), intent(in) :: bounds(4, n)
+      integer(ip), intent(in) :: cell_of(n)
+      integer(ip), intent(out) :: first(n_cells + 2), box(n), cell(n)
+      real(wp), intent(out) :: xmin(n), ymin(n), xmax(n), ymax(n)
+      integer(ip) :: i, k, c
+
+      first = 0_ip
+      do i = 1_ip, n
+         first(cell_of(i) + 2_ip) = first(cell_of(i) + 2_ip) + 1_ip
+      end do
+      first(1:2) = 1_ip
+      do c = 1_ip, n_cells
+         first(c + 2_ip) = first(c + 1_ip) + first(c + 2_ip)
+      end do
+      ! Entry c + 1 is the next free place of cell c, and in the end the first of the next cell.
+      do i = 1_ip, n
+         c = cell_of(i)
+         k = first(c + 1_ip)
+         first(c + 1_ip) = k + 1_ip
+         box(k) = i
+         cell(k) = c
+         xmin(k) = bounds(1, i)
+         ymin(k) = bounds(2, i)
+         xmax(k) = bounds(3, i)
+         ymax(k) = bounds(4, i)
+      end do
+   end subroutine sort_by_cell
+
+   !> Find all pairs of boxes of different bodies, not both fixed, that overlap.
+   subroutine search(self, boxes)
+      class(cell_grids_t), intent(inout) :: self
+      !> Boxes; read are their bodies and whether these are fixed
+      type(boxes_t), intent(in) :: boxes
+      type(tally_t), allocatable :: tally(:)
+      integer :: w
+
+      if (allocated(self%found)) then
+         if (size(self%found) /= omp_get_max_threads()) deallocate (self%found)
+      end if
+      if (.not. allocated(self%found)) allocate (self%found(omp_get_max_threads()))
+      allocate (tally(size(self%found)))
+      !$omp parallel do if (boxes%n > worth_threads) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes, tally) private(w)
+      do w = 1, size(self%found)
+         call search_part(self, w, size(self%found), self%found(w), tally(w))
+         call self%found(w)%keep_valid(boxes%body, boxes%fixed)
+      end do
+      !$omp end parallel do
+      self%total%tests = self%total%tests + sum(tally%tests)
+      self%total%visits = self%total%visits + sum(tally%visits)
+      self%total%searches = self%total%searches + sum(tally%searches)
+   end subroutine search
+
+   !> Search for the boxes of one part of each level.
+   subroutine search_part(self, w, m, found, tally)
+      class(cell_grids_t), intent(in) :: self
+      integer, intent(in) :: w, m
+      type(found_t), intent(inout) :: found
+      type(tally_t), intent(inout) :: tally
+      type(found_t) :: mine
+      type(tally_t) :: my_tally
+      integer(ip) :: low, high
+      integer :: l, other
+
+      ! What is written often stands on the stack of the thread; that of other threads is near in memory.
+      call move_alloc(found%box, mine%box)
+      call mine%reserve(64_ip)
+      do l = 1, self%n_levels
+         call part(self%grid(l)%first_box, self%grid(l)%last_box, m, w, low, high)
+         call search_own_grid(self, self%grid(l), low, high, mine, my_tally)
+         do other = l + 1, self%n_levels
+            call search_other_grid(self, self%grid(other), low, high, mine, my_tally)
+         end do
+      end do
+      call part(self%grid(l)%first_box, self%grid(l)%last_box, m, w, low, high)
+      do other = 1, self%n_levels
+         call search_other_grid(self, self%grid(other), low, high, mine, my_tally)
+      end do
+      call move_alloc(mine%box, found%box)
+      found%n = mine%n
+      tally = my_tally
+   end subroutine search_part
+
+   !> Compare boxes with those of their own grid that come later.
+   subroutine search_own_grid(self, grid, low, high, found, tally)
+      type(cell_grids_t), intent(in) :: self
+      type(cell_grid_t), intent(in) :: grid
+      integer(ip), intent(in) :: low, high
+      type(found_t), intent(inout) :: found
+      type(tally_t), intent(inout) :: tally
+      integer(ip) :: n, k, cell, beside, from, to, more
+
+      n = size(self%box, kind=ip)
+      do k = low, high
+         cell = self%cell(k)
+         beside = self%first(cell + 2_ip) - 1_ip
+         from = self%first(cell + grid%stride - 1_ip)
+         to = self%first(cell + grid%stride + 2_ip) - 1_ip
+         more = (beside - k) + (to - from + 1_ip)
+         tally%tests = tally%tests + int(more, lp)
+         if (size(found%box, 2) < found%n + more + 1_ip) call found%reserve(more + 1_ip)
+         call compare(n, self%xmin, self%ymin, self%xmax, self%ymax, self%box, k, k + 1_ip, beside, found%n, found%box)
+         call compare(n, self%xmin, self%ymin, self%xmax, self%ymax, self%box, k, from, to, found%n, found%box)
+      end do
+      tally%visits = tally%visits + 5_lp*int(high - low + 1_ip, lp)
+      tally%searches = tally%searches + int(high - low + 1_ip, lp)
+   end subroutine search_own_grid
+
+   !> Compare boxes with those of another grid.
+   subroutine search_other_grid(self, grid, low, high, found, tally)
+      type(cell_grids_t), intent(in) :: self
+      type(cell_grid_t), intent(in) :: grid
+      integer(ip), intent(in) :: low, high
+      type(found_t), intent(inout) :: found
+      type(tally_t), intent(inout) :: tally
+      integer(ip) :: n, k, r, left, right, from, to
+
+      if (grid%last_box < grid%first_box) return
+      n = size(self%box, kind=ip)
+      do k = low, high
+         left = max(column(grid, self%xmin(k)) - 1_ip, 0_ip)
+         right = column(grid, self%xmax(k))
+         do r = max(row(grid, self%ymin(k)) - 1_ip, 0_ip), row(grid, self%ymax(k))
+            from = self%first(grid%offset + r*grid%stride + left + 1_ip)
+            to = self%first(grid%offset + r*grid%stride + right + 2_ip) - 1_ip
+            tally%visits = tally%visits + int(right - left + 1_ip, lp)
+            if (to < from) cycle
+            tally%tests = tally%tests + int(to - from + 1_ip, lp)
+            if (size(found%box, 2) < found%n + to - from + 2_ip) call found%reserve(to - from + 2_ip)
+            call compare(n, self%xmin, self%ymin, self%xmax, self%ymax, self%box, k, from, to, found%n, found%box)
+         end do
+      end do
+      tally%searches = tally%searches + int(high - low + 1_ip, lp)
+   end subroutine search_other_grid
+
+   !> Compare one box with a range of boxes; there is room for one pair more than are compared.
+   pure subroutine compare(n_boxes, xmin, ymin, xmax, ymax, box, k, from, to, n_found, found)
+      integer(ip), intent(in) :: n_boxes
+      !> Bounds and numbers of the boxes in the order of cells
+      real(wp), intent(in) :: xmin(n_boxes), ymin(n_boxes), xmax(n_boxes), ymax(n_boxes)
+      integer(ip), intent(in) :: box(n_boxes)
+      !> Place of the one box, first and last place of the others
+      integer(ip), intent(in) :: k, from, to
+      !> Pairs so far
+      integer(ip), intent(inout) :: n_found
+      integer(ip), intent(inout) :: found(2, *)
+      integer(ip) :: j, n, own
+
+      own = box(k)
+      n = n_found
+      do j = from, to
+         found(1, n + 1_ip) = own
+         found(2, n + 1_ip) = box(j)
+         n = n + merge(1_ip, 0_ip, min(min(xmax(j) - xmin(k), xmax(k) - xmin(j)), &
+                                       min(ymax(j) - ymin(k), ymax(k) - ymin(j))) >= 0.0_wp)
+      end do
+      n_found = n
+   end subroutine compare
+
+   subroutine reserve_boxes(self, n)
+      type(cell_grids_t), intent(inout) :: self
+      integer(ip), intent(in) :: n
+
+      if (allocated(self%box)) then
+         if (size(self%box) == n) return
+         deallocate (self%box, self%cell, self%cell_of, self%xmin, self%ymin, self%xmax, self%ymax)
+      end if
+      allocate (self%box(n), self%cell(n), self%cell_of(n), self%xmin(n), self%ymin(n), self%xmax(n), self%ymax(n))
+   end subroutine reserve_boxes
+
+   subroutine reserve_cells(self, n)
+      type(cell_grids_t), intent(inout) :: self
+      integer(ip), intent(in) :: n
+
+      if (allocated(self%first)) then
+         if (size(self%first) >= n) return
+         deallocate (self%first)
+      end if
+      allocate (self%first(n + n/8_ip))
+   end subroutine reserve_cells
+
+   !> Memory held [B]
+   pure integer(lp) function bytes(self)
+      class(cell_grids_t), intent(in) :: self
+      integer :: w
+
+      bytes = 0_lp
+      if (.not. allocated(self%box)) return
+      bytes = int(storage_size(self%box)/8, lp)*(4_lp*size(self%box, kind=lp) + size(self%first, kind=lp)) + &
+         int(storage_size(self%xmin)/8, lp)*4_lp*size(self%xmin, kind=lp)
+      do w = 1, size(self%found)
+         if (allocated(self%found(w)%box)) bytes = bytes + int(storage_size(self%found(w)%box)/8, lp)* &
+            size(self%found(w)%box, kind=lp)
+      end do
+   end function bytes
+
+end module polydem_cell_grids

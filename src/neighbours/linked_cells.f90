@@ -1,0 +1,99 @@
+!> Linked cells: all boxes are binned into a grid at every step, and each is compared with those of its own and
+!> of the neighbouring cells (`polydem_cell_grids`).
+!>
+!> Cells are no smaller than the largest free box, apart for width and height. That is the weakness of the method:
+!> with one free box as large as the scene there is one cell, and all pairs are compared. `hierarchical_grid`
+!> is the remedy. Nothing is kept between steps but the list of pairs, whose differences are the changes.
+module polydem_linked_cells
+   use polydem_box_pairs, only: box_pairs_t, record_differences
+   use polydem_boxes, only: boxes_t
+   use polydem_cell_grids, only: cell_grids_t, part
+   use polydem_finder, only: finder_t
+   use polydem_kinds, only: ip, lp, worth_threads
+   use polydem_pair_changes, only: pair_changes_t
+   use polydem_work, only: count_bytes, count_candidates, count_depth, count_nodes, count_rebuilds, count_searches, &
+      count_tests, count_visits, phase_filter, phase_search, phase_structure
+   implicit none
+   private
+   public :: linked_cells_t
+
+   !> Finder that bins all boxes anew at every step
+   type, extends(finder_t) :: linked_cells_t
+      !> The grid; several in extensions
+      type(cell_grids_t) :: grids
+      !> Overlapping boxes of this step and of the step before; which is which alternates
+      type(box_pairs_t), private :: list(2)
+      !> Place of this step in `list`
+      integer, private :: now = 1
+      !> Changes that each thread recorded
+      type(pair_changes_t), allocatable, private :: part_changes(:)
+   contains
+      procedure :: find
+      procedure :: survey
+   end type linked_cells_t
+
+contains
+
+   !> Bin the boxes, search for pairs, put them in order and record the differences to the step before.
+   subroutine find(self, boxes, changes)
+      class(linked_cells_t), intent(inout) :: self
+      type(boxes_t), intent(in) :: boxes
+      type(pair_changes_t), intent(inout) :: changes
+
+      if (.not. allocated(self%list(1)%first)) then
+         call self%list(1)%start(boxes%n)
+         call self%list(2)%start(boxes%n)
+      end if
+      if (self%grids%n_levels == 0) call self%grids%set_levels(1, spread(1_ip, 1, boxes%n), boxes%fixed(1:boxes%n))
+      call self%grids%build(boxes%n, boxes%bounds)
+      call self%work%add(count_rebuilds, 1_lp)
+      call self%work%lap(phase_structure)
+      call self%grids%search(boxes)
+      self%work%value(count_tests) = self%grids%total%tests
+      self%work%value(count_visits) = self%grids%total%visits
+      self%work%value(count_searches) = self%grids%total%searches
+      call self%work%lap(phase_search)
+      self%now = 3 - self%now
+      call self%list(self%now)%gather(self%grids%found)
+      call record_rows(self, boxes, changes)
+      call self%work%lap(phase_filter)
+   end subroutine find
+
+   !> Sort the rows of the list and compare them with those of the step before.
+   subroutine record_rows(self, boxes, changes)
+      class(linked_cells_t), intent(inout) :: self
+      type(boxes_t), intent(in) :: boxes
+      type(pair_changes_t), intent(inout) :: changes
+      integer(ip) :: low, high
+      integer :: w
+
+      if (allocated(self%part_changes)) then
+         if (size(self%part_changes) /= size(self%grids%found)) deallocate (self%part_changes)
+      end if
+      if (.not. allocated(self%part_changes)) allocate (self%part_changes(size(self%grids%found)))
+      !$omp parallel do if (boxes%n > worth_threads) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes) private(w, low, high)
+      do w = 1, size(self%part_changes)
+         call self%part_changes(w)%clear()
+         call part(1_ip, boxes%n, size(self%part_changes), w, low, high)
+         call self%list(self%now)%sort_rows(low, high)
+         call record_differences(self%list(3 - self%now), self%list(self%now), low, high, boxes%body, &
+                                 self%part_changes(w))
+      end do
+      !$omp end parallel do
+      do w = 1, size(self%part_changes)
+         call changes%append(self%part_changes(w))
+      end do
+   end subroutine record_rows
+
+   !> Pairs kept from step to step, cells, grids and memory.
+   subroutine survey(self)
+      class(linked_cells_t), intent(inout) :: self
+
+      self%work%value(count_candidates) = int(self%list(self%now)%n(), lp)
+      self%work%value(count_nodes) = int(self%grids%n_cells, lp)
+      self%work%value(count_depth) = int(self%grids%n_levels, lp)
+      self%work%value(count_bytes) = self%list(1)%bytes() + self%list(2)%bytes() + self%grids%bytes()
+   end subroutine survey
+
+end module polydem_linked_cells
