@@ -7,6 +7,9 @@
 !> Two polygons that share a point always have boxes that share a point. For whole bodies this follows from
 !> rounding being monotonic. Boxes of pieces are padded by a few rounding errors of the size of the body, so
 !> that no gap opens between them when they are turned.
+!>
+!> For interactions with a range all boxes can be enlarged by a margin: bodies whose distance is less than two
+!> margins then have boxes that overlap.
 module polydem_make_boxes
    use polydem_bodies, only: bodies_t
    use polydem_boxes, only: boxes_t
@@ -34,20 +37,22 @@ module polydem_make_boxes
       integer(ip), allocatable :: piece_start(:)
       !> Vertices of the pieces in the frame of their body, (2, vertex) [m]
       real(wp), allocatable :: piece(:, :)
-      !> By how much the box of each piece is enlarged [m]
+      !> By how much each box is enlarged on each side [m]
       real(wp), allocatable :: padding(:)
    end type box_maker_t
 
 contains
 
    !> Decide which bodies are cut, make room for all boxes and fill them.
-   subroutine new_box_maker(maker, bodies, largest_ratio, boxes, error)
+   subroutine new_box_maker(maker, bodies, largest_ratio, margin, boxes, error)
       !> What `update_boxes` will need
       type(box_maker_t), intent(out) :: maker
       !> Bodies at their present place
       type(bodies_t), intent(in) :: bodies
       !> A body longer than this many median diameters of the free bodies is cut
       real(wp), intent(in) :: largest_ratio
+      !> By how much every box is larger on each side [m]
+      real(wp), intent(in) :: margin
       !> Boxes of all bodies
       type(boxes_t), intent(out) :: boxes
       !> Allocated if a body is so large that it had to be cut into too many pieces
@@ -65,7 +70,7 @@ contains
          all_slots(s) = s
          boxes%body(maker%first_box(s):maker%first_box(s + 1_ip) - 1_ip) = s
          boxes%fixed(maker%first_box(s):maker%first_box(s + 1_ip) - 1_ip) = bodies%fixed(s)
-         call set_reach(maker, s, body_shape(bodies, s), boxes%reach)
+         call set_reach(maker, s, body_shape(bodies, s), margin, boxes%reach)
       end do
       call update_boxes(maker, bodies, all_slots, boxes)
    end subroutine new_box_maker
@@ -116,23 +121,23 @@ contains
    end subroutine refuse
 
    !> Set the padding and the reach of the boxes of a body.
-   pure subroutine set_reach(maker, s, vertices, reach)
+   pure subroutine set_reach(maker, s, vertices, margin, reach)
       type(box_maker_t), intent(inout) :: maker
       integer(ip), intent(in) :: s
-      real(wp), intent(in) :: vertices(:, :)
+      real(wp), intent(in) :: vertices(:, :), margin
       !> Reach of all boxes [m]
       real(wp), intent(inout) :: reach(:)
-      real(wp) :: length
+      real(wp) :: length, part
       integer(ip) :: b, first, last
 
       length = diameter(vertices)
       do b = maker%first_box(s), maker%first_box(s + 1_ip) - 1_ip
          first = maker%piece_start(b)
          last = maker%piece_start(b + 1_ip) - 1_ip
-         maker%padding(b) = merge(roundings*epsilon(1.0_wp)*length, 0.0_wp, last >= first)
-         reach(b) = 0.5_wp*length
-         if (last >= first) reach(b) = 0.5_wp*diameter(maker%piece(:, first:last)) + maker%padding(b)
-         reach(b) = reach(b)*(1.0_wp + roundings*epsilon(1.0_wp))
+         maker%padding(b) = margin + merge(roundings*epsilon(1.0_wp)*length, 0.0_wp, last >= first)
+         part = length
+         if (last >= first) part = diameter(maker%piece(:, first:last))
+         reach(b) = (0.5_wp*part + maker%padding(b))*(1.0_wp + roundings*epsilon(1.0_wp))
       end do
    end subroutine set_reach
 
@@ -155,7 +160,7 @@ contains
          b = maker%first_box(s)
          if (maker%piece_start(b + 1_ip) == maker%piece_start(b)) then
             call bound(bodies%turned(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip), &
-                       0.0_wp, bodies%position(:, s), boxes%bounds(:, b))
+                       maker%padding(b), bodies%position(:, s), boxes%bounds(:, b))
             cycle
          end if
          do b = maker%first_box(s), maker%first_box(s + 1_ip) - 1_ip

@@ -1,23 +1,28 @@
 !> Granular gas: grains with random velocities and no total momentum, spread over a closed box.
+!>
+!> Grains that may overlap at the start lie on a lattice that is as dense as the fraction asks for, and the walls half
+!> a long axis outside the box that this fraction is of, so that no grain reaches into them.
 module polydem_gas
    use polydem_body_list, only: body_list_t
+   use polydem_cut_cells, only: spread_cells
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_grains, only: append_grains, draw_grains, grain_t
+   use polydem_grains, only: append_grains, draw_grains, draw_sizes, grain_t
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: fill_lattice, row_height
-   use polydem_pour, only: draw_velocities, loose_spacing, shake
+   use polydem_pour, only: looseness, loose_spacing, shake
    use polydem_random, only: new_random, random_t
    use polydem_settings, only: scene_settings_t
+   use polydem_start_velocities, only: choose_movers, draw_spins, draw_velocities, remove_momentum, set_speed
    use polydem_walls, only: append_box, rectangle
    implicit none
    private
-   public :: list_gas
+   public :: list_gas, total_area, append_flying
 
 contains
 
    !> List the bodies of the gas: grains first, then floor, left wall, right wall, lid. The centre is at 0.
    subroutine list_gas(scene, list, error)
-      !> Settings: bodies (grains), fraction (of the box that the polygons cover), width, speed, grains
+      !> Settings: bodies (grains), fraction (of the box that the polygons cover), width, speed, spin, grains
       type(scene_settings_t), intent(in) :: scene
       !> List to extend
       type(body_list_t), intent(inout) :: list
@@ -25,30 +30,61 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(random_t) :: random
       type(grain_t), allocatable :: grains(:)
-      real(wp), allocatable :: centres(:, :), velocities(:, :)
+      real(wp), allocatable :: centres(:, :)
       real(wp) :: area, width, inside(2, 4), spacing
 
-      allocate (grains(scene%bodies), centres(2, scene%bodies), velocities(2, scene%bodies))
+      allocate (grains(scene%bodies), centres(2, scene%bodies))
       random = new_random(scene%seed)
-      call draw_grains(scene, random, grains)
+      call draw_grains(scene, random, grains, draw_sizes(scene%size_ratio, scene%bodies))
       area = total_area(grains)/scene%fraction
       width = scene%width
       if (.not. width > 0.0_wp) width = sqrt(area)
       inside = rectangle(-0.5_wp*width, 0.5_wp*width, -0.5_wp*area/width, 0.5_wp*area/width)
-      call spread_out(inside, loose_spacing(scene), centres, spacing)
+      if (scene%size_ratio > 1.0_wp) then
+         call spread_cells(inside, looseness*grains%length, random, centres, spacing)
+      else if (scene%overlap) then
+         call spread_out(inside, 0.0_wp, centres, spacing)
+         call shake(random, spacing, centres)
+         inside = inside + 0.5_wp*scene%long_axis_max*sign(1.0_wp, inside)
+      else
+         call spread_out(inside, loose_spacing(scene), centres, spacing)
+         call shake(random, spacing - scene%long_axis_max, centres)
+      end if
       if (.not. spacing > 0.0_wp) then
          call raise(error, input_error, 'fraction is too large for grains that must not overlap at the start')
          return
       end if
-      call shake(random, spacing - scene%long_axis_max, centres)
-      call draw_velocities(random, 1.0_wp, velocities)
-      call remove_momentum(grains, velocities)
-      call set_speed(scene%speed, velocities)
-      call append_grains(list, grains, centres, velocities, scene%density)
-      call append_box(list, inside, scene%long_axis_max, closed=.true.)
+      call append_flying(list, scene, random, grains, centres)
+      call append_box(list, inside, scene%long_axis_max*sqrt(scene%size_ratio), closed=.true.)
    end subroutine list_gas
 
+   !> Append grains with random velocities and angular velocities; no total momentum unless only one moves.
+   subroutine append_flying(list, scene, random, grains, centres)
+      !> List to extend
+      type(body_list_t), intent(inout) :: list
+      !> Settings: speed, spin, movers
+      type(scene_settings_t), intent(in) :: scene
+      !> Stream of random numbers
+      type(random_t), intent(inout) :: random
+      !> Grains
+      type(grain_t), intent(in) :: grains(:)
+      !> Their centres, (2, grain) [m]
+      real(wp), intent(in) :: centres(:, :)
+      real(wp), allocatable :: velocities(:, :), spins(:)
+      logical, allocatable :: moves(:)
+
+      allocate (velocities(2, size(grains)), spins(size(grains)))
+      call draw_velocities(random, 1.0_wp, velocities)
+      moves = choose_movers(size(grains, kind=ip), scene%movers)
+      if (count(moves) > 1) call remove_momentum(grains, moves, velocities)
+      call set_speed(scene%speed, moves, velocities)
+      call draw_spins(random, scene%spin, spins)
+      call append_grains(list, scene, grains, centres, velocities, spins)
+   end subroutine append_flying
+
+   !> Area of all grains [m2]
    pure real(wp) function total_area(grains)
+      !> Grains
       type(grain_t), intent(in) :: grains(:)
       integer :: k
 
@@ -75,40 +111,5 @@ contains
       end do
       spacing = 0.0_wp
    end subroutine spread_out
-
-   !> Subtract the velocity of the common centre of mass. All grains have the same density.
-   pure subroutine remove_momentum(grains, velocities)
-      type(grain_t), intent(in) :: grains(:)
-      real(wp), intent(inout) :: velocities(:, :)
-      real(wp) :: drift(2)
-      integer :: k
-
-      drift = 0.0_wp
-      do k = 1, size(grains)
-         drift = drift + grains(k)%area*velocities(:, k)
-      end do
-      drift = drift/total_area(grains)
-      do k = 1, size(grains)
-         velocities(:, k) = velocities(:, k) - drift
-      end do
-   end subroutine remove_momentum
-
-   !> Scale the velocities to a given root of the mean square of the speed; a single grain stays at rest.
-   pure subroutine set_speed(speed, velocities)
-      real(wp), intent(in) :: speed
-      real(wp), intent(inout) :: velocities(:, :)
-      real(wp) :: squares
-      integer :: k
-
-      squares = 0.0_wp
-      do k = 1, size(velocities, 2)
-         squares = squares + velocities(1, k)**2 + velocities(2, k)**2
-      end do
-      if (size(velocities, 2) < 2) then
-         velocities = 0.0_wp
-      else
-         velocities = speed*sqrt(real(size(velocities, 2), wp)/squares)*velocities
-      end if
-   end subroutine set_speed
 
 end module polydem_gas

@@ -1,29 +1,33 @@
-!> Loose grains on a lattice inside a convex outline, which is how every scene with falling grains starts.
+!> Grains inside a convex outline, which is how every scene with falling grains starts: loose on a lattice, loose in
+!> cells of many sizes, or packed as in a former result.
 module polydem_pour
    use polydem_body_list, only: body_list_t
+   use polydem_cut_cells, only: spread_cells
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_grains, only: append_grains, draw_grains, grain_t
+   use polydem_grains, only: append_grains, draw_grains, draw_sizes, grain_t
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: fill_lattice
+   use polydem_packing, only: pack_grains, turn_along
    use polydem_random, only: new_random, random_t
    use polydem_settings, only: scene_settings_t
+   use polydem_start_velocities, only: draw_velocities
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: pour_grains, loose_spacing, shake, draw_velocities
+   public :: pour_grains, loose_spacing, looseness, shake
 
    !> Distance of loose grains over the greatest diameter of a grain
    real(wp), parameter :: looseness = 1.02_wp
 
 contains
 
-   !> Append n free grains without overlaps, from the bottom of the outline up, with random velocities.
+   !> Append n free grains, from the bottom of the outline up, with random velocities.
    subroutine pour_grains(list, scene, outline, n, error)
       !> List to extend
       type(body_list_t), intent(inout) :: list
-      !> Grains, seed and speed
+      !> Grains, seed, speed, packing
       type(scene_settings_t), intent(in) :: scene
-      !> Corners of the convex outline, anticlockwise, (2, corner) [m]
+      !> Corners of the convex outline, anticlockwise, (2, corner) [m]; upright rectangle if grains differ in size
       real(wp), intent(in) :: outline(:, :)
       !> Number of grains
       integer(ip), intent(in) :: n
@@ -31,22 +35,61 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(random_t) :: random
       type(grain_t), allocatable :: grains(:)
-      real(wp), allocatable :: centres(:, :), velocities(:, :)
+      real(wp), allocatable :: centres(:, :), velocities(:, :), spins(:)
+
+      allocate (grains(n), centres(2, n), velocities(2, n), spins(n))
+      random = new_random(scene%seed)
+      if (scene%packing /= '') then
+         call pack_grains(scene, outline, grains, centres, error)
+      else if (scene%size_ratio > 1.0_wp) then
+         call pour_sizes(scene, outline, random, grains, centres, error)
+      else
+         call pour_loosely(scene, outline, random, grains, centres, error)
+      end if
+      if (allocated(error)) return
+      call draw_velocities(random, scene%speed, velocities)
+      spins = 0.0_wp
+      if (scene%packing /= '') call turn_along(scene, centres, velocities, spins)
+      call append_grains(list, scene, grains, centres, velocities, spins)
+   end subroutine pour_grains
+
+   !> Loose grains on a lattice, from the bottom up.
+   subroutine pour_loosely(scene, outline, random, grains, centres, error)
+      type(scene_settings_t), intent(in) :: scene
+      real(wp), intent(in) :: outline(:, :)
+      type(random_t), intent(inout) :: random
+      type(grain_t), intent(out) :: grains(:)
+      real(wp), intent(out) :: centres(:, :)
+      type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: n_found
 
-      allocate (grains(n), centres(2, n), velocities(2, n))
       call fill_lattice(outline, loose_spacing(scene), centres, n_found)
-      if (n_found < n) then
+      if (n_found < size(grains)) then
          call raise(error, input_error, 'there is room for '//to_text(n_found)//' loose grains, not for ' &
-                    //to_text(n)//': make the container larger or the grains fewer')
+                    //to_text(size(grains, kind=ip))//': make the container larger or the grains fewer')
          return
       end if
-      random = new_random(scene%seed)
       call draw_grains(scene, random, grains)
       call shake(random, loose_spacing(scene) - scene%long_axis_max, centres)
-      call draw_velocities(random, scene%speed, velocities)
-      call append_grains(list, grains, centres, velocities, scene%density)
-   end subroutine pour_grains
+   end subroutine pour_loosely
+
+   !> Loose grains of many sizes all over an upright rectangle.
+   subroutine pour_sizes(scene, outline, random, grains, centres, error)
+      type(scene_settings_t), intent(in) :: scene
+      real(wp), intent(in) :: outline(:, :)
+      type(random_t), intent(inout) :: random
+      type(grain_t), intent(out) :: grains(:)
+      real(wp), intent(out) :: centres(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: spread
+
+      call draw_grains(scene, random, grains, draw_sizes(scene%size_ratio, size(grains, kind=ip)))
+      call spread_cells(outline, looseness*grains%length, random, centres, spread)
+      if (.not. spread > 0.0_wp) then
+         call raise(error, input_error, 'there is no room for grains of such different sizes: make the container '// &
+                    'larger or the grains fewer')
+      end if
+   end subroutine pour_sizes
 
    !> Distance of the centres of loose grains on the lattice [m]
    pure real(wp) function loose_spacing(scene)
@@ -74,21 +117,5 @@ contains
          centres(2, k) = centres(2, k) + random%between(-most, most)
       end do
    end subroutine shake
-
-   !> Draw velocities from a normal distribution.
-   subroutine draw_velocities(random, speed, velocities)
-      !> Stream of random numbers
-      type(random_t), intent(inout) :: random
-      !> Expected root of the mean square of the speed [m/s]
-      real(wp), intent(in) :: speed
-      !> Velocities, (2, :) [m/s]
-      real(wp), intent(out) :: velocities(:, :)
-      integer :: k
-
-      do k = 1, size(velocities, 2)
-         velocities(1, k) = sqrt(0.5_wp)*speed*random%normal()
-         velocities(2, k) = sqrt(0.5_wp)*speed*random%normal()
-      end do
-   end subroutine draw_velocities
 
 end module polydem_pour

@@ -7,6 +7,7 @@ module polydem_scene
    use polydem_bodies, only: bodies_t
    use polydem_bodies_file, only: read_bodies_file
    use polydem_body_list, only: body_list_t, new_bodies
+   use polydem_channel, only: list_channel
    use polydem_drum, only: list_drum
    use polydem_errors, only: error_t, input_error, raise
    use polydem_gas, only: list_gas
@@ -68,6 +69,8 @@ contains
          call list_hopper(settings%scene, list, error)
       case ('gas')
          call list_gas(settings%scene, list, error)
+      case ('channel')
+         call list_channel(settings%scene, list, error)
       case ('bed')
          call list_bed(settings%scene, list, error)
       case ('heap')

@@ -1,0 +1,157 @@
+!> A container filled with copies of a settled patch, so that a large scene starts nearly at rest.
+!>
+!> The copies stand side by side and on top of each other; kept are the grains wholly inside the container, the
+!> lowest first. Time and memory grow with the number of grains.
+module polydem_packing
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_grains, only: grain_t, pi
+   use polydem_kinds, only: ip, wp
+   use polydem_patch, only: patch_t, read_patch
+   use polydem_settings, only: scene_settings_t
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: pack_grains, fill_with_patch, turn_along
+
+   !> A convex outline, prepared to be asked what lies inside
+   type :: outline_t
+      !> Corners, anticlockwise, (2, corner) [m]
+      real(wp), allocatable :: corners(:, :)
+      !> Outward unit normal of the edge behind each corner, (2, corner)
+      real(wp), allocatable :: normals(:, :)
+      !> Middle of the bounding box [m]
+      real(wp) :: middle(2) = 0.0_wp
+      !> Radius of the greatest circle about it [m]
+      real(wp) :: radius = 0.0_wp
+   end type outline_t
+
+contains
+
+   !> Grains and their places from the packing that the scene names.
+   subroutine pack_grains(scene, corners, grains, centres, error)
+      !> Path of the packing
+      type(scene_settings_t), intent(in) :: scene
+      !> Corners of the container, convex, anticlockwise, (2, corner) [m]
+      real(wp), intent(in) :: corners(:, :)
+      !> Grains, as many as wanted
+      type(grain_t), intent(out) :: grains(:)
+      !> Their centres, (2, grain) [m]
+      real(wp), intent(out) :: centres(:, :)
+      !> If there is no packing, or no room for all
+      type(error_t), allocatable, intent(inout) :: error
+      type(patch_t) :: patch
+      integer(ip), allocatable :: source(:)
+      integer(ip) :: k, n_found
+
+      call read_patch(scene%packing, patch, error)
+      if (allocated(error)) return
+      allocate (source(size(grains)))
+      call fill_with_patch(corners, patch, centres, source, n_found)
+      if (n_found < size(grains)) then
+         call raise(error, input_error, 'there is room for '//to_text(n_found)//' packed grains, not for ' &
+                    //to_text(size(grains, kind=ip))//': make the container larger or the grains fewer')
+         return
+      end if
+      do k = 1_ip, size(grains, kind=ip)
+         grains(k) = patch%grains(source(k))
+      end do
+   end subroutine pack_grains
+
+   !> Fill a container with copies of a patch, from the bottom up, until there are enough grains.
+   pure subroutine fill_with_patch(corners, patch, centres, source, n_found)
+      !> Corners of the container, convex, anticlockwise, (2, corner) [m]
+      real(wp), intent(in) :: corners(:, :)
+      !> Patch, with grains from the lowest to the highest
+      type(patch_t), intent(in) :: patch
+      !> Centres of the copies, (2, wanted) [m]
+      real(wp), intent(out) :: centres(:, :)
+      !> Grain of the patch that each is a copy of, (wanted)
+      integer(ip), intent(out) :: source(:)
+      !> Number of copies, less than wanted if the container is full
+      integer(ip), intent(out) :: n_found
+      type(outline_t) :: outline
+      real(wp) :: place(2), origin(2)
+      integer(ip) :: row, column, columns, k
+
+      n_found = 0_ip
+      outline = new_outline(corners)
+      columns = ceiling((maxval(corners(1, :)) - minval(corners(1, :)))/patch%period(1), ip)
+      origin = [outline%middle(1) - 0.5_wp*real(columns, wp)*patch%period(1), minval(corners(2, :))]
+      row = 0_ip
+      do while (origin(2) + real(row, wp)*patch%period(2) < maxval(corners(2, :)))
+         do k = 1_ip, size(patch%grains, kind=ip)
+            do column = 0_ip, columns - 1_ip
+               if (n_found == size(source)) return
+               place = origin + patch%centres(:, k) + real([column, row], wp)*patch%period
+               if (.not. holds(outline, patch%grains(k), place)) cycle
+               n_found = n_found + 1_ip
+               centres(:, n_found) = place
+               source(n_found) = k
+            end do
+         end do
+         row = row + 1_ip
+      end do
+   end subroutine fill_with_patch
+
+   !> Where walls turn from the start, have the grains turn with them as one rigid body: their contacts stay as they
+   !> are.
+   pure subroutine turn_along(scene, centres, velocities, spins)
+      !> Prescribed motion
+      type(scene_settings_t), intent(in) :: scene
+      !> Centres of the grains, (2, grain) [m]
+      real(wp), intent(in) :: centres(:, :)
+      !> Velocities, to which those of the rotation are added, (2, grain) [m/s]
+      real(wp), intent(inout) :: velocities(:, :)
+      !> Angular velocities, likewise [rad/s]
+      real(wp), intent(inout) :: spins(:)
+      real(wp) :: rate
+
+      if (scene%motion /= 'rotation' .or. max(scene%motion_start, scene%motion_ramp) > 0.0_wp) return
+      rate = 2.0_wp*pi*scene%motion_rate
+      velocities(1, :) = velocities(1, :) - rate*(centres(2, :) - scene%motion_pivot(2))
+      velocities(2, :) = velocities(2, :) + rate*(centres(1, :) - scene%motion_pivot(1))
+      spins = spins + rate
+   end subroutine turn_along
+
+   pure function new_outline(corners) result(outline)
+      real(wp), intent(in) :: corners(:, :)
+      type(outline_t) :: outline
+      real(wp) :: edge(2)
+      integer :: k
+
+      outline%corners = corners
+      outline%middle = 0.5_wp*(minval(corners, 2) + maxval(corners, 2))
+      outline%radius = huge(1.0_wp)
+      allocate (outline%normals(2, size(corners, 2)))
+      do k = 1, size(corners, 2)
+         edge = corners(:, modulo(k, size(corners, 2)) + 1) - corners(:, k)
+         outline%normals(:, k) = [edge(2), -edge(1)]/hypot(edge(1), edge(2))
+         outline%radius = min(outline%radius, outline%normals(1, k)*(corners(1, k) - outline%middle(1)) &
+                              + outline%normals(2, k)*(corners(2, k) - outline%middle(2)))
+      end do
+   end function new_outline
+
+   !> Whether a grain lies wholly inside; the circle decides for nearly all
+   pure logical function holds(outline, grain, place)
+      type(outline_t), intent(in) :: outline
+      type(grain_t), intent(in) :: grain
+      real(wp), intent(in) :: place(2)
+      real(wp) :: arm(2), reach
+      integer :: k, v
+
+      arm = place - outline%middle
+      holds = hypot(arm(1), arm(2)) + 0.5_wp*grain%length <= outline%radius
+      if (holds) return
+      do k = 1, size(outline%corners, 2)
+         arm = place - outline%corners(:, k)
+         reach = -huge(1.0_wp)
+         do v = 1, size(grain%corners, 2)
+            reach = max(reach, outline%normals(1, k)*(arm(1) + grain%corners(1, v)) &
+                        + outline%normals(2, k)*(arm(2) + grain%corners(2, v)))
+         end do
+         if (reach > 0.0_wp) return
+      end do
+      holds = .true.
+   end function holds
+
+end module polydem_packing

@@ -1,0 +1,113 @@
+!> Velocities of grains at the start.
+module polydem_start_velocities
+   use polydem_grains, only: grain_t
+   use polydem_kinds, only: ip, wp
+   use polydem_random, only: random_t
+   implicit none
+   private
+   public :: draw_velocities, draw_spins, choose_movers, remove_momentum, set_speed
+
+contains
+
+   !> Draw velocities from a normal distribution.
+   subroutine draw_velocities(random, speed, velocities)
+      !> Stream of random numbers
+      type(random_t), intent(inout) :: random
+      !> Expected root of the mean square of the speed [m/s]
+      real(wp), intent(in) :: speed
+      !> Velocities, (2, :) [m/s]
+      real(wp), intent(out) :: velocities(:, :)
+      integer :: k
+
+      do k = 1, size(velocities, 2)
+         velocities(1, k) = sqrt(0.5_wp)*speed*random%normal()
+         velocities(2, k) = sqrt(0.5_wp)*speed*random%normal()
+      end do
+   end subroutine draw_velocities
+
+   !> Draw angular velocities from a normal distribution and scale them to a given root of the mean square.
+   subroutine draw_spins(random, spin, spins)
+      !> Stream of random numbers
+      type(random_t), intent(inout) :: random
+      !> Root of the mean square of the angular velocities [rad/s]
+      real(wp), intent(in) :: spin
+      !> Angular velocities [rad/s]
+      real(wp), intent(out) :: spins(:)
+      real(wp) :: squares
+      integer :: k
+
+      spins = 0.0_wp
+      if (.not. spin > 0.0_wp) return
+      squares = 0.0_wp
+      do k = 1, size(spins)
+         spins(k) = random%normal()
+         squares = squares + spins(k)**2
+      end do
+      spins = spin*sqrt(real(size(spins), wp)/squares)*spins
+   end subroutine draw_spins
+
+   !> Choose the grains that get a speed, evenly spaced in their order; one alone is in the middle. The only grain of
+   !> a scene rests unless it is asked to move.
+   pure function choose_movers(n, movers) result(moves)
+      !> Number of grains
+      integer(ip), intent(in) :: n
+      !> Number of those that move, at most n; 0: all
+      integer(ip), intent(in) :: movers
+      logical :: moves(n)
+      integer(ip) :: k
+
+      moves = movers == 0_ip .and. n > 1_ip
+      do k = 1_ip, movers
+         moves(ceiling((real(k, wp) - 0.5_wp)*real(n, wp)/real(movers, wp), ip)) = .true.
+      end do
+   end function choose_movers
+
+   !> Subtract the velocity of the common centre of mass of those that move, at least one. All grains have the same
+   !> density.
+   pure subroutine remove_momentum(grains, moves, velocities)
+      !> Grains
+      type(grain_t), intent(in) :: grains(:)
+      !> Which of them move
+      logical, intent(in) :: moves(:)
+      !> Velocities, (2, grain) [m/s]
+      real(wp), intent(inout) :: velocities(:, :)
+      real(wp) :: drift(2), area
+      integer :: k
+
+      drift = 0.0_wp
+      area = 0.0_wp
+      do k = 1, size(grains)
+         if (.not. moves(k)) cycle
+         drift = drift + grains(k)%area*velocities(:, k)
+         area = area + grains(k)%area
+      end do
+      drift = drift/area
+      do k = 1, size(grains)
+         velocities(:, k) = velocities(:, k) - drift
+      end do
+   end subroutine remove_momentum
+
+   !> Scale the velocities of those that move to a given root of the mean square of their speed, which stays 0
+   !> if it is; the others rest.
+   pure subroutine set_speed(speed, moves, velocities)
+      !> Root of the mean square of the speed [m/s]
+      real(wp), intent(in) :: speed
+      !> Which grains move
+      logical, intent(in) :: moves(:)
+      !> Velocities, (2, grain) [m/s]
+      real(wp), intent(inout) :: velocities(:, :)
+      real(wp) :: squares
+      integer :: k, n_moving
+
+      squares = 0.0_wp
+      n_moving = 0
+      do k = 1, size(velocities, 2)
+         if (.not. moves(k)) velocities(:, k) = 0.0_wp
+         if (.not. moves(k)) cycle
+         squares = squares + velocities(1, k)**2 + velocities(2, k)**2
+         n_moving = n_moving + 1
+      end do
+      if (squares > 0.0_wp) velocities = speed*sqrt(real(n_moving, wp)/squares)*velocities
+   end subroutine set_speed
+
+end module polydem_start_velocities
