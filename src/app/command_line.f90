@@ -12,7 +12,7 @@ module polydem_command_line
 
    !> What the user asks for
    type :: command_t
-      !> run, check, info or replay; empty if only help or the version is wanted
+      !> run, check, info, replay or bench; empty if only help or the version is wanted
       character(len=:), allocatable :: verb
       !> Namelist, result or trace; empty if none is given
       character(len=:), allocatable :: file
@@ -26,6 +26,12 @@ module polydem_command_line
       character(len=:), allocatable :: finder
       !> How often a replay is repeated
       integer :: repeat = 1
+      !> Steps of a replay; 0: all of the trace
+      integer :: steps = 0
+      !> Folder for the samples of a replay; empty: none
+      character(len=:), allocatable :: samples
+      !> Whether a replay compares every list with that of all pairs
+      logical :: oracle = .false.
       !> Whether help is wanted, on the verb or on all
       logical :: help = .false.
       !> Whether the version is wanted
@@ -50,7 +56,9 @@ module polydem_command_line
       'read a namelist file, build its scene and say what a run would do; run nothing'), &
       verb_t('info', '[RESULT.h5]', .true., 'describe this program, or a result file'), &
       verb_t('replay', 'TRACE.h5', .false., &
-      'replay recorded boxes through a neighbour finder and check every step')]
+      'replay recorded boxes through a neighbour finder and check every step'), &
+      verb_t('bench', 'FILE.nml', .false., &
+      'measure neighbour finders on the scenes of a namelist file; if interrupted, go on')]
 
    !> One option
    type :: option_t
@@ -59,21 +67,24 @@ module polydem_command_line
       !> Name of its value; blank if it takes none
       character(len=16) :: value
       !> Verbs that take it
-      character(len=24) :: verbs
+      character(len=32) :: verbs
       !> What it does
       character(len=88) :: meaning
    end type option_t
 
-   character(len=*), parameter :: all_verbs = 'run check info replay'
+   character(len=*), parameter :: all_verbs = 'run check info replay bench'
 
    type(option_t), parameter :: options(*) = [ &
-      option_t('--set', 'GROUP.KEY=VALUE', 'run check', &
+      option_t('--set', 'GROUP.KEY=VALUE', 'run check bench', &
       'override an entry of the namelist; may be repeated'), &
       option_t('--threads', 'T', 'run check replay', &
       'number of threads (default: all that the system offers; replay: one)'), &
       option_t('--force', '', 'run', 'overwrite results that are there already'), &
       option_t('--finder', 'NAME', 'replay', 'neighbour finder (default: quadtree)'), &
       option_t('--repeat', 'R', 'replay', 'how often the trace is replayed (default: 1)'), &
+      option_t('--steps', 'N', 'replay', 'replay the first steps of the trace only (default: all)'), &
+      option_t('--samples', 'FOLDER', 'replay', 'write one file of measurements per replay (default: none)'), &
+      option_t('--oracle', '', 'replay', 'compare every list with that of all pairs, whatever the trace knows'), &
       option_t('--help', '', all_verbs, 'show this help'), &
       option_t('--version', '', all_verbs, 'show the version')]
 
@@ -125,6 +136,7 @@ contains
       command%verb = ''
       command%file = ''
       command%finder = 'quadtree'
+      command%samples = ''
       used = .false.
       n_overrides = 0
       only_files = .false.
@@ -233,6 +245,12 @@ contains
             value//': there is no such finder'//suggestion(value, choices_of('neighbours', 'finder')))
       case ('--repeat')
          call read_count('--repeat', value, command%repeat, error)
+      case ('--steps')
+         call read_count('--steps', value, command%steps, error)
+      case ('--samples')
+         command%samples = value
+      case ('--oracle')
+         command%oracle = .true.
       case ('--help')
          command%help = .true.
       case default

@@ -3,11 +3,15 @@ program polydem
    use, intrinsic :: iso_c_binding, only: c_int
    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
    use omp_lib, only: omp_set_num_threads
+   use polydem_bench, only: run_bench
+   use polydem_bench_settings, only: bench_settings_t
    use polydem_build_info, only: git_revision, program_version
    use polydem_check, only: check_simulation
    use polydem_command_line, only: command_t, read_command_line, usage
    use polydem_errors, only: error_t
    use polydem_info, only: describe_program, describe_result
+   use polydem_kinds, only: ip
+   use polydem_read_bench, only: read_bench
    use polydem_read_settings, only: read_settings
    use polydem_replay, only: replay_trace
    use polydem_run, only: run_simulation
@@ -41,6 +45,7 @@ contains
       type(command_t), intent(in) :: command
       type(error_t), allocatable, intent(inout) :: error
       type(settings_t) :: settings
+      type(bench_settings_t) :: bench
 
       if (command%help) then
          write (output_unit, '(a)') usage(command%verb)
@@ -57,7 +62,11 @@ contains
          if (command%verb == 'check') call check_simulation(settings, error)
          if (command%verb == 'run') call run_simulation(settings, command%force, error)
       case ('replay')
-         call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error)
+         call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error, &
+                           int(command%steps, ip), command%samples, command%oracle)
+      case ('bench')
+         call read_bench(command%file, command%overrides, bench, error)
+         if (.not. allocated(error)) call run_bench(bench, error)
       case default
          if (command%file == '') call describe_program(error)
          if (command%file /= '') call describe_result(command%file, error)

@@ -39,6 +39,11 @@ contains
          call check_container(scene%radius, 'radius', scene, values, error)
          call check_container(scene%opening, 'opening', scene, values, error)
          if (any(scene%name == grain_scenes)) call check_container(scene%width, 'width', scene, values, error)
+         call require(scene%movers <= scene%bodies, 'must not exceed', 'movers', 'bodies', values, error)
+         call require(scene%size_ratio <= 1.0_wp .or. scene%packing == '', &
+            'above 1 does not go with', 'size_ratio', 'packing', values, error)
+         call require(scene%size_ratio <= 1.0_wp .or. .not. scene%overlap, &
+            'above 1 does not go with', 'size_ratio', 'overlap', values, error)
          associate (fastest => two_pi*scene%motion_frequency*maxval(abs(scene%motion_amplitude)))
             call require(scene%motion /= 'oscillation' .or. fastest < speed_limit, &
                'gives a speed of 1e6 m/s or more with', 'motion_amplitude', 'motion_frequency', values, error)

@@ -1,6 +1,7 @@
 !> The manual of the namelist entries: the table as Markdown.
 module polydem_entries_manual
    use polydem_namelist_entries, only: entries, entry_t, required
+   use polydem_namelist_values, only: is_text
    use polydem_strings, only: join, to_text
    use polydem_words, only: quoted, split_words
    implicit none
@@ -50,7 +51,7 @@ contains
 
       if (entry%default == required) then
          text = 'required'
-      else if (entry%type == 'word' .or. entry%type == 'path') then
+      else if (is_text(entry) .and. entry%count > 0) then
          text = '`'//quoted(trim(entry%default))//'`'
       else
          text = trim(entry%default)

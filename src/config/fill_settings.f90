@@ -1,16 +1,18 @@
 !> From the values of the table to the typed settings.
 module polydem_fill_settings
+   use polydem_bench_settings, only: bench_settings_t
    use polydem_kinds, only: ip, wp
    use polydem_namelist_entries, only: entries, first_row
    use polydem_namelist_values, only: value_t
    use polydem_settings, only: settings_t
+   use polydem_words, only: text_t
    implicit none
    private
-   public :: fill_settings
+   public :: fill_settings, fill_bench
 
    !> Take the value of an entry, given as 'group.key'.
    interface take
-      module procedure take_real, take_reals, take_integer, take_integers, take_logical, take_text
+      module procedure take_real, take_reals, take_integer, take_integers, take_logical, take_text, take_texts
    end interface take
 
 contains
@@ -24,7 +26,9 @@ contains
 
       call fill_scene(values, settings)
       call take(values, 'boxes.largest_ratio', settings%boxes%largest_ratio)
+      call take(values, 'boxes.margin', settings%boxes%margin)
       call take(values, 'neighbours.finder', settings%neighbours%finder)
+      call take(values, 'neighbours.skin', settings%neighbours%skin)
       call take(values, 'overlap.degenerate', settings%overlap%degenerate)
       associate (forces => settings%forces, integrate => settings%integrate, output => settings%output)
          call take(values, 'forces.gravity', forces%gravity)
@@ -45,8 +49,31 @@ contains
          call take(values, 'output.log_interval', output%log_interval)
          call take(values, 'output.contacts', output%contacts)
          call take(values, 'output.ledger', output%ledger)
+         call take(values, 'output.trace_steps', output%trace_steps)
+         call take(values, 'output.trace_start', output%trace_start)
+         call take(values, 'output.step_profile', output%step_profile)
       end associate
    end subroutine fill_settings
+
+   !> Fill every component of a bench from the entry of its name.
+   pure subroutine fill_bench(values, bench)
+      !> Values, (rows of the table)
+      type(value_t), intent(in) :: values(:)
+      !> Settings to fill; `file`, `text` and `resolved` stay
+      type(bench_settings_t), intent(inout) :: bench
+
+      call take(values, 'bench.scenes', bench%scenes)
+      call take(values, 'bench.names', bench%names)
+      call take(values, 'bench.prepare', bench%prepare)
+      call take(values, 'bench.finders', bench%finders)
+      call take(values, 'bench.threads', bench%threads)
+      call take(values, 'bench.repeats', bench%repeats)
+      call take(values, 'bench.mode', bench%mode)
+      call take(values, 'bench.steps', bench%steps)
+      call take(values, 'bench.folder', bench%folder)
+      bench%place_of_scenes = values(row_of(values, 'bench.scenes'))%place
+      bench%place_of_prepare = values(row_of(values, 'bench.prepare'))%place
+   end subroutine fill_bench
 
    pure subroutine fill_scene(values, settings)
       type(value_t), intent(in) :: values(:)
@@ -58,11 +85,14 @@ contains
          call take(values, 'scene.seed', scene%seed)
          call take(values, 'scene.boxes', scene%boxes)
          call take(values, 'scene.bodies', scene%bodies)
+         call take(values, 'scene.packing', scene%packing)
          call take(values, 'scene.corners_min', scene%corners_min)
          call take(values, 'scene.corners_max', scene%corners_max)
          call take(values, 'scene.short_axis', scene%short_axis)
          call take(values, 'scene.long_axis_min', scene%long_axis_min)
          call take(values, 'scene.long_axis_max', scene%long_axis_max)
+         call take(values, 'scene.size_ratio', scene%size_ratio)
+         call take(values, 'scene.order', scene%order)
          call take(values, 'scene.density', scene%density)
          call take(values, 'scene.radius', scene%radius)
          call take(values, 'scene.width', scene%width)
@@ -70,7 +100,10 @@ contains
          call take(values, 'scene.opening', scene%opening)
          call take(values, 'scene.slope', scene%slope)
          call take(values, 'scene.fraction', scene%fraction)
+         call take(values, 'scene.overlap', scene%overlap)
          call take(values, 'scene.speed', scene%speed)
+         call take(values, 'scene.spin', scene%spin)
+         call take(values, 'scene.movers', scene%movers)
          call take(values, 'scene.motion', scene%motion)
          call take(values, 'scene.motion_bodies', scene%motion_bodies)
          call take(values, 'scene.motion_pivot', scene%motion_pivot)
@@ -130,6 +163,14 @@ contains
 
       component = values(row_of(values, name))%text
    end subroutine take_text
+
+   pure subroutine take_texts(values, name, component)
+      type(value_t), intent(in) :: values(:)
+      character(len=*), intent(in) :: name
+      type(text_t), allocatable, intent(inout) :: component(:)
+
+      component = values(row_of(values, name))%texts
+   end subroutine take_texts
 
    !> Row of an entry that is in force, or else its first row
    pure integer function row_of(values, name) result(row)

@@ -7,10 +7,10 @@ module polydem_namelist_entries
    use polydem_words, only: count_words, split_words
    implicit none
    private
-   public :: entry_t, entries, required, group_length, first_row, groups, keys_of, choices_of
+   public :: entry_t, entries, required, group_length, bench_group, first_row, groups, keys_of, choices_of
 
    !> Greatest lengths in the table
-   integer, parameter :: group_length = 10, key_length = 24, allowed_length = 72
+   integer, parameter :: group_length = 10, key_length = 24, allowed_length = 160
 
    !> One row of the table
    type :: entry_t
@@ -20,7 +20,7 @@ module polydem_namelist_entries
       character(len=key_length) :: key
       !> real, integer, logical, word (one of `allowed`) or path (any text)
       character(len=7) :: type
-      !> Number of values; 0: any number from one on, none unless given
+      !> Number of values; 0: any number from one on, none unless given or by default
       integer :: count
       !> Default as in a namelist, but without quotes; or `required`
       character(len=20) :: default
@@ -37,12 +37,19 @@ module polydem_namelist_entries
    !> Default of an entry that must be given while it is in force
    character(len=*), parameter :: required = '(required)'
 
-   character(len=*), parameter :: grains = 'name: drum hopper gas bed heap'
+   !> The group of a bench, which needs no other; no run takes it
+   character(len=*), parameter :: bench_group = 'bench'
+
+   character(len=*), parameter :: grains = 'name: drum hopper gas bed heap channel'
    character(len=*), parameter :: moving = 'motion: rotation translation oscillation'
+
+   !> The finders, as in `finder_names` of the room neighbours
+   character(len=*), parameter :: finders = 'all_pairs sort_and_sweep unsorted_sweep partitioned_sweep quadtree '// &
+      'quadtree_called pruned_quadtree binary_tree linked_cells verlet hierarchical_grid'
 
    !> Group &scene
    type(entry_t), parameter :: scene_entries(*) = [ &
-      entry_t('scene', 'name', 'word', 1, required, '', 'drum hopper gas bed heap incline stack file', '', &
+      entry_t('scene', 'name', 'word', 1, required, '', 'drum hopper gas bed heap channel incline stack file', '', &
       'Scene to make, or file to read the bodies from `bodies_file`'), &
       entry_t('scene', 'bodies_file', 'path', 1, required, '', '', 'name: file', &
       'HDF5 file of the bodies'), &
@@ -52,8 +59,10 @@ module polydem_namelist_entries
       'Number of boxes, those of walls included; 0: as many as `bodies` needs'), &
       entry_t('scene', 'bodies', 'integer', 1, '0', '', '>= 0', 'name: drum', &
       'Number of grains; 0: as many as `boxes` leaves'), &
-      entry_t('scene', 'bodies', 'integer', 1, required, '', '> 0', 'name: hopper gas bed heap stack', &
+      entry_t('scene', 'bodies', 'integer', 1, required, '', '> 0', 'name: hopper gas bed heap channel stack', &
       'Number of free bodies'), &
+      entry_t('scene', 'packing', 'path', 1, '', '', '', 'name: drum bed', &
+      'Result folder (or file) of a settled bed, whose copies fill the container; empty: loose grains'), &
       entry_t('scene', 'corners_min', 'integer', 1, '7', '', '>= 3, <= 64', grains, &
       'Least number of corners of a grain'), &
       entry_t('scene', 'corners_max', 'integer', 1, '12', '', '>= 3, <= 64', grains, &
@@ -64,6 +73,10 @@ module polydem_namelist_entries
       'Least long axis (full length) of the ellipse around a grain'), &
       entry_t('scene', 'long_axis_max', 'real', 1, '11e-3', 'm', '>= 1e-15, <= 1e12', grains, &
       'Greatest long axis (full length) of the ellipse around a grain'), &
+      entry_t('scene', 'size_ratio', 'real', 1, '1', '', '>= 1, <= 1000', 'name: gas bed', &
+      'Factor of both axes of the largest grain; each octave of sizes covers the same area'), &
+      entry_t('scene', 'order', 'word', 1, 'natural', '', 'natural descending', grains, &
+      'Numbers of grains as they are made, or from right to left: a sweep''s worst start'), &
       entry_t('scene', 'density', 'real', 1, '2500', 'kg/m3', '> 0', '', &
       'Density of the bodies that have none of their own'), &
       entry_t('scene', 'radius', 'real', 1, '0', 'm', '>= 0, <= 1e12', 'name: drum', &
@@ -82,10 +95,16 @@ module polydem_namelist_entries
       'Angle of the inclined walls to the horizontal'), &
       entry_t('scene', 'slope', 'real', 1, required, 'degree', '>= 0, < 90', 'name: incline', &
       'Angle of the incline to the horizontal'), &
-      entry_t('scene', 'fraction', 'real', 1, '0.3', '', '> 0, < 1', 'name: gas', &
+      entry_t('scene', 'fraction', 'real', 1, '0.3', '', '> 0, <= 100', 'name: gas channel', &
       'Share of the area that grains cover'), &
-      entry_t('scene', 'speed', 'real', 1, required, 'm/s', '> 0, < 1e6', 'name: gas', &
+      entry_t('scene', 'overlap', 'logical', 1, '.false.', '', '', 'name: gas', &
+      'Whether grains may overlap each other at the start'), &
+      entry_t('scene', 'speed', 'real', 1, required, 'm/s', '>= 0, < 1e6', 'name: gas channel', &
       'Root mean square speed of the grains at the start'), &
+      entry_t('scene', 'spin', 'real', 1, '0', 'rad/s', '>= 0, < 1e9', 'name: gas channel', &
+      'Root mean square angular velocity of the grains at the start'), &
+      entry_t('scene', 'movers', 'integer', 1, '0', '', '>= 0', 'name: gas channel', &
+      'Number of grains that get a speed at the start; 0: all'), &
       entry_t('scene', 'speed', 'real', 1, '0', 'm/s', '>= 0, < 1e6', 'name: drum hopper bed heap', &
       'Root mean square speed of the grains at the start'), &
       entry_t('scene', 'speed', 'real', 1, '0', 'm/s', '>= 0, < 1e6', 'name: incline', &
@@ -113,8 +132,12 @@ module polydem_namelist_entries
    type(entry_t), parameter :: stage_entries(*) = [ &
       entry_t('boxes', 'largest_ratio', 'real', 1, '4', '', '>= 1', '', &
       'A body longer than this many median grain diameters is cut into several boxes'), &
-      entry_t('neighbours', 'finder', 'word', 1, 'quadtree', '', 'all_pairs sort_and_sweep quadtree', '', &
+      entry_t('boxes', 'margin', 'real', 1, '0', 'm', '>= 0, <= 1e12', '', &
+      'By how much every box is larger on each side, for interactions with a range'), &
+      entry_t('neighbours', 'finder', 'word', 1, 'quadtree', '', finders, '', &
       'How pairs of overlapping boxes are found'), &
+      entry_t('neighbours', 'skin', 'real', 1, '0', 'm', '>= 0, <= 1e12', 'finder: verlet', &
+      'What two boxes may approach before the Verlet list is made anew; 0: from its cost so far'), &
       entry_t('overlap', 'degenerate', 'word', 1, 'push', '', 'push stop', '', &
       'A contact without direction is pushed apart along the line of centres, or stops the run'), &
       entry_t('forces', 'gravity', 'real', 2, '0, -9.81', 'm/s2', '> -1e12, < 1e12', '', &
@@ -156,10 +179,37 @@ module polydem_namelist_entries
       entry_t('output', 'contacts', 'logical', 1, '.false.', '', '', '', &
       'Whether frames hold the contacts'), &
       entry_t('output', 'ledger', 'logical', 1, '.true.', '', '', '', &
-      'Whether energy and momentum are booked')]
+      'Whether energy and momentum are booked'), &
+      entry_t('output', 'trace_steps', 'integer', 1, '0', '', '>= 0', '', &
+      'Steps whose boxes are recorded in trace.h5'), &
+      entry_t('output', 'trace_start', 'real', 1, '0', 's', '>= 0, <= 1e12', '', &
+      'Simulated time at which the recording of boxes starts'), &
+      entry_t('output', 'step_profile', 'logical', 1, '.false.', '', '', '', &
+      'Whether steps.h5 tells the times and counts of every single step')]
+
+   !> The group of a bench
+   type(entry_t), parameter :: bench_entries(*) = [ &
+      entry_t(bench_group, 'scenes', 'path', 0, required, '', '', '', &
+      'Scenes to measure, each a trace or a namelist file with overrides (file.nml group.key=value ...)'), &
+      entry_t(bench_group, 'names', 'path', 0, required, '', '', '', &
+      'One name per scene: letters, digits, . and _'), &
+      entry_t(bench_group, 'prepare', 'path', 0, '', '', '', '', &
+      'Namelist files with overrides that are run before all scenes, unless their results are there'), &
+      entry_t(bench_group, 'finders', 'word', 0, required, '', finders, '', &
+      'Neighbour finders to measure'), &
+      entry_t(bench_group, 'threads', 'integer', 0, '1', '', '>= 1, <= 9999', '', &
+      'Numbers of threads to measure with'), &
+      entry_t(bench_group, 'repeats', 'integer', 1, '7', '', '>= 1, <= 9999', '', &
+      'Timed repeats, after a warm-up in which every list is checked'), &
+      entry_t(bench_group, 'mode', 'word', 1, 'replay', '', 'replay live', '', &
+      'Whether recorded boxes are replayed or whole time steps are done'), &
+      entry_t(bench_group, 'steps', 'integer', 1, '0', '', '>= 0', '', &
+      'Steps of a sample; 0: all of the trace, or (live) as many as `trace_steps` of the scene'), &
+      entry_t(bench_group, 'folder', 'path', 1, '', '', '', '', &
+      'Folder of traces and samples; empty: results/ and the name of the namelist file')]
 
    !> The table
-   type(entry_t), parameter :: entries(*) = [scene_entries, stage_entries, run_entries]
+   type(entry_t), parameter :: entries(*) = [scene_entries, stage_entries, run_entries, bench_entries]
 
 contains
 

@@ -5,10 +5,10 @@ module polydem_namelist_values
    use polydem_namelist_entries, only: entry_t, required
    use polydem_namelist_statements, only: literal_t, statement_t
    use polydem_strings, only: to_text
-   use polydem_words, only: count_words, lower_case, quoted, split_words, suggestion
+   use polydem_words, only: count_words, lower_case, quoted, split_words, suggestion, text_t
    implicit none
    private
-   public :: value_t, read_value, value_text, label
+   public :: value_t, read_value, value_text, label, is_text
 
    character(len=*), parameter :: digits = '0123456789'
 
@@ -30,6 +30,8 @@ module polydem_namelist_values
       logical :: flag = .false.
       !> Value of a word or path entry
       character(len=:), allocatable :: text
+      !> Values of a list of words or paths, (count)
+      type(text_t), allocatable :: texts(:)
    end type value_t
 
 contains
@@ -59,6 +61,8 @@ contains
       value%reals = [(0.0_wp, k=1, merge(n, 0, entry%type == 'real'))]
       value%integers = [(0_ip, k=1, merge(n, 0, entry%type == 'integer'))]
       value%text = ''
+      if (allocated(value%texts)) deallocate (value%texts)
+      allocate (value%texts(merge(n, 0, is_text(entry))))
       do k = 1, n
          call read_one(entry, statement%values(k), k, value, problem)
          if (allocated(problem)) then
@@ -76,6 +80,14 @@ contains
 
       text = quoted(trim(entry%key))//' in &'//trim(entry%group)
    end function label
+
+   !> Whether the values of an entry are words or paths
+   pure logical function is_text(entry)
+      !> Its row
+      type(entry_t), intent(in) :: entry
+
+      is_text = entry%type == 'word' .or. entry%type == 'path'
+   end function is_text
 
    pure function counted(n) result(text)
       integer, intent(in) :: n
@@ -104,6 +116,7 @@ contains
          call read_logical(literal, value%flag, problem)
       case default
          value%text = trim(literal%text)
+         value%texts(k)%text = trim(literal%text)
          call check_text(entry, literal, problem)
       end select
    end subroutine read_one
@@ -297,7 +310,10 @@ contains
       case ('logical')
          text = trim(merge('.true. ', '.false.', value%flag))
       case default
-         text = quoted(value%text)
+         do k = 1, size(value%texts)
+            text = text//', '//quoted(value%texts(k)%text)
+         end do
+         text = text(min(3, len(text) + 1):)
       end select
    end function value_text
 

@@ -13,7 +13,7 @@ module polydem_read_settings
    use polydem_text_file, only: read_text_file
    implicit none
    private
-   public :: read_settings, read_settings_text
+   public :: read_settings, read_settings_text, with_plain_line_ends
 
 contains
 
@@ -51,7 +51,7 @@ contains
 
       source%name = trim(file_name)
       source%text = text
-      call resolve_entries(source, overrides, values, error)
+      call resolve_entries(source, .false., overrides, values, error)
       if (allocated(error)) return
       settings%file = trim(file_name)
       settings%text = with_plain_line_ends(text)
@@ -62,6 +62,7 @@ contains
 
    !> The text without carriage returns and with a line end after the last line
    pure function with_plain_line_ends(text) result(plain)
+      !> Text of any length
       character(len=*), intent(in) :: text
       character(len=:), allocatable :: plain
       character(len=*), parameter :: line_feed = achar(10), carriage_return = achar(13)

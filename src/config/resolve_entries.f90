@@ -6,10 +6,10 @@
 module polydem_resolve_entries
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, wp
-   use polydem_namelist_entries, only: entries, entry_t, first_row, group_length, groups, keys_of, required
+   use polydem_namelist_entries, only: bench_group, entries, entry_t, first_row, group_length, groups, keys_of, required
    use polydem_namelist_statements, only: read_statements, statement_t
    use polydem_namelist_tokens, only: source_t
-   use polydem_namelist_values, only: label, read_value, value_t, value_text
+   use polydem_namelist_values, only: is_text, label, read_value, value_t, value_text
    use polydem_strings, only: join, to_text
    use polydem_words, only: count_words, quoted, split_words, suggestion
    implicit none
@@ -19,9 +19,11 @@ module polydem_resolve_entries
 contains
 
    !> Find the value of every row of the table.
-   pure subroutine resolve_entries(source, overrides, values, error)
+   pure subroutine resolve_entries(source, of_bench, overrides, values, error)
       !> Namelist text
       type(source_t), intent(in) :: source
+      !> Whether it describes a bench, by its only group, or a run, by all others
+      logical, intent(in) :: of_bench
       !> Overrides 'group.key=value'; the last one of an entry counts
       character(len=*), intent(in) :: overrides(:)
       !> Values, (rows of the table)
@@ -35,18 +37,18 @@ contains
       call read_statements(source, statements, error)
       if (allocated(error)) return
       if (size(statements) == 0) then
-         call raise(error, input_error, &
-            source%name//': holds no namelist group; it needs &scene and &integrate')
+         call raise(error, input_error, source%name//': holds no namelist group; it needs '// &
+            trim(merge('&bench               ', '&scene and &integrate', of_bench)))
          return
       end if
-      call collect_statements(statements, given, error)
+      call collect_statements(statements, of_bench, given, error)
       if (allocated(error)) return
-      call collect_overrides(overrides, given, error)
+      call collect_overrides(overrides, of_bench, given, error)
       if (allocated(error)) return
 
       allocate (values(size(entries)))
       do row = 1, size(entries)
-         call resolve_row(source, given, row, values, error)
+         call resolve_row(source, of_bench, given, row, values, error)
          if (allocated(error)) return
       end do
       do row = 1, size(entries)
@@ -56,14 +58,15 @@ contains
    end subroutine resolve_entries
 
    !> Sort the statements of the file by the first rows of their entries.
-   pure subroutine collect_statements(statements, given, error)
+   pure subroutine collect_statements(statements, of_bench, given, error)
       type(statement_t), intent(in) :: statements(:)
+      logical, intent(in) :: of_bench
       type(statement_t), intent(inout) :: given(:)
       type(error_t), allocatable, intent(inout) :: error
       integer :: earlier, k, row
 
       do k = 1, size(statements)
-         call check_names(statements(k), error)
+         call check_names(statements(k), of_bench, error)
          if (allocated(error)) return
          do earlier = 1, k - 1
             if (statements(earlier)%group /= statements(k)%group) cycle
@@ -85,14 +88,20 @@ contains
       if (statement%key /= '') text = quoted(statement%key)//' in &'//statement%group
    end function name_of
 
-   !> The group and the key must be in the table.
-   pure subroutine check_names(statement, error)
+   !> The group and the key must be in the table, and belong to a bench or a run.
+   pure subroutine check_names(statement, of_bench, error)
       type(statement_t), intent(in) :: statement
+      logical, intent(in) :: of_bench
       type(error_t), allocatable, intent(inout) :: error
 
       if (all(groups() /= statement%group)) then
          call raise(error, input_error, statement%place//': unknown group &'//statement%group// &
-            suggestion(statement%group, groups()))
+            suggestion(statement%group, pack(groups(), (groups() == bench_group) .eqv. of_bench)))
+      else if (of_bench .and. statement%group /= bench_group) then
+         call raise(error, input_error, statement%place//': group &'//statement%group//' belongs to a run; a bench '// &
+            'has the group &bench only')
+      else if (statement%group == bench_group .and. .not. of_bench) then
+         call raise(error, input_error, statement%place//': group &bench belongs to a bench: polydem bench FILE.nml')
       else if (statement%key /= '' .and. first_row(statement%group, statement%key) == 0) then
          call raise(error, input_error, statement%place//': unknown key '//quoted(statement%key)//' in &'// &
             statement%group//suggestion(statement%key, keys_of(statement%group)))
@@ -100,23 +109,25 @@ contains
    end subroutine check_names
 
    !> Let the command line replace what the file says.
-   pure subroutine collect_overrides(overrides, given, error)
+   pure subroutine collect_overrides(overrides, of_bench, given, error)
       character(len=*), intent(in) :: overrides(:)
+      logical, intent(in) :: of_bench
       type(statement_t), intent(inout) :: given(:)
       type(error_t), allocatable, intent(inout) :: error
       type(statement_t) :: statement
       integer :: k
 
       do k = 1, size(overrides)
-         call read_override(trim(overrides(k)), statement, error)
+         call read_override(trim(overrides(k)), of_bench, statement, error)
          if (allocated(error)) return
          given(first_row(statement%group, statement%key)) = statement
       end do
    end subroutine collect_overrides
 
    !> Read 'group.key=value' as the statement '&group key = value'; words and paths need no quotes.
-   pure subroutine read_override(override, statement, error)
+   pure subroutine read_override(override, of_bench, statement, error)
       character(len=*), intent(in) :: override
+      logical, intent(in) :: of_bench
       type(statement_t), intent(out) :: statement
       type(error_t), allocatable, intent(inout) :: error
       type(statement_t), allocatable :: statements(:)
@@ -144,7 +155,7 @@ contains
       end if
       statement = statements(2)
       statement%is_override = .true.
-      call check_names(statement, error)
+      call check_names(statement, of_bench, error)
    end subroutine read_override
 
    !> The value, in quotes if the entry is a text and has none
@@ -156,14 +167,15 @@ contains
       text = given
       row = first_row(group, key)
       if (row == 0) return
-      if (entries(row)%type /= 'word' .and. entries(row)%type /= 'path') return
+      if (.not. is_text(entries(row))) return
       if (scan(adjustl(given)//' ', '''"') == 1) return
       text = quoted(trim(adjustl(given)))
    end function value_of_override
 
    !> The value of a row: what is given, or the default.
-   pure subroutine resolve_row(source, given, row, values, error)
+   pure subroutine resolve_row(source, of_bench, given, row, values, error)
       type(source_t), intent(in) :: source
+      logical, intent(in) :: of_bench
       type(statement_t), intent(in) :: given(:)
       integer, intent(in) :: row
       type(value_t), intent(inout) :: values(:)
@@ -172,7 +184,8 @@ contains
 
       associate (entry => entries(row))
          home = first_row(entry%group, entry%key)
-         values(row)%in_force = is_needed(entry, values)
+         values(row)%in_force = (entry%group == bench_group) .eqv. of_bench
+         if (values(row)%in_force) values(row)%in_force = is_needed(entry, values)
          if (values(row)%in_force .and. allocated(given(home)%values)) then
             call read_value(entry, given(home), values(row), error)
          else if (entry%default /= required) then
@@ -208,7 +221,7 @@ contains
       integer :: k
 
       statement%place = source%name
-      if (entry%type == 'word' .or. entry%type == 'path') then
+      if (is_text(entry) .and. entry%count > 0) then
          allocate (statement%values(1))
          statement%values(1)%text = trim(entry%default)
          statement%values(1)%has_quotes = .true.
@@ -232,6 +245,7 @@ contains
       value%text = ''
       value%reals = [(0.0_wp, k=1, merge(entry%count, 0, entry%type == 'real'))]
       value%integers = [(0_ip, k=1, merge(entry%count, 0, entry%type == 'integer'))]
+      allocate (value%texts(0))
    end subroutine read_nothing
 
    !> ' with name = 'hopper'' for an entry that is required only then
@@ -285,7 +299,7 @@ contains
          ' = '//join(split_words(needs), ' or ')//', not with '//values(decider)%text)
    end subroutine check_use
 
-   !> All values in force as a namelist that can be read again, one entry to a line; an empty list is left out
+   !> All values in force as a namelist that can be read again, one entry to a line; empty lists and groups are left out
    pure function resolved_text(values) result(text)
       !> Values, (rows of the table)
       type(value_t), intent(in) :: values(:)
@@ -297,12 +311,13 @@ contains
       text = ''
       group = ''
       do row = 1, size(entries)
+         if (.not. values(row)%in_force) cycle
          if (entries(row)%group /= group) then
-            if (row > 1) text = text//'/'//line_end
+            if (text /= '') text = text//'/'//line_end
             group = entries(row)%group
             text = text//'&'//trim(group)//line_end
          end if
-         if (values(row)%in_force) text = text//line_of(entries(row), value_text(entries(row), values(row)))
+         text = text//line_of(entries(row), value_text(entries(row), values(row)))
       end do
       text = text//'/'//line_end
    end function resolved_text

@@ -20,6 +20,8 @@ module polydem_settings
       integer(ip) :: boxes
       !> Number of free bodies
       integer(ip) :: bodies
+      !> Result folder, segment or bodies file of a settled bed to fill the container with; empty: loose grains
+      character(len=:), allocatable :: packing
       !> Least number of corners of a grain
       integer(ip) :: corners_min
       !> Greatest number of corners of a grain
@@ -30,6 +32,10 @@ module polydem_settings
       real(wp) :: long_axis_min
       !> Greatest full long axis of the ellipse around a grain [m]
       real(wp) :: long_axis_max
+      !> Factor of both axes of the largest grain; 1: all alike
+      real(wp) :: size_ratio
+      !> Order of the identifiers of the grains: 'natural' or 'descending'
+      character(len=:), allocatable :: order
       !> Density of the grains [kg/m2 per metre of depth, that is kg/m3]
       real(wp) :: density
       !> Radius of the drum [m]; 0: from the number of grains
@@ -42,10 +48,16 @@ module polydem_settings
       real(wp) :: opening
       !> Slope of the incline or of the hopper walls [degree]
       real(wp) :: slope
-      !> Share of the area covered by grains (gas)
+      !> Share of the area covered by grains (gas, channel)
       real(wp) :: fraction
+      !> Whether grains may overlap each other at the start (gas)
+      logical :: overlap
       !> Root mean square speed of the grains, or speed of the block (incline), at the start [m/s]
       real(wp) :: speed
+      !> Root mean square angular velocity of the grains at the start (gas, channel) [rad/s]
+      real(wp) :: spin
+      !> Number of grains that get a speed at the start (gas, channel); 0: all
+      integer(ip) :: movers
       !> Prescribed motion of walls: none, rotation, translation or oscillation
       character(len=:), allocatable :: motion
       !> Identifiers of the fixed bodies that move; empty: all fixed bodies
@@ -70,12 +82,16 @@ module polydem_settings
    type :: boxes_settings_t
       !> A body longer than this many median grain diameters is cut into several boxes
       real(wp) :: largest_ratio
+      !> By how much every box is larger on each side [m]
+      real(wp) :: margin
    end type boxes_settings_t
 
    !> Group &neighbours
    type :: neighbours_settings_t
       !> Name of the neighbour finder
       character(len=:), allocatable :: finder
+      !> Skin of a Verlet list [m]; 0: automatic
+      real(wp) :: skin
    end type neighbours_settings_t
 
    !> Group &overlap
@@ -130,6 +146,12 @@ module polydem_settings
       logical :: contacts
       !> Whether energy and momentum are booked
       logical :: ledger
+      !> Steps whose boxes are recorded; 0: none
+      integer(ip) :: trace_steps
+      !> Simulated time at which the recording starts [s]
+      real(wp) :: trace_start
+      !> Whether times and counts of every step are kept
+      logical :: step_profile
    end type output_settings_t
 
    !> All settings of a run

@@ -2,7 +2,13 @@
 module polydem_words
    implicit none
    private
-   public :: lower_case, quoted, count_words, split_words, suggestion
+   public :: text_t, lower_case, quoted, count_words, split_words, suggestion
+
+   !> A text of its own length, for lists of texts
+   type :: text_t
+      !> The text
+      character(len=:), allocatable :: text
+   end type text_t
 
 contains
 

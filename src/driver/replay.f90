@@ -1,193 +1,248 @@
-!> Replay of recorded boxes through a neighbour finder: every step is checked and timed.
+!> Replay of recorded boxes through a neighbour finder: every list is checked, every step timed.
 !>
-!> What is timed begins with the boxes of a step in memory and ends with the complete list; ordering the
-!> changes is timed by itself. Per step the shortest of all repeats counts, then the mean over the steps,
-!> divided by the number of boxes, fixed ones included. One thread: its processor time; more: elapsed time.
+!> The first pass warms up, checks every list and counts; the timed ones follow. What is timed begins with the
+!> boxes of a step in memory and ends with the complete list. Per step the shortest of all timed passes counts, then
+!> the mean over the steps, divided by the number of boxes, fixed ones included. One thread: its processor time;
+!> more: elapsed time.
 module polydem_replay
    use, intrinsic :: iso_fortran_env, only: output_unit
    use omp_lib, only: omp_set_num_threads
    use polydem_boxes, only: boxes_t
-   use polydem_clock, only: thread_cpu_seconds, wall_seconds
-   use polydem_counters, only: counters_t
-   use polydem_errors, only: error_t, raise, run_error
-   use polydem_hash, only: add_modulo, hexadecimal, pair_hash
+   use polydem_errors, only: error_t
+   use polydem_hash, only: hexadecimal, mix_word
    use polydem_kinds, only: dp, ip, lp
-   use polydem_neighbours, only: neighbours_t, new_neighbours
+   use polydem_neighbours, only: neighbours_t
+   use polydem_paths, only: make_folder
+   use polydem_provenance, only: collect_provenance, provenance_t
+   use polydem_reference, only: expect_by_oracle, new_reference, reference_t, total_hash
+   use polydem_replay_sample, only: replay_sample
+   use polydem_sample_file, only: case_t, sample_t, write_sample
    use polydem_strings, only: to_text
-   use polydem_trace, only: read_trace, trace_t
+   use polydem_trace, only: first_boxes, read_trace, trace_t
+   use polydem_work, only: count_names, n_counts, n_phases, n_sums, phase_names
    implicit none
    private
-   public :: replay_trace
-
-   !> What a replay measures and sums up
-   type :: record_t
-      !> Shortest time of each step to find and merge the changes [s]
-      real(dp), allocatable :: list_seconds(:)
-      !> Shortest time of each step to order the changes [s]
-      real(dp), allocatable :: order_seconds(:)
-      !> Pairs of all steps
-      integer(lp) :: pairs_total = 0_lp
-      !> Sum of the hashes of all pairs of all steps
-      integer(lp) :: hash = 0_lp
-   end type record_t
+   public :: replay_trace, describe_trace, expect_by_trace, sample_path
 
 contains
 
    !> Replay a trace, print what was measured as key=value lines, fail at the first wrong step.
-   subroutine replay_trace(path, finder, threads, repeats, error)
+   subroutine replay_trace(path, finder, threads, repeats, error, steps, samples, oracle)
       !> HDF5 file
       character(len=*), intent(in) :: path
       !> Name of the neighbour finder
       character(len=*), intent(in) :: finder
       !> Number of threads
       integer(ip), intent(in) :: threads
-      !> How often the whole trace is replayed, each time from an empty list
+      !> How often the whole trace is replayed and timed, each time from an empty list
       integer(ip), intent(in) :: repeats
       !> Allocated if the file cannot be read, the finder is unknown or a step is wrong
       type(error_t), allocatable, intent(inout) :: error
+      !> Later steps are left out; 0 or absent: none
+      integer(ip), intent(in), optional :: steps
+      !> Folder for one sample file per pass; empty or absent: none
+      character(len=*), intent(in), optional :: samples
+      !> Whether lists are compared with those of all_pairs although the trace knows their numbers; no if absent
+      logical, intent(in), optional :: oracle
       type(trace_t) :: trace
       type(boxes_t) :: boxes
-      type(neighbours_t) :: neighbours, oracle
-      type(record_t) :: record
-      integer(ip) :: k
+      type(reference_t) :: reference
+      type(case_t) :: case
+      type(sample_t) :: warm_up, best
+      logical :: ask_oracle
 
       call omp_set_num_threads(int(threads))
-      call read_trace(path, trace, error)
+      call read_trace(path, trace, error, steps)
       if (allocated(error)) return
       call first_boxes(trace, boxes)
-      allocate (record%list_seconds(trace%n_steps), record%order_seconds(trace%n_steps), source=huge(1.0_dp))
-      do k = 1_ip, repeats
-         call new_neighbours(neighbours, finder, boxes, error)
-         if (.not. allocated(trace%n_pairs)) call new_neighbours(oracle, 'all_pairs', boxes, error)
-         if (allocated(error)) return
-         call replay_once(trace, threads == 1_ip, k == 1_ip, boxes, neighbours, oracle, record, error)
-         if (allocated(error)) return
-      end do
-      call print_record(path, finder, threads, repeats, trace, boxes, neighbours, record)
+      call describe_trace(trace, boxes, case)
+      case%scene = stem(path)
+      case%trace = path
+      case%finder = finder
+      case%threads = threads
+      call new_reference(reference, trace%n_steps)
+      call expect_by_trace(trace, reference)
+      ask_oracle = .not. allocated(trace%n_pairs)
+      if (present(oracle)) ask_oracle = ask_oracle .or. oracle
+      if (ask_oracle) call ask_all_pairs(trace, boxes, reference, error)
+      if (allocated(error)) return
+      case%checked = 'npairs'
+      if (ask_oracle) case%checked = 'all_pairs '//to_text(trace%n_steps)//' steps'
+      call replay_all(trace, boxes, repeats, case, reference, warm_up, best, error, samples)
+      if (.not. allocated(error)) call print_record(repeats, warm_up, best)
    end subroutine replay_trace
 
-   !> Replay all steps once.
-   subroutine replay_once(trace, one_thread, first_repeat, boxes, neighbours, oracle, record, error)
+   !> The warm-up, and all timed passes.
+   subroutine replay_all(trace, boxes, repeats, case, reference, warm_up, best, error, samples)
       type(trace_t), intent(in) :: trace
-      logical, intent(in) :: one_thread, first_repeat
       type(boxes_t), intent(inout) :: boxes
-      type(neighbours_t), intent(inout) :: neighbours
-      !> Finder to check against if the trace has no numbers of pairs; used in the first repeat
-      type(neighbours_t), intent(inout) :: oracle
-      type(record_t), intent(inout) :: record
+      integer(ip), intent(in) :: repeats
+      type(case_t), intent(inout) :: case
+      type(reference_t), intent(inout) :: reference
+      !> First pass; and the shortest times of each step in the others
+      type(sample_t), intent(out) :: warm_up, best
       type(error_t), allocatable, intent(inout) :: error
-      real(dp) :: began, found, ordered, merged
-      integer(ip) :: s, k
+      character(len=*), intent(in), optional :: samples
+      integer(ip) :: k
+
+      warm_up%case = case
+      call replay_sample(trace, boxes, .true., reference, warm_up, error)
+      if (allocated(error)) return
+      case%pairs_total = sum(int(warm_up%pairs, lp))
+      case%pair_hash = total_hash(warm_up%hash)
+      warm_up%case = case
+      call keep_sample(warm_up, error, samples)
+      do k = 1_ip, repeats
+         case%repeat = k
+         call replay_again(trace, boxes, case, reference, best, error, samples)
+         if (allocated(error)) return
+      end do
+   end subroutine replay_all
+
+   !> One timed pass.
+   subroutine replay_again(trace, boxes, case, reference, best, error, samples)
+      type(trace_t), intent(in) :: trace
+      type(boxes_t), intent(inout) :: boxes
+      type(case_t), intent(in) :: case
+      type(reference_t), intent(inout) :: reference
+      type(sample_t), intent(inout) :: best
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: samples
+      type(sample_t) :: sample
+
+      sample%case = case
+      call replay_sample(trace, boxes, .false., reference, sample, error)
+      if (allocated(error)) return
+      call keep_sample(sample, error, samples)
+      if (case%repeat > 1_ip) then
+         sample%elapsed = min(sample%elapsed, best%elapsed)
+         sample%processor = min(sample%processor, best%processor)
+         sample%phase = min(sample%phase, best%phase)
+      end if
+      best = sample
+   end subroutine replay_again
+
+   !> Write a sample if a folder is given.
+   subroutine keep_sample(sample, error, folder)
+      type(sample_t), intent(in) :: sample
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: folder
+      type(provenance_t) :: provenance
+
+      if (.not. present(folder)) return
+      if (folder == '') return
+      call make_folder(folder, error)
+      if (allocated(error)) return
+      call collect_provenance(provenance, sample%case%trace, '', '', 0_ip)
+      call write_sample(sample_path(folder, sample%case), sample, phase_names, count_names, provenance, error)
+   end subroutine keep_sample
+
+   !> Path of a sample: scene, finder, threads, repeat
+   function sample_path(folder, case) result(path)
+      !> Folder of the samples
+      character(len=*), intent(in) :: folder
+      !> What is measured
+      type(case_t), intent(in) :: case
+      character(len=:), allocatable :: path
+
+      path = folder//'/'//case%scene//'-'//case%finder//'-'//to_text(case%threads)//'-'//to_text(case%repeat)//'.h5'
+   end function sample_path
+
+   !> Everything that a case knows from its trace.
+   subroutine describe_trace(trace, boxes, case)
+      !> Recorded boxes
+      type(trace_t), intent(in) :: trace
+      !> Boxes of one of its steps
+      type(boxes_t), intent(in) :: boxes
+      !> What is measured
+      type(case_t), intent(inout) :: case
+      integer(ip) :: b, k, s
+
+      case%mode = 'replay'
+      case%boxes = boxes%n
+      case%fixed = count(boxes%fixed, kind=ip)
+      case%bodies = boxes%n_bodies
+      case%steps = trace%n_steps
+      case%dt = trace%dt
+      case%identity = 0_lp
+      do s = 1_ip, trace%n_steps
+         do b = 1_ip, boxes%n
+            do k = 1_ip, 4_ip
+               case%identity = mix_word(case%identity, transfer(real(trace%bounds(k, b, s), dp), 0_lp))
+            end do
+         end do
+      end do
+   end subroutine describe_trace
+
+   !> What the trace itself knows of its lists of pairs
+   subroutine expect_by_trace(trace, reference)
+      !> Recorded boxes
+      type(trace_t), intent(in) :: trace
+      !> Expected lists
+      type(reference_t), intent(inout) :: reference
+
+      reference%other = 'the trace'
+      if (allocated(trace%n_pairs)) then
+         reference%pairs = trace%n_pairs(:trace%n_steps)
+         reference%knows_number = .true.
+      end if
+      if (allocated(trace%pair_hash)) then
+         reference%hash = trace%pair_hash(:trace%n_steps)
+         reference%knows_hash = .true.
+      end if
+   end subroutine expect_by_trace
+
+   !> Let all_pairs say what every list is.
+   subroutine ask_all_pairs(trace, boxes, reference, error)
+      type(trace_t), intent(in) :: trace
+      type(boxes_t), intent(inout) :: boxes
+      type(reference_t), intent(inout) :: reference
+      type(error_t), allocatable, intent(inout) :: error
+      type(neighbours_t) :: oracle
+      integer(ip) :: s
 
       do s = 1_ip, trace%n_steps
          boxes%bounds = trace%bounds(:, :, s)
-         began = seconds(one_thread)
-         call neighbours%find(boxes)
-         found = seconds(one_thread)
-         call neighbours%order()
-         ordered = seconds(one_thread)
-         call neighbours%merge()
-         merged = seconds(one_thread)
-         record%list_seconds(s) = min(record%list_seconds(s), (found - began) + (merged - ordered))
-         record%order_seconds(s) = min(record%order_seconds(s), ordered - found)
-         if (allocated(trace%n_pairs)) then
-            call check_number(s, neighbours, trace%n_pairs(s), error)
-         else if (first_repeat) then
-            call oracle%update(boxes)
-            call check_list(s, neighbours, oracle, error)
-         end if
+         call expect_by_oracle(reference, s, boxes, oracle, error)
          if (allocated(error)) return
-         if (.not. first_repeat) cycle
-         record%pairs_total = record%pairs_total + int(neighbours%pairs%n, lp)
-         do k = 1_ip, neighbours%pairs%n
-            record%hash = add_modulo(record%hash, pair_hash(neighbours%pairs%first(k) - 1_ip, &
-                                                            neighbours%pairs%second(k) - 1_ip))
-         end do
       end do
-   end subroutine replay_once
-
-   real(dp) function seconds(one_thread)
-      logical, intent(in) :: one_thread
-
-      if (one_thread) then
-         seconds = thread_cpu_seconds()
-      else
-         seconds = wall_seconds()
-      end if
-   end function seconds
-
-   !> Compare the number of pairs with the recorded one.
-   subroutine check_number(step, neighbours, expected, error)
-      integer(ip), intent(in) :: step, expected
-      type(neighbours_t), intent(in) :: neighbours
-      type(error_t), allocatable, intent(inout) :: error
-
-      if (neighbours%pairs%n == expected .and. neighbours%pairs%contradictions == 0_lp) return
-      call raise(error, run_error, 'step '//to_text(step - 1_ip)//': '//neighbours%name//' found '// &
-                 to_text(neighbours%pairs%n)//' pairs, the trace says '//to_text(expected))
-   end subroutine check_number
-
-   !> Compare the list of pairs with that of the oracle.
-   subroutine check_list(step, neighbours, oracle, error)
-      integer(ip), intent(in) :: step
-      type(neighbours_t), intent(in) :: neighbours, oracle
-      type(error_t), allocatable, intent(inout) :: error
-      logical :: same
-      integer(ip) :: n
-
-      n = oracle%pairs%n
-      same = neighbours%pairs%n == n .and. neighbours%pairs%contradictions == 0_lp
-      if (same) same = all(neighbours%pairs%first(1:n) == oracle%pairs%first(1:n)) .and. &
-                       all(neighbours%pairs%second(1:n) == oracle%pairs%second(1:n))
-      if (same) return
-      call raise(error, run_error, 'step '//to_text(step - 1_ip)//': '//neighbours%name//' found '// &
-                 to_text(neighbours%pairs%n)//' pairs, all_pairs '//to_text(n)//', and not the same ones')
-   end subroutine check_list
-
-   !> Boxes of the trace, at their first step; body k has box k.
-   subroutine first_boxes(trace, boxes)
-      type(trace_t), intent(in) :: trace
-      type(boxes_t), intent(out) :: boxes
-      integer(ip) :: k
-
-      boxes%n = size(trace%fixed, kind=ip)
-      boxes%n_bodies = boxes%n
-      boxes%body = [(k, k=1_ip, boxes%n)]
-      boxes%fixed = trace%fixed
-      boxes%reach = trace%reach
-      boxes%bounds = trace%bounds(:, :, 1)
-   end subroutine first_boxes
+   end subroutine ask_all_pairs
 
    !> Print key=value lines.
-   subroutine print_record(path, finder, threads, repeats, trace, boxes, neighbours, record)
-      character(len=*), intent(in) :: path, finder
-      integer(ip), intent(in) :: threads, repeats
-      type(trace_t), intent(in) :: trace
-      type(boxes_t), intent(in) :: boxes
-      type(neighbours_t), intent(in) :: neighbours
-      type(record_t), intent(in) :: record
-      type(counters_t) :: counters
-      integer(ip) :: n
+   subroutine print_record(repeats, warm_up, best)
+      integer(ip), intent(in) :: repeats
+      type(sample_t), intent(in) :: warm_up, best
+      integer(lp) :: total(n_counts)
       integer :: k
 
-      n = trace%n_steps
-      write (output_unit, '(2a)') 'trace=', path, 'finder=', finder
-      write (output_unit, '(a,i0)') 'boxes=', boxes%n, 'walls=', count(boxes%fixed), 'steps=', n, &
-         'threads=', threads, 'repeats=', repeats
-      call print_time('ns_per_box_per_step=', record%list_seconds, boxes%n)
-      call print_time('ns_per_box_per_step_after_first=', record%list_seconds(2:), boxes%n)
-      call print_time('ns_ordering=', record%order_seconds, boxes%n)
-      call print_time('ns_ordering_after_first=', record%order_seconds(2:), boxes%n)
-      write (output_unit, '(a,i0)') 'pairs_total=', record%pairs_total
-      write (output_unit, '(2a)') 'pair_hash=0x', hexadecimal(record%hash)
-      if (allocated(trace%n_pairs)) write (output_unit, '(a)') 'checked_against=npairs'
-      if (.not. allocated(trace%n_pairs)) write (output_unit, '(a)') 'checked_against=all_pairs'
-      call neighbours%report(counters)
-      do k = 1, size(counters%name)
-         write (output_unit, '(2a,i0)') trim(counters%name(k)), '=', counters%value(k)
+      associate (case => warm_up%case)
+         write (output_unit, '(2a)') 'trace=', case%trace, 'finder=', case%finder
+         write (output_unit, '(a,i0)') 'boxes=', case%boxes, 'walls=', case%fixed, 'bodies=', case%bodies, &
+            'steps=', case%steps, 'threads=', case%threads, 'repeats=', repeats
+         if (case%threads == 1_ip) call print_times(best%processor, case%boxes)
+         if (case%threads > 1_ip) call print_times(best%elapsed, case%boxes)
+         do k = 1, n_phases
+            call print_time('ns_'//trim(phase_names(k))//'_after_first=', best%phase(k, 2:), case%boxes)
+         end do
+         write (output_unit, '(a,i0)') 'pairs_total=', case%pairs_total
+         write (output_unit, '(2a)') 'pair_hash=0x', hexadecimal(case%pair_hash), &
+            'checked_against=', case%checked(:index(case%checked//' ', ' ') - 1)
+      end associate
+      total = sum(warm_up%count, dim=2)
+      total(n_sums + 1:) = warm_up%count(n_sums + 1:, size(warm_up%count, 2))
+      do k = 1, n_counts
+         if (total(k) /= 0_lp) write (output_unit, '(2a,i0)') trim(count_names(k)), '=', total(k)
       end do
       write (output_unit, '(a)') 'result=ok'
    end subroutine print_record
+
+   subroutine print_times(step_seconds, n_boxes)
+      real(dp), intent(in) :: step_seconds(:)
+      integer(ip), intent(in) :: n_boxes
+
+      call print_time('ns_per_box_per_step=', step_seconds, n_boxes)
+      call print_time('ns_per_box_per_step_after_first=', step_seconds(2:), n_boxes)
+   end subroutine print_times
 
    !> Print the mean time of a step per box in nanoseconds.
    subroutine print_time(key, step_seconds, n_boxes)
@@ -200,5 +255,17 @@ contains
       write (number, '(f24.3)') 1.0e9_dp*sum(step_seconds)/real(size(step_seconds), dp)/real(n_boxes, dp)
       write (output_unit, '(2a)') key, trim(adjustl(number))
    end subroutine print_time
+
+   !> Name of a file without path and suffix
+   pure function stem(path)
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: stem
+      integer :: first, last
+
+      first = index(path, '/', back=.true.) + 1
+      last = index(path, '.', back=.true.) - 1
+      if (last < first) last = len(path)
+      stem = path(first:last)
+   end function stem
 
 end module polydem_replay

@@ -14,7 +14,8 @@ module polydem_run
    use polydem_paths, only: make_folder
    use polydem_profile, only: write_profile
    use polydem_provenance, only: collect_provenance, provenance_t
-   use polydem_result_folder, only: clear_result, holds_result
+   use polydem_recorder, only: recorder_t
+   use polydem_result_folder, only: clear_result, default_folder, holds_result
    use polydem_run_lock, only: lock_result, unlock_result
    use polydem_settings, only: settings_t
    use polydem_simulation, only: advance, check_stability, new_simulation, report_counters, simulation_t, time_of
@@ -23,7 +24,7 @@ module polydem_run
    use polydem_trajectory, only: trajectory_t
    implicit none
    private
-   public :: run_simulation
+   public :: run_simulation, result_folder
 
    !> Steps between two looks at the stable step
    integer(lp), parameter :: stability_interval = 100_lp
@@ -36,6 +37,8 @@ module polydem_run
       type(simulation_t) :: simulation
       !> Frames
       type(trajectory_t) :: trajectory
+      !> Boxes, and times of every step
+      type(recorder_t) :: recorder
       !> Log on the screen and in the folder
       type(log_t) :: log
       !> Where the result comes from
@@ -93,6 +96,7 @@ contains
          if (.not. allocated(error)) call watch(run, error)
          call run%simulation%timers%lap(stage_output)
          call run%simulation%timers%end_step()
+         if (.not. allocated(error)) call run%recorder%record(run%simulation, error)
       end do
       call finish(run, wall_seconds() - began, error)
    end subroutine go
@@ -128,7 +132,8 @@ contains
       call describe(run%simulation, run%log)
       call choose_intervals(run)
       call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error)
-      call watch(run, error)
+      if (.not. allocated(error)) call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, error)
+      if (.not. allocated(error)) call watch(run, error)
    end subroutine prepare
 
    !> Frame, line and look at the stable step, when it is time for them.
@@ -201,6 +206,7 @@ contains
          hash = state_hash(s%bodies)
          call report_counters(s, counters)
          call run%trajectory%close(late_error)
+         call run%recorder%close(run%log, late_error)
          call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, status, late_error)
          call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n)
          call write_counters(run%log, counters)
@@ -245,16 +251,12 @@ contains
 
    !> The folder of the settings, or results/<name of the input without path and suffix>
    pure function result_folder(settings) result(folder)
+      !> Settings of a run
       type(settings_t), intent(in) :: settings
       character(len=:), allocatable :: folder
-      integer :: first, last
 
       folder = settings%output%folder
-      if (folder /= '') return
-      first = index(settings%file, '/', back=.true.) + 1
-      last = index(settings%file, '.', back=.true.) - 1
-      if (last < first) last = len(settings%file)
-      folder = 'results/'//settings%file(first:last)
+      if (folder == '') folder = default_folder(settings%file)
    end function result_folder
 
 end module polydem_run

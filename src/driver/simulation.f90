@@ -112,9 +112,11 @@ contains
       if (allocated(error)) return
       call list_moving(self)
       call new_motion_guard(self%guard, self%bodies, self%moving)
-      call new_box_maker(self%maker, self%bodies, settings%boxes%largest_ratio, self%boxes, error)
+      associate (choice => settings%boxes)
+         call new_box_maker(self%maker, self%bodies, choice%largest_ratio, choice%margin, self%boxes, error)
+      end associate
       if (allocated(error)) return
-      call new_neighbours(self%neighbours, settings%neighbours%finder, self%boxes, error)
+      call new_neighbours(self%neighbours, settings%neighbours%finder, self%boxes, error, settings%neighbours%skin)
       if (allocated(error)) return
       call allocate_memory(self)
       call move_walls(self, 0.0_wp)
@@ -177,7 +179,7 @@ contains
    !> Exact counts of the work done so far.
    subroutine report_counters(self, counters)
       !> The simulation
-      type(simulation_t), intent(in) :: self
+      type(simulation_t), intent(inout) :: self
       !> List to set them in
       type(counters_t), intent(inout) :: counters
 

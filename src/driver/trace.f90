@@ -1,11 +1,13 @@
 !> Recorded boxes, read from a file and checked.
 !>
 !> A trace holds `aabb` (steps, boxes, 4), the bounds of every box at every step; `is_wall` (boxes), not zero
-!> for fixed ones; and may hold `npairs` (steps), the exact number of pairs, and the polygons `vertices` (n, 2)
-!> and `vertex_offset` (boxes + 1), from which the greatest extent of a box at any angle is known. Steps and
-!> boxes count from 0, as in the file.
+!> for fixed ones; and may hold `npairs` (steps) and `pair_hash` (steps), the exact number of pairs and the sum
+!> of their hashes; `body` (boxes), the body of each box, from 1, ascending; `reach` (boxes), the greatest half
+!> side of each box at any angle; or the polygons `vertices` (n, 2) and `vertex_offset` (boxes + 1), from which
+!> it follows; and the attribute `dt`. Steps and boxes count from 0 in messages, as in the file.
 module polydem_trace
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use polydem_boxes, only: boxes_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp, wp
@@ -13,40 +15,55 @@ module polydem_trace
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: trace_t, read_trace
+   public :: trace_t, read_trace, first_boxes
 
    !> Recorded boxes
    type :: trace_t
       !> Number of steps
       integer(ip) :: n_steps = 0_ip
+      !> Time between steps [s]; 0 if it is not known
+      real(dp) :: dt = 0.0_dp
       !> Bounds, (4, box, step) [m]
       real(wp), allocatable :: bounds(:, :, :)
       !> Whether each box is fixed
       logical, allocatable :: fixed(:)
+      !> Slot of the body of each box
+      integer(ip), allocatable :: body(:)
       !> Greatest half side of each box at any angle [m]
       real(wp), allocatable :: reach(:)
       !> Number of pairs of each step; not allocated if the trace has none
       integer(ip), allocatable :: n_pairs(:)
+      !> Sum of the hashes of the pairs of each step; not allocated if the trace has none
+      integer(lp), allocatable :: pair_hash(:)
    end type trace_t
+
+   !> Bounds are read in blocks of about so many numbers, so that they are not in memory twice
+   integer(lp), parameter :: block_numbers = 8388608_lp
 
 contains
 
    !> Read a trace and check that it holds boxes and that its parts fit together.
-   subroutine read_trace(path, trace, error)
+   subroutine read_trace(path, trace, error, most_steps)
       !> HDF5 file
       character(len=*), intent(in) :: path
       !> What it holds
       type(trace_t), intent(out) :: trace
       !> Allocated if the file cannot be read or is no trace
       type(error_t), allocatable, intent(inout) :: error
+      !> Later steps are left out; 0 or absent: none
+      integer(ip), intent(in), optional :: most_steps
       type(hdf5_file_t) :: file
       type(error_t), allocatable :: ignored
 
       call file%open(path, error)
       if (allocated(error)) return
+      if (present(most_steps)) trace%n_steps = most_steps
       call read_boxes(path, file, trace, error)
+      if (.not. allocated(error)) call read_bodies(path, file, trace, error)
       if (.not. allocated(error)) call read_numbers(path, file, trace, error)
+      if (.not. allocated(error)) call read_reach(path, file, trace, error)
       if (.not. allocated(error)) call read_polygons(path, file, trace, error)
+      if (.not. allocated(error)) call file%read_real_attribute('/', 'dt', trace%dt, error)
       if (allocated(error)) then
          call file%close(ignored)
       else
@@ -54,7 +71,23 @@ contains
       end if
    end subroutine read_trace
 
-   !> Read the bounds of all boxes, and which are fixed; until polygons say more, reach is the greatest half side.
+   !> Boxes of the first step of a trace
+   subroutine first_boxes(trace, boxes)
+      !> Recorded boxes
+      type(trace_t), intent(in) :: trace
+      !> Boxes as finders see them
+      type(boxes_t), intent(out) :: boxes
+
+      boxes%n = size(trace%fixed, kind=ip)
+      boxes%n_bodies = trace%body(boxes%n)
+      boxes%one_to_one = boxes%n_bodies == boxes%n
+      boxes%body = trace%body
+      boxes%fixed = trace%fixed
+      boxes%reach = trace%reach
+      boxes%bounds = trace%bounds(:, :, 1)
+   end subroutine first_boxes
+
+   !> Read the bounds of all boxes, and which are fixed; until more is known, reach is the greatest half side.
    subroutine read_boxes(path, file, trace, error)
       character(len=*), intent(in) :: path
       type(hdf5_file_t), intent(in) :: file
@@ -63,6 +96,7 @@ contains
       real(dp), allocatable :: bounds(:, :, :)
       integer(lp), allocatable :: extent(:)
       integer(ip), allocatable :: is_wall(:)
+      integer(ip) :: first, n_rows, s
       logical :: fit
 
       call file%shape_of('/aabb', extent, error)
@@ -73,19 +107,91 @@ contains
       if (.not. fit) then
          call raise(error, input_error, path//': aabb must have the shape (steps, boxes, 4), with at least one '// &
                     'step and one box')
-      else if (size(is_wall, kind=lp) /= extent(2)) then
-         call raise(error, input_error, path//': is_wall has '//to_text(size(is_wall, kind=ip))// &
-                    ' entries, but aabb '//to_text(extent(2))//' boxes')
+         return
       end if
+      call check_size(path, 'is_wall', size(is_wall, kind=lp), extent(2), 'boxes', error)
       if (allocated(error)) return
-      trace%n_steps = int(extent(1), ip)
+      if (trace%n_steps == 0_ip) trace%n_steps = int(extent(1), ip)
+      trace%n_steps = min(trace%n_steps, int(extent(1), ip))
       trace%fixed = is_wall /= 0_ip
-      ! All steps at once: in a compressed trace one step alone costs as much as all of its chunk.
-      call file%read('/aabb', bounds, error)
-      if (allocated(error)) return
-      trace%bounds = real(bounds, wp)
+      allocate (trace%bounds(4, extent(2), trace%n_steps))
+      ! Many steps at once: in a compressed trace one step alone costs as much as all of its chunk.
+      n_rows = int(max(1_lp, block_numbers/(4_lp*extent(2))), ip)
+      do first = 1_ip, trace%n_steps, n_rows
+         call file%read_rows('/aabb', first, min(n_rows, trace%n_steps - first + 1_ip), bounds, error)
+         if (allocated(error)) return
+         do s = 1_ip, size(bounds, 3, kind=ip)
+            trace%bounds(:, :, first + s - 1_ip) = real(bounds(:, :, s), wp)
+         end do
+      end do
       call check_boxes(path, trace, error)
    end subroutine read_boxes
+
+   !> Every list has one entry for each box or step.
+   subroutine check_size(path, name, n, expected, what, error)
+      character(len=*), intent(in) :: path, name, what
+      integer(lp), intent(in) :: n, expected
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(error) .or. n == expected) return
+      call raise(error, input_error, path//': '//name//' has '//to_text(n)//' entries, but aabb '// &
+                 to_text(expected)//' '//what)
+   end subroutine check_size
+
+   !> Read which body each box belongs to; without it every box is a body. Boxes of one body are all fixed or none.
+   subroutine read_bodies(path, file, trace, error)
+      character(len=*), intent(in) :: path
+      type(hdf5_file_t), intent(in) :: file
+      type(trace_t), intent(inout) :: trace
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: k, n
+      logical :: sound
+
+      n = size(trace%fixed, kind=ip)
+      if (.not. file%has('/body')) then
+         trace%body = [(k, k=1_ip, n)]
+         return
+      end if
+      call file%read('/body', trace%body, error)
+      if (allocated(error)) return
+      call check_size(path, 'body', size(trace%body, kind=lp), int(n, lp), 'boxes', error)
+      if (allocated(error)) return
+      sound = trace%body(1) == 1_ip
+      do k = 2_ip, n
+         if (.not. sound) exit
+         sound = trace%body(k) == trace%body(k - 1_ip) .or. trace%body(k) == trace%body(k - 1_ip) + 1_ip
+      end do
+      if (.not. sound) then
+         call raise(error, input_error, path//': body must begin with 1 and ascend without gaps')
+         return
+      end if
+      do k = 2_ip, n
+         if (trace%body(k) /= trace%body(k - 1_ip)) cycle
+         if (trace%fixed(k) .eqv. trace%fixed(k - 1_ip)) cycle
+         call raise(error, input_error, path//': is_wall differs between boxes of the body '//to_text(trace%body(k)))
+         return
+      end do
+   end subroutine read_bodies
+
+   !> Read the greatest half sides at any angle, if there are any; what was seen counts too.
+   subroutine read_reach(path, file, trace, error)
+      character(len=*), intent(in) :: path
+      type(hdf5_file_t), intent(in) :: file
+      type(trace_t), intent(inout) :: trace
+      type(error_t), allocatable, intent(inout) :: error
+      real(dp), allocatable :: reach(:)
+
+      if (.not. file%has('/reach')) return
+      call file%read('/reach', reach, error)
+      if (allocated(error)) return
+      call check_size(path, 'reach', size(reach, kind=lp), size(trace%fixed, kind=lp), 'boxes', error)
+      if (allocated(error)) return
+      if (.not. all(ieee_is_finite(real(reach, wp))) .or. any(reach < 0.0_dp)) then
+         call raise(error, input_error, path//': reach must be finite and not negative')
+         return
+      end if
+      trace%reach = max(trace%reach, real(reach, wp))
+   end subroutine read_reach
 
    !> Insist on finite bounds, the lower ones not above the upper ones, and keep the greatest half sides.
    subroutine check_boxes(path, trace, error)
@@ -112,19 +218,27 @@ contains
       end do
    end subroutine check_boxes
 
-   !> Read the numbers of pairs, if there are any.
+   !> Read the numbers of pairs and their hashes, if there are any.
    subroutine read_numbers(path, file, trace, error)
       character(len=*), intent(in) :: path
       type(hdf5_file_t), intent(in) :: file
       type(trace_t), intent(inout) :: trace
       type(error_t), allocatable, intent(inout) :: error
 
-      if (.not. file%has('/npairs')) return
-      call file%read('/npairs', trace%n_pairs, error)
+      integer(lp), allocatable :: extent(:)
+
+      call file%shape_of('/aabb', extent, error)
       if (allocated(error)) return
-      if (size(trace%n_pairs) == trace%n_steps) return
-      call raise(error, input_error, path//': npairs has '//to_text(size(trace%n_pairs, kind=ip))// &
-                 ' entries, but aabb '//to_text(trace%n_steps)//' steps')
+      if (file%has('/npairs')) then
+         call file%read('/npairs', trace%n_pairs, error)
+         if (allocated(error)) return
+         call check_size(path, 'npairs', size(trace%n_pairs, kind=lp), extent(1), 'steps', error)
+      end if
+      if (file%has('/pair_hash')) then
+         call file%read('/pair_hash', trace%pair_hash, error)
+         if (allocated(error)) return
+         call check_size(path, 'pair_hash', size(trace%pair_hash, kind=lp), extent(1), 'steps', error)
+      end if
    end subroutine read_numbers
 
    !> Read the polygons, if there are any: their diameters are greater than the boxes that were seen.

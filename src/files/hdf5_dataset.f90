@@ -8,11 +8,11 @@ module polydem_hdf5_dataset
    use, intrinsic :: iso_c_binding, only: c_ptr
    use hdf5, only: h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dont_atexit_f, h5dopen_f, &
       h5dread_f, h5dset_extent_f, h5dwrite_f, h5eset_auto_f, h5get_libversion_f, h5kind_to_type, h5lexists_f, &
-      h5open_f, h5pclose_f, h5pcreate_f, h5pset_chunk_f, h5pset_create_inter_group_f, h5sclose_f, &
-      h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, &
-      h5tclose_f, h5tget_class_f, h5tget_size_f
+      h5open_f, h5pclose_f, h5pcreate_f, h5pset_chunk_f, h5pset_create_inter_group_f, h5pset_deflate_f, &
+      h5pset_shuffle_f, h5sclose_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
+      h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, h5tclose_f, h5tget_class_f, h5tget_size_f, h5zfilter_avail_f
    use hdf5, only: h5_integer_kind, h5_real_kind, h5p_dataset_create_f, h5p_link_create_f, h5s_select_set_f, &
-      h5s_unlimited_f, h5t_enum_f, h5t_float_f, h5t_integer_f, hid_t, hsize_t, size_t
+      h5s_unlimited_f, h5t_enum_f, h5t_float_f, h5t_integer_f, h5z_filter_deflate_f, hid_t, hsize_t, size_t
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_strings, only: to_text
@@ -38,6 +38,8 @@ module polydem_hdf5_dataset
       character(len=:), allocatable :: path
       !> Name of the data set, like /frames/position
       character(len=:), allocatable :: name
+      !> Whether a new growing data set is compressed
+      logical :: compressed = .false.
    end type place_t
 
 contains
@@ -227,6 +229,7 @@ contains
       call h5screate_simple_f(n, extent, space, status, limit)
       if (status >= 0) call h5pcreate_f(h5p_dataset_create_f, properties, status)
       if (status >= 0) call h5pset_chunk_f(properties, n, chunk, status)
+      if (status >= 0 .and. place%compressed) call compress(properties, status)
       call expect(status, 'make room for', place, error)
       if (allocated(error)) return
       call create_dataset(place, kind_in_file, space, dataset, error, properties)
@@ -234,6 +237,18 @@ contains
       call h5pclose_f(properties, ignored)
       call h5sclose_f(space, ignored)
    end subroutine create_growing
+
+   !> Let chunks be shuffled and deflated, if this HDF5 can.
+   subroutine compress(properties, status)
+      integer(hid_t), intent(in) :: properties
+      integer, intent(out) :: status
+      logical :: possible
+
+      call h5zfilter_avail_f(h5z_filter_deflate_f, possible, status)
+      if (status < 0 .or. .not. possible) return
+      call h5pset_shuffle_f(properties, status)
+      if (status >= 0) call h5pset_deflate_f(properties, 1, status)
+   end subroutine compress
 
    subroutine grow(dataset, place, kind_in_file, row, n_rows, address, error)
       integer(hid_t), intent(in) :: dataset, kind_in_file

@@ -8,10 +8,10 @@ module polydem_hdf5_file
    use, intrinsic :: iso_c_binding, only: c_loc
    use hdf5, only: hsize_t
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_hdf5_appender, only: hdf5_appender_t
    use polydem_hdf5_dataset, only: dataset_shape, double_type, holds_integers, holds_reals, library_version, &
       long_type, place_t, read_dataset
-   use polydem_hdf5_text, only: read_text
-   use polydem_hdf5_writer, only: hdf5_writer_t
+   use polydem_hdf5_text, only: read_attribute_value, read_text
    use polydem_kinds, only: dp, ip, lp
    use polydem_strings, only: join, to_text
    implicit none
@@ -20,12 +20,14 @@ module polydem_hdf5_file
 
    !> An HDF5 file: create, open (to read), flush, close, has, shape_of, write, append, append_rows,
    !> write_attribute, read
-   type, extends(hdf5_writer_t) :: hdf5_file_t
+   type, extends(hdf5_appender_t) :: hdf5_file_t
    contains
       !> Read a data set, allocating the values: read(name, values, error). Whole numbers may have any width,
       !> or be h5py's booleans.
       generic :: read => read_reals, read_real_table, read_real_block, read_integers, read_longs, &
          read_one_text
+      procedure :: read_rows
+      procedure :: read_real_attribute
       procedure, private :: read_reals, read_real_table, read_real_block, read_integers, read_longs
       procedure, private :: read_one_text
    end type hdf5_file_t
@@ -78,6 +80,29 @@ contains
                         c_loc(values), error)
    end subroutine read_real_block
 
+   !> Read some rows of a data set of three dimensions.
+   subroutine read_rows(self, name, first, n_rows, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      !> Name of the data set
+      character(len=*), intent(in) :: name
+      !> First row along the slowest dimension, counted from 1
+      integer(ip), intent(in) :: first
+      !> How many rows; there must be so many
+      integer(ip), intent(in) :: n_rows
+      !> What they hold, fastest dimension first
+      real(dp), allocatable, target, intent(out) :: values(:, :, :)
+      !> Allocated on failure, or if the data set has another number of dimensions
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call expect_rank(self%place_of(name), 3, extent, error)
+      if (allocated(error)) return
+      extent(3) = int(n_rows, hsize_t)
+      allocate (values(extent(1), extent(2), extent(3)))
+      call read_dataset(self%place_of(name), holds_reals, double_type(), &
+                        [0_hsize_t, 0_hsize_t, int(first - 1_ip, hsize_t)], extent, c_loc(values), error)
+   end subroutine read_rows
+
    subroutine read_longs(self, name, values, error)
       class(hdf5_file_t), intent(in) :: self
       character(len=*), intent(in) :: name
@@ -119,6 +144,20 @@ contains
 
       call read_text(self%place_of(name), text, error)
    end subroutine read_one_text
+
+   !> Read a real number that is attached to a group or data set.
+   subroutine read_real_attribute(self, object, name, value, error)
+      class(hdf5_file_t), intent(in) :: self
+      !> Group or data set, and name of the attribute
+      character(len=*), intent(in) :: object, name
+      !> The number; left as it is if there is no such attribute
+      real(dp), intent(inout), target :: value
+      !> Allocated if it cannot be read
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: there
+
+      call read_attribute_value(self%place_of(object), name, double_type(), c_loc(value), there, error)
+   end subroutine read_real_attribute
 
    !> Find the shape of a data set and insist on its number of dimensions.
    subroutine expect_rank(place, rank, extent, error)

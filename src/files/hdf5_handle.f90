@@ -17,6 +17,8 @@ module polydem_hdf5_handle
       integer(hid_t) :: id = -1_hid_t
       !> Its path
       character(len=:), allocatable :: path
+      !> Whether growing data sets are compressed
+      logical :: compressed = .false.
    contains
       procedure :: create
       procedure :: open => open_file
@@ -39,17 +41,21 @@ module polydem_hdf5_handle
 contains
 
    !> Create a file for writing; a file of the same name is lost.
-   subroutine create(self, path, error)
+   subroutine create(self, path, error, compressed)
       class(hdf5_handle_t), intent(inout) :: self
       !> Path of the file
       character(len=*), intent(in) :: path
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
+      !> Whether data sets to which rows are added are compressed, without loss; no if absent
+      logical, intent(in), optional :: compressed
       integer :: status
 
       call start_library(error)
       if (allocated(error)) return
       self%path = path
+      self%compressed = .false.
+      if (present(compressed)) self%compressed = compressed
       call h5fcreate_f(path, h5f_acc_trunc_f, self%id, status)
       if (status >= 0) return
       self%id = -1_hid_t
@@ -157,6 +163,7 @@ contains
       place%file = self%id
       place%path = self%path
       place%name = name
+      place%compressed = self%compressed
    end function place_of
 
 end module polydem_hdf5_handle

@@ -3,7 +3,7 @@
 !> HDF5 handles them as addresses of texts that end with a null character.
 module polydem_hdf5_text
    use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_loc, c_null_char, c_null_ptr, c_ptr, c_size_t
-   use hdf5, only: h5aclose_f, h5acreate_f, h5adelete_f, h5aexists_f, h5awrite_f, h5dclose_f, &
+   use hdf5, only: h5aclose_f, h5acreate_f, h5adelete_f, h5aexists_f, h5aopen_f, h5aread_f, h5awrite_f, h5dclose_f, &
       h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dvlen_reclaim_f, h5oclose_f, h5oopen_f, &
       h5sclose_f, h5screate_f, h5tclose_f, h5tcopy_f, h5tis_variable_str_f, h5tset_cset_f
    use hdf5, only: h5p_default_f, h5s_scalar_f, h5t_cset_utf8_f, h5t_string, hid_t, hsize_t
@@ -11,7 +11,7 @@ module polydem_hdf5_text
    use polydem_hdf5_dataset, only: dataset_shape, expect, place_t, write_dataset
    implicit none
    private
-   public :: write_texts, read_text, write_attribute_value, write_text_attribute
+   public :: write_texts, read_text, write_attribute_value, read_attribute_value, write_text_attribute
 
    interface
       !> C strlen
@@ -184,5 +184,38 @@ contains
       call h5sclose_f(space, ignored)
       call h5oclose_f(object, ignored)
    end subroutine write_attribute_value
+
+   !> Read one value that is attached to a group or data set.
+   subroutine read_attribute_value(place, name, kind_in_memory, address, there, error)
+      !> File and the name of the group or data set
+      type(place_t), intent(in) :: place
+      !> Name of the attribute
+      character(len=*), intent(in) :: name
+      !> HDF5 type in memory; HDF5 converts
+      integer(hid_t), intent(in) :: kind_in_memory
+      !> Address of room for the value, untouched if there is none
+      type(c_ptr), intent(in) :: address
+      !> Whether there is such an attribute
+      logical, intent(out) :: there
+      !> Allocated if it cannot be read
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: object, attribute
+      type(c_ptr) :: buffer
+      integer :: status, ignored
+
+      there = .false.
+      call h5oopen_f(place%file, place%name, object, status)
+      call expect(status, 'open', place, error)
+      if (allocated(error)) return
+      call h5aexists_f(object, name, there, status)
+      if (status >= 0 .and. there) then
+         buffer = address
+         call h5aopen_f(object, name, attribute, status)
+         if (status >= 0) call h5aread_f(attribute, kind_in_memory, buffer, status)
+         call h5aclose_f(attribute, ignored)
+      end if
+      call expect(status, "read the attribute '"//name//"' of", place, error)
+      call h5oclose_f(object, ignored)
+   end subroutine read_attribute_value
 
 end module polydem_hdf5_text

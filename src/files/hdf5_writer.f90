@@ -1,13 +1,12 @@
-!> Writing to an HDF5 file: new data sets, rows added to growing ones, attributes.
+!> Writing to an HDF5 file: new data sets and attributes.
 !>
 !> Every procedure takes the name of the data set and the values, and allocates `error` on failure, with the
 !> file and the data set in its message. `unit` and `meaning` become attributes of the data set.
 module polydem_hdf5_writer
-   use, intrinsic :: iso_c_binding, only: c_loc, c_ptr
+   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr, c_ptr
    use hdf5, only: hid_t, hsize_t
    use polydem_errors, only: error_t
-   use polydem_hdf5_dataset, only: append_rows_to, byte_type, double_type, integer_type, long_type, &
-      write_dataset
+   use polydem_hdf5_dataset, only: byte_type, double_type, integer_type, long_type, write_dataset
    use polydem_hdf5_handle, only: hdf5_handle_t
    use polydem_hdf5_text, only: write_attribute_value, write_text_attribute, write_texts
    use polydem_kinds, only: bp, dp, ip, lp
@@ -20,20 +19,14 @@ module polydem_hdf5_writer
    contains
       !> Write a new data set: write(name, values, error, unit, meaning)
       generic :: write => write_real, write_reals, write_real_table, write_integer, write_integers, &
-         write_long, write_longs, write_bytes, write_text, write_text_list
-      !> Add one row along the slowest dimension: append(name, values, error, unit, meaning)
-      generic :: append => append_real, append_reals, append_real_table, append_integer, append_integers, &
-         append_long
-      !> Add a row for each place of the last dimension: append_rows(name, values, error, unit, meaning)
-      generic :: append_rows => append_rows_reals, append_rows_table, append_rows_integers
+         write_long, write_longs, write_long_table, write_bytes, write_text, write_text_list
       !> Attach a value to a group or data set: write_attribute(object, name, value, error)
       generic :: write_attribute => attach_text, attach_integer, attach_real
+      procedure :: describe
       procedure, private :: write_real, write_reals, write_real_table, write_integer, write_integers
-      procedure, private :: write_long, write_longs, write_bytes, write_text, write_text_list
-      procedure, private :: append_real, append_reals, append_real_table, append_integer, append_integers
-      procedure, private :: append_long, append_rows_reals, append_rows_table, append_rows_integers
+      procedure, private :: write_long, write_longs, write_long_table, write_bytes, write_text, write_text_list
       procedure, private :: attach_text, attach_integer, attach_real
-      procedure, private :: put, add, describe
+      procedure, private :: put
    end type hdf5_writer_t
 
 contains
@@ -53,27 +46,14 @@ contains
       call self%describe(name, error, unit, meaning)
    end subroutine put
 
-   !> Add contiguous rows to a growing data set, which gets its attributes when it is made.
-   subroutine add(self, name, type, row, n_rows, address, error, unit, meaning)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer(hid_t), intent(in) :: type
-      integer, intent(in) :: row(:), n_rows
-      type(c_ptr), intent(in) :: address
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-      logical :: known
-
-      if (allocated(error)) return
-      known = self%has(name)
-      call append_rows_to(self%place_of(name), type, int(row, hsize_t), int(n_rows, hsize_t), address, error)
-      if (.not. known) call self%describe(name, error, unit, meaning)
-   end subroutine add
-
+   !> Give a data set its attributes.
    subroutine describe(self, name, error, unit, meaning)
       class(hdf5_writer_t), intent(in) :: self
+      !> Name of the data set
       character(len=*), intent(in) :: name
+      !> Allocated on failure; nothing happens if it is already
       type(error_t), allocatable, intent(inout) :: error
+      !> Its unit and meaning; none if absent
       character(len=*), intent(in), optional :: unit, meaning
 
       if (allocated(error)) return
@@ -103,8 +83,11 @@ contains
       real(dp), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
 
-      call self%put(name, double_type(), shape(values), c_loc(values), error, unit, meaning)
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%put(name, double_type(), [size(values)], address, error, unit, meaning)
    end subroutine write_reals
 
    subroutine write_real_table(self, name, values, error, unit, meaning)
@@ -113,8 +96,11 @@ contains
       real(dp), intent(in), target, contiguous :: values(:, :)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
 
-      call self%put(name, double_type(), shape(values), c_loc(values), error, unit, meaning)
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%put(name, double_type(), [size(values, 1), size(values, 2)], address, error, unit, meaning)
    end subroutine write_real_table
 
    subroutine write_integer(self, name, values, error, unit, meaning)
@@ -133,8 +119,11 @@ contains
       integer(ip), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
 
-      call self%put(name, integer_type(), shape(values), c_loc(values), error, unit, meaning)
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%put(name, integer_type(), [size(values)], address, error, unit, meaning)
    end subroutine write_integers
 
    subroutine write_long(self, name, values, error, unit, meaning)
@@ -153,9 +142,25 @@ contains
       integer(lp), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
 
-      call self%put(name, long_type(), shape(values), c_loc(values), error, unit, meaning)
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%put(name, long_type(), [size(values)], address, error, unit, meaning)
    end subroutine write_longs
+
+   subroutine write_long_table(self, name, values, error, unit, meaning)
+      class(hdf5_writer_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(lp), intent(in), target, contiguous :: values(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
+
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%put(name, long_type(), [size(values, 1), size(values, 2)], address, error, unit, meaning)
+   end subroutine write_long_table
 
    subroutine write_bytes(self, name, values, error, unit, meaning)
       class(hdf5_writer_t), intent(in) :: self
@@ -163,8 +168,11 @@ contains
       integer(bp), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
 
-      call self%put(name, byte_type(), shape(values), c_loc(values), error, unit, meaning)
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%put(name, byte_type(), [size(values)], address, error, unit, meaning)
    end subroutine write_bytes
 
    subroutine write_text(self, name, values, error, unit, meaning)
@@ -190,107 +198,6 @@ contains
       call write_texts(self%place_of(name), [size(values, kind=hsize_t)], values, error)
       call self%describe(name, error, unit, meaning)
    end subroutine write_text_list
-
-   !> Add a row to a growing data set; the other forms of `append` differ in kind and shape only.
-   subroutine append_real(self, name, values, error, unit, meaning)
-      class(hdf5_writer_t), intent(in) :: self
-      !> Name of the data set, like /frames/position
-      character(len=*), intent(in) :: name
-      !> The row
-      real(dp), intent(in), target :: values
-      !> Allocated on failure; nothing happens if it is already
-      type(error_t), allocatable, intent(inout) :: error
-      !> Attributes of the data set when it is made
-      character(len=*), intent(in), optional :: unit, meaning
-
-      call self%add(name, double_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
-   end subroutine append_real
-
-   subroutine append_reals(self, name, values, error, unit, meaning)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      real(dp), intent(in), target, contiguous :: values(:)
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-
-      call self%add(name, double_type(), shape(values), 1, c_loc(values), error, unit, meaning)
-   end subroutine append_reals
-
-   subroutine append_real_table(self, name, values, error, unit, meaning)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      real(dp), intent(in), target, contiguous :: values(:, :)
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-
-      call self%add(name, double_type(), shape(values), 1, c_loc(values), error, unit, meaning)
-   end subroutine append_real_table
-
-   subroutine append_integer(self, name, values, error, unit, meaning)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer(ip), intent(in), target :: values
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-
-      call self%add(name, integer_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
-   end subroutine append_integer
-
-   subroutine append_integers(self, name, values, error, unit, meaning)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer(ip), intent(in), target, contiguous :: values(:)
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-
-      call self%add(name, integer_type(), shape(values), 1, c_loc(values), error, unit, meaning)
-   end subroutine append_integers
-
-   subroutine append_long(self, name, values, error, unit, meaning)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer(lp), intent(in), target :: values
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-
-      call self%add(name, long_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
-   end subroutine append_long
-
-   !> Add several rows to a growing data set; the other forms of `append_rows` differ in kind and shape only.
-   subroutine append_rows_reals(self, name, values, error, unit, meaning)
-      class(hdf5_writer_t), intent(in) :: self
-      !> Name of the data set, like /frames/position
-      character(len=*), intent(in) :: name
-      !> The rows, one for each place of the last dimension
-      real(dp), intent(in), target, contiguous :: values(:)
-      !> Allocated on failure; nothing happens if it is already
-      type(error_t), allocatable, intent(inout) :: error
-      !> Attributes of the data set when it is made
-      character(len=*), intent(in), optional :: unit, meaning
-
-      call self%add(name, double_type(), [integer ::], size(values, 1), c_loc(values), error, unit, meaning)
-   end subroutine append_rows_reals
-
-   subroutine append_rows_table(self, name, values, error, unit, meaning)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      real(dp), intent(in), target, contiguous :: values(:, :)
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-
-      call self%add(name, double_type(), [size(values, 1)], size(values, 2), c_loc(values), error, &
-                    unit, meaning)
-   end subroutine append_rows_table
-
-   subroutine append_rows_integers(self, name, values, error, unit, meaning)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer(ip), intent(in), target, contiguous :: values(:)
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-
-      call self%add(name, integer_type(), [integer ::], size(values, 1), c_loc(values), error, unit, meaning)
-   end subroutine append_rows_integers
 
    !> Attach a value to a group or data set; the other forms of `write_attribute` differ in kind only.
    subroutine attach_text(self, object, name, value, error)

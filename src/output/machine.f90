@@ -1,9 +1,11 @@
-!> The machine a run is on (Linux): its name, processor and caches, the time, and whether a person watches.
+!> The machine a run is on (Linux): its name and parts, how busy it is, the time, and whether a person watches.
 module polydem_machine
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_long, c_null_char, c_null_ptr, c_ptr, c_size_t
+   use polydem_kinds, only: dp, ip
    implicit none
    private
-   public :: host_name, processor_name, cache_sizes, utc_now, terminal_watches
+   public :: host_name, processor_name, cache_sizes, memory_size, frequency_governor, kernel_release, cores_online
+   public :: load_average, environment, utc_now, terminal_watches
 
    interface
       !> POSIX gethostname(2)
@@ -18,6 +20,12 @@ module polydem_machine
          import :: c_int
          integer(c_int), value :: descriptor
       end function isatty
+
+      !> POSIX sysconf(3)
+      integer(c_long) function sysconf(name) bind(C, name='sysconf')
+         import :: c_int, c_long
+         integer(c_int), value :: name
+      end function sysconf
 
       !> C time
       integer(c_long) function c_time(place) bind(C, name='time')
@@ -45,6 +53,8 @@ module polydem_machine
    character(len=*), parameter :: unknown = 'unknown'
    !> Enough for a line of a file of /sys
    integer, parameter :: line_length = 64
+   !> _SC_NPROCESSORS_ONLN of sysconf(3) on Linux
+   integer(c_int), parameter :: online = 84_c_int
    !> File descriptor of standard output
    integer(c_int), parameter :: standard_output = 1_c_int
 
@@ -102,6 +112,67 @@ contains
       end do
       if (text == '') text = unknown
    end function cache_sizes
+
+   !> Size of the main memory, like '32768 MiB', from /proc/meminfo
+   function memory_size() result(text)
+      character(len=:), allocatable :: text
+      character(len=line_length) :: line
+      character(len=16) :: number
+      integer :: kibibytes, status
+
+      text = unknown
+      line = first_line('/proc/meminfo')
+      if (index(line, 'MemTotal:') /= 1) return
+      read (line(10:), *, iostat=status) kibibytes
+      if (status /= 0) return
+      write (number, '(i0)') kibibytes/1024
+      text = trim(number)//' MiB'
+   end function memory_size
+
+   !> What chooses the frequency of the first processor, like 'performance', from /sys
+   function frequency_governor() result(text)
+      character(len=:), allocatable :: text
+
+      text = trim(first_line('/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor'))
+      if (text == '') text = unknown
+   end function frequency_governor
+
+   !> Release of the kernel, from /proc
+   function kernel_release() result(text)
+      character(len=:), allocatable :: text
+
+      text = trim(first_line('/proc/sys/kernel/osrelease'))
+      if (text == '') text = unknown
+   end function kernel_release
+
+   !> Processors that are switched on
+   integer(ip) function cores_online()
+      cores_online = int(sysconf(online), ip)
+   end function cores_online
+
+   !> Processes that wanted to run, on average over the last minute; 0 where the system does not tell
+   real(dp) function load_average()
+      character(len=line_length) :: line
+      integer :: status
+
+      line = first_line('/proc/loadavg')
+      read (line, *, iostat=status) load_average
+      if (status /= 0) load_average = 0.0_dp
+   end function load_average
+
+   !> Value of an environment variable, or 'unset'
+   function environment(name) result(text)
+      !> Its name
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: text
+      integer :: length, status
+
+      call get_environment_variable(name, length=length, status=status)
+      text = 'unset'
+      if (status /= 0) return
+      text = repeat(' ', length)
+      if (length > 0) call get_environment_variable(name, text)
+   end function environment
 
    !> First line of a file, empty if it cannot be read
    function first_line(path) result(text)

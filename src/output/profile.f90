@@ -1,12 +1,12 @@
 !> The profile of a run: seconds per stage, counters, provenance, the hash of the last state. Written at its
 !> end, whole or not at all.
 module polydem_profile
+   use polydem_complete_file, only: begin_file, complete_file
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t
    use polydem_hash, only: hexadecimal
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, lp
-   use polydem_paths, only: exists, remove_file, rename_file, sync_file
    use polydem_provenance, only: provenance_t, write_provenance
    use polydem_result_folder, only: profile_path
    use polydem_segment, only: schema_version
@@ -14,9 +14,6 @@ module polydem_profile
    implicit none
    private
    public :: write_profile
-
-   !> End of the name of a profile that is not complete
-   character(len=*), parameter :: unfinished = '.unfinished'
 
 contains
 
@@ -39,19 +36,13 @@ contains
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      type(error_t), allocatable :: ignored
       character(len=:), allocatable :: path
 
       path = profile_path(folder)
-      call file%create(path//unfinished, error)
+      call begin_file(file, path, error)
       call fill_profile(file, timers, seconds, counters, state_hash, status, error)
       if (.not. allocated(error)) call write_provenance(provenance, file, error)
-      if (allocated(error)) call file%abandon(error)
-      call file%close(error)
-      if (.not. allocated(error)) call sync_file(path//unfinished, error)
-      if (.not. allocated(error)) call rename_file(path//unfinished, path, error)
-      if (.not. allocated(error)) call sync_file(folder, error)
-      if (exists(path//unfinished)) call remove_file(path//unfinished, ignored)
+      call complete_file(file, path, error)
    end subroutine write_profile
 
    subroutine fill_profile(file, timers, seconds, counters, state_hash, status, error)

@@ -1,15 +1,16 @@
 !> Where a result comes from: the program, the build, the machine, the input. Stored in every file.
 module polydem_provenance
    use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version
-   use omp_lib, only: omp_get_max_threads, omp_get_num_procs
+   use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_get_proc_bind, omp_proc_bind_false
    use polydem_build_info, only: build_type, git_revision, program_version
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t, library_version
-   use polydem_kinds, only: ip, precision_name
-   use polydem_machine, only: cache_sizes, host_name, processor_name, utc_now
+   use polydem_kinds, only: dp, ip, precision_name
+   use polydem_machine, only: cache_sizes, cores_online, environment, frequency_governor, host_name, kernel_release, &
+      load_average, memory_size, processor_name, utc_now
    implicit none
    private
-   public :: provenance_t, collect_provenance, write_provenance
+   public :: provenance_t, collect_provenance, threads_are_bound, write_provenance
 
    !> Everything that is worth knowing about the origin of a result
    type :: provenance_t
@@ -33,6 +34,20 @@ module polydem_provenance
       character(len=:), allocatable :: processor
       !> Sizes of its caches
       character(len=:), allocatable :: caches
+      !> Size of its memory
+      character(len=:), allocatable :: memory
+      !> What chooses the frequency of its processors
+      character(len=:), allocatable :: governor
+      !> Release of its kernel
+      character(len=:), allocatable :: kernel
+      !> Processors that are switched on
+      integer(ip) :: cores = 0_ip
+      !> Processes that wanted to run in the minute before the start
+      real(dp) :: load = 0.0_dp
+      !> Whether and where threads are bound to processors
+      character(len=:), allocatable :: binding
+      !> How idle threads wait
+      character(len=:), allocatable :: wait_policy
       !> OpenMP threads of the run
       integer(ip) :: threads = 0_ip
       !> Processors that the run may use
@@ -76,6 +91,14 @@ contains
       provenance%host = host_name()
       provenance%processor = processor_name()
       provenance%caches = cache_sizes()
+      provenance%memory = memory_size()
+      provenance%governor = frequency_governor()
+      provenance%kernel = kernel_release()
+      provenance%cores = cores_online()
+      provenance%load = load_average()
+      provenance%binding = trim(merge('bound    ', 'not bound', threads_are_bound()))//', OMP_PROC_BIND '// &
+         environment('OMP_PROC_BIND')//', OMP_PLACES '//environment('OMP_PLACES')
+      provenance%wait_policy = environment('OMP_WAIT_POLICY')
       provenance%threads = int(omp_get_max_threads(), ip)
       provenance%processors = int(omp_get_num_procs(), ip)
       provenance%command_line = command_line()
@@ -85,6 +108,11 @@ contains
       provenance%seed = seed
       provenance%started = utc_now()
    end subroutine collect_provenance
+
+   !> Whether OpenMP binds its threads to processors
+   logical function threads_are_bound()
+      threads_are_bound = omp_get_proc_bind() /= omp_proc_bind_false
+   end function threads_are_bound
 
    !> Write the group /provenance; the time of writing is its entry `written`.
    subroutine write_provenance(provenance, file, error)
@@ -106,6 +134,13 @@ contains
       call file%write('/provenance/host', provenance%host, error)
       call file%write('/provenance/processor', provenance%processor, error)
       call file%write('/provenance/caches', provenance%caches, error)
+      call file%write('/provenance/memory', provenance%memory, error)
+      call file%write('/provenance/governor', provenance%governor, error)
+      call file%write('/provenance/kernel', provenance%kernel, error)
+      call file%write('/provenance/cores', provenance%cores, error)
+      call file%write('/provenance/load', provenance%load, error)
+      call file%write('/provenance/binding', provenance%binding, error)
+      call file%write('/provenance/wait_policy', provenance%wait_policy, error)
       call file%write('/provenance/threads', provenance%threads, error)
       call file%write('/provenance/processors', provenance%processors, error)
       call file%write('/provenance/command_line', provenance%command_line, error)

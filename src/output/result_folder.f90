@@ -3,34 +3,38 @@
 !>     trajectory_0001.h5, ...    closed segments of the trajectory, in order
 !>     trajectory_0007.h5.open    the segment being written
 !>     profile.h5                 times, counters, provenance; its presence says that the run ended
+!>     trace.h5                   recorded boxes, if asked for
+!>     steps.h5                   times and counts of every step, if asked for
 !>     log.txt                    what the run printed
 module polydem_result_folder
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip
    use polydem_paths, only: exists, remove_file
+   use polydem_segment_path, only: open_suffix, segment_path
    implicit none
    private
-   public :: segment_path, profile_path, log_path, holds_result, clear_result, open_suffix
+   public :: segment_path, profile_path, log_path, trace_path, steps_path, default_folder
+   public :: holds_result, clear_result, open_suffix, unfinished
 
-   !> End of the name of a segment that is being written
-   character(len=*), parameter :: open_suffix = '.open'
+   !> End of the name of any other file that is not complete
+   character(len=*), parameter :: unfinished = '.unfinished'
    !> Segments are looked for until so many numbers in a row are missing
    integer(ip), parameter :: greatest_gap = 100_ip
 
 contains
 
-   !> Path of a closed segment
-   pure function segment_path(folder, number) result(path)
-      !> Folder of the result
-      character(len=*), intent(in) :: folder
-      !> Its number, from 1
-      integer(ip), intent(in) :: number
-      character(len=:), allocatable :: path
-      character(len=16) :: digits
+   !> results/<name of the input without path and suffix>
+   pure function default_folder(input_file) result(folder)
+      !> Path of the namelist file
+      character(len=*), intent(in) :: input_file
+      character(len=:), allocatable :: folder
+      integer :: first, last
 
-      write (digits, '(i0.4)') number
-      path = folder//'/trajectory_'//trim(digits)//'.h5'
-   end function segment_path
+      first = index(input_file, '/', back=.true.) + 1
+      last = index(input_file, '.', back=.true.) - 1
+      if (last < first) last = len(input_file)
+      folder = 'results/'//input_file(first:last)
+   end function default_folder
 
    !> Path of the profile
    pure function profile_path(folder) result(path)
@@ -49,6 +53,24 @@ contains
 
       path = folder//'/log.txt'
    end function log_path
+
+   !> Path of the recorded boxes
+   pure function trace_path(folder) result(path)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      character(len=:), allocatable :: path
+
+      path = folder//'/trace.h5'
+   end function trace_path
+
+   !> Path of the times and counts of every step
+   pure function steps_path(folder) result(path)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      character(len=:), allocatable :: path
+
+      path = folder//'/steps.h5'
+   end function steps_path
 
    !> Whether a folder holds a result that a run would overwrite
    logical function holds_result(folder)
@@ -73,6 +95,10 @@ contains
 
       call remove_if_there(profile_path(folder), error)
       call remove_if_there(log_path(folder), error)
+      call remove_if_there(trace_path(folder), error)
+      call remove_if_there(trace_path(folder)//unfinished, error)
+      call remove_if_there(steps_path(folder), error)
+      call remove_if_there(steps_path(folder)//unfinished, error)
       last = 0_ip
       number = 1_ip
       do while (number <= last + greatest_gap)

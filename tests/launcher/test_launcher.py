@@ -112,7 +112,7 @@ class Words(Toy):
     def test_help_needs_no_build(self):
         code, output, _ = self.call("--help")
         self.assertEqual(code, 0)
-        for verb in ("run", "check", "info", "plot", "replay", "test", "--no-install"):
+        for verb in ("run", "check", "info", "plot", "replay", "bench", "test", "--no-install"):
             self.assertIn(f"\n  {verb} ", output)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
 
@@ -200,6 +200,8 @@ class BareMachine(Toy):
         self.assertEqual(code, 1)
         for package in ("gfortran", "cmake", "ninja-build", "git", "libhdf5-dev"):
             self.assertIn(package, output.split())
+        self.assertNotIn("valgrind", output.split())
+        self.assertIn("valgrind", self.call("cache", "results/bench", "--no-install", **machine)[1].split())
         self.assertFalse(os.path.exists(machine["APT_LOG"]))
 
     def test_says_what_is_missing_installs_it_and_runs(self):

@@ -1,0 +1,120 @@
+!> Settings of a bench from a namelist file, by the same table and the same reader as those of a run.
+module polydem_read_bench
+   use polydem_bench_settings, only: bench_settings_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_fill_settings, only: fill_bench
+   use polydem_namelist_entries, only: bench_group, first_row
+   use polydem_namelist_tokens, only: source_t
+   use polydem_namelist_values, only: value_t
+   use polydem_read_settings, only: with_plain_line_ends
+   use polydem_resolve_entries, only: resolve_entries, resolved_text
+   use polydem_strings, only: to_text
+   use polydem_text_file, only: read_text_file
+   use polydem_words, only: quoted, text_t
+   implicit none
+   private
+   public :: read_bench, read_bench_text
+
+   !> What the name of a scene, which becomes part of file names, may be made of
+   character(len=*), parameter :: safe_letters = &
+      'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._'
+
+contains
+
+   !> Read the settings of a bench from a file.
+   subroutine read_bench(file, overrides, bench, error)
+      !> Path of the namelist file
+      character(len=*), intent(in) :: file
+      !> Overrides of the command line, each 'bench.key=value'; the last one of an entry counts
+      character(len=*), intent(in) :: overrides(:)
+      !> Complete, checked settings
+      type(bench_settings_t), intent(out) :: bench
+      !> What is wrong with the file or an override, with file:line or --set bench.key=value in front
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: text
+
+      call read_text_file(file, text, error)
+      if (allocated(error)) return
+      call read_bench_text(file, text, overrides, bench, error)
+   end subroutine read_bench
+
+   !> Read the settings of a bench from a text.
+   pure subroutine read_bench_text(file_name, text, overrides, bench, error)
+      !> Name in messages
+      character(len=*), intent(in) :: file_name
+      !> Namelist group
+      character(len=*), intent(in) :: text
+      !> Overrides of the command line
+      character(len=*), intent(in) :: overrides(:)
+      !> Complete, checked settings
+      type(bench_settings_t), intent(out) :: bench
+      !> What is wrong with the text or an override
+      type(error_t), allocatable, intent(inout) :: error
+      type(source_t) :: source
+      type(value_t), allocatable :: values(:)
+
+      source%name = trim(file_name)
+      source%text = text
+      call resolve_entries(source, .true., overrides, values, error)
+      if (allocated(error)) return
+      bench%file = trim(file_name)
+      bench%text = with_plain_line_ends(text)
+      bench%resolved = resolved_text(values)
+      call fill_bench(values, bench)
+      call check_bench(bench, values, error)
+   end subroutine read_bench_text
+
+   !> Check entries against each other, and lists for what stands twice.
+   pure subroutine check_bench(bench, values, error)
+      type(bench_settings_t), intent(in) :: bench
+      type(value_t), intent(in) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      if (size(bench%names) /= size(bench%scenes)) then
+         call blame('names', 'has '//to_text(size(bench%names))//' values, but there are '// &
+            to_text(size(bench%scenes))//' scenes', values, error)
+      end if
+      do k = 1, size(bench%names)
+         if (verify(bench%names(k)%text, safe_letters) > 0 .or. bench%names(k)%text == '') call blame('names', &
+            'holds '//quoted(bench%names(k)%text)//', but a name consists of letters, digits, . and _', values, error)
+      end do
+      do k = 1, size(bench%scenes)
+         if (bench%scenes(k)%text == '') call blame('scenes', 'holds an empty scene', values, error)
+      end do
+      do k = 1, size(bench%prepare)
+         if (bench%prepare(k)%text == '') call blame('prepare', 'holds an empty text', values, error)
+      end do
+      call refuse_twice('names', bench%names, values, error)
+      call refuse_twice('finders', bench%finders, values, error)
+      do k = 2, size(bench%threads)
+         if (any(bench%threads(:k - 1) == bench%threads(k))) call blame('threads', 'holds '// &
+            to_text(bench%threads(k))//' twice', values, error)
+      end do
+   end subroutine check_bench
+
+   pure subroutine refuse_twice(key, texts, values, error)
+      character(len=*), intent(in) :: key
+      type(text_t), intent(in) :: texts(:)
+      type(value_t), intent(in) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: j, k
+
+      do k = 2, size(texts)
+         do j = 1, k - 1
+            if (texts(j)%text == texts(k)%text) call blame(key, 'holds '//quoted(texts(k)%text)//' twice', values, &
+                                                           error)
+         end do
+      end do
+   end subroutine refuse_twice
+
+   !> Raise an error at the place where an entry is given.
+   pure subroutine blame(key, complaint, values, error)
+      character(len=*), intent(in) :: key, complaint
+      type(value_t), intent(in) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+
+      call raise(error, input_error, values(first_row(bench_group, key))%place//': '''//key//''' in &bench '//complaint)
+   end subroutine blame
+
+end module polydem_read_bench

@@ -1,0 +1,137 @@
+!> What a run records on request besides frames: the boxes of some steps, times and counts of every step.
+!>
+!> Nothing is done, and no time spent, unless it is asked for. What it costs is in no stage of the profile.
+module polydem_recorder
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_list_hash, only: list_hash
+   use polydem_log, only: log_t
+   use polydem_provenance, only: provenance_t
+   use polydem_result_folder, only: steps_path, trace_path
+   use polydem_simulation, only: simulation_t
+   use polydem_step_file, only: step_file_t, step_row_t
+   use polydem_strings, only: to_text
+   use polydem_timers, only: n_stages, stage_names
+   use polydem_trace_file, only: trace_file_t
+   use polydem_work, only: count_names, n_counts, n_phases, phase_names
+   use polydem_work_meter, only: work_meter_t
+   implicit none
+   private
+   public :: recorder_t, first_trace_step
+
+   !> A recording under way
+   type :: recorder_t
+      private
+      !> Boxes
+      type(trace_file_t) :: trace
+      !> First step to record, and how many; 0 for none
+      integer(lp) :: first_step = 0_lp
+      integer(ip) :: trace_steps = 0_ip
+      !> Times and counts
+      type(step_file_t) :: steps
+      !> Work of the finder up to the last step
+      type(work_meter_t) :: meter
+      !> Seconds of each stage up to the last step
+      real(dp) :: stage_seconds(n_stages) = 0.0_dp
+      !> Row of the present step
+      type(step_row_t) :: row
+   contains
+      procedure :: open => open_recorder
+      procedure :: record
+      procedure :: close => close_recorder
+   end type recorder_t
+
+contains
+
+   !> Prepare what the settings of the simulation ask for, and record step 0.
+   subroutine open_recorder(self, simulation, folder, provenance, log, error)
+      class(recorder_t), intent(inout) :: self
+      !> Simulation before its first step
+      type(simulation_t), intent(inout) :: simulation
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      !> Where the result comes from
+      type(provenance_t), intent(in) :: provenance
+      !> Log, for warnings
+      type(log_t), intent(inout) :: log
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (output => simulation%settings%output, boxes => simulation%boxes)
+         self%trace_steps = output%trace_steps
+         if (self%trace_steps > 0_ip) then
+            self%first_step = first_trace_step(output%trace_start, simulation%dt)
+            if (self%first_step + int(self%trace_steps, lp) - 1_lp > simulation%n_steps) call log%write_line( &
+               'warning: the run ends before the trace is complete')
+            call self%trace%open(trace_path(folder), boxes%body(:boxes%n), boxes%fixed(:boxes%n), &
+                                 boxes%reach(:boxes%n), simulation%dt, provenance, error)
+         end if
+         if (output%step_profile) then
+            call self%steps%open(steps_path(folder), stage_names, phase_names, count_names, provenance, error)
+            allocate (self%row%stage(n_stages), self%row%phase(n_phases), self%row%count(n_counts))
+            call self%meter%look(simulation%neighbours%finder, self%row%phase, self%row%count)
+         end if
+      end associate
+      if (.not. allocated(error)) call record_boxes(self, simulation, error)
+   end subroutine open_recorder
+
+   !> Record the step that was just done.
+   subroutine record(self, simulation, error)
+      class(recorder_t), intent(inout) :: self
+      !> Simulation; its finder may be asked for its state
+      type(simulation_t), intent(inout) :: simulation
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+
+      call record_boxes(self, simulation, error)
+      if (.not. self%steps%is_open .or. allocated(error)) return
+      associate (row => self%row)
+         row%step = simulation%step
+         row%stage = simulation%timers%total - self%stage_seconds
+         self%stage_seconds = simulation%timers%total
+         call self%meter%look(simulation%neighbours%finder, row%phase, row%count)
+         row%pairs = simulation%neighbours%pairs%n
+         row%contacts = simulation%contacts%n
+      end associate
+      call self%steps%add(self%row, error)
+   end subroutine record
+
+   !> Complete what is recorded, and say so if it is less than was asked for.
+   subroutine close_recorder(self, log, error)
+      class(recorder_t), intent(inout) :: self
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (self%trace%is_open) call log%write_line('warning: the run ended before the trace was complete; there are '// &
+         to_text(self%trace%n_steps)//' of '//to_text(self%trace_steps)//' steps')
+      call self%trace%close(error)
+      call self%steps%close(error)
+   end subroutine close_recorder
+
+   !> The first step at or after a time
+   pure integer(lp) function first_trace_step(start, dt)
+      !> The time [s]
+      real(wp), intent(in) :: start
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Shares of a step that are rounding errors of a quotient
+      real(wp), parameter :: slack = 1.0e-6_wp
+
+      first_trace_step = ceiling(min(start/dt, 1.0e15_wp) - slack, lp)
+   end function first_trace_step
+
+   subroutine record_boxes(self, simulation, error)
+      type(recorder_t), intent(inout) :: self
+      type(simulation_t), intent(in) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (.not. self%trace%is_open .or. simulation%step < self%first_step) return
+      associate (boxes => simulation%boxes, pairs => simulation%neighbours%pairs)
+         call self%trace%add(simulation%step, boxes%bounds(:, :boxes%n), pairs%n, list_hash(pairs), error)
+      end associate
+      if (self%trace%n_steps == self%trace_steps) call self%trace%close(error)
+   end subroutine record_boxes
+
+end module polydem_recorder

@@ -1,0 +1,194 @@
+!> Writing to an HDF5 file: rows added to data sets that grow.
+!>
+!> A data set is made, with its attributes, when it gets its first row.
+module polydem_hdf5_appender
+   use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr, c_ptr
+   use hdf5, only: hid_t, hsize_t
+   use polydem_errors, only: error_t
+   use polydem_hdf5_dataset, only: append_rows_to, double_type, integer_type, long_type
+   use polydem_hdf5_writer, only: hdf5_writer_t
+   use polydem_kinds, only: dp, ip, lp
+   implicit none
+   private
+   public :: hdf5_appender_t
+
+   !> A file whose data sets can grow
+   type, extends(hdf5_writer_t) :: hdf5_appender_t
+   contains
+      !> Add one row along the slowest dimension: append(name, values, error, unit, meaning)
+      generic :: append => append_real, append_reals, append_real_table, append_integer, append_integers, &
+         append_long
+      !> Add a row for each place of the last dimension: append_rows(name, values, error, unit, meaning)
+      generic :: append_rows => append_rows_reals, append_rows_table, append_rows_integers, append_rows_longs, &
+         append_rows_long_table
+      procedure, private :: append_real, append_reals, append_real_table, append_integer, append_integers
+      procedure, private :: append_long, append_rows_reals, append_rows_table, append_rows_integers
+      procedure, private :: append_rows_longs, append_rows_long_table
+      procedure, private :: add
+   end type hdf5_appender_t
+
+contains
+
+   !> Add contiguous rows to a growing data set, which gets its attributes when it is made.
+   subroutine add(self, name, type, row, n_rows, address, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(hid_t), intent(in) :: type
+      integer, intent(in) :: row(:), n_rows
+      type(c_ptr), intent(in) :: address
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+      logical :: known
+
+      if (allocated(error)) return
+      known = self%has(name)
+      call append_rows_to(self%place_of(name), type, int(row, hsize_t), int(n_rows, hsize_t), address, error)
+      if (.not. known) call self%describe(name, error, unit, meaning)
+   end subroutine add
+
+   !> Add a row to a growing data set; the other forms of `append` differ in kind and shape only.
+   subroutine append_real(self, name, values, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      !> Name of the data set, like /frames/position
+      character(len=*), intent(in) :: name
+      !> The row
+      real(dp), intent(in), target :: values
+      !> Allocated on failure; nothing happens if it is already
+      type(error_t), allocatable, intent(inout) :: error
+      !> Attributes of the data set when it is made
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, double_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
+   end subroutine append_real
+
+   subroutine append_reals(self, name, values, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
+
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%add(name, double_type(), [size(values)], 1, address, error, unit, meaning)
+   end subroutine append_reals
+
+   subroutine append_real_table(self, name, values, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), intent(in), target, contiguous :: values(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
+
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%add(name, double_type(), [size(values, 1), size(values, 2)], 1, address, error, unit, meaning)
+   end subroutine append_real_table
+
+   subroutine append_integer(self, name, values, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(ip), intent(in), target :: values
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, integer_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
+   end subroutine append_integer
+
+   subroutine append_integers(self, name, values, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(ip), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
+
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%add(name, integer_type(), [size(values)], 1, address, error, unit, meaning)
+   end subroutine append_integers
+
+   subroutine append_long(self, name, values, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(lp), intent(in), target :: values
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+
+      call self%add(name, long_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
+   end subroutine append_long
+
+   !> Add several rows to a growing data set; the other forms of `append_rows` differ in kind and shape only.
+   subroutine append_rows_reals(self, name, values, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      !> Name of the data set, like /frames/position
+      character(len=*), intent(in) :: name
+      !> The rows, one for each place of the last dimension
+      real(dp), intent(in), target, contiguous :: values(:)
+      !> Allocated on failure; nothing happens if it is already
+      type(error_t), allocatable, intent(inout) :: error
+      !> Attributes of the data set when it is made
+      character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
+
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%add(name, double_type(), [integer ::], size(values, 1), address, error, unit, meaning)
+   end subroutine append_rows_reals
+
+   subroutine append_rows_table(self, name, values, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), intent(in), target, contiguous :: values(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
+
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%add(name, double_type(), [size(values, 1)], size(values, 2), address, error, &
+                    unit, meaning)
+   end subroutine append_rows_table
+
+   subroutine append_rows_integers(self, name, values, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(ip), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
+
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%add(name, integer_type(), [integer ::], size(values, 1), address, error, unit, meaning)
+   end subroutine append_rows_integers
+
+   subroutine append_rows_longs(self, name, values, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(lp), intent(in), target, contiguous :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
+
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%add(name, long_type(), [integer ::], size(values, 1), address, error, unit, meaning)
+   end subroutine append_rows_longs
+
+   subroutine append_rows_long_table(self, name, values, error, unit, meaning)
+      class(hdf5_appender_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(lp), intent(in), target, contiguous :: values(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=*), intent(in), optional :: unit, meaning
+      type(c_ptr) :: address
+
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
+      call self%add(name, long_type(), [size(values, 1)], size(values, 2), address, error, unit, meaning)
+   end subroutine append_rows_long_table
+
+end module polydem_hdf5_appender
