@@ -1,10 +1,11 @@
-"""Command line: python -m polydem_post plot RESULT, python -m polydem_post table RESULT."""
+"""Command line: python -m polydem_post plot, table, tables or cache."""
 
 from __future__ import annotations
 
 import argparse
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 from . import __version__
@@ -46,7 +47,35 @@ def _parser() -> argparse.ArgumentParser:
     table.set_defaults(action=_table)
     table.add_argument("result", type=Path, metavar="RESULT", help="folder of a result")
     table.add_argument("--format", choices=FORMATS, default="text", help="form of the table")
+
+    tables = verbs.add_parser("tables", help="write all tables, figures and verdicts of bench folders")
+    tables.set_defaults(action=_tables)
+    tables.add_argument("folders", type=Path, nargs="+", metavar="BENCH_FOLDER",
+                        help="folder of a bench; several: of other machines or builds, the first one leads")
+    tables.add_argument("--output", type=Path, metavar="DIR", help="where to; report in the first folder if absent")
+    tables.add_argument("--no-figures", action="store_true", help="tables and verdicts only")
+    _add_cache(verbs)
     return parser
+
+
+def _add_cache(verbs) -> None:
+    cache = verbs.add_parser(
+        "cache", help="count cache misses on the traces of a bench folder",
+        description="Replays every trace of a bench folder in cachegrind and writes cache.csv there, which the "
+                    "verb tables "
+        "takes up. What cache.csv holds is not counted again: delete it after a change of the program.")
+    cache.set_defaults(action=_cache)
+    cache.add_argument("folder", type=Path, metavar="BENCH_FOLDER", help="folder of a bench, with traces")
+    cache.add_argument("--program", type=Path, required=True, help="the built program (the launcher says which)")
+    cache.add_argument("--finders", type=_words, metavar="A,B,C", help="those of the samples if absent")
+    cache.add_argument("--scenes", type=_words, metavar="A,B,C", help="all that have a trace if absent")
+    cache.add_argument("--steps", type=_numbers, default=[2, 12], metavar="FEW,MORE",
+                       help="steps of the two replays whose difference counts (default: 2,12)")
+    cache.add_argument("--machine", action="store_true",
+                       help="simulate first and last level of this machine, not D1 32 KiB 8-way and LL 1 MiB 16-way")
+    for level in ("D1", "LL"):
+        cache.add_argument(f"--{level}", metavar="SIZE,WAYS,LINE", help=f"simulate this {level} [bytes, ways, bytes]")
+    cache.add_argument("--branch-sim", action="store_true", help="count mispredicted branches too")
 
 
 def _numbers(text: str) -> list[int]:
@@ -54,6 +83,10 @@ def _numbers(text: str) -> list[int]:
         return [int(word) for word in text.split(",")]
     except ValueError as error:
         raise argparse.ArgumentTypeError(f"'{text}' is not a list of whole numbers like 0,10,-1") from error
+
+
+def _words(text: str) -> list[str]:
+    return [word for word in text.split(",") if word]
 
 
 def _plot(options: argparse.Namespace) -> None:
@@ -76,6 +109,31 @@ def _picture_name(trajectory: Trajectory, numbers: list[int]) -> str:
 
 def _table(options: argparse.Namespace) -> None:
     print(timing_table(Trajectory(options.result), options.format))
+
+
+def _tables(options: argparse.Namespace) -> None:
+    from .report import write_report
+
+    written = write_report(options.folders, options.output, figures=not options.no_figures)
+    print(written[-1].parent)
+
+
+def _cache(options: argparse.Namespace) -> None:
+    from .bench import read_bench
+    from .cache import count_misses
+    from .cachegrind import PLAIN_MODEL, Model, machine_model
+
+    if len(options.steps) != 2 or not 1 <= options.steps[0] < options.steps[1]:
+        raise ResultError("--steps takes two numbers, the first at least 1 and less than the second")
+    model = machine_model() if options.machine else Model(**PLAIN_MODEL)
+    model = replace(model, **{level: getattr(options, level) for level in ("D1", "LL") if getattr(options, level)})
+    finders = options.finders or read_bench([options.folder]).named("finder")
+    steps, branches = tuple(options.steps), options.branch_sim
+    count_misses(options.folder, options.program, finders, model, steps, options.scenes, branches, say=_say)
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""The table of times of a run, for people, manuals, papers and spreadsheets."""
+"""The table of times of a run."""
 
 from __future__ import annotations
 
+from .emit import FORMATS, Table
 from .trajectory import Trajectory
 
-#: How a table can be written
-FORMATS = ("text", "markdown", "latex", "csv")
+__all__ = ["FORMATS", "timing_rows", "timing_table"]
 
 HEADING = ("stage", "steps", "least [us]", "mean [us]", "most [us]", "total [s]", "share [%]")
 
@@ -29,31 +29,7 @@ def timing_rows(trajectory: Trajectory) -> list[tuple[str, ...]]:
 
 def timing_table(trajectory: Trajectory, form: str = "text") -> str:
     """The table in one of FORMATS."""
-    rows = timing_rows(trajectory)
-    if form == "csv":
-        return "\n".join(",".join(row) for row in [HEADING, *rows])
-    if form == "markdown":
-        rule = ("---", *("---:" for _ in HEADING[1:]))
-        return "\n".join("| " + " | ".join(row) + " |" for row in [HEADING, rule, *rows])
-    if form == "latex":
-        return _latex(rows)
-    widths = [max(len(row[k]) for row in [HEADING, *rows]) for k in range(len(HEADING))]
-    return "\n".join(_aligned(row, widths) for row in [HEADING, *rows])
-
-
-def _aligned(row: tuple[str, ...], widths: list[int]) -> str:
-    cells = [row[0].ljust(widths[0])] + [cell.rjust(width) for cell, width in zip(row[1:], widths[1:])]
-    return "  ".join(cells).rstrip()
-
-
-def _latex(rows: list[tuple[str, ...]]) -> str:
-    """A table of the package booktabs."""
-    heading = (text.replace("us]", r"$\mu$s]").replace("%", r"\%") for text in HEADING)
-    lines = [r"\begin{tabular}{l" + "r" * (len(HEADING) - 1) + "}", r"\toprule"]
-    lines += [" & ".join(heading) + r" \\", r"\midrule"]
-    lines += [" & ".join(row) + r" \\" for row in rows]
-    lines += [r"\bottomrule", r"\end{tabular}"]
-    return "\n".join(lines)
+    return Table("times", "Times of the stages", HEADING, timing_rows(trajectory)).written(form)
 
 
 def _share(part: float, whole: float) -> str:

@@ -131,7 +131,7 @@ class Trajectory:
     def frame(self, number: int) -> Frame:
         """The bodies of a frame."""
         segment, row = self._locate(number)
-        with _open(segment.path) as file:
+        with open_file(segment.path) as file:
             bodies, frames = file["bodies"], file["frames"]
             return Frame(
                 step=int(segment.steps[row]),
@@ -149,7 +149,7 @@ class Trajectory:
     def contacts(self, number: int) -> Contacts:
         """The contacts of a frame."""
         segment, row = self._locate(number)
-        with _open(segment.path) as file:
+        with open_file(segment.path) as file:
             if "contacts" not in file:
                 raise ResultError(f"{segment.path}: holds no contacts; run with output.contacts = .true.")
             group = file["contacts"]
@@ -160,7 +160,7 @@ class Trajectory:
     def walls(self, number: int) -> Walls:
         """Forces and torques on the fixed bodies in a frame; empty if there are none."""
         segment, row = self._locate(number)
-        with _open(segment.path) as file:
+        with open_file(segment.path) as file:
             if "walls" not in file:
                 return Walls(np.empty(0, dtype=np.int32), np.empty((0, 2)), np.empty(0))
             group = file["walls"]
@@ -171,7 +171,7 @@ class Trajectory:
         """Entries of the energy and momentum ledger, one value per frame; empty if it was not kept."""
         columns: dict[str, list[np.ndarray]] = {}
         for segment in self._segments:
-            with _open(segment.path) as file:
+            with open_file(segment.path) as file:
                 for name, values in file.get("ledger", {}).items():
                     columns.setdefault(name, []).append(values[: len(segment.times)])
         return {name: np.concatenate(parts) for name, parts in columns.items()}
@@ -199,7 +199,7 @@ class Trajectory:
     def provenance(self) -> dict:
         """Where the result comes from: program, build, machine, input."""
         path = self._profile_path if self._profile_path.exists() else self._segments[0].path
-        with _open(path) as file:
+        with open_file(path) as file:
             return {name: _plain(entry) for name, entry in file["provenance"].items()}
 
     @property
@@ -221,7 +221,7 @@ class Trajectory:
     def _open_profile(self) -> h5py.File:
         if not self._profile_path.exists():
             raise ResultError(f"{self._profile_path}: there is no such file; it is written when a run ends")
-        return _open(self._profile_path)
+        return open_file(self._profile_path)
 
     def _locate(self, number: int) -> tuple[_Segment, int]:
         row = number + len(self) if number < 0 else number
@@ -253,7 +253,7 @@ def _find_segments(folder: Path) -> list[_Segment]:
 
 
 def _read_segment(path: Path) -> _Segment:
-    with _open(path) as file:
+    with open_file(path) as file:
         try:
             if "frames" not in file:
                 raise ResultError(f"{path}: is not a segment of a trajectory")
@@ -292,7 +292,7 @@ def _present_path(path: Path) -> Path:
     return path
 
 
-def _open(path: Path) -> h5py.File:
+def open_file(path: Path) -> h5py.File:
     """Open a file, also one that a run is still writing or has just closed and renamed."""
     try:
         try:

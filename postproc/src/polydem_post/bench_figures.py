@@ -1,0 +1,172 @@
+"""Figures that the paper has no counterpart of: all finders over size, threads, cache misses, candidates and visits."""
+
+from __future__ import annotations
+
+import matplotlib
+import numpy as np
+
+from . import cache, series
+from .bench import Bench
+from .bench_tables import visits_per_search
+from .figure_style import (
+    LOOKS,
+    SETTINGS,
+    Drawing,
+    draw_estimates,
+    look,
+    over_size,
+    panels,
+    panels_with_legend,
+    readable_decades,
+    shared_legend,
+)
+from .statistics import median
+
+#: Finders in the figure of threads, and what they stand for
+PARALLEL = {
+    "partitioned_sweep": "sweep, partitioned lists",
+    "sort_and_sweep": "sweep, one axis per thread",
+    "quadtree": "quadtree, search",
+    "linked_cells": "linked cells, scan",
+}
+
+
+def bench_drawings(bench: Bench) -> list[Drawing]:
+    """Those of the figures that the samples can give."""
+    here = bench.on()
+    with matplotlib.rc_context(SETTINGS):
+        drawn = [all_finders(here), threads(here), misses(bench), work(here)]
+    return [drawing for drawing in drawn if drawing]
+
+
+def all_finders(bench: Bench) -> Drawing | None:
+    """Time per box over size."""
+    figure, (axis,), below = panels_with_legend(1, 6.4, 3.8, rows=6)
+    for finder in _finders(bench):
+        cases = [case for case in series.over_size(bench, finder) if case.time()]
+        if not cases:
+            continue
+        law = series.law(cases)
+        slope = "" if law is None else f": slope {law.exponent.text()}"
+        draw_estimates(
+            axis,
+            [case.boxes for case in cases],
+            [median(list(case.time().values())) for case in cases],
+            label=finder + slope,
+            **look(finder),
+        )
+    if not axis.has_data():
+        return None
+    over_size(axis, "time per box and step [ns]")
+    shared_legend(below, [axis], columns=2)
+    return Drawing(
+        "finders_over_size",
+        figure,
+        "Time per box and step of all finders on the drum, one thread, first step excluded: median and 95 % interval. "
+        "The slopes are those of the time per step against the number of boxes (1: the time per box is constant).",
+    )
+
+
+def threads(bench: Bench) -> Drawing | None:
+    """The failing parallel sweep and what works, on the largest drum that was run on several threads."""
+    scene = _threaded_scene(bench)
+    if scene is None:
+        return None
+    figure, (axis,) = panels(width=5.0, height=3.8)
+    most = 1
+    for finder, name in PARALLEL.items():
+        cases = bench.select(scene=scene, finder=finder, mode="replay")
+        one = [case for case in cases if case.threads == 1]
+        if not one or len(cases) < 2:
+            continue
+        gains = [series.ratio(one[0], case, series.elapsed_time) for case in cases]
+        draw_estimates(axis, [case.threads for case in cases], gains, label=name, **look(finder))
+        most = max(most, *(case.threads for case in cases))
+    counts = np.arange(1, most + 1)
+    axis.plot(counts, counts, color="0.75", linewidth=0.8, zorder=0, label="as many as threads")
+    axis.axhline(1.0, color="0.75", linewidth=0.8, linestyle="--", zorder=0)
+    axis.set(xlabel="threads", ylabel="speed-up against one thread", xticks=counts if most <= 16 else counts[::8])
+    axis.set_ylim(0.0, axis.get_ylim()[1] * 1.1)
+    axis.legend(fontsize=8, loc="upper left")
+    cores = bench.cases[0].provenance.get("processors", "?")
+    return Drawing(
+        "speed_up",
+        figure,
+        f"Speed-up (ratio of elapsed times, median and 95 % interval) of one scene, {scene}, against one thread of the "
+        f"same finder; {cores} processors. Below the dashed line threads make it slower.",
+    )
+
+
+def _threaded_scene(bench: Bench) -> str | None:
+    """The drum with most parallel finders on several threads, of those the largest; else any such scene."""
+    counts = {}
+    for case in bench.select(mode="replay"):
+        if case.threads > 1 and case.finder in PARALLEL:
+            drum = series.kind(case.scene) == "drum"
+            counts.setdefault((case.scene, drum, case.boxes), set()).add(case.finder)
+    best = max(counts, key=lambda key: (key[1], len(counts[key]), key[2]), default=None)
+    return best[0] if best else None
+
+
+def misses(bench: Bench) -> Drawing | None:
+    """Simulated misses per box over size."""
+    records = [record for record in cache.read_records(bench.folders) if series.kind(record.scene) == "drum"]
+    models = list(dict.fromkeys(record.model for record in records))
+    if not records:
+        return None
+    records = [record for record in records if record.model == models[0]]
+    figure, axes, below = panels_with_legend(2, 4.2, 3.2, rows=3)
+    finders = list(dict.fromkeys(record.finder for record in records))
+    for finder in sorted(finders, key=_rank):
+        found = [record for record in records if record.finder == finder]
+        for axis, level in zip(axes, ("first_level", "last_level")):
+            axis.plot(
+                [r.boxes for r in found],
+                [getattr(r, level) for r in found],
+                linewidth=1.1,
+                label=finder,
+                **look(finder),
+            )
+    for axis, label in zip(axes, ("first-level misses", "last-level misses")):
+        over_size(axis, f"{label} per box and step", logarithmic=False)
+        axis.set_ylim(bottom=0.0)
+    shared_legend(below, axes, columns=4)
+    return Drawing(
+        "cache_misses",
+        figure,
+        f"Misses of data, reads and writes, per box and step, simulated by cachegrind ({models[0]}) on one thread. "
+        "The counts are the same at every call; real machines fetch ahead and miss less.",
+    )
+
+
+def work(bench: Bench) -> Drawing | None:
+    """Candidates per box and nodes per search, over size."""
+    figure, (left, right), below = panels_with_legend(2, 4.2, 3.2, rows=3)
+    for finder in _finders(bench):
+        cases = series.over_size(bench, finder)
+        candidates = [(c.boxes, c.count("candidates") / c.boxes) for c in cases if c.count("candidates") > 0.0]
+        visits = [(c.boxes, visits_per_search(c)) for c in cases if visits_per_search(c) > 0.0]
+        for axis, points in ((left, candidates), (right, visits)):
+            if points and finder != "all_pairs":
+                axis.plot(*np.array(points).T, linewidth=1.1, label=finder, **look(finder))
+    if not left.has_data() and not right.has_data():
+        return None
+    for axis, label in ((left, "candidates per box"), (right, "nodes or cells per search")):
+        over_size(axis, label)
+        readable_decades(axis.yaxis)
+    shared_legend(below, [left, right], columns=4)
+    return Drawing(
+        "work_over_size",
+        figure,
+        "Left: possible pairs that a finder keeps from step to step. Right: nodes or cells that it looks at when the "
+        "neighbours of one box are searched. Exact counts, means over the steps but the first.",
+    )
+
+
+def _finders(bench: Bench) -> list:
+    return sorted(bench.named("finder"), key=_rank)
+
+
+def _rank(finder: str) -> int:
+    """Place of a finder in legends."""
+    return list(LOOKS).index(finder) if finder in LOOKS else len(LOOKS)

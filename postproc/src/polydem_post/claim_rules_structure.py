@@ -1,0 +1,192 @@
+"""Rules for claims about structures and counts: C5, C7, C8, C15, C16, C17."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import complexity, paper, series
+from .bench import Bench
+from .bench_tables import visits_per_search
+from .claims import CONFIRMED, CONTRADICTED, Finding, Missing, claim, needed, of_parts, said
+from .series import SWEEP, TREE
+from .statistics import number
+
+
+@claim(
+    "C5",
+    "The fine-grained parallel sweep fails; one axis per thread and the tree's list can be parallelised",
+    "no numbers",
+    "elapsed time on the most threads of which there are processors: partitioned_sweep not faster than "
+    "sort_and_sweep on one "
+    "thread; sort_and_sweep (two threads) and quadtree at least 1.2 times as fast as themselves on one",
+    "speed_up",
+)
+def parallel(bench: Bench) -> Finding:
+    here, parts, found = bench.on(), [], []
+    for finder, base, least in (("partitioned_sweep", SWEEP, None), (SWEEP, SWEEP, 1.2), (TREE, TREE, 1.2)):
+        case = _most_threads(here, finder, most=2 if finder == SWEEP else None)
+        one = needed(
+            here.select(scene=case.scene, mode="replay", finder=base, threads=1), f"'{base}' on one thread as well"
+        )[0]
+        gain = series.ratio(one, case, series.elapsed_time)
+        parts.append(gain.value <= 1.0 if least is None else gain.value >= least)
+        own = here.select(scene=case.scene, mode="replay", finder=finder, threads=1)
+        against = (
+            f", {series.ratio(own[0], case, series.elapsed_time).text()} against itself"
+            if own and base != finder
+            else ""
+        )
+        crossings = case.count("crossings")
+        crossed = f", {number(crossings / case.boxes)} crossings per box" if crossings > 0.0 else ""
+        found.append(f"{finder} on {case.threads} threads: {gain.text()}{against}{crossed}")
+    return Finding(
+        of_parts(parts), "; ".join(found), f"As said: {said(partitioned=parts[0], per_axis=parts[1], tree=parts[2])}."
+    )
+
+
+def _most_threads(bench: Bench, finder: str, most: int | None = None):
+    """The largest drum on the most threads, not more than there are processors."""
+    cases = [
+        case
+        for case in series.cases_of(bench, "drum", finder=finder, mode="replay")
+        if 1 < case.threads <= min(most or case.threads, int(case.provenance.get("processors", case.threads)))
+    ]
+    needed(cases, f"./polydem bench on a drum with '{finder}' on one and on several threads")
+    return max(cases, key=lambda case: (case.threads, case.boxes))
+
+
+@claim(
+    "C7",
+    "Depth of the tree and nodes reserved for it",
+    "depth 9 (87381 nodes) to 5058 boxes, 10 (349525) to 12651",
+    "depth equal to the paper's within one level at each of its sizes that was measured",
+    "table_2",
+)
+def depth(bench: Bench) -> Finding:
+    cases = [case for case in series.over_size(bench.on(), TREE) if np.isfinite(case.count("depth"))]
+    rows = [(case, size) for case in cases for size in paper.DEPTH_AND_NODES if abs(case.boxes - size) <= 0.02 * size]
+    needed(rows, "./polydem bench on the drums of the paper's sizes, finder 'quadtree'")
+    parts = [abs(case.count("depth") - paper.DEPTH_AND_NODES[size][0]) <= 1.0 for case, size in rows]
+    ours = "; ".join(
+        f"{case.boxes}: depth {number(case.count('depth'))}, {number(case.count('nodes'), 5)} nodes" for case, _ in rows
+    )
+    saved = [paper.DEPTH_AND_NODES[size][1] / case.count("nodes") for case, size in rows]
+    return Finding(
+        of_parts(parts),
+        ours,
+        "A tree that holds only nodes in use needs "
+        f"{number(min(saved), 2)} to {number(max(saved), 2)} times fewer than the paper reserves.",
+    )
+
+
+@claim(
+    "C8",
+    "Complexity: tree not inlined like the sweep, inlined about four times that",
+    "70 sweep, 273 inlined, 77 not",
+    "tree / sweep within 0.75 to 1.5; of the inlined tree there is no source of its own",
+    "table_3, complexity",
+)
+def complexities(_: Bench) -> Finding:
+    if complexity.counter() is None:
+        raise Missing(complexity.HOW_TO_GET)
+    sweep, tree = (complexity.totals(finder, complexity.SOURCES) for finder in (SWEEP, TREE))
+    if not sweep or not tree:
+        raise Missing(f"it beside the sources {complexity.SOURCES}")
+    ratio = tree["total"] / sweep["total"]
+    worst = {
+        name: max(p.complexity for p in complexity.count_finder(name, complexity.SOURCES)) for name in (SWEEP, TREE)
+    }
+    verdict = CONFIRMED if 0.75 <= ratio <= 1.5 else CONTRADICTED
+    return Finding(
+        verdict,
+        f"{sweep['total']} sweep, {tree['total']} tree: {number(ratio)}",
+        "Inlined or not our tree is one source, so inlining adds no complexity to it. Greatest single procedures: "
+        f"{worst[SWEEP]} (sweep), {worst[TREE]} (tree); both below the 50 that the paper quotes as untestable.",
+    )
+
+
+@claim(
+    "C15",
+    "A search costs the equal-leaf tree log N, the minimal tree a constant",
+    "N log N against N",
+    "visits per search from the smallest to the largest drum: of pruned_quadtree grown by at least half as much "
+    "as log N, of "
+    "quadtree by less than half as much",
+    "list_cost, work_over_size",
+)
+def searches(bench: Bench) -> Finding:
+    parts, found = [], []
+    for finder, grows in (("pruned_quadtree", True), (TREE, False)):
+        points = [(case.boxes, visits_per_search(case)) for case in series.over_size(bench.on(), finder)]
+        points = [(boxes, visits) for boxes, visits in points if np.isfinite(visits)]
+        if len(points) < 3:
+            raise Missing(f"./polydem bench on drums of at least three sizes, one thread, finder '{finder}'")
+        (small, few), (large, many) = points[0], points[-1]
+        logarithm = np.log(large) / np.log(small) - 1.0
+        grown = many / few - 1.0
+        parts.append(bool(grown >= 0.5 * logarithm) is grows)
+        found.append(
+            f"{finder} {number(few)} to {number(many)} visits per search ({100 * grown:+.0f} %, log N "
+            f"{100 * logarithm:+.0f} %)"
+        )
+    return Finding(of_parts(parts), "; ".join(found))
+
+
+@claim(
+    "C16",
+    "From a bad order the sweep can need N^2 at the start; sorting the centres first cures it",
+    "no numbers",
+    "exchanges of the first step, several sizes: exponent of unsorted_sweep at least 1.8, of sort_and_sweep at "
+    "most 1.3; one "
+    "size: at least N^2/20 and at most a twentieth of that",
+    "first_step",
+)
+def worst_order(bench: Bench) -> Finding:
+    counts = {}
+    for finder in ("unsorted_sweep", SWEEP):
+        cases = series.cases_of(bench.on(), "worst", finder=finder, threads=1)
+        points = {case.boxes: case.count("swaps", first=True) for case in cases}
+        counts[finder] = {boxes: swaps for boxes, swaps in points.items() if np.isfinite(swaps)}
+        needed(counts[finder], "./polydem bench on scenes worst_order_N, finders 'unsorted_sweep', 'sort_and_sweep'")
+    bad, good = counts.values()
+    if min(len(bad), len(good)) >= 2:
+        bad_slope, good_slope = (
+            float(np.polyfit(np.log(list(each)), np.log([max(v, 1.0) for v in each.values()]), 1)[0])
+            for each in (bad, good)
+        )
+        return Finding(
+            of_parts([bad_slope >= 1.8, good_slope <= 1.3]),
+            f"exponents {number(bad_slope)} without, {number(good_slope)} with sorting the centres",
+            f"Exchanges: {_listed(bad)} without; {_listed(good)} with.",
+        )
+    boxes = max(set(bad) & set(good) or {max(bad)})
+    parts = [bad[boxes] >= boxes**2 / 20.0, good.get(boxes, np.inf) <= bad[boxes] / 20.0]
+    return Finding(
+        of_parts(parts),
+        f"{boxes} boxes: {number(bad[boxes], 4)} exchanges without, {number(good.get(boxes, np.nan), 4)} with",
+        f"N^2 is {number(float(boxes) ** 2)}.",
+    )
+
+
+def _listed(counts: dict) -> str:
+    return ", ".join(f"{boxes}: {number(swaps, 4)}" for boxes, swaps in counts.items())
+
+
+@claim(
+    "C17",
+    "Most of what the sweep keeps in order concerns boxes that cannot touch",
+    "Fig. 1, no number",
+    "more than half of the exchanges are idle on every drum",
+    "figure_01_idle_swaps",
+)
+def idle(bench: Bench) -> Finding:
+    cases = [case for case in series.over_size(bench.on(), SWEEP) if case.count("swaps") > 0.0]
+    shares = {case.boxes: case.count("idle_swaps") / case.count("swaps") for case in cases}
+    shares = {boxes: share for boxes, share in shares.items() if np.isfinite(share)}
+    needed(shares, "./polydem bench on drums, finder 'sort_and_sweep'")
+    low, high = min(shares.values()), max(shares.values())
+    return Finding(
+        CONFIRMED if low > 0.5 else CONTRADICTED,
+        f"{100 * low:.1f} to {100 * high:.1f} % of the exchanges",
+        f"{min(shares)} to {max(shares)} boxes, exact counts.",
+    )

@@ -1,0 +1,251 @@
+"""Rules for claims about times: C1 to C4, C6, C10, C13, C18."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from . import paper, series
+from .bench import Bench
+from .paper_tables import clock_of
+from .cache import read_records
+from .claims import CONFIRMED, CONTRADICTED, IN_PART, NOT_TESTABLE, Finding, Missing, claim, needed, of_parts
+from .series import SWEEP, TREE
+from .statistics import median, number, pooled, ratio_of_medians
+
+#: What has to be run for the drums of all sizes
+DRUMS = "./polydem bench on drums of at least three sizes, one thread, finders "
+
+
+def _series(bench: Bench, finder: str, mode: str = "replay") -> list:
+    return needed(series.over_size(bench.on(), finder, mode=mode), DRUMS + f"'{finder}'")
+
+
+def _law(bench: Bench, finder: str, quantity=series.total_time) -> series.Law:
+    return needed(series.law(_series(bench, finder), quantity), DRUMS + f"'{finder}'")
+
+
+def _pairs(bench: Bench, upper: str = TREE, lower: str = SWEEP, mode: str = "replay", paper_sizes: bool = True) -> list:
+    """Cases of two finders side by side, on the drums of the paper's sizes."""
+    both = series.pairs_of(_series(bench, upper, mode), _series(bench, lower, mode))
+    low, high = paper.SIZES
+    return needed(
+        [pair for pair in both if not paper_sizes or 0.9 * low <= pair[0].boxes <= 1.1 * high],
+        DRUMS + f"'{upper}', '{lower}'",
+    )
+
+
+@claim(
+    "C1",
+    "Both algorithms are O(N) per step",
+    "slopes 0.992 (sweep), 0.994 (tree)",
+    "both slopes within 1.00 +- 0.05; if not, the exponents of the counted operations say whether work or memory grows",
+    "figure_09_total, finders_over_size",
+)
+def linear(bench: Bench) -> Finding:
+    found, parts, reasons = [], [], []
+    for finder in (SWEEP, TREE):
+        law = _law(bench, finder)
+        parts.append(abs(law.exponent.value - 1.0) <= 0.05)
+        found.append(f"{law.exponent.text()} ({finder})")
+        counted = series.count_slope(_series(bench, finder), "tests", "swaps", "visits")
+        if not parts[-1]:
+            reasons.append(
+                f"{finder}: the operations (tests, exchanges, visits) grow with exponent {number(counted)}, "
+                "the rest is time per operation."
+                if np.isfinite(counted)
+                else f"{finder}: nothing was counted."
+            )
+        upto = series.law(_series(bench, finder), largest=1.2e5)
+        if upto and len(upto.sizes) < len(law.sizes):
+            found[-1] += f", up to {upto.sizes[-1]:.0f} boxes {upto.exponent.text()}"
+    return Finding(of_parts(parts), "; ".join(found), " ".join(reasons))
+
+
+@claim(
+    "C2",
+    "The tree takes about 0.9 of the time of the sweep",
+    "0.9 for 2522 to 12651 boxes",
+    "mean ratio over the drums of these sizes within 0.8 to 1.0, interval included",
+    "figure_09_total",
+)
+def total_ratio(bench: Bench) -> Finding:
+    both = _pairs(bench)
+    ratio = series.pooled_ratio(both)
+    each = ", ".join(f"{tree.boxes}: {series.ratio(tree, sweep).text()}" for tree, sweep in both)
+    reason = f"Replay, without the making of the boxes. By size: {each}."
+    try:
+        live = series.pooled_ratio(_pairs(bench, mode="live"))
+        reason += f" Live, with the making of the boxes: {live.text()}."
+    except Missing:
+        pass
+    return Finding(CONFIRMED if ratio.meets(0.8, 1.0) else CONTRADICTED, ratio.text(), reason)
+
+
+@claim(
+    "C3",
+    "Updating the structure alone takes the tree 0.1 of the time of the sweep",
+    "0.1; slopes 1.43 (sweep), 1.39 (tree)",
+    "mean ratio within 0.05 to 0.2, and both slopes within 0.1 of the paper's, intervals included",
+    "figure_10_update, phases",
+)
+def update_ratio(bench: Bench) -> Finding:
+    both = needed([pair for pair in _pairs(bench) if all(map(series.structure_time, pair))], DRUMS + "with phases")
+    ratio = series.pooled_ratio(both, series.structure_time)
+    parts, slopes = [ratio.meets(0.05, 0.2)], []
+    low, high = 0.9 * paper.SIZES[0], 1.1 * paper.SIZES[1]
+    for finder in (SWEEP, TREE):
+        near = [case for case in _series(bench, finder) if low <= case.boxes <= high]
+        law, whole = series.law(near, series.structure_time), _law(bench, finder, series.structure_time)
+        slopes.append(f"{finder} {law.exponent.text() if law else '-'} (all sizes {whole.exponent.text()})")
+        said = paper.UPDATE_SLOPE[finder]
+        parts.append(law is not None and law.exponent.meets(said - 0.1, said + 0.1))
+    return Finding(
+        of_parts(parts),
+        f"{ratio.text()}; slopes: {'; '.join(slopes)}",
+        "The ratio: " + ("as said" if parts[0] else "not as said") + "; slopes as said: " + f"{sum(parts[1:])} of 2.",
+    )
+
+
+@claim(
+    "C4",
+    "Most of the time of the tree goes into the list of pairs",
+    "about 80 %",
+    "share of search, filter, order and merge within 0.7 to 0.9, mean over the drums of the paper's sizes",
+    "phases",
+)
+def list_share(bench: Bench) -> Finding:
+    shares = [{key[1]: value for key, value in series.list_share(tree).items()} for tree, _ in _pairs(bench)]
+    share = needed(pooled(shares), DRUMS + "with phases")
+    return Finding(
+        CONFIRMED if share.meets(0.7, 0.9) else CONTRADICTED,
+        share.text(),
+        "All but the structure; our tree keeps possible pairs from step to step and compares all of them at "
+        "every step.",
+    )
+
+
+@claim(
+    "C6",
+    "Inlining the traversal hurts below about 5000 boxes and helps beyond about 10000",
+    "slopes 0.994 (inlined), 1.1 (not)",
+    "inlined / not inlined above 1 at all sizes below 5000, and below 1 at all sizes beyond 10000, intervals "
+    "clear of 1",
+    "figure_11_inlining",
+)
+def inlining(bench: Bench) -> Finding:
+    both = _pairs(bench, TREE, "quadtree_called", paper_sizes=False)
+    small = [series.ratio(*pair) for pair in both if pair[0].boxes < paper.INLINING_HURTS_BELOW]
+    large = [series.ratio(*pair) for pair in both if pair[0].boxes > paper.INLINING_HELPS_BEYOND]
+    if not small or not large:
+        raise Missing(DRUMS + "'quadtree', 'quadtree_called' with sizes below 5000 and beyond 10000")
+    parts = [all(ratio.low > 1.0 for ratio in small), all(ratio.high < 1.0 for ratio in large)]
+    slopes = [series.law(_series(bench, finder)) for finder in (TREE, "quadtree_called")]
+    fitted = "; ".join(f"slope {law.exponent.text()} ({name})" for law, name in zip(slopes, ("inlined", "not")) if law)
+    ratios = ", ".join(f"{a.boxes}: {series.ratio(a, b).text()}" for a, b in both)
+    return Finding(
+        of_parts(parts),
+        f"ratios {ratios}; {fitted}",
+        f"Hurts below 5000: {'yes' if parts[0] else 'no'}; helps beyond 10000: {'yes' if parts[1] else 'no'}.",
+    )
+
+
+@claim(
+    "C10",
+    "Memory matters more than the clock",
+    "2.4 GHz with DDR4 beats 3.3 GHz with DDR3",
+    "of two machines the one with the lower clock is faster on the same drums",
+    "figure_08_13_machines, table_1",
+)
+def memory(bench: Bench) -> Finding:
+    machines = bench.named("machine")
+    if len(machines) < 2:
+        raise Missing("the same bench on a second machine, and give both folders")
+    times = {
+        machine: {
+            case.scene: median(list(case.time().values())).value for case in series.over_size(bench.on(machine), TREE)
+        }
+        for machine in machines
+    }
+    shared = set.intersection(*(set(each) for each in times.values()))
+    needed(shared, "the same drums with 'quadtree' on all machines")
+    mean = {
+        machine: float(np.exp(np.mean([np.log(times[machine][scene]) for scene in shared]))) for machine in machines
+    }
+    clocks = {machine: clock_of(bench.provenance(machine)) for machine in machines}
+    ours = "; ".join(f"{machine} ({clocks[machine]} GHz): {number(mean[machine])} ns/box" for machine in machines)
+    if any(clock == "-" for clock in clocks.values()):
+        return Finding(
+            NOT_TESTABLE,
+            ours,
+            "Not all machines state their clock; take machines that do, and differ in clock and memory.",
+        )
+    pairs = [(a, b) for a in machines for b in machines if float(clocks[a]) < float(clocks[b])]
+    if not pairs:
+        return Finding(NOT_TESTABLE, ours, "All have one clock; take machines that differ in it.")
+    slower_wins = [mean[a] < mean[b] for a, b in pairs]
+    return Finding(
+        of_parts(slower_wins), ours, f"The lower clock won in {sum(slower_wins)} of {len(pairs)} comparisons."
+    )
+
+
+@claim(
+    "C13",
+    "Times rise above the trend where the data outgrow a cache",
+    "near 5000 boxes",
+    "time per box of the quadtree at least 10 % greater at the sizes that outgrow a level (twice its bytes or "
+    "more, as far as "
+    "the next level) than at those that fit into it, intervals apart, for at least one level",
+    "figure_11_inlining, cache_misses",
+)
+def caches(bench: Bench) -> Finding:
+    cases = [case for case in _series(bench, TREE) if np.isfinite(series.held_bytes(case)) and case.time()]
+    levels = needed(
+        series.cache_levels(cases[0].provenance) if cases else [], DRUMS + "'quadtree', with bytes and caches"
+    )
+    ends = [size for _, size in levels[1:]] + [np.inf]
+    found, rises = [], []
+    for (name, size), end in zip(levels, ends):
+        inside = [case for case in cases if 0.5 * size >= series.held_bytes(case)]
+        beyond = [case for case in cases if 2.0 * size <= series.held_bytes(case) <= max(end, 4.0 * size)]
+        if not inside or not beyond:
+            continue
+        below, above = median(list(inside[-1].time().values())), median(list(beyond[-1].time().values()))
+        rises.append(above.value >= 1.1 * below.value and above.low > below.high)
+        found.append(f"{name}: {inside[-1].boxes} boxes {below.text()}, {beyond[-1].boxes} boxes {above.text()} ns/box")
+    if not found:
+        raise Missing(DRUMS + "'quadtree', of which some fit into half a level and others take twice the level")
+    misses = [r for r in read_records(bench.folders) if r.finder == TREE and series.kind(r.scene) == "drum"]
+    told = ", ".join(f"{r.boxes}: {number(r.last_level)}" for r in misses)
+    return Finding(
+        CONFIRMED if any(rises) else CONTRADICTED,
+        "; ".join(found),
+        f"Rises at {sum(rises)} of {len(rises)} levels."
+        + (f" Simulated last-level misses per box: {told}." if told else ""),
+    )
+
+
+@claim(
+    "C18",
+    "-O3 brings nothing over -O2",
+    "no significant change",
+    "mean ratio -O3 / -O2 over the drums within 0.95 to 1.05 for tree and sweep",
+    "builds",
+)
+def optimisation(bench: Bench) -> Finding:
+    machine = bench.named("machine")[0]
+    names = dict.fromkeys(case.build for case in bench.cases if case.machine == machine)
+    by_level = {level: [name for name in names if level in name.split()] for level in ("-O3", "-O2")}
+    if not all(by_level.values()):
+        raise Missing("the same bench with a build at -O2 (-D CMAKE_Fortran_FLAGS_RELEASE=-O2), and give both folders")
+    three, two = (bench.on(machine, by_level[level][0]) for level in ("-O3", "-O2"))
+    parts, found = [], []
+    for finder in (SWEEP, TREE):
+        both = series.pairs_of(series.over_size(three, finder), series.over_size(two, finder))
+        ratios = [ratio_of_medians(list(a.time().values()), list(b.time().values())) for a, b in both]
+        needed([ratio for ratio in ratios if ratio], f"the same drums with '{finder}' in both builds")
+        mean = float(np.exp(np.mean([np.log(ratio.value) for ratio in ratios])))
+        parts.append(0.95 <= mean <= 1.05)
+        found.append(
+            f"{finder} {number(mean)} ({', '.join(f'{a.boxes}: {r.text()}' for (a, _), r in zip(both, ratios))})"
+        )
+    return Finding(CONFIRMED if all(parts) else IN_PART if any(parts) else CONTRADICTED, "; ".join(found))

@@ -1,0 +1,127 @@
+"""Verdicts on the paper's claims, each computed from the samples by a rule that states its threshold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .bench import Bench
+from .emit import Table
+
+CONFIRMED = "confirmed"
+IN_PART = "confirmed in part"
+CONTRADICTED = "contradicted"
+NOT_TESTABLE = "not testable here"
+NOT_MEASURED = "not measured"
+
+
+class Missing(Exception):
+    """What a rule needs is not among the samples; the message says what to run."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What a rule found."""
+
+    verdict: str
+    #: Our value with its interval
+    ours: str
+    #: Why, with numbers
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A claim of the paper and the rule that judges it."""
+
+    id: str
+    text: str
+    #: The paper's value
+    paper: str
+    #: When it counts as confirmed
+    threshold: str
+    #: Tables and figures that show more
+    where: str
+    #: Rule: Bench -> Finding; raises Missing
+    rule: object
+
+    def judge(self, bench: Bench) -> Finding:
+        """The verdict on the claim."""
+        try:
+            return self.rule(bench)
+        except Missing as missing:
+            return Finding(NOT_MEASURED, "-", f"run: {missing}")
+
+
+#: All claims by identifier, filled by the modules of rules
+CLAIMS: dict[str, Claim] = {}
+
+
+def claim(identifier: str, text: str, paper: str, threshold: str, where: str):
+    """Register a rule under the claim that it judges."""
+
+    def register(rule):
+        CLAIMS[identifier] = Claim(identifier, text, paper, threshold, where, rule)
+        return rule
+
+    return register
+
+
+def of_parts(parts: list) -> str:
+    """Verdict of a claim of several parts, each true or false."""
+    if all(parts):
+        return CONFIRMED
+    return IN_PART if any(parts) else CONTRADICTED
+
+
+def said(**parts) -> str:
+    """Which parts are as the paper says: bed yes, gas no."""
+    return ", ".join(f"{name.replace('_', ' ')} {'yes' if part else 'no'}" for name, part in parts.items())
+
+
+def needed(found, what: str):
+    """What was found, or Missing if that is nothing."""
+    if not found:
+        raise Missing(what)
+    return found
+
+
+def judge_all(bench: Bench) -> list:
+    """[(claim, finding)] in the order of the claims."""
+    from . import claim_rules_scenes, claim_rules_structure, claim_rules_time  # noqa: F401  they register their rules
+
+    return [(each, each.judge(bench)) for each in sorted(CLAIMS.values(), key=lambda c: int(c.id[1:]))]
+
+
+def verdict_table(judged: list) -> Table:
+    """The verdicts as a table."""
+    table = Table("claims", "Claims of the paper", ("claim", "says", "paper", "ours", "verdict", "look at"), texts=6)
+    for each, finding in judged:
+        table.add(each.id, each.text, each.paper, finding.ours, finding.verdict, each.where)
+    return table
+
+
+def claims_document(bench: Bench) -> str:
+    """claims.md: the verdicts, then for each claim its rule and its reasons."""
+    judged = judge_all(bench)
+    main = bench.on()
+    lines = [
+        "# The claims of the paper, and what these samples say",
+        "",
+        f"Samples: {', '.join(str(folder) for folder in bench.folders)}. Machines: "
+        f"{'; '.join(bench.named('machine'))}. "
+        f"Verdicts are of {'; '.join(main.named('machine'))}, build {'; '.join(main.named('build'))}, if a rule "
+        "does not "
+        "compare machines or builds. Intervals: 95 %, over repeats on this machine.",
+        "",
+        verdict_table(judged).written("markdown"),
+        "",
+        "## Rules and reasons",
+        "",
+    ]
+    for each, finding in judged:
+        lines += [
+            f"**{each.id}** {each.text}. *Rule:* {each.threshold}. *Verdict:* {finding.verdict}. "
+            f"{finding.reason}".rstrip(),
+            "",
+        ]
+    return "\n".join(lines)

@@ -1,0 +1,160 @@
+"""How figures look and how they are written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+from . import series
+from .trajectory import ResultError
+
+#: Forms in which every figure is written, and what keeps the time of writing out of each
+FORMS = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}
+
+#: Finder -> colour (Okabe & Ito 2008, told apart by the colour-blind) and marker
+LOOKS = {
+    "quadtree": ("#0072B2", "o"),
+    "sort_and_sweep": ("#D55E00", "s"),
+    "quadtree_called": ("#56B4E9", "v"),
+    "pruned_quadtree": ("#CC79A7", "^"),
+    "partitioned_sweep": ("#B8860B", "D"),
+    "unsorted_sweep": ("#8B4513", "<"),
+    "linked_cells": ("#009E73", "P"),
+    "verlet": ("#000000", "X"),
+    "hierarchical_grid": ("#6A3D9A", "p"),
+    "binary_tree": ("#7F7F7F", ">"),
+    "all_pairs": ("#B0B0B0", "*"),
+}
+
+#: The paper's numbers are drawn thus
+PAPER = {"color": "0.45", "linestyle": (0, (1, 1.5)), "linewidth": 1.4}
+
+#: Settings of matplotlib under which figures are drawn and written
+SETTINGS = {
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+    "svg.hashsalt": "polydem",
+    "svg.fonttype": "none",
+    "pdf.fonttype": 42,
+    "path.simplify": False,
+}
+
+
+@dataclass
+class Drawing:
+    """A figure with its name and what is to be read under it."""
+
+    name: str
+    figure: Figure
+    caption: str
+
+
+def panels(count: int = 1, width: float = 4.6, height: float = 3.4) -> tuple:
+    """A figure with panels side by side."""
+    figure = Figure(figsize=(width * count, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure, figure.subplots(1, count, squeeze=False)[0]
+
+
+def panels_with_legend(count: int, width: float, height: float, rows: int) -> tuple:
+    """A figure with panels side by side, and below them an empty one for a legend of so many rows that all share."""
+    figure = Figure(figsize=(width * count, height + 0.22 * rows), layout="constrained")
+    FigureCanvasAgg(figure)
+    grid = figure.add_gridspec(2, count, height_ratios=[height, 0.22 * rows])
+    below = figure.add_subplot(grid[1, :])
+    below.axis("off")
+    return figure, [figure.add_subplot(grid[0, k]) for k in range(count)], below
+
+
+def shared_legend(below, axes, columns: int) -> None:
+    """Every label once, in the empty panel."""
+    entries = {}
+    for axis in axes:
+        for handle, label in zip(*axis.get_legend_handles_labels()):
+            entries.setdefault(label, handle)
+    below.legend(entries.values(), entries.keys(), ncol=columns, loc="center", fontsize=8, borderpad=0.0)
+
+
+def look(finder: str) -> dict:
+    """Colour and marker of a finder."""
+    colour, marker = LOOKS.get(finder, ("0.3", "h"))
+    return {"color": colour, "marker": marker, "markersize": 4.5}
+
+
+def over_size(axis, label: str, logarithmic: bool = True) -> None:
+    """Boxes from left to right, what the label says upwards."""
+    axis.set(xscale="log", xlabel="boxes", ylabel=label, yscale="log" if logarithmic else "linear")
+    axis.xaxis.set_major_formatter(FuncFormatter(_thousands))
+    if logarithmic:
+        readable_decades(axis.yaxis)
+    low, high = axis.get_xlim()
+    axis.xaxis.set_minor_formatter(NullFormatter())
+    if high / low < 300.0:
+        axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high / low < 30.0 else (1.0, 3.0)))
+
+
+def readable_decades(axis) -> None:
+    """Plain numbers at a logarithmic axis, with 2 and 5 between if it is short."""
+    low, high = axis.get_view_interval()
+    if high / max(low, 1e-300) < 30.0:
+        axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _thousands(value: float, _) -> str:
+    if value >= 1e6:
+        return f"{value / 1e6:g}M"
+    return f"{value / 1e3:g}k" if value >= 1e3 else f"{value:g}"
+
+
+def draw_estimates(axis, x, estimates: list, **style) -> None:
+    """Points with their intervals, joined by a line unless the style says otherwise."""
+    y = np.array([estimate.value for estimate in estimates])
+    low = np.array([estimate.low if np.isfinite(estimate.low) else estimate.value for estimate in estimates])
+    high = np.array([estimate.high if np.isfinite(estimate.high) else estimate.value for estimate in estimates])
+    spread = np.maximum(np.stack([y - low, high - y]), 0.0)
+    axis.errorbar(x, y, yerr=spread, elinewidth=0.9, capsize=2.0, **{"linewidth": 1.1, **style})
+
+
+def draw_law(axis, law: series.Law, **style) -> None:
+    """A fitted power law over the sizes that it was fitted to."""
+    axis.plot(law.sizes, law.at(law.sizes), linewidth=1.1, zorder=1, **style)
+
+
+def mark_caches(axis, sizes: list) -> None:
+    """Vertical lines where a finder outgrows a level of the caches: [(name, boxes)]."""
+    low, high = axis.get_xlim()
+    for name, boxes in sizes:
+        if low < boxes < high:
+            axis.axvline(boxes, color="0.6", linewidth=0.8, linestyle="--", zorder=0)
+            axis.annotate(
+                name,
+                (boxes, 1.0),
+                xycoords=("data", "axes fraction"),
+                xytext=(2, -2),
+                fontsize=8,
+                textcoords="offset points",
+                va="top",
+                color="0.35",
+            )
+
+
+def save_drawing(drawing: Drawing, folder: Path) -> list[Path]:
+    """Write a figure in all FORMS, without anything in it that changes from call to call."""
+    paths = [folder / f"{drawing.name}.{form}" for form in FORMS]
+    try:
+        with matplotlib.rc_context(SETTINGS):
+            for path, metadata in zip(paths, FORMS.values()):
+                drawing.figure.savefig(path, dpi=200, metadata=metadata)
+    except OSError as error:
+        raise ResultError(f"{folder}: cannot be written ({error})") from error
+    return paths

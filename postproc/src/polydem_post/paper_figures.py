@@ -1,0 +1,257 @@
+"""The paper's Figs. 1 and 8 to 13 with our measurements; what the paper gives as a number is drawn beside them."""
+
+from __future__ import annotations
+
+import matplotlib
+import numpy as np
+
+from . import paper, series
+from .bench import Bench
+from .figure_style import PAPER, SETTINGS, Drawing, draw_estimates, draw_law, look, mark_caches, over_size, panels
+from .series import SWEEP, TREE
+from .statistics import median
+
+#: Label of times
+TIME = "time per step [ms]"
+
+
+def paper_drawings(bench: Bench) -> list[Drawing]:
+    """Those of the figures that the samples can give."""
+    here = bench.on()
+    with matplotlib.rc_context(SETTINGS):
+        drawn = [idle_swaps(here), machines(bench), total(here), update(here), inlining(here), interpreted(here)]
+    return [drawing for drawing in drawn if drawing]
+
+
+def idle_swaps(bench: Bench) -> Drawing | None:
+    """Fig. 1: how many of the exchanges of the sweep concern boxes that cannot touch."""
+    cases = [case for case in series.over_size(bench, SWEEP) if case.count("swaps") > 0.0]
+    shares = [100.0 * case.count("idle_swaps") / case.count("swaps") for case in cases]
+    if not cases or not np.any(np.isfinite(shares)):
+        return None
+    figure, (axis,) = panels()
+    axis.plot([case.boxes for case in cases], shares, linewidth=1.1, **look(SWEEP))
+    axis.axhline(50.0, **PAPER)
+    axis.annotate(
+        "most: more than half (paper, no number)", (0.02, 51.0), xycoords=("axes fraction", "data"), fontsize=8
+    )
+    over_size(axis, "idle exchanges [%]", logarithmic=False)
+    axis.set_ylim(0.0, 102.0)
+    return Drawing(
+        "figure_01_idle_swaps",
+        figure,
+        "Fig. 1: share of the exchanges of ends in sort-and-sweep that concern boxes which cannot touch, because "
+        "they are apart on the other axis before and after the step. Exact counts.",
+    )
+
+
+def machines(bench: Bench) -> Drawing | None:
+    """Figs. 8 and 13: the same run on several machines."""
+    figure, (axis,) = panels()
+    drawn = 0
+    for k, machine in enumerate(bench.named("machine")):
+        cases = series.over_size(bench.on(machine), TREE)
+        if cases:
+            colour, marker = list(looks_of_machines())[k % 6]
+            draw_estimates(
+                axis,
+                [case.boxes for case in cases],
+                _per_step(cases),
+                label=machine,
+                color=colour,
+                marker=marker,
+                markersize=4.5,
+            )
+            drawn += 1
+    if drawn == 0:
+        return None
+    axis.legend(fontsize=8)
+    over_size(axis, TIME)
+    alone = " Only one machine is in these samples: give the folders of others too, to compare." if drawn == 1 else ""
+    return Drawing(
+        "figure_08_13_machines",
+        figure,
+        "Figs. 8 and 13: time of the quadtree per step on several machines, one thread." + alone + " In the paper "
+        "Xeon56 (2.4 GHz, DDR4) is faster than Xeon32 (3.3 GHz, DDR3); against Xeon56 the Apple M2 is 1.8 and the "
+        "M4 3.5 (small systems) to 3 times (large systems) faster.",
+    )
+
+
+def looks_of_machines():
+    """Colours and markers for machines."""
+    return zip(("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000", "#56B4E9"), "osP^Xv")
+
+
+def total(bench: Bench) -> Drawing | None:
+    """Fig. 9: all of the neighbourhood, tree and sweep."""
+    return _two_finders(
+        bench,
+        series.total_time,
+        "figure_09_total",
+        "Fig. 9: time for the list of pairs",
+        paper.TOTAL_SLOPE,
+        paper.TOTAL_RATIO,
+        "0.9",
+    )
+
+
+def update(bench: Bench) -> Drawing | None:
+    """Fig. 10: the update of the structure alone."""
+    return _two_finders(
+        bench,
+        series.structure_time,
+        "figure_10_update",
+        "Fig. 10: time to update the structure alone",
+        paper.UPDATE_SLOPE,
+        paper.UPDATE_RATIO,
+        "0.1",
+    )
+
+
+def _two_finders(bench: Bench, quantity, name: str, what: str, slopes: dict, ratio: float, ratio_text: str):
+    """Time over size of tree and sweep with fitted slopes, and their ratio."""
+    cases = {finder: [c for c in series.over_size(bench, finder) if quantity(c)] for finder in (TREE, SWEEP)}
+    if not any(cases.values()):
+        return None
+    figure, (left, right) = panels(2, width=4.2)
+    for finder, found in cases.items():
+        law = series.law(found, quantity)
+        label = finder if law is None else f"{finder}: slope {law.exponent.text()}; paper {slopes[finder]:g}"
+        draw_estimates(
+            left, [c.boxes for c in found], _per_step(found, quantity), label=label, **look(finder), linestyle="none"
+        )
+        if law is not None:
+            draw_law(left, law, color=look(finder)["color"])
+            slope = slopes[finder]
+            middle = np.exp(np.mean(np.log(law.sizes)))
+            left.plot(law.sizes, law.at(middle) * (law.sizes / middle) ** slope, zorder=0, **PAPER)
+    both = series.pairs_of(cases[TREE], cases[SWEEP])
+    draw_estimates(
+        right,
+        [tree.boxes for tree, _ in both],
+        [series.ratio(*pair, quantity) for pair in both],
+        color="black",
+        marker="o",
+        markersize=4.5,
+        label="these samples",
+    )
+    right.plot(paper.SIZES, (ratio, ratio), label=f"paper: about {ratio_text}", **PAPER)
+    over_size(left, TIME)
+    over_size(right, "tree / sweep", logarithmic=False)
+    right.set_ylim(bottom=0.0)
+    for axis in (left, right):
+        low, high = axis.get_ylim()
+        axis.set_ylim(low, high * (3.0 if axis is left else 1.25))
+        axis.legend(fontsize=8, loc="upper left")
+    return Drawing(
+        name,
+        figure,
+        what + " per step against the number of boxes, one thread, with fitted power laws (95 % "
+        "intervals) and, dotted, the slopes that the paper gives, through the middle of our line; right: ratio of "
+        "the two. Fixed boxes count. The making of the boxes is not in.",
+    )
+
+
+def inlining(bench: Bench) -> Drawing | None:
+    """Fig. 11: the tree inlined and not, and where it outgrows the caches."""
+    cases = {finder: series.over_size(bench, finder) for finder in (TREE, "quadtree_called")}
+    if not all(cases.values()):
+        return None
+    figure, (left, right) = panels(2, width=4.2)
+    for finder, found in cases.items():
+        law = series.law(found)
+        slope = "" if law is None else f": slope {law.exponent.text()}; paper {paper.INLINING_SLOPE[finder]:g}"
+        name = "inlined" if finder == TREE else "not inlined"
+        draw_estimates(
+            left,
+            [c.boxes for c in found],
+            [median(list(c.time().values())) for c in found],
+            label=name + slope,
+            **look(finder),
+        )
+    both = series.pairs_of(cases[TREE], cases["quadtree_called"])
+    draw_estimates(
+        right,
+        [a.boxes for a, _ in both],
+        [series.ratio(a, b) for a, b in both],
+        color="black",
+        marker="o",
+        markersize=4.5,
+    )
+    right.axhline(1.0, color="0.7", linewidth=0.8)
+    for boxes, text, side in (
+        (paper.INLINING_HURTS_BELOW, "paper: hurts ←", "right"),
+        (paper.INLINING_HELPS_BEYOND, "→ helps", "left"),
+    ):
+        right.axvline(boxes, **PAPER)
+        right.annotate(text, (boxes, 1.01), xycoords=("data", "axes fraction"), fontsize=8, ha=side, color="0.35")
+    over_size(left, "time per box and step [ns]", logarithmic=False)
+    over_size(right, "inlined / not inlined", logarithmic=False)
+    left.set_ylim(0.0, left.get_ylim()[1] * 1.3)
+    mark_caches(left, outgrown(cases[TREE]))
+    left.legend(fontsize=8, loc="lower right", frameon=True, framealpha=1.0, edgecolor="none")
+    return Drawing(
+        "figure_11_inlining",
+        figure,
+        "Fig. 11: the quadtree from one source, compiled with and without inlining. Dashed: the number of boxes at "
+        "which what the finder holds (and the boxes) outgrows a level of the caches of this machine. Dotted: the "
+        "numbers of boxes that the paper names.",
+    )
+
+
+def outgrown(cases: list) -> list:
+    """[(level, boxes)] at which the bytes of a series pass the levels of the caches, between sizes by interpolation."""
+    points = [(series.held_bytes(case), case.boxes) for case in cases if np.isfinite(series.held_bytes(case))]
+    if not points:
+        return []
+    held, boxes = np.log(np.array(points, dtype=float)).T
+    levels = series.cache_levels(cases[0].provenance)
+    return [
+        (name, float(np.exp(np.interp(np.log(size), held, boxes))))
+        for name, size in levels
+        if held.min() <= np.log(size) <= held.max()
+    ]
+
+
+def interpreted(bench: Bench) -> Drawing | None:
+    """Fig. 12: an interpreter against compiled code; an indication only."""
+    cases = series.over_size(bench, TREE)
+    cases = [case for case in cases if case.boxes <= 2 * max(paper.OCTAVE)]
+    if not cases:
+        return None
+    figure, (axis,) = panels()
+    sizes = sorted(paper.OCTAVE)
+    axis.plot(
+        sizes,
+        [paper.OCTAVE[size][0] for size in sizes],
+        color="0.35",
+        marker="x",
+        linewidth=1.1,
+        label="MATLAB example of the authors in GNU Octave",
+    )
+    draw_estimates(axis, [case.boxes for case in cases], _per_step(cases), label="polydem, quadtree", **look(TREE))
+    middle = np.array([case.boxes for case in cases], dtype=float)
+    ours = np.array([estimate.value for estimate in _per_step(cases)])
+    axis.fill_between(
+        middle,
+        paper.COMPILED_GAIN[0] * ours,
+        paper.COMPILED_GAIN[1] * ours,
+        color="0.88",
+        linewidth=0,
+        label="8 to 18 times polydem (gain of the paper)",
+    )
+    over_size(axis, TIME)
+    axis.set_ylim(top=axis.get_ylim()[1] * 8.0)
+    axis.legend(fontsize=8, loc="upper left")
+    return Drawing(
+        "figure_12_interpreted",
+        figure,
+        "Fig. 12 is not testable without MATLAB and its compiler. As an indication only: the authors' published "
+        "example in GNU Octave, another interpreter on another machine with another scene, making of the boxes "
+        "included, against our compiled program. The paper's gain by compiling one and the same program is 8 to 18.",
+    )
+
+
+def _per_step(cases: list, quantity=series.total_time) -> list:
+    """Time per step [ms]."""
+    return [median([1e-6 * case.boxes * value for value in quantity(case).values()]) for case in cases]

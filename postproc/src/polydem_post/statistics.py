@@ -1,0 +1,164 @@
+"""Medians, ratios and slopes with intervals from repeated measurements.
+
+Intervals come from the bootstrap (Efron 1979): the repeats are drawn again with replacement, and what is wanted is
+computed from each draw. With seven repeats the plain percentile interval of a median covers the truth in about
+88 % of all cases instead of 95 %, so the percentiles are widened as Hesterberg (2015, The American Statistician 69,
+371, "expanded percentile") proposes, to 98 %. Slopes join many medians and need no widening: theirs cover 98 %, too.
+The tests of this module count the coverage.
+
+The intervals tell how much a measurement would change if it were repeated on this machine. They know nothing of
+other machines, and that of a slope nothing of how well a power law fits.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+#: How often repeats are drawn again
+DRAWS = 4000
+#: Start of the random numbers: the same data always have the same intervals
+SEED = 20260101
+#: Part of all cases in which an interval shall hold the truth
+CONFIDENCE = 0.95
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number from repeated measurements; NaN where nothing was measured."""
+
+    #: The number: a median, a ratio, a slope
+    value: float
+    #: Ends of its interval; NaN if there are fewer than two repeats
+    low: float = math.nan
+    high: float = math.nan
+    #: Least of all repeats
+    least: float = math.nan
+    #: Number of repeats
+    repeats: int = 0
+
+    def __bool__(self) -> bool:
+        return math.isfinite(self.value)
+
+    def meets(self, low: float, high: float) -> bool:
+        """Whether the number or a part of its interval lies between two bounds."""
+        lower = self.low if math.isfinite(self.low) else self.value
+        upper = self.high if math.isfinite(self.high) else self.value
+        return bool(self) and lower <= high and upper >= low
+
+    def text(self, digits: int = 3) -> str:
+        """Like 1.02 [0.99, 1.04]."""
+        if not self:
+            return "-"
+        if not math.isfinite(self.low):
+            return number(self.value, digits)
+        return f"{number(self.value, digits)} [{number(self.low, digits)}, {number(self.high, digits)}]"
+
+
+#: Nothing was measured
+NOTHING = Estimate(math.nan)
+
+
+def number(value: float, digits: int = 3) -> str:
+    """A number with so many significant digits, without an exponent where that can be read."""
+    if not math.isfinite(value):
+        return "-"
+    if value == 0.0:
+        return "0"
+    if not 1e-4 <= abs(value) < 1e7:
+        return f"{value:.{digits - 1}e}"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(value))))
+    return f"{value:.{decimals}f}"
+
+
+def median(values) -> Estimate:
+    """Median of the repeats with its interval."""
+    values = np.asarray(values, dtype=float)
+    if len(values) == 0:
+        return NOTHING
+    middles = np.median(values[_draws(len(values))], axis=1)
+    return _estimate(float(np.median(values)), middles, values)
+
+
+def median_of_ratios(upper: dict, lower: dict) -> Estimate:
+    """Median of the ratios of two quantities that were measured side by side: repeat -> value."""
+    shared = sorted(set(upper) & set(lower))
+    return median([upper[key] / lower[key] for key in shared])
+
+
+def ratio_of_medians(upper, lower) -> Estimate:
+    """Ratio of two medians that were measured apart."""
+    upper, lower = np.asarray(upper, dtype=float), np.asarray(lower, dtype=float)
+    if len(upper) == 0 or len(lower) == 0:
+        return NOTHING
+    above = np.median(upper[_draws(len(upper), 0)], axis=1)
+    below = np.median(lower[_draws(len(lower), 1)], axis=1)
+    few = upper if len(upper) <= len(lower) else lower
+    return _estimate(float(np.median(upper) / np.median(lower)), above / below, few, least=math.nan)
+
+
+def slope(sizes, repeats) -> Estimate:
+    """Exponent of a power law, by least squares through the logarithms of the medians over size.
+
+    `repeats` holds, for each size, the values of its repeats; repeats of different sizes are drawn independently.
+    """
+    kept = [(size, np.asarray(values, dtype=float)) for size, values in zip(sizes, repeats) if len(values) > 0]
+    if len({size for size, _ in kept}) < 2:
+        return NOTHING
+    x = np.log([size for size, _ in kept])
+    weight = (x - x.mean()) / np.sum((x - x.mean()) ** 2)
+    drawn = np.stack([np.median(values[_draws(len(values), k)], axis=1) for k, (_, values) in enumerate(kept)])
+    value = float(weight @ np.log([np.median(values) for _, values in kept]))
+    fewest = min((values for _, values in kept), key=len)
+    return _estimate(value, weight @ np.log(drawn), fewest, least=math.nan, tail=0.5 * (1.0 - CONFIDENCE))
+
+
+def intercept(sizes, medians, exponent: float) -> float:
+    """Factor c of the fitted law c * size**exponent."""
+    return float(np.exp(np.mean(np.log(medians) - exponent * np.log(sizes))))
+
+
+def pooled(ratios: list) -> Estimate:
+    """Geometric mean of several paired ratios: a list of dictionaries repeat -> ratio with common repeats."""
+    ratios = [each for each in ratios if each]
+    if not ratios:
+        return NOTHING
+    shared = set.intersection(*(set(each) for each in ratios))
+    return median([float(np.exp(np.mean([np.log(each[key]) for each in ratios]))) for key in sorted(shared)])
+
+
+def _estimate(
+    value: float, drawn: np.ndarray, values: np.ndarray, least: float | None = None, tail: float | None = None
+) -> Estimate:
+    """The number with the interval that its draws span."""
+    low = high = math.nan
+    if len(values) > 1:
+        tail = tail or _tail(len(values))
+        low, high = np.quantile(drawn, [tail, 1.0 - tail])
+    least = float(values.min()) if least is None else least
+    return Estimate(value, float(low), float(high), least, len(values))
+
+
+@lru_cache(maxsize=64)
+def _draws(n: int, stream: int = 0) -> np.ndarray:
+    """Numbers of the repeats of every draw, (DRAWS, n)."""
+    return np.random.default_rng([SEED, stream]).integers(0, n, size=(DRAWS, n))
+
+
+@lru_cache(maxsize=None)
+def _tail(n: int) -> float:
+    """Probability that is cut off at each end of the draws from n repeats."""
+    quantile = -_student(0.5 * (1.0 - CONFIDENCE), n - 1) * math.sqrt(n / (n - 1))
+    return 0.5 * math.erfc(quantile / math.sqrt(2.0))
+
+
+def _student(probability: float, freedom: int) -> float:
+    """Lower quantile of Student's distribution, from its density over the angle atan(t/sqrt(f))."""
+    angles = np.linspace(-0.5 * math.pi, 0.0, 20001)
+    density = np.cos(angles) ** (freedom - 1)
+    below = np.concatenate([[0.0], np.cumsum(0.5 * (density[1:] + density[:-1]))])
+    angle = float(np.interp(probability, 0.5 * below / below[-1], angles))
+    return math.sqrt(freedom) * math.tan(angle)

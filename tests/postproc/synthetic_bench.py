@@ -1,0 +1,206 @@
+"""Writes bench folders whose truth is known: every time and count follows a law that a test can choose."""
+
+from dataclasses import dataclass, field, replace
+
+import h5py
+import numpy as np
+
+PHASES = ("structure", "search", "filter", "order", "merge", "waiting")
+COUNTS = (
+    "tests",
+    "swaps",
+    "idle_swaps",
+    "leavers",
+    "leaf_changes",
+    "searches",
+    "visits",
+    "rebuilds",
+    "crossings",
+    "passes",
+    "candidates",
+    "nodes",
+    "depth",
+    "bytes",
+)
+STAGES = ("boxes", "neighbours", "overlap", "forces", "integrate", "output")
+SIZES = (2522, 5058, 7599, 10014, 12651, 100000)
+
+
+@dataclass
+class Truth:
+    """Time per step of one finder: 1e-9 * time * boxes**exponent seconds."""
+
+    time: float = 50.0
+    exponent: float = 1.0
+    #: Share of the phases
+    shares: tuple = (0.2, 0.4, 0.25, 0.1, 0.05, 0.0)
+    #: Speed-up on more than one thread
+    gain: float = 1.0
+    #: Count -> number per box
+    counts: dict = field(default_factory=dict)
+
+
+@dataclass
+class Machine:
+    """Where and by what the samples were made."""
+
+    host: str = "alpha"
+    processor: str = "Intel(R) Xeon(R) CPU X1 @ 2.40GHz"
+    options: str = "-mtune=generic -march=x86-64 -O3 -fopenmp"
+    caches: str = "L1d 32K, L1i 32K, L2 1024K, L3 32768K"
+    clock: str = "2.4 GHz"
+    #: Times are this many times as long
+    slowness: float = 1.0
+
+
+def write_sample(
+    folder,
+    name,
+    finder,
+    truth,
+    boxes,
+    machine=Machine(),
+    repeat=1,
+    threads=1,
+    steps=6,
+    mode="replay",
+    bodies=None,
+    noise=0.01,
+    first=10.0,
+    pair_hash="00ab",
+    checked="all_pairs 6 steps",
+    first_counts=None,
+):
+    """Write one sample."""
+    (folder / "samples").mkdir(parents=True, exist_ok=True)
+    random = np.random.default_rng([boxes, repeat, threads, *map(ord, finder + name)])
+    step = 1e-9 * truth.time * machine.slowness * float(boxes) ** truth.exponent / (truth.gain if threads > 1 else 1.0)
+    elapsed = step * random.lognormal(0.0, noise) * np.ones(steps)
+    elapsed[0] *= first
+    with h5py.File(folder / "samples" / f"{name}-{finder}-{threads}-{repeat}.h5", "w") as file:
+        file.attrs["content"] = "sample of a bench by polydem"
+        file.attrs["schema_version"] = 1
+        facts = {
+            "scene": name,
+            "mode": mode,
+            "finder": finder,
+            "threads": threads,
+            "repeat": repeat,
+            "boxes": boxes,
+            "fixed": boxes // 10,
+            "bodies": bodies or boxes,
+            "steps": steps,
+            "dt": 2.5e-5,
+            "load": 0.1,
+            "time_utc": "2026-01-01T00:00:00Z",
+            "pair_hash": pair_hash,
+            "pairs_total": 2 * boxes * steps,
+            "checked": checked,
+            "trace": f"traces/{name}/trace.h5",
+        }
+        write_facts(file, "case", facts)
+        write_facts(
+            file,
+            "provenance",
+            {
+                "host": machine.host,
+                "processor": machine.processor,
+                "options": machine.options,
+                "caches": machine.caches,
+                "clock": machine.clock,
+                "precision": "double",
+                "build_type": "Release",
+                "processors": 4,
+                "revision": "abc",
+            },
+        )
+        file["steps/elapsed"] = elapsed
+        file["steps/processor"] = elapsed
+        file["steps/pairs"] = np.full(steps, 2 * boxes, dtype=np.int32)
+        write_columns(file, "phase", PHASES, np.outer(elapsed, truth.shares))
+        if mode == "live":
+            write_columns(file, "stage", STAGES, np.outer(elapsed, (0.1, 1.0, 3.0, 1.0, 0.5, 0.0)))
+        if repeat == 0:
+            values = np.array([round(boxes * truth.counts.get(count, 0.0)) for count in COUNTS])
+            values[COUNTS.index("depth")] = truth.counts.get("depth", 0)
+            table = np.tile(values, (steps, 1))
+            for count, value in (first_counts or {}).items():
+                table[0, COUNTS.index(count)] = value
+            write_columns(file, "count", COUNTS, table)
+
+
+def write_facts(file, group, facts):
+    """Texts as the Fortran program writes them, of fixed length, and numbers."""
+    for name, value in facts.items():
+        file[f"{group}/{name}"] = np.bytes_(value) if isinstance(value, str) else value
+
+
+def write_columns(file, what, names, table):
+    """A table with the names of its columns."""
+    file[f"steps/{what}_name"] = np.array([name.ljust(12).encode() for name in names])
+    file[f"steps/{what}"] = table
+
+
+def truths():
+    """Finders that behave as the paper says."""
+    tree = {"searches": 0.05, "visits": 1.0, "nodes": 1.6, "depth": 9, "bytes": 100.0, "candidates": 4.0, "tests": 4.0}
+    sweep = {"swaps": 0.2, "idle_swaps": 0.15, "tests": 0.3, "bytes": 100.0}
+    return {
+        "quadtree": Truth(45.0, 1.0, (0.2, 0.4, 0.25, 0.1, 0.05, 0.0), 1.7, tree),
+        "quadtree_called": Truth(45.0, 1.0, (0.2, 0.4, 0.25, 0.1, 0.05, 0.0), 1.7, tree),
+        "pruned_quadtree": Truth(60.0, 1.05, (0.1, 0.7, 0.1, 0.05, 0.05, 0.0), 1.0, tree),
+        "sort_and_sweep": Truth(50.0, 1.0, (0.8, 0.0, 0.1, 0.05, 0.05, 0.0), 1.4, sweep),
+        "partitioned_sweep": Truth(70.0, 1.0, (0.9, 0.0, 0.05, 0.03, 0.02, 0.3), 0.8, {**sweep, "crossings": 0.05}),
+        "linked_cells": Truth(70.0, 1.0, (0.2, 0.5, 0.3, 0.0, 0.0, 0.0), 1.8, {"visits": 9.0, "searches": 1.0}),
+    }
+
+
+def write_drums(
+    folder, of_finders, machine=Machine(), sizes=SIZES, repeats=7, threads=(1, 2), mode="replay", **options
+):
+    """Drums of several sizes with all finders; the two largest paper's sizes on several threads."""
+    for boxes in sizes:
+        for finder, truth in of_finders.items():
+            here = truth
+            if finder == "pruned_quadtree":
+                here = replace(truth, counts={**truth.counts, "visits": 0.1 * np.log2(boxes)})
+            if finder == "quadtree_called":
+                here = replace(truth, time=truth.time * (0.9 if boxes < 5000 else 1.2))
+            if truth.counts.get("depth"):
+                here = replace(here, counts={**here.counts, "depth": 9 if boxes < 6000 else 10})
+            for count in threads if boxes == 12651 else (1,):
+                for repeat in range(repeats + 1):
+                    write_sample(
+                        folder, f"drum_{boxes}", finder, here, boxes, machine, repeat, count, mode=mode, **options
+                    )
+
+
+def write_hard_scenes(folder, of_finders, machine=Machine(), repeats=3):
+    """One scene of every kind that a claim names; times of the paper's two finders change as the claims say."""
+    factors = {
+        "bed": (1.1, 1.0, 3.0),
+        "gas_10": (0.5, 1.0, 3.0),
+        "soft_3": (9.0, 9.0, 1.0),
+        "range_4": (9.0, 9.0, 1.0),
+        "hopper": (1.0, 1.0, 1.0),
+        "sizes_1": (1.0, 1.0, 1.0),
+        "sizes_100": (2.0, 2.0, 1.0),
+    }
+    for name, by_finder in factors.items():
+        for finder, factor in zip(("quadtree", "sort_and_sweep", "linked_cells"), by_finder):
+            truth = replace(of_finders[finder], time=of_finders[finder].time * factor)
+            for repeat in range(repeats + 1):
+                write_sample(folder, name, finder, truth, 3000, machine, repeat, bodies=2500)
+    for boxes in (1000, 4000):
+        for finder, power in (("unsorted_sweep", 2.0), ("sort_and_sweep", 1.0)):
+            for repeat in range(2):
+                write_sample(
+                    folder,
+                    f"worst_order_{boxes}",
+                    finder,
+                    of_finders["sort_and_sweep"],
+                    boxes,
+                    machine,
+                    repeat,
+                    first_counts={"swaps": round(0.4 * boxes**power)},
+                )

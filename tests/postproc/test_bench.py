@@ -1,0 +1,163 @@
+"""Reading bench folders: what counts, and how folders of several machines become one."""
+
+import h5py
+import numpy as np
+import pytest
+from polydem_post import series
+from polydem_post.bench import build_label, read_bench
+from polydem_post.statistics import median
+from polydem_post.trajectory import ResultError
+from synthetic_bench import Machine, Truth, truths, write_drums, write_sample
+
+TRUTH = Truth(40.0, counts={"swaps": 0.25})
+
+
+def test_the_warm_up_and_the_first_step_do_not_count_and_are_kept(tmp_path):
+    for repeat in range(4):
+        slow = Truth(4000.0) if repeat == 0 else TRUTH
+        write_sample(tmp_path, "drum_1000", "quadtree", slow, 1000, repeat=repeat, noise=0.0, first=50.0)
+    (case,) = read_bench([tmp_path]).cases
+    assert list(case.time().values()) == pytest.approx([40.0] * 3)
+    assert list(case.first_step().values()) == pytest.approx([2000.0] * 3)
+    assert [sample.repeat for sample in case.samples] == [0, 1, 2, 3]
+    assert case.samples[0].elapsed[1] == pytest.approx(4e-3)
+    assert sum(
+        list(case.phase(name).values())[0] for name in ("structure", "search", "filter", "order", "merge")
+    ) == pytest.approx(40.0)
+
+
+def test_counts_are_means_over_the_steps_but_the_first(tmp_path):
+    write_sample(tmp_path, "drum_1000", "quadtree", TRUTH, 1000, repeat=0, first_counts={"swaps": 77})
+    (case,) = read_bench([tmp_path]).cases
+    assert (case.count("swaps"), case.count("swaps", first=True)) == (250.0, 77.0)
+    assert np.isnan(case.count("unheard_of"))
+    assert not median(list(case.time().values()))
+
+
+def test_one_thread_is_timed_by_its_processor_and_more_by_the_clock(tmp_path):
+    for threads in (1, 2):
+        write_sample(tmp_path, "drum_1000", "quadtree", TRUTH, 1000, threads=threads, noise=0.0)
+        with h5py.File(tmp_path / "samples" / f"drum_1000-quadtree-{threads}-1.h5", "a") as file:
+            file["steps/processor"][...] = 0.5 * file["steps/elapsed"][...]
+    one, two = read_bench([tmp_path]).select()
+    assert list(one.time().values()) == pytest.approx([20.0])
+    assert list(two.time().values()) == pytest.approx([40.0])
+    assert list(series.elapsed_time(one).values()) == pytest.approx([40.0])
+
+
+def test_live_samples_are_timed_by_their_stages(tmp_path):
+    write_sample(tmp_path, "drum_1000", "quadtree", TRUTH, 1000, mode="live", noise=0.0)
+    (case,) = read_bench([tmp_path]).cases
+    assert list(case.time().values()) == pytest.approx([40.0])
+    assert list(series.total_time(case).values()) == pytest.approx([44.0])
+
+
+def test_what_is_being_written_is_left_out(tmp_path):
+    write_sample(tmp_path, "drum_1000", "quadtree", TRUTH, 1000)
+    (tmp_path / "samples" / "drum_1000-quadtree-1-2.h5.unfinished").write_bytes(b"half a file")
+    (case,) = read_bench([tmp_path]).cases
+    assert len(case.samples) == 1
+
+
+def test_folders_of_two_machines_become_one_bench_of_two_machines(tmp_path):
+    machines = [Machine(), Machine("beta", "AMD EPYC", slowness=1.5)]
+    for machine in machines:
+        write_drums(tmp_path / machine.host, {"quadtree": TRUTH}, machine, sizes=(1000, 2000), repeats=3)
+    bench = read_bench([tmp_path / "alpha", tmp_path / "beta"])
+    assert bench.named("machine") == ["Intel Xeon X1", "AMD EPYC"]
+    assert len(bench.cases) == 4
+    assert bench.on().named("machine") == ["Intel Xeon X1"]
+    fast, slow = (bench.on(machine).select(boxes=2000)[0] for machine in bench.named("machine"))
+    assert series.ratio(slow, fast).value == pytest.approx(1.5, rel=0.05)
+
+
+def test_two_machines_with_one_processor_are_told_apart_by_their_hosts(tmp_path):
+    for host in ("alpha", "beta"):
+        write_sample(tmp_path / host, "drum_1000", "quadtree", TRUTH, 1000, Machine(host))
+    assert read_bench([tmp_path / "alpha", tmp_path / "beta"]).named("machine") == [
+        "Intel Xeon X1 (alpha)",
+        "Intel Xeon X1 (beta)",
+    ]
+
+
+def test_a_second_folder_of_the_same_machine_adds_repeats_that_are_not_paired_with_the_first(tmp_path):
+    for part in ("a", "b"):
+        write_sample(tmp_path / part, "drum_1000", "quadtree", TRUTH, 1000)
+    (case,) = read_bench([tmp_path / "a", tmp_path / "b"]).cases
+    assert len(case.time()) == 2
+
+
+@pytest.mark.parametrize(
+    "facts, label",
+    [
+        ({"options": "-O3 -fopenmp -march=x86-64"}, "-O3"),
+        ({"options": "-O2 -march=native"}, "-O2 -march=native"),
+        ({"options": "-O3", "precision": "single", "build_type": "Debug"}, "-O3 single Debug"),
+        ({}, "unknown"),
+    ],
+)
+def test_builds_are_told_apart_by_what_changes_the_program(facts, label):
+    assert build_label(facts) == label
+
+
+def test_samples_of_one_name_and_different_scenes_are_refused(tmp_path):
+    for repeat, pair_hash in ((1, "00ab"), (2, "00cd")):
+        write_sample(tmp_path, "drum_1000", "quadtree", TRUTH, 1000, repeat=repeat, pair_hash=pair_hash)
+    with pytest.raises(ResultError, match="differ in pair_hash: 00ab, 00cd"):
+        read_bench([tmp_path])
+
+
+def test_a_folder_without_samples_is_explained(tmp_path):
+    with pytest.raises(ResultError, match="holds no samples of a bench .* ./polydem bench"):
+        read_bench([tmp_path])
+
+
+def test_a_broken_sample_and_a_foreign_file_are_named(tmp_path):
+    write_sample(tmp_path, "drum_1000", "quadtree", TRUTH, 1000)
+    path = tmp_path / "samples" / "drum_1000-quadtree-1-1.h5"
+    with h5py.File(path, "a") as file:
+        del file["steps/elapsed"]
+    with pytest.raises(ResultError, match=r"drum_1000-quadtree-1-1.h5: cannot be read"):
+        read_bench([tmp_path])
+    with h5py.File(path, "a") as file:
+        file.attrs["content"] = "trajectory"
+    with pytest.raises(ResultError, match="is not a sample of a bench"):
+        read_bench([tmp_path])
+
+
+@pytest.mark.parametrize(
+    "name, kind",
+    [
+        ("drum_2522", "drum"),
+        ("drums_12651", "drum"),
+        ("patch", "drum"),
+        ("bed_static", "bed"),
+        ("gas_0.1", "gas"),
+        ("sizes_100", "sizes"),
+        ("worst_order_5000", "worst"),
+        ("range_0.01", "range"),
+        ("one_mover", "rest"),
+        ("bedrock", "bedrock"),
+    ],
+)
+def test_the_kind_of_a_scene_is_the_beginning_of_its_name(name, kind):
+    assert series.kind(name) == kind
+
+
+def test_the_slope_of_a_series_and_its_counts_are_those_of_the_truth(tmp_path):
+    write_drums(tmp_path, {"quadtree": Truth(40.0, 1.1, counts={"tests": 3.0})}, repeats=5)
+    cases = series.over_size(read_bench([tmp_path]).on(), "quadtree")
+    law = series.law(cases)
+    assert law.exponent.low < 1.1 < law.exponent.high
+    assert law.at(10000.0) == pytest.approx(40e-6 * 10000.0**1.1, rel=0.02)
+    assert series.count_slope(cases, "tests", "swaps") == pytest.approx(1.0, abs=1e-3)
+
+
+def test_the_caches_of_a_machine_are_those_for_data():
+    levels = series.cache_levels({"caches": "L1d 32K, L1i 64K, L2 1024K, L3 32M"})
+    assert levels == [("L1", 2**15), ("L2", 2**20), ("L3", 2**25)]
+
+
+def test_all_finders_of_the_fixture_have_positive_shares():
+    for truth in truths().values():
+        assert sum(truth.shares[:5]) == pytest.approx(1.0)

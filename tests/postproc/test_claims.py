@@ -1,0 +1,200 @@
+"""Verdicts follow the data: a bench that behaves as the paper says confirms its claims, and another one does not."""
+
+from dataclasses import replace
+
+import pytest
+from polydem_post import claim_rules_structure, complexity
+from polydem_post.bench import read_bench
+from polydem_post.claims import (
+    CONFIRMED,
+    CONTRADICTED,
+    IN_PART,
+    NOT_MEASURED,
+    NOT_TESTABLE,
+    claims_document,
+    judge_all,
+    of_parts,
+)
+from synthetic_bench import Machine, truths, write_drums, write_hard_scenes, write_sample
+
+SIZES = (2522, 5058, 12651, 100000)
+SLOWER = Machine("beta", "AMD EPYC", clock="3.3 GHz", slowness=1.3)
+
+
+def as_the_paper_says():
+    """Truths under which every claim that synthetic samples can show is true."""
+    found = truths()
+    found["sort_and_sweep"] = replace(found["sort_and_sweep"], shares=(0.85, 0.0, 0.05, 0.05, 0.05, 0.0))
+    found["quadtree"] = replace(found["quadtree"], shares=(0.2, 0.4, 0.25, 0.1, 0.05, 0.0))
+    return found
+
+
+def verdicts(folder, finders=None, machines=(Machine(),), hard=True, **options):
+    """Claim -> finding of a bench that follows some truths."""
+    finders = finders or as_the_paper_says()
+    for machine in machines:
+        write_drums(folder / machine.host, finders, machine, SIZES, repeats=3, **options)
+    if hard:
+        write_hard_scenes(folder / machines[0].host, finders)
+    folders = [folder / machine.host for machine in machines]
+    return {claim.id: finding for claim, finding in judge_all(read_bench(folders))}
+
+
+def changed(finder, **changes):
+    """The truths with one finder changed."""
+    finders = as_the_paper_says()
+    counts = changes.pop("counts", {})
+    finders[finder] = replace(finders[finder], counts={**finders[finder].counts, **counts}, **changes)
+    return finders
+
+
+@pytest.fixture(scope="module")
+def agreeing(tmp_path_factory):
+    return verdicts(tmp_path_factory.mktemp("agreeing"), machines=(Machine(), SLOWER))
+
+
+@pytest.mark.parametrize("claim", ["C1", "C2", "C4", "C5", "C6", "C7", "C10", "C11", "C12", "C15", "C16", "C17", "C19"])
+def test_a_bench_as_the_paper_says_confirms(agreeing, claim):
+    assert agreeing[claim].verdict == CONFIRMED, agreeing[claim]
+
+
+@pytest.mark.parametrize(
+    "claim, finder, changes, verdict",
+    [
+        ("C1", "quadtree", {"exponent": 1.2, "time": 8.0}, IN_PART),
+        ("C2", "quadtree", {"time": 90.0}, CONTRADICTED),
+        ("C2", "quadtree", {"time": 20.0}, CONTRADICTED),
+        ("C4", "quadtree", {"shares": (0.6, 0.2, 0.1, 0.05, 0.05, 0.0)}, CONTRADICTED),
+        ("C5", "partitioned_sweep", {"gain": 2.0}, IN_PART),
+        ("C5", "quadtree", {"gain": 1.0}, IN_PART),
+        ("C6", "quadtree", {"time": 20.0}, IN_PART),
+        ("C7", "quadtree", {"counts": {"depth": 0}}, NOT_MEASURED),
+        ("C12", "linked_cells", {"time": 2000.0}, IN_PART),
+        ("C17", "sort_and_sweep", {"counts": {"idle_swaps": 0.05}}, CONTRADICTED),
+        ("C19", "linked_cells", {"time": 2000.0}, CONTRADICTED),
+        ("C15", "quadtree", {"counts": {"searches": 0.0}}, NOT_MEASURED),
+    ],
+)
+def test_a_verdict_flips_with_the_data(tmp_path, claim, finder, changes, verdict):
+    finders = changed(finder, **changes)
+    if claim == "C7":
+        del finders["quadtree"]
+    found = verdicts(tmp_path, finders, hard=claim in ("C12", "C19"))
+    assert found[claim].verdict == verdict, found[claim]
+
+
+def test_the_update_of_the_structure_is_judged_by_ratio_and_slopes(tmp_path, agreeing):
+    assert agreeing["C3"].verdict == CONTRADICTED
+    finders = changed("quadtree", shares=(0.1, 0.5, 0.25, 0.1, 0.05, 0.0))
+    assert verdicts(tmp_path / "ratio", finders, hard=False)["C3"].verdict == IN_PART
+    finders = {name: replace(truth, exponent=1.4) for name, truth in finders.items()}
+    assert verdicts(tmp_path / "both", finders, hard=False)["C3"].verdict == CONFIRMED
+
+
+def test_a_contradicted_slope_tells_whether_the_operations_grow(tmp_path):
+    found = verdicts(tmp_path, changed("quadtree", exponent=1.2, time=8.0), hard=False)["C1"]
+    assert "the operations (tests, exchanges, visits) grow with exponent 1.00" in found.reason
+
+
+def test_the_depth_of_the_tree_is_compared_with_the_papers(tmp_path):
+    for boxes in (2522, 12651):
+        truth = replace(truths()["quadtree"], counts={"depth": 14, "nodes": 1.6})
+        for repeat in range(2):
+            write_sample(tmp_path, f"drum_{boxes}", "quadtree", truth, boxes, repeat=repeat)
+    assert dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C7"].verdict == CONTRADICTED
+
+
+def test_memory_against_clock_needs_two_machines_that_state_their_clocks(tmp_path, agreeing):
+    assert agreeing["C10"].verdict == CONFIRMED
+    assert verdicts(tmp_path / "one", hard=False)["C10"].verdict == NOT_MEASURED
+    silent = replace(SLOWER, clock="unknown")
+    assert verdicts(tmp_path / "silent", machines=(Machine(), silent), hard=False)["C10"].verdict == NOT_TESTABLE
+    faster = replace(SLOWER, slowness=0.7)
+    assert verdicts(tmp_path / "faster", machines=(Machine(), faster), hard=False)["C10"].verdict == CONTRADICTED
+
+
+def test_wrong_lists_on_cut_walls_contradict(tmp_path):
+    write_hard_scenes(tmp_path, as_the_paper_says())
+    for finder in ("quadtree", "linked_cells"):
+        truth = truths()[finder]
+        write_sample(tmp_path, "sizes_50", finder, truth, 3000, pair_hash=finder, bodies=2500)
+    found = dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C11"]
+    assert found.verdict == IN_PART and "Equal lists on 3 of 4 scenes" in found.reason
+
+
+def test_a_list_that_was_not_compared_with_the_oracle_proves_nothing(tmp_path):
+    write_hard_scenes(tmp_path, as_the_paper_says())
+    write_sample(tmp_path, "sizes_50", "quadtree", truths()["quadtree"], 3000, checked="sort_and_sweep")
+    assert dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C11"].verdict == NOT_MEASURED
+
+
+@pytest.mark.parametrize("jump, verdict", [(1.0, CONTRADICTED), (1.5, CONFIRMED)])
+def test_a_rise_beyond_a_cache_is_seen(tmp_path, jump, verdict):
+    for boxes in (2522, 5058, 100000):
+        truth = replace(truths()["quadtree"], time=45.0 * (jump if boxes > 50000 else 1.0))
+        for repeat in range(6):
+            write_sample(tmp_path, f"drum_{boxes}", "quadtree", truth, boxes, repeat=repeat)
+    assert dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C13"].verdict == verdict
+
+
+def test_whole_steps_tell_what_a_week_is_worth_and_no_more(tmp_path):
+    write_drums(
+        tmp_path, {"quadtree": truths()["quadtree"]}, sizes=(12651,), repeats=2, threads=(1,), mode="live", noise=0.0
+    )
+    found = dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C14"]
+    assert found.verdict == NOT_TESTABLE
+    assert found.ours.startswith("3.19 ms per step; a week: ")
+
+
+@pytest.mark.parametrize("slowness, verdict", [(1.01, CONFIRMED), (1.3, CONTRADICTED)])
+def test_builds_are_compared_on_one_machine(tmp_path, slowness, verdict):
+    finders = as_the_paper_says()
+    write_drums(tmp_path / "o3", finders, sizes=SIZES, repeats=3)
+    assert dict((c.id, f) for c, f in judge_all(read_bench([tmp_path / "o3"])))["C18"].verdict == NOT_MEASURED
+    write_drums(tmp_path / "o2", finders, Machine(options="-O2", slowness=slowness), SIZES, repeats=3)
+    bench = read_bench([tmp_path / "o3", tmp_path / "o2"])
+    assert dict((c.id, f) for c, f in judge_all(bench))["C18"].verdict == verdict
+
+
+def test_the_worst_order_is_judged_by_exponents(tmp_path):
+    for boxes in (1000, 4000):
+        for finder in ("unsorted_sweep", "sort_and_sweep"):
+            write_sample(
+                tmp_path,
+                f"worst_order_{boxes}",
+                finder,
+                truths()["sort_and_sweep"],
+                boxes,
+                repeat=0,
+                first_counts={"swaps": boxes},
+            )
+    assert dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C16"].verdict == IN_PART
+
+
+@pytest.mark.parametrize("tree, verdict", [(90, CONFIRMED), (300, CONTRADICTED)])
+def test_complexities_are_judged_by_their_ratio(monkeypatch, agreeing, tmp_path, tree, verdict):
+    monkeypatch.setattr(complexity, "counter", lambda: "a tool")
+    monkeypatch.setattr(complexity, "totals", lambda finder, _: {"total": tree if finder == "quadtree" else 80})
+    monkeypatch.setattr(complexity, "count_finder", lambda *_: [complexity.Procedure("a.f90", "find", 9)])
+    assert claim_rules_structure.complexities(None).verdict == verdict
+    monkeypatch.setattr(complexity, "counter", lambda: None)
+    write_sample(tmp_path, "drum_100", "verlet", truths()["quadtree"], 100)
+    found = dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C8"]
+    assert found.verdict == NOT_MEASURED and "pip install" in found.reason
+
+
+def test_nothing_measured_says_what_to_run_for_every_claim_but_the_untestable(tmp_path):
+    write_sample(tmp_path, "drum_100", "verlet", truths()["quadtree"], 100)
+    bench = read_bench([tmp_path])
+    found = {claim.id: finding for claim, finding in judge_all(bench)}
+    assert list(found) == [f"C{k}" for k in range(1, 20)]
+    for identifier in set(found) - {"C8", "C9"}:
+        assert found[identifier].verdict == NOT_MEASURED
+        assert found[identifier].reason.startswith("run: ")
+    assert found["C9"].verdict == NOT_TESTABLE
+    text = claims_document(bench)
+    assert all(f"| C{k} |" in text for k in range(1, 20))
+
+
+def test_parts_are_all_some_or_none():
+    assert [of_parts(parts) for parts in ([True, True], [True, False], [False])] == [CONFIRMED, IN_PART, CONTRADICTED]

@@ -1,0 +1,213 @@
+"""Tables and figures of a whole report."""
+
+import csv
+from dataclasses import replace
+
+import pytest
+from matplotlib.image import imread
+from polydem_post import bench_tables, complexity, paper_tables
+from polydem_post.__main__ import main
+from polydem_post.bench import read_bench
+from polydem_post.bench_figures import bench_drawings
+from polydem_post.paper_figures import paper_drawings
+from polydem_post.targets import targets
+from synthetic_bench import Machine, truths, write_drums, write_hard_scenes
+
+FIGURES = (
+    "figure_01_idle_swaps",
+    "figure_08_13_machines",
+    "figure_09_total",
+    "figure_10_update",
+    "figure_11_inlining",
+    "figure_12_interpreted",
+    "finders_over_size",
+    "speed_up",
+    "cache_misses",
+    "work_over_size",
+)
+TABLES = (
+    "table_1",
+    "table_2",
+    "table_3",
+    "times",
+    "phases",
+    "counters",
+    "first_step",
+    "scenes",
+    "speed_up",
+    "list_cost",
+    "builds",
+    "cache",
+    "claims",
+)
+SIZES = (2522, 5058, 12651, 100000)
+CACHE = """scene,boxes,finder,few,more,instructions,accesses,first_level,last_level,mispredictions,model,hardware
+drum_2522,2522,quadtree,2,12,200.0,90.0,2.9,0.2,-1.0,"D1 32 KiB 8-way, LL 1 MiB 16-way",not available
+drum_5058,5058,quadtree,2,12,200.0,90.0,3.1,0.9,-1.0,"D1 32 KiB 8-way, LL 1 MiB 16-way",not available
+"""
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    """Two machines, the first with two builds, hard scenes and counted misses."""
+    folder = tmp_path_factory.mktemp("benches")
+    finders = truths()
+    write_drums(folder / "a", finders, sizes=SIZES, repeats=3)
+    write_hard_scenes(folder / "a", finders)
+    (folder / "a" / "cache.csv").write_text(CACHE, encoding="utf-8")
+    write_drums(folder / "b", finders, Machine("beta", "AMD EPYC", slowness=1.3), SIZES, repeats=3)
+    write_drums(folder / "c", finders, Machine(options="-O2"), SIZES, repeats=2)
+    return [folder / name for name in "abc"]
+
+
+@pytest.fixture(scope="module")
+def bench(folders):
+    return read_bench(folders)
+
+
+@pytest.fixture(scope="module")
+def report(folders, tmp_path_factory):
+    output = tmp_path_factory.mktemp("report")
+    assert main(["tables", *map(str, folders), "--output", str(output)]) == 0
+    return output
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_every_figure_is_there_in_three_forms_and_not_empty(report, name):
+    pixels = imread(report / "figures" / f"{name}.png")
+    assert min(pixels.shape[:2]) > 500
+    assert pixels[..., :3].std() > 0.02
+    assert (report / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+    assert "</svg>" in (report / "figures" / f"{name}.svg").read_text(encoding="utf-8")
+    assert f"**{name}**" in (report / "figures" / "captions.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_every_table_is_there_in_four_forms(report, name):
+    with (report / "tables" / f"{name}.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    if name != "table_3" or complexity.counter() is not None:
+        assert len(rows) > 1
+    assert len({len(row) for row in rows}) == 1
+    for end in ("txt", "md", "tex"):
+        assert (report / "tables" / f"{name}.{end}").stat().st_size > 0
+
+
+def test_a_report_is_the_same_every_time(report, folders, tmp_path):
+    assert main(["tables", *map(str, folders), "--output", str(tmp_path)]) == 0
+    files = sorted(path.relative_to(report) for path in report.rglob("*.*"))
+    assert len(files) > 80
+    for path in files:
+        assert (report / path).read_bytes() == (tmp_path / path).read_bytes(), path
+
+
+def rows_of(table):
+    """Rows as dictionaries."""
+    return [dict(zip(table.heading, row)) for row in table.rows]
+
+
+def test_table_1_shows_the_papers_machines_and_ours(bench):
+    rows = rows_of(paper_tables.machines(bench))
+    assert [row["machine"] for row in rows[-2:]] == ["Intel Xeon X1", "AMD EPYC"]
+    assert rows[-2]["clock [GHz]"] == "2.4"
+    assert any("E5-2680v4" in row["machine"] for row in rows)
+
+
+def test_table_2_sets_used_nodes_beside_reserved_ones(bench):
+    rows = rows_of(paper_tables.depth_and_nodes(bench.on()))
+    row = next(row for row in rows if row["boxes"] == "12651" and row["finder"] == "quadtree")
+    assert (row["depth, paper"], row["nodes, paper"]) == ("10", "349525")
+    assert (row["full tree of our depth"], row["nodes per box"]) == ("349525", "1.60")
+
+
+@pytest.mark.parametrize("time, reached", [(45.0, "clearly"), (59.4, "yes"), (70.0, "no")])
+def test_targets_are_judged_on_the_drum_of_12651_boxes(tmp_path, time, reached):
+    finders = {"quadtree": replace(truths()["quadtree"], time=time), "verlet": truths()["quadtree"]}
+    write_drums(tmp_path, finders, sizes=(12651,), repeats=7, threads=(1,))
+    (row,) = rows_of(targets(read_bench([tmp_path])))
+    assert row["reached"] == reached
+    assert float(row["over verlet, same run"].split()[0]) == pytest.approx(time / 45.0, rel=0.05)
+
+
+def test_the_speed_up_is_that_of_the_truth(bench):
+    rows = rows_of(bench_tables.speed_up(bench.on()))
+    found = {row["finder"]: float(row["speed-up"].split()[0]) for row in rows}
+    assert found["quadtree"] == pytest.approx(1.7, rel=0.05)
+    assert found["partitioned_sweep"] == pytest.approx(0.8, rel=0.05)
+
+
+def test_the_best_finder_of_a_scene_is_marked(bench):
+    rows = rows_of(bench_tables.scenes(bench.on()))
+    soft = next(row for row in rows if row["scene"] == "soft_3")
+    assert soft["linked_cells"].endswith("*") and not soft["quadtree"].endswith("*")
+
+
+def test_the_figure_of_total_times_tells_fitted_slopes_and_the_papers(bench):
+    drawing = next(each for each in paper_drawings(bench) if each.name == "figure_09_total")
+    left, right = drawing.figure.axes
+    texts = [text.get_text() for text in left.get_legend().get_texts()]
+    (text,) = [text for text in texts if text.startswith("quadtree: slope ") and text.endswith("; paper 0.994")]
+    assert float(text.split()[2]) == pytest.approx(1.0, abs=0.02)
+    assert (left.get_xlabel(), left.get_ylabel()) == ("boxes", "time per step [ms]")
+    assert "paper: about 0.9" in [text.get_text() for text in right.get_legend().get_texts()]
+
+
+def test_threads_are_compared_in_one_figure(bench):
+    drawing = next(each for each in bench_drawings(bench) if each.name == "speed_up")
+    labels = [text.get_text() for text in drawing.figure.axes[0].get_legend().get_texts()]
+    assert {"sweep, partitioned lists", "quadtree, search", "linked cells, scan"} <= set(labels)
+
+
+def test_one_machine_alone_is_told_in_the_caption(folders):
+    alone, both = (
+        next(each.caption for each in paper_drawings(read_bench(some)) if "machines" in each.name)
+        for some in (folders[:1], folders[:2])
+    )
+    assert "Only one machine" in alone and "Only one machine" not in both
+
+
+def test_the_smallest_bench_gives_a_report_too(tmp_path):
+    write_drums(tmp_path / "a", {"verlet": truths()["quadtree"]}, sizes=(1000,), repeats=1)
+    assert main(["tables", str(tmp_path / "a")]) == 0
+    assert "not measured" in (tmp_path / "a" / "report" / "claims.md").read_text(encoding="utf-8")
+
+
+def test_a_missing_folder_ends_with_code_2(capsys):
+    assert main(["tables", "no/such/folder"]) == 2
+    assert "holds no samples" in capsys.readouterr().err
+
+
+def test_complexity_follows_uses_and_includes(tmp_path):
+    pytest.importorskip("lizard")
+    (tmp_path / "nodes.inc").write_text(
+        "subroutine insert(a)\nif (a > 0) a = 1\nend subroutine insert\n", encoding="utf-8"
+    )
+    (tmp_path / "tree_nodes.f90").write_text(
+        "module polydem_tree_nodes\ncontains\ninclude 'nodes.inc'\nend module\n", encoding="utf-8"
+    )
+    (tmp_path / "tree.f90").write_text(
+        "module polydem_tree\nuse polydem_tree_nodes, only: insert\ntype, extends(finder_t) :: tree_t\nend "
+        "type\ncontains\n"
+        "subroutine search(n)\ninteger :: n, k\ndo k = 1, n\nif (k > 3 .and. k < 5) exit\nend do\nend "
+        "subroutine search\n"
+        "end module polydem_tree\n",
+        encoding="utf-8",
+    )
+    assert [path.name for path in complexity.sources_of("tree", tmp_path)] == [
+        "tree.f90",
+        "tree_nodes.f90",
+        "nodes.inc",
+    ]
+    assert complexity.finders_in(tmp_path) == ["tree"]
+    assert complexity.totals("tree", tmp_path) == {
+        "initialization": 0,
+        "updating data structure": 2,
+        "updating contact list": 4,
+        "total": 6,
+    }
+
+
+def test_without_the_tool_the_table_of_complexity_says_how_to_get_it(monkeypatch, tmp_path):
+    monkeypatch.setattr(complexity, "counter", lambda: None)
+    (table,) = complexity.complexity_tables(tmp_path)
+    assert table.rows == [] and "pip install" in table.note
