@@ -10,7 +10,7 @@ module polydem_namelist_entries
    public :: entry_t, entries, required, group_length, bench_group, first_row, groups, keys_of, choices_of
 
    !> Greatest lengths in the table
-   integer, parameter :: group_length = 10, key_length = 24, allowed_length = 160
+   integer, parameter :: group_length = 10, key_length = 24, allowed_length = 200
 
    !> One row of the table
    type :: entry_t
@@ -45,7 +45,7 @@ module polydem_namelist_entries
 
    !> The finders, as in `finder_names` of the room neighbours
    character(len=*), parameter :: finders = 'all_pairs sort_and_sweep unsorted_sweep partitioned_sweep quadtree '// &
-      'quadtree_called pruned_quadtree binary_tree linked_cells verlet hierarchical_grid'
+      'quadtree_called pruned_quadtree binary_tree linked_cells verlet hierarchical_grid sort_and_sweep_o2 quadtree_o2'
 
    !> Group &scene
    type(entry_t), parameter :: scene_entries(*) = [ &

@@ -9,7 +9,9 @@ module polydem_finder_factory
    use polydem_partitioned_sweep, only: partitioned_sweep_t
    use polydem_quadtree_called, only: quadtree_called_t => quadtree_t
    use polydem_quadtree_inlined, only: quadtree_t
+   use polydem_quadtree_o2, only: quadtree_o2_t => quadtree_t
    use polydem_sort_and_sweep, only: sort_and_sweep_t
+   use polydem_sort_and_sweep_o2, only: sort_and_sweep_o2_t => sort_and_sweep_t
    use polydem_strings, only: join
    use polydem_verlet, only: verlet_t
    implicit none
@@ -17,9 +19,10 @@ module polydem_finder_factory
    public :: new_finder, finder_names
 
    !> Names of all finders, as in the namelist and in results
-   character(len=*), parameter :: finder_names(11) = &
+   character(len=*), parameter :: finder_names(13) = &
       [character(len=18) :: 'all_pairs', 'sort_and_sweep', 'unsorted_sweep', 'partitioned_sweep', 'quadtree', &
-       'quadtree_called', 'pruned_quadtree', 'binary_tree', 'linked_cells', 'verlet', 'hierarchical_grid']
+       'quadtree_called', 'pruned_quadtree', 'binary_tree', 'linked_cells', 'verlet', 'hierarchical_grid', &
+       'sort_and_sweep_o2', 'quadtree_o2']
 
 contains
 
@@ -49,6 +52,10 @@ contains
          allocate (partitioned_sweep_t :: finder)
       case ('quadtree')
          call new_tree(finder, equal_leaves=.false., one_axis=.false.)
+      case ('quadtree_o2')
+         allocate (quadtree_o2_t :: finder)
+      case ('sort_and_sweep_o2')
+         allocate (sort_and_sweep_o2_t :: finder)
       case ('quadtree_called')
          allocate (quadtree_called_t :: finder)
       case ('pruned_quadtree')

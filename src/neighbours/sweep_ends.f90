@@ -124,7 +124,7 @@ contains
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
       !> Bounds of the step before, (4, box) [m]
-      real(wp), intent(in), contiguous :: before(:, :)
+      real(wp), intent(in) :: before(:, :)
       !> Refreshed ends
       type(ends_t), intent(inout) :: ends
       !> Changes and counts are added to it
@@ -160,12 +160,12 @@ contains
       tests = 0_lp
       lowest = huge(1_ip)
       highest = 0_ip
-      do k = first, high
+      k = first - 1_ip
+      do
+         k = k + 1_ip
+         if (.not. two_runs) k = next_suspect(k, high, n_ends, value)
+         if (k > high) exit
          new = value(k)
-         if (value(k - 1_ip) < new) then
-            if (two_runs) exit
-            cycle
-         end if
          mover = code(k)
          place = k
          do while (place > low)
@@ -198,6 +198,16 @@ contains
       report%tests = report%tests + tests
       moved = [lowest, highest]
    end subroutine insert
+
+   !> First place from k on whose end is not greater than the one before it; high + 1 if there is none.
+   pure integer(ip) function next_suspect(k, high, n_ends, value)
+      integer(ip), intent(in) :: k, high, n_ends
+      real(wp), intent(in) :: value(n_ends)
+
+      do next_suspect = k, high
+         if (.not. (value(next_suspect - 1_ip) < value(next_suspect))) return
+      end do
+   end function next_suspect
 
    !> Order of ends of equal value: lower ends first, then by box
    pure logical function comes_before(one, other)

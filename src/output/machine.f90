@@ -4,7 +4,8 @@ module polydem_machine
    use polydem_kinds, only: dp, ip
    implicit none
    private
-   public :: host_name, processor_name, cache_sizes, memory_size, frequency_governor, kernel_release, cores_online
+   public :: host_name, processor_name, processor_clock, cache_sizes, memory_size, frequency_governor
+   public :: kernel_release, cores_online
    public :: load_average, environment, utc_now, terminal_watches
 
    interface
@@ -71,24 +72,49 @@ contains
       name = buffer(:index(buffer, c_null_char) - 1)
    end function host_name
 
-   !> Model of the processor, from /proc/cpuinfo
+   !> Model of the processor
    function processor_name() result(name)
       character(len=:), allocatable :: name
+
+      name = processor_fact('model name')
+   end function processor_name
+
+   !> Clock of the first processor when asked, like '2.596 GHz'
+   function processor_clock() result(text)
+      character(len=:), allocatable :: text
+      character(len=12) :: number
+      real(dp) :: megahertz
+      integer :: status
+
+      text = processor_fact('cpu MHz')
+      read (text, *, iostat=status) megahertz
+      if (status /= 0) then
+         text = unknown
+         return
+      end if
+      write (number, '(f12.3)') 1.0e-3_dp*megahertz
+      text = trim(adjustl(number))//' GHz'
+   end function processor_clock
+
+   !> What /proc/cpuinfo says first under some name
+   function processor_fact(name) result(fact)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: fact
       character(len=512) :: line
       integer :: unit, status
 
-      name = unknown
+      fact = unknown
       open (newunit=unit, file='/proc/cpuinfo', status='old', action='read', iostat=status)
       if (status /= 0) return
       do
          read (unit, '(a)', iostat=status) line
          if (status /= 0) exit
-         if (index(line, 'model name') /= 1) cycle
-         name = trim(adjustl(line(index(line, ':') + 1:)))
+         if (index(line, name) /= 1) cycle
+         fact = trim(adjustl(line(index(line, ':') + 1:)))
          exit
       end do
       close (unit)
-   end function processor_name
+   end function processor_fact
 
    !> Caches that the first processor sees, like 'L1d 48K, L1i 32K, L2 2048K, L3 107520K', from /sys
    function cache_sizes() result(text)

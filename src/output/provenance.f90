@@ -7,7 +7,7 @@ module polydem_provenance
    use polydem_hdf5_file, only: hdf5_file_t, library_version
    use polydem_kinds, only: dp, ip, precision_name
    use polydem_machine, only: cache_sizes, cores_online, environment, frequency_governor, host_name, kernel_release, &
-      load_average, memory_size, processor_name, utc_now
+      load_average, memory_size, processor_clock, processor_name, utc_now
    implicit none
    private
    public :: provenance_t, collect_provenance, threads_are_bound, write_provenance
@@ -32,6 +32,8 @@ module polydem_provenance
       character(len=:), allocatable :: host
       !> Model of its processor
       character(len=:), allocatable :: processor
+      !> Clock of its first processor at the start
+      character(len=:), allocatable :: clock
       !> Sizes of its caches
       character(len=:), allocatable :: caches
       !> Size of its memory
@@ -90,6 +92,7 @@ contains
       provenance%hdf5_version = library_version()
       provenance%host = host_name()
       provenance%processor = processor_name()
+      provenance%clock = processor_clock()
       provenance%caches = cache_sizes()
       provenance%memory = memory_size()
       provenance%governor = frequency_governor()
@@ -133,6 +136,7 @@ contains
       call file%write('/provenance/hdf5_version', provenance%hdf5_version, error)
       call file%write('/provenance/host', provenance%host, error)
       call file%write('/provenance/processor', provenance%processor, error)
+      call file%write('/provenance/clock', provenance%clock, error)
       call file%write('/provenance/caches', provenance%caches, error)
       call file%write('/provenance/memory', provenance%memory, error)
       call file%write('/provenance/governor', provenance%governor, error)

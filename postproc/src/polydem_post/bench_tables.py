@@ -228,7 +228,7 @@ def visits_per_search(case: Case, first: bool = False) -> float:
 
 
 def builds(bench: Bench) -> Table:
-    """Every build against the one of the same machine that has most samples: -O2 against -O3 (claim C18)."""
+    """Every build against the one of the same machine that has most samples."""
     table = Table(
         "builds",
         "Builds: ratio of times, one thread",

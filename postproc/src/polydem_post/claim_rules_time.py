@@ -10,7 +10,7 @@ from .paper_tables import clock_of
 from .cache import read_records
 from .claims import CONFIRMED, CONTRADICTED, IN_PART, NOT_TESTABLE, Finding, Missing, claim, needed, of_parts
 from .series import SWEEP, TREE
-from .statistics import median, number, pooled, ratio_of_medians
+from .statistics import median, number, pooled
 
 #: What has to be run for the drums of all sizes
 DRUMS = "./polydem bench on drums of at least three sizes, one thread, finders "
@@ -229,23 +229,14 @@ def caches(bench: Bench) -> Finding:
     "-O3 brings nothing over -O2",
     "no significant change",
     "mean ratio -O3 / -O2 over the drums within 0.95 to 1.05 for tree and sweep",
-    "builds",
+    "times",
 )
 def optimisation(bench: Bench) -> Finding:
-    machine = bench.named("machine")[0]
-    names = dict.fromkeys(case.build for case in bench.cases if case.machine == machine)
-    by_level = {level: [name for name in names if level in name.split()] for level in ("-O3", "-O2")}
-    if not all(by_level.values()):
-        raise Missing("the same bench with a build at -O2 (-D CMAKE_Fortran_FLAGS_RELEASE=-O2), and give both folders")
-    three, two = (bench.on(machine, by_level[level][0]) for level in ("-O3", "-O2"))
     parts, found = [], []
     for finder in (SWEEP, TREE):
-        both = series.pairs_of(series.over_size(three, finder), series.over_size(two, finder))
-        ratios = [ratio_of_medians(list(a.time().values()), list(b.time().values())) for a, b in both]
-        needed([ratio for ratio in ratios if ratio], f"the same drums with '{finder}' in both builds")
-        mean = float(np.exp(np.mean([np.log(ratio.value) for ratio in ratios])))
-        parts.append(0.95 <= mean <= 1.05)
-        found.append(
-            f"{finder} {number(mean)} ({', '.join(f'{a.boxes}: {r.text()}' for (a, _), r in zip(both, ratios))})"
-        )
+        both = series.pairs_of(series.over_size(bench, finder), series.over_size(bench, f"{finder}_o2"))
+        needed(both, DRUMS + f"'{finder}' and '{finder}_o2'")
+        mean = series.pooled_ratio(both)
+        parts.append(0.95 <= mean.value <= 1.05)
+        found.append(f"{finder} {mean.text()}")
     return Finding(CONFIRMED if all(parts) else IN_PART if any(parts) else CONTRADICTED, "; ".join(found))
