@@ -10,6 +10,7 @@ from polydem_post.__main__ import main
 from polydem_post.bench import read_bench
 from polydem_post.bench_figures import bench_drawings
 from polydem_post.paper_figures import paper_drawings
+from polydem_post.slope_tables import slopes
 from polydem_post.targets import targets
 from synthetic_bench import Machine, truths, write_drums, write_hard_scenes
 
@@ -36,6 +37,7 @@ TABLES = (
     "scenes",
     "speed_up",
     "list_cost",
+    "slopes",
     "builds",
     "cache",
     "claims",
@@ -211,3 +213,13 @@ def test_without_the_tool_the_table_of_complexity_says_how_to_get_it(monkeypatch
     monkeypatch.setattr(complexity, "counter", lambda: None)
     (table,) = complexity.complexity_tables(tmp_path)
     assert table.rows == [] and "pip install" in table.note
+
+
+def test_slopes_tell_how_time_and_counted_work_grow(tmp_path):
+    finders = truths()
+    write_drums(tmp_path, {"quadtree": replace(finders["quadtree"], exponent=1.2)}, sizes=SIZES, repeats=3)
+    table = slopes(read_bench([tmp_path]))
+    row = dict(zip(table.heading, table.rows[0]))
+    assert (row["scenes"], row["finder"], row["sizes"]) == ("drum", "quadtree", "2522 to 100000")
+    assert abs(float(row["all sizes"].split()[0]) - 1.2) < 0.02
+    assert abs(float(row["visits (counted)"]) - 1.0) < 0.02

@@ -9,6 +9,7 @@ from .bench_tables import all_tables
 from .claims import claims_document, judge_all, verdict_table
 from .complexity import SOURCES, complexity_tables
 from .emit import FORMATS, SUFFIXES, Table
+from .slope_tables import slopes
 from .targets import targets
 from .trajectory import ResultError
 
@@ -32,7 +33,7 @@ def write_report(folders: list, output: Path | None = None, figures: bool = True
 
 def tables_of(bench: Bench) -> list[Table]:
     """All tables of a report."""
-    wanted = [table for table in [targets(bench.on())] if table.rows]
+    wanted = [table for table in [targets(bench.on()), slopes(bench)] if table.rows]
     return [*all_tables(bench), *wanted, *complexity_tables(SOURCES), verdict_table(judge_all(bench))]
 
 

@@ -24,6 +24,7 @@ KINDS = {
     "column": r"column|tall",
     "rest": r"rest|one",
     "line": r"channel|line",
+    "even": r"even",
 }
 
 #: Finders that begin anew at every step, or nearly so: what the incremental ones are measured against
@@ -55,9 +56,9 @@ def cases_of(bench: Bench, of_kind: str, **wanted) -> list:
     return [case for case in bench.select(**wanted) if kind(case.scene) == of_kind]
 
 
-def over_size(bench: Bench, finder: str, threads: int = 1, mode: str = "replay") -> list:
-    """One finder on the drums of all sizes; one case per number of boxes."""
-    found = {case.boxes: case for case in cases_of(bench, "drum", finder=finder, threads=threads, mode=mode)}
+def over_size(bench: Bench, finder: str, threads: int = 1, mode: str = "replay", of_kind: str = "drum") -> list:
+    """One finder on the scenes of a kind, of all sizes; one case per number of boxes."""
+    found = {case.boxes: case for case in cases_of(bench, of_kind, finder=finder, threads=threads, mode=mode)}
     return [found[boxes] for boxes in sorted(found)]
 
 
