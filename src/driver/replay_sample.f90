@@ -6,7 +6,7 @@
 module polydem_replay_sample
    use polydem_boxes, only: boxes_t
    use polydem_errors, only: error_t
-   use polydem_kinds, only: dp, ip, lp
+   use polydem_kinds, only: dp, ip, lp, worth_threads
    use polydem_machine, only: load_average, utc_now
    use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_reference, only: check_list, check_number, reference_t
@@ -49,7 +49,7 @@ contains
       call clock%calibrate()
       sample%clock_cost = clock%processor_cost
       do s = 1_ip, trace%n_steps
-         boxes%bounds = trace%bounds(:, :, s)
+         call place_boxes(trace, s, boxes)
          call clock%start()
          call neighbours%update(boxes)
          call clock%stop(sample%elapsed(s), sample%processor(s))
@@ -65,6 +65,20 @@ contains
       end do
       if (.not. checked) call check_list(reference, trace%n_steps, sample%case%finder, neighbours%pairs, error)
    end subroutine replay_sample
+
+   !> Copy the boxes of a step, each thread its part: so they lie near the processors as they do when a run makes them.
+   subroutine place_boxes(trace, s, boxes)
+      type(trace_t), intent(in) :: trace
+      integer(ip), intent(in) :: s
+      type(boxes_t), intent(inout) :: boxes
+      integer(ip) :: b
+
+      !$omp parallel do if (boxes%n > worth_threads) schedule(static) default(none) shared(trace, boxes, s) private(b)
+      do b = 1_ip, boxes%n
+         boxes%bounds(:, b) = trace%bounds(:, b, s)
+      end do
+      !$omp end parallel do
+   end subroutine place_boxes
 
    !> Make room for the measurements.
    subroutine reserve_sample(n_steps, checked, sample)

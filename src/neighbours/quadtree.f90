@@ -39,6 +39,8 @@ module polydem_quadtree
    !> Side of some level's cells in units of the typical reach: the largest that hold one centre each in a
    !> packing. Other values, between powers of two, give up to 1.6 times as many candidates (measured).
    real(dp), parameter :: typical_share = 1.2_dp
+   !> Boxes to search from which on threads share the work: a search takes about two microseconds
+   integer(ip), parameter :: worth_searching = 16_ip
    !> Most levels below that one
    integer, parameter :: most_levels = 12
 
@@ -285,7 +287,7 @@ contains
       integer(ip) :: k, low, high
       integer :: w
 
-      !$omp parallel do if (self%tree%n_changed > worth_threads) schedule(static, 1) default(none) &
+      !$omp parallel do if (self%tree%n_changed > worth_searching) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, k, low, high)
       do w = 1, size(self%worker)
          call part(self%tree%n_changed, size(self%worker), w, low, high)
