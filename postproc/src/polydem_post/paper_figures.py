@@ -189,7 +189,7 @@ def inlining(bench: Bench) -> Drawing | None:
     over_size(right, "inlined / not inlined", logarithmic=False)
     left.set_ylim(0.0, left.get_ylim()[1] * 1.3)
     mark_caches(left, outgrown(cases[TREE]))
-    left.legend(fontsize=8, loc="lower right", frameon=True, framealpha=1.0, edgecolor="none")
+    left.legend(fontsize=8, loc="upper left", frameon=True, framealpha=1.0, edgecolor="none")
     return Drawing(
         "figure_11_inlining",
         figure,
