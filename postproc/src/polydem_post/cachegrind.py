@@ -72,7 +72,7 @@ def finder_functions(sources: Path) -> re.Pattern:
     if not modules:
         raise ResultError(f"{sources}: the sources of the finders are not there; they tell which functions to count")
     names = "|".join(map(re.escape, [*modules, *HELPERS]))
-    return re.compile(rf"__polydem_(?:{names})(?:_\w+)?_MOD_(?!(?:{REPORTS})(?:\W|$))")
+    return re.compile(rf"__polydem_(?:{names})(?:_inlined|_called|_o2)?_MOD_(?!(?:{REPORTS})(?:\W|$))")
 
 
 def simulate(command: list[str], model: Model, functions: re.Pattern, branches: bool = False) -> dict:
