@@ -9,6 +9,10 @@
 !> and b = min(s1, s2). Two equal squares face to face have the stiffness E, a square on a large plate E/2, and two bars
 !> of length a and height h E a/h side to side and E h/a end to end, as with the area law.
 !>
+!> A face that tilts keeps its area as long as its corners stay inside, so nothing drives it back within tilts of twice
+!> the depth over the width, and no damping sees it (dA/dt = 0). The area law drives it back, since it acts at the
+!> centroid of the overlap, at the price of work on closed paths. With this law stacks stand, but they sway.
+!>
 !> A contact without a direction (one body inside the other) has no force of that kind. The one it gets, along the
 !> line of centres, leads out but has no energy; whoever cannot accept that sets degenerate = 'stop' in &overlap.
 module polydem_conservative_law
