@@ -1,6 +1,9 @@
 """Compare overlaps computed by the program overlap_stream with exact rational arithmetic.
 
-    check_exact_overlap.py PROGRAM [PAIRS_PER_KIND [SEED]]
+    check_exact_overlap.py PROGRAM [--full] [--seed SEED]
+
+Ten thousand pairs, more than a thousand of them degenerate on purpose; `--full`: a hundred thousand random and ten
+thousand degenerate ones.
 
 The exact side knows nothing of clipping loops: every edge of one polygon is cut to the interval that lies in
 the other (Cyrus & Beck), in integers, and the area follows from Green's theorem. Only the standard library
@@ -12,6 +15,8 @@ is used. Exit status 1 if any pair misses its bound:
     every remembered edge gives the same bits
 """
 
+import argparse
+import concurrent.futures
 import math
 import os
 import random
@@ -227,8 +232,13 @@ def many_corners(rng):
     return a, b, (rng.uniform(-1, 1), rng.uniform(-1, 1))
 
 
-KINDS = [pair_of_grains, grain_on_wall, grain_at_end_of_wall, lattice_pair, turned_lattice_pair, needles,
-         nearly_parallel, many_corners]
+RANDOM = [pair_of_grains, grain_on_wall, grain_at_end_of_wall, needles, many_corners]
+DEGENERATE = [lattice_pair, turned_lattice_pair, nearly_parallel]
+# pairs of each kind
+USUAL = {kind: 1800 for kind in RANDOM} | {kind: 400 for kind in DEGENERATE}
+FULL = {kind: 20000 for kind in RANDOM} | {kind: 3334 for kind in DEGENERATE}
+# pairs that one process compares at a time
+LOT = 200
 # kinds whose polygons share no part of an edge: there N is a matter of convention
 GENERIC = [pair_of_grains, grain_at_end_of_wall, needles, many_corners]
 
@@ -267,13 +277,13 @@ def integral_error(a, b, offset, exact, integrals, result):
 
 
 def check(program, kind, count, seed):
-    """Compare one kind of pairs; print one line; return the number of misses."""
+    """Compare some pairs of one kind; return contacts, the worst error over the allowed, and what is wrong."""
     rng = random.Random(f"{kind.__name__} {seed}")
     pairs = [kind(rng) for _ in range(count)]
     results = computed(program, [(a, b, o, 0) for a, b, o in pairs])
     again = computed(program, [(a, b, o, rng.choice([r[7], rng.randint(1, len(a)), -rng.randint(1, len(b))]))
                                for (a, b, o), r in zip(pairs, results)])
-    misses, worst, contacts = 0, 0.0, 0
+    misses, worst, contacts = [], 0.0, 0
     for (a, b, offset), result, other in zip(pairs, results, again):
         exact, integrals = exact_overlap(a, b, offset)
         error = float(abs(Fraction(result[0]) - exact)) / allowed_error(a, b, exact)
@@ -291,20 +301,35 @@ def check(program, kind, count, seed):
         if not all(map(math.isfinite, result)):
             miss.append("not finite")
         if miss:
-            misses += 1
-            if misses <= 3:
-                print(f"  {kind.__name__}: {', '.join(miss)}: A* = {float(exact):.6e}, A = {result[0]:.6e}, "
-                      f"a = {a}, b = {b}, offset = {offset}")
-    print(f"{kind.__name__:24s} {count:6d} pairs {contacts:6d} contacts, worst error {worst:8.2e} of the allowed, "
-          f"{misses} misses")
-    return misses
+            misses.append(f"{', '.join(miss)}: A* = {float(exact):.6e}, A = {result[0]:.6e}, a = {a}, b = {b}, "
+                          f"offset = {offset}")
+    return contacts, worst, misses
+
+
+def check_kind(pool, program, kind, count, seed):
+    """Compare one kind of pairs in lots; print one line; return the number of misses."""
+    sizes = [min(LOT, count - first) for first in range(0, count, LOT)]
+    lots = [pool.submit(check, program, kind, size, f"{seed} {lot}") for lot, size in enumerate(sizes)]
+    found = [lot.result() for lot in lots]
+    misses = [miss for _, _, some in found for miss in some]
+    for miss in misses[:3]:
+        print(f"  {kind.__name__}: {miss}")
+    print(f"{kind.__name__:24s} {count:6d} pairs {sum(n for n, _, _ in found):6d} contacts, "
+          f"worst error {max(worst for _, worst, _ in found):8.2e} of the allowed, {len(misses)} misses", flush=True)
+    return len(misses)
 
 
 def main():
-    program = sys.argv[1]
-    count = int(sys.argv[2]) if len(sys.argv) > 2 else 250
-    seed = sys.argv[3] if len(sys.argv) > 3 else "1"
-    sys.exit(1 if sum(check(program, kind, count, seed) for kind in KINDS) else 0)
+    parser = argparse.ArgumentParser()
+    parser.add_argument("program")
+    parser.add_argument("--full", action="store_true")
+    parser.add_argument("--seed", default="1")
+    given = parser.parse_args()
+    plan = FULL if given.full else USUAL
+    with concurrent.futures.ProcessPoolExecutor() as pool:
+        misses = sum(check_kind(pool, given.program, kind, count, given.seed) for kind, count in plan.items())
+    print(f"{sum(plan.values())} pairs, {sum(plan[kind] for kind in DEGENERATE)} of them degenerate: {misses} misses")
+    sys.exit(1 if misses else 0)
 
 
 if __name__ == "__main__":
