@@ -7,8 +7,8 @@ module overlap_cases
    use polydem_random, only: random_t
    implicit none
    private
-   public :: rectangle, regular, grain, turned, overlap_of, worst_area, worst_normal, worst_centroid, roundoff
-   public :: two_pi
+   public :: rectangle, regular, grain, turned, overlap_of, roundoff, two_pi
+   public :: worst_area, worst_normal, worst_normal_far, worst_moment, worst_centroid
 
    !> Full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586476925286766559_wp
@@ -170,18 +170,71 @@ contains
       real(wp), intent(in) :: offset(2)
       !> True integral of the outward normal of a over its outline inside b
       real(wp), intent(in) :: normal(2)
+
+      worst_normal = worst_normal_at([0.0_wp, 0.0_wp], a, b, offset, normal)
+   end function worst_normal
+
+   !> The same far from it, for overlaps whose normal vector follows their position without a jump.
+   pure real(wp) function worst_normal_far(a, b, offset, normal)
+      !> First polygon
+      real(wp), intent(in) :: a(:, :)
+      !> Second polygon
+      real(wp), intent(in) :: b(:, :)
+      !> Centre of b minus centre of a
+      real(wp), intent(in) :: offset(2)
+      !> True integral of the outward normal of a over its outline inside b
+      real(wp), intent(in) :: normal(2)
+
+      worst_normal_far = worst_normal_at(far, a, b, offset, normal)
+   end function worst_normal_far
+
+   !> Greatest error of the normal vector over all positions at a place
+   pure real(wp) function worst_normal_at(place, a, b, offset, normal)
+      real(wp), intent(in) :: place(2)
+      real(wp), intent(in) :: a(:, :)
+      real(wp), intent(in) :: b(:, :)
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: normal(2)
       type(overlap_t) :: overlap
       real(wp) :: image(2, 1)
       integer :: k
 
-      worst_normal = 0.0_wp
+      worst_normal_at = 0.0_wp
       do k = 1, n_positions
-         overlap = placed(a, b, offset, k, [0.0_wp, 0.0_wp])
+         overlap = placed(a, b, offset, k, place)
          image = turned(reshape(normal, [2, 1]), angle_of(k))
          if (modulo(k, 2) == 0) image = -image
-         worst_normal = worse(worst_normal, norm2(overlap%normal - image(:, 1)))
+         worst_normal_at = worse(worst_normal_at, norm2(overlap%normal - image(:, 1)))
       end do
-   end function worst_normal
+   end function worst_normal_at
+
+   !> Greatest error of both moments over all positions near the origin
+   pure real(wp) function worst_moment(a, b, offset, moment_a, moment_b)
+      !> First polygon
+      real(wp), intent(in) :: a(:, :)
+      !> Second polygon
+      real(wp), intent(in) :: b(:, :)
+      !> Centre of b minus centre of a
+      real(wp), intent(in) :: offset(2)
+      !> True moment of the normal vector about the centre of a
+      real(wp), intent(in) :: moment_a
+      !> True moment of the normal vector about the centre of b
+      real(wp), intent(in) :: moment_b
+      type(overlap_t) :: overlap
+      real(wp) :: moments(2)
+      integer :: k
+
+      worst_moment = 0.0_wp
+      do k = 1, n_positions
+         overlap = placed(a, b, offset, k, [0.0_wp, 0.0_wp])
+         if (modulo(k, 2) == 0) then
+            moments = -[overlap%moment_b, overlap%moment_a]
+         else
+            moments = [overlap%moment_a, overlap%moment_b]
+         end if
+         worst_moment = worse(worst_moment, maxval(abs(moments - [moment_a, moment_b])))
+      end do
+   end function worst_moment
 
    !> Greatest error of the centroid over all positions near the origin
    pure real(wp) function worst_centroid(a, b, offset, centroid)
@@ -247,6 +300,8 @@ contains
       overlap%area = overlap%area/scale**2
       overlap%normal = overlap%normal/scale
       overlap%centroid = overlap%centroid/scale
+      overlap%moment_a = overlap%moment_a/scale**2
+      overlap%moment_b = overlap%moment_b/scale**2
    end function placed
 
 end module overlap_cases
