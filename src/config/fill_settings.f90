@@ -40,6 +40,7 @@ contains
          call take(values, 'forces.tangential_stiffness', forces%tangential_stiffness)
          call take(values, 'forces.tangential_damping', forces%tangential_damping)
          call take(values, 'integrate.scheme', integrate%scheme)
+         call take(values, 'integrate.accumulation', integrate%accumulation)
          call take(values, 'integrate.dt', integrate%dt)
          call take(values, 'integrate.fraction', integrate%fraction)
          call take(values, 'integrate.duration', integrate%duration)

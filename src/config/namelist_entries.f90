@@ -162,6 +162,8 @@ module polydem_namelist_entries
    type(entry_t), parameter :: run_entries(*) = [ &
       entry_t('integrate', 'scheme', 'word', 1, 'velocity_verlet', '', 'velocity_verlet gear', '', &
       'Integration scheme'), &
+      entry_t('integrate', 'accumulation', 'word', 1, 'plain', '', 'plain compensated', 'scheme: velocity_verlet', &
+      'Sums of positions and velocities over steps as they are, or with what rounding takes carried along'), &
       entry_t('integrate', 'dt', 'real', 1, '0', 's', '>= 0', '', &
       'Time step; 0: `fraction` of the stable step'), &
       entry_t('integrate', 'fraction', 'real', 1, '0.3', '', '> 0', '', &

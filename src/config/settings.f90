@@ -124,6 +124,8 @@ module polydem_settings
    type :: integrate_settings_t
       !> 'velocity_verlet' or 'gear'
       character(len=:), allocatable :: scheme
+      !> Sums of velocity Verlet over steps: 'plain' or 'compensated'
+      character(len=:), allocatable :: accumulation
       !> Time step [s]; 0: `fraction` of the stable step
       real(wp) :: dt
       !> Share of the stable step that is taken if dt is 0
