@@ -55,6 +55,10 @@ contains
                'must be 0, or else', 'boxes', 'bodies', values, error)
          end if
       end associate
+      if (settings%guards%energy /= 'off' .and. .not. settings%output%ledger) then
+         call raise(error, input_error, values(first_row('guards', 'energy'))%place// &
+            ': ''energy'' in &guards needs ''ledger'' in &output')
+      end if
    end subroutine check_settings
 
    !> Refuse containers that are too large for the grains; lengths that are not in force are 0.

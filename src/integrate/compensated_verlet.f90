@@ -1,9 +1,9 @@
 !> Velocity Verlet whose sums over steps do not drift: position and velocity are carried as two numbers each.
 !>
-!> Every addition to a position or velocity is split without error into its rounded sum and what rounding cost (D.E. Knuth,
-!> The Art of Computer Programming 2, Sec. 4.2.2, Theorem B); the cost enters the next addition (W. Kahan, Commun.
-!> ACM 8 (1965) 40). So millions of steps lose no more than one. The larger part of each number is what everybody
-!> else sees. It takes a compiler that leaves sums as they stand, as the standard wants it (no -ffast-math).
+!> Every addition to a position or velocity is split without error into its rounded sum and what rounding cost
+!> (D.E. Knuth, The Art of Computer Programming 2, Sec. 4.2.2, Theorem B); the cost enters the next addition
+!> (W. Kahan, Commun. ACM 8 (1965) 40). So millions of steps lose no more than one. The larger part of each number
+!> is what everybody else sees. It takes a compiler that leaves sums as they stand (no -ffast-math).
 module polydem_compensated_verlet
    use polydem_bodies, only: bodies_t
    use polydem_kinds, only: ip, wp, worth_threads
@@ -90,7 +90,7 @@ contains
       !$omp end parallel do
    end subroutine correct
 
-   !> Move along one coordinate: its velocity in the middle of the step, its place at the end, its velocity predicted there.
+   !> One coordinate: its velocity in the middle of the step, its place at the end, its velocity predicted there.
    pure subroutine move(dt, acceleration, place, velocity, half, lost_place, lost_speed)
       real(wp), intent(in) :: dt, acceleration
       real(wp), intent(inout) :: place, velocity, half, lost_place, lost_speed
