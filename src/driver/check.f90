@@ -1,6 +1,6 @@
 !> What a run would do, without running it.
 module polydem_check
-   use polydem_description, only: describe
+   use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t
    use polydem_kinds, only: lp, wp
    use polydem_log, only: log_t
@@ -33,6 +33,7 @@ contains
       if (allocated(error)) return
       call write_lines(log, settings%resolved)
       call describe(simulation, log)
+      call list_overlaps(simulation, '', log, error)
       call check_stability(simulation, stable, warning, error)
       if (allocated(warning)) call log%write_line('warning: '//warning)
       call log%write_line('memory     '//to_text(after)//' KiB resident, of which '//to_text(after - before)// &
