@@ -1,7 +1,7 @@
 !> How deep contacts are against the bodies that they join.
 !>
-!> The depth of a contact is its area over its length, the mean depth of the overlap; its share is that over the thickness of
-!> the thinner of its bodies, so that about a half means that a body has lost its way.
+!> The depth of a contact is its area over its length, the mean depth of the overlap; its share is that over the
+!> thickness of the thinner of its bodies, so that about a half means that a body has lost its way.
 module polydem_depths
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t

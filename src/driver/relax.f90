@@ -1,10 +1,10 @@
 !> Push overlapping bodies apart before a run begins.
 !>
-!> In every sweep each contact asks its two bodies to part by its depth. Bodies answer all their contacts at once: shifts
-!> and turns are shared by mass and inertia and divided among the contacts of a body, so that no sweep overshoots
+!> In every sweep each contact asks its two bodies to part by its depth. Bodies answer all their contacts at once:
+!> shifts and turns are shared by mass and inertia and divided among the contacts of a body, so that no sweep overshoots
 !> (the element bound of `stable_step`; position projection as of M. Mueller et al., J. Vis. Commun. Image
-!> Represent. 18 (2007) 109, but all contacts side by side). Neither forces nor velocities take part, fixed bodies stay,
-!> and the result has the same bits for any number of threads.
+!> Represent. 18 (2007) 109, but all contacts side by side). Neither forces nor velocities take part, fixed bodies
+!> stay, and the result has the same bits for any number of threads.
 module polydem_relax
    use polydem_assemble, only: incidence_t, index_contacts
    use polydem_bodies, only: bodies_t, turn_bodies
@@ -83,7 +83,8 @@ contains
          call push_apart(contacts, incidence, bodies)
          relaxation%sweeps = relaxation%sweeps + 1_ip
       end do
-      relaxation%move = sqrt(maxval((bodies%position(1, :) - start(1, :))**2 + (bodies%position(2, :) - start(2, :))**2))
+      relaxation%move = sqrt(maxval((bodies%position(1, :) - start(1, :))**2 &
+                                    + (bodies%position(2, :) - start(2, :))**2))
    end subroutine relax_bodies
 
    !> One sweep: all contacts ask, all free bodies answer.
@@ -100,8 +101,10 @@ contains
       !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
       !$omp    shared(contacts, incidence, bodies, impulse) private(c, mobility)
       do c = 1_ip, contacts%n
-         mobility = mobility_of(contacts%first(c), contacts%arm_first(:, c), contacts%direction(:, c), incidence, bodies) &
-            + mobility_of(contacts%second(c), contacts%arm_second(:, c), contacts%direction(:, c), incidence, bodies)
+         associate (direction => contacts%direction(:, c))
+            mobility = mobility_of(contacts%first(c), contacts%arm_first(:, c), direction, incidence, bodies) &
+               + mobility_of(contacts%second(c), contacts%arm_second(:, c), direction, incidence, bodies)
+         end associate
          impulse(c) = contacts%area(c)/(contacts%length(c)*mobility)
       end do
       !$omp end parallel do

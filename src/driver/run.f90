@@ -134,7 +134,8 @@ contains
       call list_overlaps(run%simulation, run%folder, run%log, error)
       call new_watch(run%watch, run%simulation)
       call choose_intervals(run)
-      if (.not. allocated(error)) call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error)
+      if (allocated(error)) return
+      call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error)
       if (.not. allocated(error)) call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, error)
    end subroutine prepare
 
@@ -177,18 +178,18 @@ contains
       end associate
    end subroutine write_frame
 
-   !> After a numerical failure, write the state in which the run stopped, if every body is somewhere; else the last frame
-   !> stays the one that was due before.
+   !> After a numerical failure, write the state in which the run stopped, if every body is somewhere; else the last
+   !> frame stays the one that was due before.
    subroutine write_last_frame(run, code, error)
       type(run_t), intent(inout) :: run
       !> Exit code of the failure
       integer, intent(in) :: code
       type(error_t), allocatable, intent(inout) :: error
 
-      associate (s => run%simulation)
+      associate (s => run%simulation, bodies => run%simulation%bodies)
          if (code /= run_error .or. run%last_frame == s%step) return
-         if (.not. all(ieee_is_finite(s%bodies%position)) .or. .not. all(ieee_is_finite(s%bodies%angle)) .or. &
-             .not. all(ieee_is_finite(s%bodies%velocity)) .or. .not. all(ieee_is_finite(s%bodies%angular_velocity))) return
+         if (.not. all(ieee_is_finite(bodies%position)) .or. .not. all(ieee_is_finite(bodies%velocity))) return
+         if (.not. all(ieee_is_finite(bodies%angle)) .or. .not. all(ieee_is_finite(bodies%angular_velocity))) return
          if (s%settings%output%ledger) call fill_row(s, run%balance, run%row)
       end associate
       call write_frame(run, error)

@@ -1,4 +1,4 @@
-!> The guards of a run that look at whole steps: depth of contacts, energy, stable step; and what all guards have to tell.
+!> The guards of a run that look at whole steps: depth of contacts, energy, stable step; and what all have to tell.
 !>
 !> A guard that is off is not looked at and holds no array.
 module polydem_watch
