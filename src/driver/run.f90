@@ -12,6 +12,7 @@ module polydem_run
    use polydem_ledger_row, only: ledger_row_t
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_counters, write_hash, write_header, write_timings
+   use polydem_machine, only: resident_memory
    use polydem_paths, only: make_folder
    use polydem_profile, only: write_profile
    use polydem_provenance, only: collect_provenance, provenance_t
@@ -203,8 +204,9 @@ contains
       type(error_t), allocatable :: late_error
       type(counters_t) :: counters
       character(len=:), allocatable :: status
-      integer(lp) :: hash
+      integer(lp) :: hash, memory
 
+      memory = resident_memory()
       status = 'finished'
       if (allocated(error)) status = error%message
       associate (s => run%simulation)
@@ -213,7 +215,8 @@ contains
          if (allocated(error)) call write_last_frame(run, error%code, late_error)
          call run%trajectory%close(late_error)
          call run%recorder%close(run%log, late_error)
-         call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, status, late_error)
+         call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, status, late_error, &
+                            memory)
          call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n)
          call write_counters(run%log, counters)
          if (s%settings%output%ledger) call write_books(s, run%log)
