@@ -3,7 +3,8 @@
 usage: check_unstable.py PROGRAM INPUTS TEST_GALLERY
 
 Cleanly: exit code 1; a message with step, body, position and what to do; the same at the end of the log; a profile;
-a closed trajectory. The third argument is the source of the tests at the own steps, which must know every scene.
+a closed trajectory whose last frame is the step at which the run stopped. The third argument is the source of the
+tests at the own steps, which must know every scene.
 """
 
 import re
@@ -36,6 +37,12 @@ def stop(program, path, folder, *settings):
     assert "NaN" not in log and "Infinity" not in log, (path.name, log[-1000:])
     names = {each.name for each in folder.iterdir()}
     assert {"profile.h5", "trajectory_0001.h5"} <= names and not any(name.endswith(".open") for name in names), names
+    step = int(match[1].split()[1].rstrip(":"))
+    dt = float(re.search(r"^step       dt = (\S+) s", log, re.MULTILINE)[1])
+    segment = max(str(each) for each in folder.glob("trajectory_*.h5"))
+    info = subprocess.run([program, "info", segment], capture_output=True, text=True, timeout=60, check=True).stdout
+    last = float(re.search(r"frames .* s to (\S+) s", info)[1])
+    assert abs(last - step * dt) <= 1e-5 * step * dt, (path.name, step, dt, info)
     return match[1]
 
 
