@@ -16,6 +16,11 @@ class FakeStudy(Study):
     calls: list = []
     version = "1"
 
+    def count(self, namelist, folder, overrides):
+        self.run(namelist, folder, overrides)
+        steps = int(round(float(next(word for word in overrides if "duration" in word).split("=")[1]) / 2e-5))
+        return 1000 + steps * (300 if "forces.friction=cundall_strack" in overrides else 200)
+
     def run(self, namelist, folder, overrides):
         self.calls.append(namelist)
         cost = 2.0 if "forces.friction=cundall_strack" in overrides else 1.0
@@ -73,23 +78,23 @@ def test_every_model_has_something_to_be_compared_with_before_it():
 def test_models_run_in_turns_and_an_interrupted_study_goes_on(study):
     samples = costs.measure_costs(study, 2, say=lambda _: None)
     assert [sample.model for sample in samples[: len(MODELS)]] == [model.name for model in MODELS]
-    assert len(samples) == len(MODELS) * (3 + costs.WEIGHINGS)
-    assert study.calls == ["bed.nml"] + ["bench/drum.nml"] * len(samples)
+    assert len(samples) == len(MODELS) * (3 + costs.WEIGHINGS + 1)
+    assert study.calls == ["bed.nml"] + ["bench/drum.nml"] * (len(samples) + len(MODELS))
     path = study.output / costs.FILE
     assert read_samples(path) == samples
     kept = path.read_text(encoding="utf-8").splitlines()[:5]
     path.write_text("\n".join(kept) + "\n", encoding="utf-8")
     study.calls.clear()
     assert costs.measure_costs(study, 2, say=lambda _: None) == samples
-    assert study.calls == ["bench/drum.nml"] * (len(samples) - 4)
+    assert study.calls == ["bench/drum.nml"] * (len(samples) - 4 + len(MODELS))
 
 
 def test_the_table_tells_what_was_measured(study):
     table = costs.write_costs(costs.measure_costs(study, 2, say=lambda _: None), study.output)
     rows = {row[0]: row for row in table.rows}
-    assert rows["nothing"][2:4] == ("1.00 [1.00, 1.00] us", "10240 in all")
-    assert rows["friction (Cundall-Strack)"][2:4] == ("+100.0 [+100.0, +100.0]", "+10240.0")
-    assert rows["ledger"][2:4] == ("+0.0 [+0.0, +0.0]", "+0.0")
+    assert rows["nothing"][2:5] == ("1.00 [1.00, 1.00] us", "0.000200 million", "10240")
+    assert rows["friction (Cundall-Strack)"][2:5] == ("+100.0 [+100.0, +100.0]", "+50.00", "+10240")
+    assert rows["ledger"][2:5] == ("+0.0 [+0.0, +0.0]", "+0.00", "+0")
     assert rows["guard: energy"][1] == "guards.energy=warn"
     assert "polydem 1 (revision)" in table.note and "processor" in table.note
     assert costs_table(read_samples(study.output / costs.FILE)).rows == table.rows

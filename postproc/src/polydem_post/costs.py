@@ -3,8 +3,9 @@
 A drum is packed from a settled bed and runs a few steps, once with a model and once without, all models in turns,
 again and again. Ratios are formed within each turn, so that a machine that slows down for a while spoils a turn and
 not a model.
-A step is all its stages, guards and output included; the start of a run does not count. Memory is what the process
-holds after the last step of a larger drum, on less off.
+A step is all its stages, guards and output included; the start of a run does not count. Beside times stand the
+instructions that a step takes in a simulated processor: the same at every call and on a busy machine, where times are
+worth little. Memory is what the process holds after the last step of a larger drum, on less off.
 
 Times of forces differ also because the model changes what happens; in so few steps hardly.
 """
@@ -13,10 +14,13 @@ from __future__ import annotations
 
 import csv
 import os
+import re
 import subprocess
 from dataclasses import asdict, astuple, dataclass, fields
 from pathlib import Path
 
+from .cachegrind import PLAIN_MODEL, simulate
+from .cachegrind import Model as Caches
 from .emit import FORMATS, SUFFIXES, Table
 from .statistics import Estimate, median, median_of_ratios, number
 from .trajectory import ResultError, Trajectory
@@ -27,6 +31,8 @@ FILE = "samples.csv"
 #: Steps and boxes of the runs for times, and of those for memory
 TIMED = (400, 2522)
 WEIGHED = (4, 100000)
+#: Instructions are those of the last hundred steps, in which everything happens that does not happen in every step
+COUNTED = ((20, 600), (120, 600))
 
 #: How often memory is measured
 WEIGHINGS = 3
@@ -82,13 +88,13 @@ class Sample:
     """One run."""
 
     model: str
-    #: 'time' or 'memory'
+    #: 'time', 'memory' or 'count'
     kind: str
     repeat: int
     bodies: int
     steps: int
     threads: int
-    #: Mean of a step, all stages [us]
+    #: Mean of a step, all stages [us]; of 'count' its instructions
     step: float
     #: Contacts per step
     contacts: float
@@ -108,15 +114,24 @@ class Study:
     output: Path
     threads: int = 1
 
+    def command(self, namelist: str, folder: Path, overrides, threads: int) -> list[str]:
+        """Command that runs a scene."""
+        words = [f"output.folder={folder}", *overrides]
+        command = [str(self.program), "run", str(self.inputs / namelist), "--force", "--threads", str(threads)]
+        return command + [part for word in words for part in ("--set", word)]
+
     def run(self, namelist: str, folder: Path, overrides) -> Trajectory:
         """Run a scene and open its result."""
-        words = [f"output.folder={folder}", *overrides]
-        command = [str(self.program), "run", str(self.inputs / namelist), "--force", "--threads", str(self.threads)]
-        command += [part for word in words for part in ("--set", word)]
+        command = self.command(namelist, folder, overrides, self.threads)
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise ResultError(f"{' '.join(command)}: {done.stderr.strip()}")
         return Trajectory(folder)
+
+    def count(self, namelist: str, folder: Path, overrides) -> int:
+        """Instructions of a run on one thread, its start included."""
+        command = self.command(namelist, folder, overrides, 1)
+        return simulate(command, Caches(**PLAIN_MODEL), re.compile(""))["Ir"]
 
     def bed(self) -> Path:
         """The settled bed that drums are packed from; made if it is not there."""
@@ -125,11 +140,21 @@ class Study:
             self.run("bed.nml", folder, ["output.frame_interval=0", "output.ledger=.false."])
         return folder
 
+    def overrides(self, model: Model, steps: int, boxes: int) -> list[str]:
+        """What makes a drum of a size that has one model on."""
+        size = [f"scene.boxes={boxes}", f"scene.packing={self.bed()}", f"integrate.duration={2e-5 * steps:.6e}"]
+        return [*BARE, *size, *model.on]
+
     def sample(self, model: Model, kind: str, repeat: int) -> Sample:
         """One run with a model."""
-        steps, boxes = TIMED if kind == "time" else WEIGHED
-        size = [f"scene.boxes={boxes}", f"scene.packing={self.bed()}", f"integrate.duration={2e-5 * steps:.6e}"]
-        result = self.run("bench/drum.nml", self.output / "run", [*BARE, *size, *model.on])
+        scene, folder = "bench/drum.nml", self.output / "run"
+        if kind == "count":
+            few, more = (self.count(scene, folder, self.overrides(model, *size)) for size in COUNTED)
+            result = Trajectory(folder)
+            step = (more - few) / (COUNTED[1][0] - COUNTED[0][0])
+        else:
+            result = self.run(scene, folder, self.overrides(model, *(TIMED if kind == "time" else WEIGHED)))
+            step = 1e6 * float(sum(result.profile["total"])) / result.counters["steps"]
         profile, counters, origin = result.profile, result.counters, result.provenance
         return Sample(
             model.name,
@@ -138,7 +163,7 @@ class Study:
             counters["bodies"],
             counters["steps"],
             self.threads,
-            round(1e6 * float(sum(profile["total"])) / counters["steps"], 4),
+            round(step, 4),
             round(counters["contacts"] / counters["steps"], 1),
             profile["memory"],
             f"polydem {origin['version']} ({origin['revision']}), {origin['build_type']}, {origin['compiler']}",
@@ -150,6 +175,7 @@ def measure_costs(study: Study, repeats: int, say=print) -> list[Sample]:
     """All samples, those in the file and those that are missing there."""
     samples = read_samples(study.output / FILE)
     wanted = [("time", k) for k in range(repeats + 1)] + [("memory", k) for k in range(1, WEIGHINGS + 1)]
+    wanted.append(("count", 1))
     for kind, repeat in wanted:
         taken = {sample.model for sample in samples if (sample.kind, sample.repeat) == (kind, repeat)}
         for model in MODELS:
@@ -207,6 +233,15 @@ def share_of_step(samples: list, model: Model) -> Estimate:
     return Estimate(*scaled, ratio.repeats)
 
 
+def share_of_instructions(samples: list, model: Model) -> float:
+    """What a model adds to the instructions of a step [%]."""
+    return 100.0 * (_instructions(samples, model.name) / _instructions(samples, model.off) - 1.0)
+
+
+def _instructions(samples: list, name: str) -> float:
+    return median([sample.step for sample in samples if (sample.kind, sample.model) == ("count", name)]).value
+
+
 def bytes_per_body(samples: list, model: Model) -> float:
     """Memory that a model adds, per body [bytes]."""
     return _weight(samples, model.name) - _weight(samples, model.off)
@@ -224,7 +259,7 @@ def costs_table(samples: list) -> Table:
     table = Table(
         "costs",
         "What optional models cost",
-        ("model", "on by", "of a step [%]", "bytes per body", "contacts per step"),
+        ("model", "on by", "time of a step [%]", "instructions [%]", "bytes per body", "contacts per step"),
         texts=2,
     )
     for model in MODELS:
@@ -234,15 +269,18 @@ def costs_table(samples: list) -> Table:
         contacts = number(mine[0].contacts, 4)
         if model.name == model.off:
             step = median([sample.step for sample in mine])
-            table.add(model.name, "", f"{step.text()} us", f"{_weight(samples, model.name):.0f} in all", contacts)
+            counted = f"{number(1e-6 * _instructions(samples, model.name))} million"
+            table.add(model.name, "", f"{step.text()} us", counted, f"{_weight(samples, model.name):.0f}", contacts)
             continue
         share = share_of_step(samples, model)
         text = f"{share.value:+.1f} [{share.low:+.1f}, {share.high:+.1f}]"
         shown = ", ".join(word for word in model.on if word not in _model(model.off).on)
-        table.add(model.name, shown, text, f"{bytes_per_body(samples, model):+.1f}", contacts)
+        counted = f"{share_of_instructions(samples, model):+.2f}"
+        table.add(model.name, shown, text, counted, f"{bytes_per_body(samples, model):+.0f}", contacts)
     table.note = (
         f"{first.program}; {first.machine}; {first.threads} thread(s). Times: {first.bodies} bodies, {first.steps} "
-        f"steps, median of {max(s.repeat for s in timed)} turns with its interval. Memory: {WEIGHED[1]} boxes. "
+        f"steps, median of {max(s.repeat for s in timed)} turns with its interval. Instructions: {COUNTED[1][1]} "
+        f"boxes, one thread, a hundred steps. Memory: {WEIGHED[1]} boxes, to about 7 bytes. "
         "Against the same without it; frames with contacts against frames, the guard of energy against the ledger."
     )
     return table
