@@ -148,15 +148,18 @@ module polydem_namelist_entries
       'Normal damping by the exact rate of the area, by backward difference as in the book, or none'), &
       entry_t('forces', 'damping_coefficient', 'real', 1, '0.0251', '', '>= 0, <= 1e6', 'damping: rate book', &
       'Damping coefficient gamma'), &
-      entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack none', '', &
-      'Friction law'), &
-      entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', 'friction: cundall_strack', &
+      entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack exact none', '', &
+      'Friction by a tangential spring, without one (needs `scheme` velocity_verlet), or none'), &
+      entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', &
+      'friction: cundall_strack exact', &
       'Friction coefficient mu'), &
       entry_t('forces', 'tangential_stiffness', 'real', 1, '0.2857142857142857', '', '> 0, <= 1e6', &
       'friction: cundall_strack', &
       'Tangential stiffness as a share of E'), &
       entry_t('forces', 'tangential_damping', 'real', 1, '0.25', '', '>= 0, <= 1e6', 'friction: cundall_strack', &
-      'Tangential damping as a share of sqrt(k_t m_t)')]
+      'Tangential damping as a share of sqrt(k_t m_t)'), &
+      entry_t('forces', 'friction_tolerance', 'real', 1, '1e-10', '', '> 0, <= 1e-3', 'friction: exact', &
+      'Slip that may remain where contacts stick, as a share of the greatest that friction takes in a step')]
 
    !> Groups of the run
    type(entry_t), parameter :: run_entries(*) = [ &

@@ -110,7 +110,7 @@ module polydem_settings
       character(len=:), allocatable :: damping
       !> Dimensionless damping coefficient gamma
       real(wp) :: damping_coefficient
-      !> Friction: 'cundall_strack' or 'none'
+      !> Friction: 'cundall_strack', 'exact' or 'none'
       character(len=:), allocatable :: friction
       !> Friction coefficient mu
       real(wp) :: friction_coefficient
@@ -118,6 +118,8 @@ module polydem_settings
       real(wp) :: tangential_stiffness
       !> Tangential damping as a share of sqrt(k_t m_t)
       real(wp) :: tangential_damping
+      !> Slip that exact friction may leave, as a share of the greatest slip velocity it takes from a contact in a step
+      real(wp) :: friction_tolerance
    end type forces_settings_t
 
    !> Group &integrate

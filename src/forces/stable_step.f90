@@ -153,7 +153,7 @@ contains
       c_n = 0.0_wp
       c_t = 0.0_wp
       if (settings%damping /= 'none') c_n = settings%damping_coefficient*sqrt(mass_normal*settings%stiffness)*ratio
-      if (settings%friction /= 'none') then
+      if (settings%friction == 'cundall_strack') then
          k_t = settings%tangential_stiffness*settings%stiffness
          c_t = settings%tangential_damping*sqrt(mass_tangential*k_t)
       end if
