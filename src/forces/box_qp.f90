@@ -8,12 +8,12 @@
 !>
 !> Projected Gauss-Seidel finds which contacts stick and solves easy networks in a few sweeps from the forces of the
 !> last step, but for a column of n blocks it takes some n^2 sweeps. So, when sweeps gain little, the contacts
-!> off their bounds are handed to conjugate gradients (with the mobilities as preconditioner) until the minimum among
-!> them is reached, or one of them hits its bound, or the contacts at bounds ask to be let go; then sweeps go on.
-!> This is the scheme of J.J. More & G. Toraldo, SIAM J. Optim. 1 (1991) 93, with sweeps in place of projected gradients
-!> and with the test for letting go of Z. Dostal, SIAM J. Optim. 7 (1997) 871. Every step lowers the function, and
-!> sweeps alone converge, so the whole does; once the contacts at bounds are known, a search ends in at most as many
-!> iterations as there are others.
+!> off their bounds are handed to conjugate gradients (with the mobilities as preconditioner), anew with those that are
+!> left whenever some come to their bounds, until the minimum among them is reached or the contacts at bounds have
+!> much more to gain by being let go; then sweeps go on. This is the scheme of J.J. More & G. Toraldo, SIAM J. Optim. 1
+!> (1991) 93, with sweeps in place of projected gradients, and with the test for letting go of Z. Dostal, SIAM J. Optim.
+!> 7 (1997) 871. Every step lowers the function, and sweeps alone converge, so the whole does; once the contacts at
+!> bounds are known, a search ends in at most as many iterations as there are others.
 !>
 !> Sums run over fixed blocks, and then over blocks in order: the same bits for any number of threads.
 module polydem_box_qp
@@ -69,6 +69,8 @@ module polydem_box_qp
    integer(ip), parameter :: block = 256_ip
    !> Sweeps go on while one leaves less than this share of the slip
    real(wp), parameter :: good_share = 0.3_wp
+   !> Contacts are held at their bounds until their squared descent is this many times that of the others
+   real(wp), parameter :: patience = 10.0_wp
    !> No smaller share of slip than this can be told from rounding
    real(wp), parameter :: least_tolerance = 16.0_wp*epsilon(1.0_wp)
 
@@ -130,22 +132,27 @@ contains
       self%velocity = self%free + self%push
    end subroutine renew_velocities
 
-   !> Conjugate gradients among the contacts off their bounds.
+   !> Conjugate gradients among the contacts off their bounds, which become fewer whenever some come to theirs.
    subroutine search(self, network, incidence)
       type(box_qp_t), intent(inout) :: self
       type(friction_network_t), intent(in) :: network
       type(incidence_t), intent(in) :: incidence
+      integer(ip) :: k
 
       self%n_searches = self%n_searches + 1_lp
-      call renew_velocities(self, network, incidence)
-      if (is_shared(network)) then
-         !$omp parallel default(none) shared(self, network, incidence)
-         call descend(self, network, incidence)
-         !$omp end parallel
-      else
-         call descend(self, network, incidence)
-      end if
-      if (self%is_blocked) call step_to_bounds(self, network, incidence)
+      ! Each time around a contact comes to its bound, but for rounding errors.
+      do k = 1_ip, 2_ip*network%n
+         call renew_velocities(self, network, incidence)
+         if (is_shared(network)) then
+            !$omp parallel default(none) shared(self, network, incidence)
+            call descend(self, network, incidence)
+            !$omp end parallel
+         else
+            call descend(self, network, incidence)
+         end if
+         if (.not. self%is_blocked) exit
+         call step_to_bounds(self, network, incidence)
+      end do
       call renew_velocities(self, network, incidence)
    end subroutine search
 
@@ -176,7 +183,7 @@ contains
       share = 0.0_wp
       is_blocked = .false.
       do iteration = 0_ip, network%n
-         if (now%slip <= self%enough .or. now%wish > now%descent) exit
+         if (now%slip <= self%enough .or. now%wish > patience*now%descent) exit
          call look_ahead(self, network, incidence, share, now)
          is_blocked = .not. now%descent < now%curvature*now%room
          if (is_blocked) exit
@@ -185,7 +192,7 @@ contains
          share = now%descent/descent
       end do
       !$omp single
-      self%n_iterations = self%n_iterations + int(iteration, lp)
+      self%n_iterations = self%n_iterations + int(iteration, lp) + merge(1_lp, 0_lp, is_blocked)
       self%is_blocked = is_blocked
       self%last = now
       !$omp end single

@@ -77,9 +77,9 @@ contains
 
    end subroutine random_scene
 
-   !> Squares on top of each other on a fixed one, each pushed sideways and twisted.
+   !> Thin plates on top of each other on a fixed one, each pushed sideways and twisted.
    subroutine column_of(n_blocks, scene)
-      !> Number of free squares
+      !> Number of free plates
       integer(ip), intent(in) :: n_blocks
       !> The scene
       type(scene_t), intent(out) :: scene
@@ -90,7 +90,7 @@ contains
          scene%bodies%force(1, c + 1_ip) = 0.01_wp
          scene%bodies%torque(c + 1_ip) = 1.0e-4_wp*cos(real(c, wp))
          call set_contact(scene, c, c, c + 1_ip, [0.0_wp, -1.0_wp], 10.0_wp*real(n_blocks - c + 1_ip, wp), &
-                          [0.0_wp, 0.005_wp], [0.0_wp, -0.005_wp])
+                          [0.0_wp, 1.0e-4_wp], [0.0_wp, -1.0e-4_wp])
       end do
       call finish(scene, n_blocks)
    end subroutine column_of
@@ -163,8 +163,8 @@ contains
 
    end subroutine dense_of
 
-   !> Greatest violation of the conditions of a solution: of the bounds, of no slip below them, of slip against the force
-   !> at them; forces as shares of their limits, slip as a share of the greatest change of a slip velocity.
+   !> Greatest violation of the conditions of a solution: of the bounds, of no slip below them, of slip against the
+   !> force at them; forces as shares of their limits, slip as a share of the greatest change of a slip velocity.
    real(wp) function kkt_error(scene, dt, friction)
       !> Scene with its friction
       type(scene_t), intent(in) :: scene
