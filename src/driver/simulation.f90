@@ -144,11 +144,12 @@ contains
       call self%timers%lap(stage_integrate)
       call find_and_push(self, self%dt, error)
       if (allocated(error)) return
+      call self%integrator%correct(self%dt, self%bodies)
+      call self%timers%lap(stage_integrate)
       if (self%settings%output%ledger) then
          call book_step(self%ledger, self%dt, self%settings%forces%gravity, self%bodies, self%contacts)
          call self%timers%lap(stage_forces)
       end if
-      call self%integrator%correct(self%dt, self%bodies)
       call check_motion(self%guard, self%bodies, self%step, self%dt, error)
       call self%timers%lap(stage_integrate)
    end subroutine advance
