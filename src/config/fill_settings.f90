@@ -42,6 +42,7 @@ contains
          call take(values, 'forces.friction_coefficient', forces%friction_coefficient)
          call take(values, 'forces.tangential_stiffness', forces%tangential_stiffness)
          call take(values, 'forces.tangential_damping', forces%tangential_damping)
+         call take(values, 'forces.friction_tolerance', forces%friction_tolerance)
          call take(values, 'integrate.scheme', integrate%scheme)
          call take(values, 'integrate.accumulation', integrate%accumulation)
          call take(values, 'integrate.dt', integrate%dt)

@@ -153,15 +153,18 @@ module polydem_namelist_entries
       'Damping coefficient gamma; some hundreds with hunt_crossley, which takes little at low speed'), &
       entry_t('forces', 'restitution', 'real', 1, '0', '', '>= 0, <= 1', 'damping: rate', &
       'Restitution of flat contacts, 0.01 to 1, in place of `damping_coefficient`; left out: by the latter'), &
-      entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack none', '', &
-      'Friction law'), &
-      entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', 'friction: cundall_strack', &
+      entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack exact none', '', &
+      'Friction by a tangential spring, without one (needs `scheme` velocity_verlet), or none'), &
+      entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', &
+      'friction: cundall_strack exact', &
       'Friction coefficient mu'), &
       entry_t('forces', 'tangential_stiffness', 'real', 1, '0.2857142857142857', '', '> 0, <= 1e6', &
       'friction: cundall_strack', &
       'Tangential stiffness as a share of E'), &
       entry_t('forces', 'tangential_damping', 'real', 1, '0.25', '', '>= 0, <= 1e6', 'friction: cundall_strack', &
-      'Tangential damping as a share of sqrt(k_t m_t)')]
+      'Tangential damping as a share of sqrt(k_t m_t)'), &
+      entry_t('forces', 'friction_tolerance', 'real', 1, '1e-10', '', '> 0, <= 1e-3', 'friction: exact', &
+      'Slip that may remain where contacts stick, as a share of the greatest that friction takes in a step')]
 
    !> What is watched; a body that is nowhere (NaN) stops every run
    type(entry_t), parameter :: guard_entries(*) = [ &

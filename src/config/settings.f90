@@ -114,7 +114,7 @@ module polydem_settings
       real(wp) :: damping_coefficient
       !> Restitution of a flat contact, in place of the damping coefficient; 0: not given
       real(wp) :: restitution
-      !> Friction: 'cundall_strack' or 'none'
+      !> Friction: 'cundall_strack', 'exact' or 'none'
       character(len=:), allocatable :: friction
       !> Friction coefficient mu
       real(wp) :: friction_coefficient
@@ -122,6 +122,8 @@ module polydem_settings
       real(wp) :: tangential_stiffness
       !> Tangential damping as a share of sqrt(k_t m_t)
       real(wp) :: tangential_damping
+      !> Slip that exact friction may leave, as a share of the greatest slip velocity it takes from a contact in a step
+      real(wp) :: friction_tolerance
    end type forces_settings_t
 
    !> Group &integrate

@@ -1,7 +1,8 @@
 !> The force law of a run: the list of its parts. The only file that knows all parts by name.
 !>
 !> To add a part: write it as a `force_part_t` in a file of its own, add its name to the choices of the
-!> namelist, and append it here in the order in which parts must act (elastic, damping, friction).
+!> namelist, and append it here in the order in which parts must act (elastic, damping, friction). A law may end with a
+!> constraint on velocities, which acts when all other forces on the bodies are known.
 module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
@@ -9,12 +10,14 @@ module polydem_force_law
    use polydem_conservative_law, only: conservative_law_t, new_conservative_law
    use polydem_contacts, only: contact_memory_t, contacts_t
    use polydem_cundall_strack, only: cundall_strack_t
+   use polydem_exact_friction, only: exact_friction_t
    use polydem_force_part, only: force_part_t
    use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
    use polydem_rate_damping, only: rate_damping_t
    use polydem_restitution_damping, only: damping_ratio_of, restitution_damping_t
    use polydem_settings, only: forces_settings_t
+   use polydem_velocity_constraint, only: velocity_constraint_t
    implicit none
    private
    public :: force_law_t, new_force_law, evaluate_law
@@ -28,7 +31,9 @@ module polydem_force_law
    !> Parts in the order in which they act, and which columns of memory they need
    type :: force_law_t
       type(part_holder_t), allocatable, private :: parts(:)
-      !> Whether a part remembers tangential springs
+      !> What acts after all parts; unallocated if there is none
+      class(velocity_constraint_t), allocatable :: constraint
+      !> Whether a part remembers tangential forces
       logical :: needs_tangential = .false.
       !> Whether a part remembers the area of the last step
       logical :: needs_area = .false.
@@ -57,13 +62,19 @@ contains
          call append(law, area_law_t(stiffness=settings%stiffness))
       end if
       call append_damping(settings, law)
-      if (settings%friction == 'cundall_strack') then
+      select case (settings%friction)
+      case ('cundall_strack')
          call append(law, cundall_strack_t(coefficient=settings%friction_coefficient, &
                                            stiffness=settings%tangential_stiffness*settings%stiffness, &
                                            damping=settings%tangential_damping))
          law%description = law%description//', Cundall-Strack friction'
          law%needs_tangential = .true.
-      end if
+      case ('exact')
+         law%constraint = exact_friction_t(coefficient=settings%friction_coefficient, &
+                                           tolerance=settings%friction_tolerance)
+         law%description = law%description//', exact friction'
+         law%needs_tangential = .true.
+      end select
    end subroutine new_force_law
 
    subroutine append_damping(settings, law)

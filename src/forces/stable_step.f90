@@ -171,7 +171,7 @@ contains
 
       k_t = 0.0_wp
       c_t = 0.0_wp
-      if (settings%friction /= 'none') then
+      if (settings%friction == 'cundall_strack') then
          k_t = settings%tangential_stiffness*settings%stiffness
          c_t = settings%tangential_damping*sqrt(mass_tangential*k_t)
       end if

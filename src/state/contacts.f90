@@ -59,7 +59,7 @@ module polydem_contacts
    type :: contact_memory_t
       !> Edge that separated the pair last: +k of the first body, -k of the second, 0 unknown
       integer(ip), allocatable :: separating_edge(:)
-      !> Stored tangential spring force [N/m]
+      !> Tangential force of the last step: of the spring, or of exact friction [N/m]
       real(wp), allocatable :: tangential(:)
       !> Area at the last step [m2], for the book's backward difference
       real(wp), allocatable :: area(:)
