@@ -46,7 +46,7 @@ module polydem_box_qp
       real(wp), allocatable :: force(:)
       !> Avoidable slip that may remain, as a share of the greatest slip velocity that a contact takes away
       real(wp) :: tolerance = 0.0_wp
-      !> Sweeps and searches take turns at most this often
+      !> Sweeps and searches take turns at most this often, at least once
       integer :: most_rounds = 1000
       !> The share that did remain
       real(wp) :: residual = 0.0_wp
