@@ -32,6 +32,8 @@ module polydem_force_law
       logical :: needs_tangential = .false.
       !> Whether a part remembers the area of the last step
       logical :: needs_area = .false.
+      !> Whether the law asks for the effective area of overlaps
+      logical :: needs_effective_area = .false.
       !> Names of the parts, for `check` and the log
       character(len=:), allocatable :: description
    end type force_law_t
@@ -53,6 +55,7 @@ contains
       if (settings%law == 'conservative') then
          call new_conservative_law(settings%stiffness, bodies, conservative)
          call append(law, conservative)
+         law%needs_effective_area = .true.
       else
          call append(law, area_law_t(stiffness=settings%stiffness))
       end if

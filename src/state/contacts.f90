@@ -19,17 +19,21 @@ module polydem_contacts
       integer(ip) :: n_degenerate = 0_ip
       !> Whether the elastic force has an energy, quadratic in the area: half of elastic area/length
       logical :: energy_is_quadratic = .false.
+      !> Whether `area` and what follows from it (`rate`, `normal`, `moment`, `direction`, `length`) are to be those of
+      !> the effective area, which differs from the area by the shape of the overlap
+      logical :: area_is_effective = .false.
       !> Place in the pair list
       integer(ip), allocatable :: pair(:)
       !> Slot of the body with the lower identifier
       integer(ip), allocatable :: first(:)
       !> Slot of the body with the higher identifier
       integer(ip), allocatable :: second(:)
-      !> Area of the overlap [m2]
+      !> Area of the overlap, true or effective [m2]
       real(wp), allocatable :: area(:)
       !> Rate of change of the area, exact from positions and velocities [m2/s]
       real(wp), allocatable :: rate(:)
-      !> Integral of the outward normal over the outline of the first body inside the second, (2, contact) [m]
+      !> Integral of the outward normal over the outline of the first body inside the second, weighted if the area is
+      !> effective, (2, contact) [m]
       real(wp), allocatable :: normal(:, :)
       !> Moment of that integral about the centres of the first and of the second body, (2, contact) [m2]
       real(wp), allocatable :: moment(:, :)
