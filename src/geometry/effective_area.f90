@@ -38,7 +38,7 @@ contains
 
    !> Replace area, normal and moments of an overlap by the effective area and its own.
    !>
-   !> `moment_a` is about the origin, `moment_b` about the clipper's centre. Nothing is left where rounding ate the loop.
+   !> `moment_a` is about the origin, `moment_b` about the clipper's centre. A loop lost in rounding leaves none.
    pure subroutine weigh_by_shape(n, corners, vertex, on_clipper, offset, overlap)
       !> Number of vertices
       integer(ip), intent(in) :: n
@@ -52,8 +52,8 @@ contains
       real(wp), intent(in) :: offset(2)
       !> The overlap, as for the area
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: place(2, n), unit_area, moments(3), determinant, root, weight(3), c(2), p(2), q(2), step(2)
-      real(wp) :: moment, along_p, along_q, share
+      real(wp) :: place(2, n), unit_area, moments(3), determinant, root, weight(3), c(2), p(2), step(2)
+      real(wp) :: moment, along(2), share
       integer(ip) :: i, j
 
       c = overlap%centroid
@@ -72,7 +72,6 @@ contains
          if (.not. on_clipper(i)) cycle
          j = merge(1_ip, i + 1_ip, i == n)
          p = vertex(i, :) - c
-         q = vertex(j, :) - c
          step = vertex(j, :) - vertex(i, :)
          ! Simpson's weights at both ends and, fourfold, in the middle
          weight(1) = level(place(:, i))
@@ -82,9 +81,9 @@ contains
          share = weight(1) + weight(2) + weight(3)
          overlap%normal(1) = overlap%normal(1) + share*step(2)
          overlap%normal(2) = overlap%normal(2) - share*step(1)
-         along_p = step(1)*p(1) + step(2)*p(2)
-         along_q = step(1)*q(1) + step(2)*q(2)
-         moment = moment - (weight(1)*along_p + weight(2)*along_q + weight(3)*0.5_wp*(along_p + along_q))
+         along(1) = step(1)*p(1) + step(2)*p(2)
+         along(2) = along(1) + (step(1)*step(1) + step(2)*step(2))
+         moment = moment - (weight(1)*along(1) + weight(2)*along(2) + weight(3)*0.5_wp*(along(1) + along(2)))
       end do
       overlap%moment_a = moment + (c(1)*overlap%normal(2) - c(2)*overlap%normal(1))
       c = c - offset
