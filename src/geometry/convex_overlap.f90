@@ -249,7 +249,7 @@ contains
       end do
       call integrate_loop(n, corners, vertex(:, :, now), on_clipper(:, now), offset, overlap)
       if (.not. (by_shape .and. overlap%area > 0.0_wp)) return
-      call weigh_by_shape(n, corners, vertex(:, :, now), on_clipper(:, now), offset, overlap)
+      call weigh_by_shape(n, corners, vertex(:, :, now), on_clipper(:, now), offset, vertex(:, :, 3_ip - now), overlap)
    end subroutine clip_in
 
    !> Depth of the subject's centre below all edges of the clipper

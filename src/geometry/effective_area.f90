@@ -39,7 +39,7 @@ contains
    !> Replace area, normal and moments of an overlap by the effective area and its own.
    !>
    !> `moment_a` is about the origin, `moment_b` about the clipper's centre. A loop lost in rounding leaves none.
-   pure subroutine weigh_by_shape(n, corners, vertex, on_clipper, offset, overlap)
+   pure subroutine weigh_by_shape(n, corners, vertex, on_clipper, offset, place, overlap)
       !> Number of vertices
       integer(ip), intent(in) :: n
       !> Room for vertices
@@ -50,21 +50,24 @@ contains
       logical, intent(in) :: on_clipper(corners)
       !> Centre of the clipper [m]
       real(wp), intent(in) :: offset(2)
+      !> Work space: scaled coordinates, (corner, along or across)
+      real(wp), intent(inout) :: place(corners, 2)
       !> The overlap, as for the area
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: place(2, n), unit_area, moments(3), determinant, root, weight(3), c(2), p(2), step(2)
-      real(wp) :: moment, along(2), share
+      real(wp) :: unit_area, moments(3), determinant, root, unit, moment, weight(3), along(2)
+      real(wp) :: c(2), p(2), step(2)
       integer(ip) :: i, j
 
       c = overlap%centroid
-      call straighten(n, vertex(:n, :), place, unit_area)
-      call measure(n, place, moments)
+      call straighten(n, corners, vertex, place, unit_area)
+      call measure(n, corners, place, moments)
       determinant = moments(1)*moments(3) - moments(2)**2
       if (.not. determinant > 0.0_wp) then
          overlap = overlap_t()
          return
       end if
       root = sqrt(12.0_wp*sqrt(determinant))
+      unit = root/(24.0_wp*determinant)
       overlap%area = unit_area*root
       overlap%normal = 0.0_wp
       moment = 0.0_wp
@@ -74,98 +77,97 @@ contains
          p = vertex(i, :) - c
          step = vertex(j, :) - vertex(i, :)
          ! Simpson's weights at both ends and, fourfold, in the middle
-         weight(1) = level(place(:, i))
-         weight(2) = level(place(:, j))
-         weight(3) = 4.0_wp*level(0.5_wp*(place(:, i) + place(:, j)))
-         weight = weight*(root/(24.0_wp*determinant))
-         share = weight(1) + weight(2) + weight(3)
-         overlap%normal(1) = overlap%normal(1) + share*step(2)
-         overlap%normal(2) = overlap%normal(2) - share*step(1)
+         weight(1) = unit*level(place(i, 1), place(i, 2))
+         weight(2) = unit*level(place(j, 1), place(j, 2))
+         weight(3) = unit*level(place(i, 1) + place(j, 1), place(i, 2) + place(j, 2))
+         overlap%normal(1) = overlap%normal(1) + (weight(1) + weight(2) + weight(3))*step(2)
+         overlap%normal(2) = overlap%normal(2) - (weight(1) + weight(2) + weight(3))*step(1)
          along(1) = step(1)*p(1) + step(2)*p(2)
          along(2) = along(1) + (step(1)*step(1) + step(2)*step(2))
          moment = moment - (weight(1)*along(1) + weight(2)*along(2) + weight(3)*0.5_wp*(along(1) + along(2)))
       end do
       overlap%moment_a = moment + (c(1)*overlap%normal(2) - c(2)*overlap%normal(1))
-      c = c - offset
-      overlap%moment_b = moment + (c(1)*overlap%normal(2) - c(2)*overlap%normal(1))
+      overlap%moment_b = moment + ((c(1) - offset(1))*overlap%normal(2) - (c(2) - offset(2))*overlap%normal(1))
 
    contains
 
-      !> The form q at a place, times the determinant
-      pure real(wp) function level(x)
-         real(wp), intent(in) :: x(2)
+      !> The form q at a place, times the determinant; at twice a place four times as much
+      pure real(wp) function level(x, y)
+         real(wp), intent(in) :: x, y
 
-         level = moments(3)*x(1)*x(1) - 2.0_wp*moments(2)*x(1)*x(2) + moments(1)*x(2)*x(2)
+         level = moments(3)*x*x - 2.0_wp*moments(2)*x*y + moments(1)*y*y
       end function level
 
    end subroutine weigh_by_shape
 
    !> Coordinates of a loop along and across the line from its first vertex to the farthest from it, scaled to about 1.
-   pure subroutine straighten(n, vertex, place, unit_area)
+   pure subroutine straighten(n, corners, vertex, place, unit_area)
       integer(ip), intent(in) :: n
-      real(wp), intent(in) :: vertex(n, 2)
-      !> Scaled coordinates, (along or across, vertex)
-      real(wp), intent(out) :: place(2, n)
+      integer(ip), intent(in) :: corners
+      real(wp), intent(in) :: vertex(corners, 2)
+      real(wp), intent(inout) :: place(corners, 2)
       !> Area of the unit square of the scaled coordinates [m2]
       real(wp), intent(out) :: unit_area
-      real(wp) :: axis(2), square, longest, height
+      real(wp) :: axis(2), arm(2), square, longest, scale
       integer(ip) :: i
 
       longest = 0.0_wp
       axis = 0.0_wp
       do i = 1_ip, n
-         place(1, i) = vertex(i, 1) - vertex(1, 1)
-         place(2, i) = vertex(i, 2) - vertex(1, 2)
-         square = place(1, i)*place(1, i) + place(2, i)*place(2, i)
-         if (square > longest) axis = place(:, i)
+         arm = vertex(i, :) - vertex(1, :)
+         square = arm(1)*arm(1) + arm(2)*arm(2)
+         if (square > longest) axis = arm
          longest = max(longest, square)
+         place(i, :) = arm
       end do
-      height = 0.0_wp
+      unit_area = 0.0_wp
       do i = 1_ip, n
-         place(:, i) = [axis(1)*place(1, i) + axis(2)*place(2, i), axis(1)*place(2, i) - axis(2)*place(1, i)]
-         height = max(height, abs(place(2, i)))
+         arm = place(i, :)
+         place(i, 1) = axis(1)*arm(1) + axis(2)*arm(2)
+         place(i, 2) = axis(1)*arm(2) - axis(2)*arm(1)
+         unit_area = max(unit_area, abs(place(i, 2)))
       end do
-      unit_area = height
-      if (.not. height > 0.0_wp) return
+      if (.not. unit_area > 0.0_wp) return
+      scale = 1.0_wp/unit_area
+      longest = 1.0_wp/longest
       do i = 1_ip, n
-         place(1, i) = place(1, i)/longest
-         place(2, i) = place(2, i)/height
+         place(i, 1) = place(i, 1)*longest
+         place(i, 2) = place(i, 2)*scale
       end do
    end subroutine straighten
 
-   !> Second moments (xx, xy, yy) of a loop about its centroid; its places are then relative to that.
-   pure subroutine measure(n, place, moments)
+   !> Second moments (xx, xy, yy) of a loop about its centroid, 0 if it has no area; places become relative to that.
+   pure subroutine measure(n, corners, place, moments)
       integer(ip), intent(in) :: n
-      real(wp), intent(inout) :: place(2, n)
+      integer(ip), intent(in) :: corners
+      !> Scaled coordinates; the first vertex is at the origin
+      real(wp), intent(inout) :: place(corners, 2)
       real(wp), intent(out) :: moments(3)
-      real(wp) :: area, part, centre(2)
-      integer(ip) :: i, j
+      real(wp) :: area, part, centre(2), p(2), q(2)
+      integer(ip) :: i
 
       area = 0.0_wp
       centre = 0.0_wp
       do i = 2_ip, n - 1_ip
-         associate (p => place(:, i), q => place(:, i + 1_ip))
-            part = p(1)*q(2) - p(2)*q(1)
-            area = area + part
-            centre = centre + part*(p + q)
-         end associate
+         p = place(i, :)
+         q = place(i + 1_ip, :)
+         part = p(1)*q(2) - p(2)*q(1)
+         area = area + part
+         centre = centre + part*(p + q)
       end do
       moments = 0.0_wp
       if (.not. area > 0.0_wp) return
       centre = centre/(3.0_wp*area)
+      q = place(n, :) - centre
       do i = 1_ip, n
-         place(:, i) = place(:, i) - centre
+         p = q
+         q = place(i, :) - centre
+         place(i, :) = q
+         part = (p(1)*q(2) - p(2)*q(1))/12.0_wp
+         moments(1) = moments(1) + part*(p(1)*p(1) + p(1)*q(1) + q(1)*q(1))
+         moments(2) = moments(2) + part*(p(1)*p(2) + q(1)*q(2) + 0.5_wp*(p(1)*q(2) + q(1)*p(2)))
+         moments(3) = moments(3) + part*(p(2)*p(2) + p(2)*q(2) + q(2)*q(2))
       end do
-      do i = 1_ip, n
-         j = merge(1_ip, i + 1_ip, i == n)
-         associate (p => place(:, i), q => place(:, j))
-            part = p(1)*q(2) - p(2)*q(1)
-            moments(1) = moments(1) + part*(p(1)*p(1) + p(1)*q(1) + q(1)*q(1))
-            moments(2) = moments(2) + part*(p(1)*p(2) + q(1)*q(2) + 0.5_wp*(p(1)*q(2) + q(1)*p(2)))
-            moments(3) = moments(3) + part*(p(2)*p(2) + p(2)*q(2) + q(2)*q(2))
-         end associate
-      end do
-      moments = moments/12.0_wp
    end subroutine measure
 
 end module polydem_effective_area
