@@ -38,6 +38,7 @@ contains
          call take(values, 'forces.damping', forces%damping)
          call take(values, 'forces.damping_coefficient', forces%damping_coefficient)
          call take(values, 'forces.restitution', forces%restitution)
+         call take(values, 'forces.tilt_damping', forces%tilt_damping)
          call take(values, 'forces.friction', forces%friction)
          call take(values, 'forces.friction_coefficient', forces%friction_coefficient)
          call take(values, 'forces.tangential_stiffness', forces%tangential_stiffness)

@@ -145,7 +145,7 @@ module polydem_namelist_entries
       entry_t('forces', 'stiffness', 'real', 1, '1e7', 'N/m2', '> 0, <= 1e30', '', &
       'Young''s modulus E in two dimensions'), &
       entry_t('forces', 'law', 'word', 1, 'area', '', 'area conservative', '', &
-      'Elastic force: E A/l of the book, or the one with the energy E A^2/(2 l b)'), &
+      'Elastic force: E A/l of the book, or with the energy E G^2/(2 l b), G the effective area'), &
       entry_t('forces', 'damping', 'word', 1, 'rate', '', 'rate hunt_crossley book none', '', &
       'Normal damping by the rate of the area, by that times the elastic force, as in the book, or none'), &
       entry_t('forces', 'damping_coefficient', 'real', 1, '0.0251', '', '>= 0, <= 1e6', &
@@ -153,6 +153,8 @@ module polydem_namelist_entries
       'Damping coefficient gamma; some hundreds with hunt_crossley, which takes little at low speed'), &
       entry_t('forces', 'restitution', 'real', 1, '0', '', '>= 0, <= 1', 'damping: rate', &
       'Restitution of flat contacts, 0.01 to 1, in place of `damping_coefficient`; left out: by the latter'), &
+      entry_t('forces', 'tilt_damping', 'real', 1, '0', '', '>= 0, <= 1e6', '', &
+      'Damping of tilts as a share of sqrt(k I), k = E L^3/(12 l); 0: none, 2: critical for two bodies'), &
       entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack exact none', '', &
       'Friction by a tangential spring, without one (needs `scheme` velocity_verlet), or none'), &
       entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', &

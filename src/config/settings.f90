@@ -114,6 +114,8 @@ module polydem_settings
       real(wp) :: damping_coefficient
       !> Restitution of a flat contact, in place of the damping coefficient; 0: not given
       real(wp) :: restitution
+      !> Damping of tilts as a share of sqrt(k I_eff)
+      real(wp) :: tilt_damping = 0.0_wp
       !> Friction: 'cundall_strack', 'exact' or 'none'
       character(len=:), allocatable :: friction
       !> Friction coefficient mu

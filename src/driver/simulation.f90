@@ -114,6 +114,8 @@ contains
       self%bodies = bodies
       self%motions = motions
       call new_force_law(settings%forces, self%bodies, self%law)
+      self%contacts%area_is_effective = self%law%needs_effective_area
+      self%contacts%has_twist = self%law%needs_twist
       call new_integrator(settings%integrate, self%integrator)
       call choose_step(self, error)
       if (allocated(error)) return

@@ -17,6 +17,7 @@ module polydem_force_law
    use polydem_rate_damping, only: rate_damping_t
    use polydem_restitution_damping, only: damping_ratio_of, restitution_damping_t
    use polydem_settings, only: forces_settings_t
+   use polydem_tilt_damping, only: tilt_damping_t
    use polydem_velocity_constraint, only: velocity_constraint_t
    implicit none
    private
@@ -37,6 +38,10 @@ module polydem_force_law
       logical :: needs_tangential = .false.
       !> Whether a part remembers the area of the last step
       logical :: needs_area = .false.
+      !> Whether the law asks for the effective area of overlaps
+      logical :: needs_effective_area = .false.
+      !> Whether a part adds torques of its own
+      logical :: needs_twist = .false.
       !> Names of the parts, for `check` and the log
       character(len=:), allocatable :: description
    end type force_law_t
@@ -58,10 +63,16 @@ contains
       if (settings%law == 'conservative') then
          call new_conservative_law(settings%stiffness, bodies, conservative)
          call append(law, conservative)
+         law%needs_effective_area = .true.
       else
          call append(law, area_law_t(stiffness=settings%stiffness))
       end if
       call append_damping(settings, law)
+      if (settings%tilt_damping > 0.0_wp) then
+         call append(law, tilt_damping_t(stiffness=settings%stiffness, share=settings%tilt_damping))
+         law%description = law%description//', damping of tilts'
+         law%needs_twist = .true.
+      end if
       select case (settings%friction)
       case ('cundall_strack')
          call append(law, cundall_strack_t(coefficient=settings%friction_coefficient, &
@@ -111,7 +122,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0 at the start of a run
       real(wp), intent(in) :: dt
-      !> Contacts; `elastic`, `normal_force` and `tangential_force` are set
+      !> Contacts; `elastic`, `normal_force`, `tangential_force` and `twist` are set
       type(contacts_t), intent(inout) :: contacts
       !> What is remembered of the pairs
       type(contact_memory_t), intent(inout) :: memory
@@ -120,6 +131,7 @@ contains
       contacts%elastic(1:contacts%n) = 0.0_wp
       contacts%normal_force(1:contacts%n) = 0.0_wp
       contacts%tangential_force(1:contacts%n) = 0.0_wp
+      if (contacts%has_twist) contacts%twist(1:contacts%n) = 0.0_wp
       do k = 1, size(law%parts)
          call law%parts(k)%part%add(bodies, dt, contacts, memory)
       end do

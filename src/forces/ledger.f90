@@ -30,7 +30,7 @@ module polydem_ledger
    type :: ledger_t
       !> Work of the elastic normal forces on both bodies [J/m]
       real(wp) :: elastic_work = 0.0_wp
-      !> Work of the normal damping [J/m]
+      !> Work of the normal damping and of that of tilts [J/m]
       real(wp) :: damping_work = 0.0_wp
       !> Work of the tangential forces [J/m]
       real(wp) :: friction_work = 0.0_wp
@@ -223,6 +223,10 @@ contains
                                  - bodies%angular_velocity(contacts%second(c)))
          power(1) = power(1) + contacts%elastic(c)*approach
          power(2) = power(2) + (contacts%normal_force(c) - contacts%elastic(c))*approach
+         if (contacts%has_twist) then
+            power(2) = power(2) + contacts%twist(c)*(bodies%angular_velocity(contacts%first(c)) &
+                                                     - bodies%angular_velocity(contacts%second(c)))
+         end if
          power(3) = power(3) + contacts%tangential_force(c) &
             *(contacts%direction(1, c)*vy - contacts%direction(2, c)*vx)
          power(4) = power(4) + 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)
