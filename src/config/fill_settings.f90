@@ -35,6 +35,7 @@ contains
          call take(values, 'forces.stiffness', forces%stiffness)
          call take(values, 'forces.damping', forces%damping)
          call take(values, 'forces.damping_coefficient', forces%damping_coefficient)
+         call take(values, 'forces.damping_from_touch', forces%damping_from_touch)
          call take(values, 'forces.friction', forces%friction)
          call take(values, 'forces.friction_coefficient', forces%friction_coefficient)
          call take(values, 'forces.tangential_stiffness', forces%tangential_stiffness)

@@ -148,6 +148,8 @@ module polydem_namelist_entries
       'Normal damping by the exact rate of the area, by backward difference as in the book, or none'), &
       entry_t('forces', 'damping_coefficient', 'real', 1, '0.0251', '', '>= 0, <= 1e6', 'damping: rate book', &
       'Damping coefficient gamma'), &
+      entry_t('forces', 'damping_from_touch', 'logical', 1, '.false.', '', '', 'damping: rate', &
+      'Whether damping begins at the touch within the step: restitution of second order in dt'), &
       entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack none', '', &
       'Friction law'), &
       entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', 'friction: cundall_strack', &
@@ -160,8 +162,8 @@ module polydem_namelist_entries
 
    !> Groups of the run
    type(entry_t), parameter :: run_entries(*) = [ &
-      entry_t('integrate', 'scheme', 'word', 1, 'velocity_verlet', '', 'velocity_verlet gear', '', &
-      'Integration scheme'), &
+      entry_t('integrate', 'scheme', 'word', 1, 'velocity_verlet', '', 'velocity_verlet gear gear_3_20', '', &
+      'Integration scheme; Gear corrects positions by 3/16, or 3/20, meant for forces of positions alone'), &
       entry_t('integrate', 'dt', 'real', 1, '0', 's', '>= 0', '', &
       'Time step; 0: `fraction` of the stable step'), &
       entry_t('integrate', 'fraction', 'real', 1, '0.3', '', '> 0', '', &

@@ -110,6 +110,8 @@ module polydem_settings
       character(len=:), allocatable :: damping
       !> Dimensionless damping coefficient gamma
       real(wp) :: damping_coefficient
+      !> Whether damping begins at the touch, not with the step in which it is first seen
+      logical :: damping_from_touch = .false.
       !> Friction: 'cundall_strack' or 'none'
       character(len=:), allocatable :: friction
       !> Friction coefficient mu
@@ -122,7 +124,7 @@ module polydem_settings
 
    !> Group &integrate
    type :: integrate_settings_t
-      !> 'velocity_verlet' or 'gear'
+      !> 'velocity_verlet', 'gear' or 'gear_3_20'
       character(len=:), allocatable :: scheme
       !> Time step [s]; 0: `fraction` of the stable step
       real(wp) :: dt

@@ -8,6 +8,7 @@ module polydem_force_law
    use polydem_book_damping, only: book_damping_t
    use polydem_contacts, only: contact_memory_t, contacts_t
    use polydem_cundall_strack, only: cundall_strack_t
+   use polydem_damping_onset, only: damping_onset_t
    use polydem_force_part, only: force_part_t
    use polydem_kinds, only: ip, wp
    use polydem_rate_damping, only: rate_damping_t
@@ -54,6 +55,11 @@ contains
          law%description = law%description//', book damping'
          law%needs_area = .true.
       end select
+      if (settings%damping_from_touch) then
+         call append(law, damping_onset_t())
+         law%description = law%description//' from first touch'
+         law%needs_area = .true.
+      end if
       if (settings%friction == 'cundall_strack') then
          call append(law, cundall_strack_t(coefficient=settings%friction_coefficient, &
                                            stiffness=settings%tangential_stiffness*settings%stiffness, &

@@ -57,7 +57,7 @@ module polydem_contacts
       integer(ip), allocatable :: separating_edge(:)
       !> Stored tangential spring force [N/m]
       real(wp), allocatable :: tangential(:)
-      !> Area at the last step [m2], for the book's backward difference
+      !> Area at the last step [m2], for the book's backward difference and to know new contacts
       real(wp), allocatable :: area(:)
    end type contact_memory_t
 
