@@ -106,7 +106,7 @@ contains
       self%settings = settings
       self%bodies = bodies
       self%motions = motions
-      call new_force_law(settings%forces, self%law)
+      call new_force_law(settings%forces, self%bodies, self%law)
       call new_integrator(settings%integrate, self%integrator)
       call choose_step(self, error)
       if (allocated(error)) return

@@ -23,8 +23,8 @@ HELPERS = ("sort", "sort_reals")
 #: Procedures of finders that only report
 REPORTS = "survey|report|bytes|pool_bytes"
 
-#: Large arrays begin on a page in runs of any length. Else glibc moves its threshold with what was freed before, arrays lie
-#: otherwise towards each other, and the misses of the first step no longer cancel between a short and a long run.
+#: Large arrays begin on a page in runs of any length. Else glibc moves its threshold with what was freed before, arrays
+#: lie otherwise towards each other, and the misses of the first step no longer cancel between a short and a long run.
 SAME_PLACES = {"MALLOC_MMAP_THRESHOLD_": "65536"}
 
 #: Counters of the hardware that are asked for
