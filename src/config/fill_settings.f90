@@ -42,6 +42,7 @@ contains
          call take(values, 'forces.friction_coefficient', forces%friction_coefficient)
          call take(values, 'forces.tangential_stiffness', forces%tangential_stiffness)
          call take(values, 'forces.tangential_damping', forces%tangential_damping)
+         call take(values, 'forces.midstep_slip', forces%midstep_slip)
          call take(values, 'integrate.scheme', integrate%scheme)
          call take(values, 'integrate.dt', integrate%dt)
          call take(values, 'integrate.fraction', integrate%fraction)

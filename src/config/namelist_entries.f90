@@ -163,7 +163,9 @@ module polydem_namelist_entries
       'friction: cundall_strack', &
       'Tangential stiffness as a share of E'), &
       entry_t('forces', 'tangential_damping', 'real', 1, '0.25', '', '>= 0, <= 1e6', 'friction: cundall_strack', &
-      'Tangential damping as a share of sqrt(k_t m_t)')]
+      'Tangential damping as a share of sqrt(k_t m_t)'), &
+      entry_t('forces', 'midstep_slip', 'logical', 1, '.false.', '', '', 'friction: cundall_strack', &
+      'Whether the slip velocity is taken in the middle of the step: friction of second order in dt')]
 
    !> Groups of the run
    type(entry_t), parameter :: run_entries(*) = [ &

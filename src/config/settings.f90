@@ -124,6 +124,8 @@ module polydem_settings
       real(wp) :: tangential_stiffness
       !> Tangential damping as a share of sqrt(k_t m_t)
       real(wp) :: tangential_damping
+      !> Whether the slip velocity in the middle of the step extends the tangential spring, not that at its end
+      logical :: midstep_slip = .false.
    end type forces_settings_t
 
    !> Group &integrate

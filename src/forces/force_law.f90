@@ -66,7 +66,8 @@ contains
       if (settings%friction == 'cundall_strack') then
          call append(law, cundall_strack_t(coefficient=settings%friction_coefficient, &
                                            stiffness=settings%tangential_stiffness*settings%stiffness, &
-                                           damping=settings%tangential_damping))
+                                           damping=settings%tangential_damping, &
+                                           midstep=settings%midstep_slip))
          law%description = law%description//', Cundall-Strack friction'
          law%needs_tangential = .true.
       end if

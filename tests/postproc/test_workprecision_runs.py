@@ -31,10 +31,10 @@ def study(tmp_path_factory, scene):
 
 def test_damping_from_touch_is_of_second_order_and_less_wrong(study):
     curves = {curve.numerics: curve for curve in read_study(study[0]).curves}
-    assert set(curves) == {"velocity_verlet", "velocity_verlet, touch", "gear", "gear_3_20"}
-    assert curves["velocity_verlet, touch"].order(0.0) == pytest.approx(2.0, abs=0.35)
+    assert set(curves) == set(precision_samples.NUMERICS)
+    assert curves["velocity_verlet, second order"].order(0.0) == pytest.approx(2.0, abs=0.35)
     assert curves["velocity_verlet"].order(0.0) == pytest.approx(1.0, abs=0.35)
-    assert curves["velocity_verlet, touch"].points[-1].rms < 0.2 * curves["velocity_verlet"].points[-1].rms
+    assert curves["velocity_verlet, second order"].points[-1].rms < 0.2 * curves["velocity_verlet"].points[-1].rms
     assert all(point.least > 0.0 and 0.0 < point.share < 1.0 for curve in curves.values() for point in curve.points)
 
 

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import NullFormatter
 
 from .figure_style import Drawing, panels, shared_legend
 from .precision_scenes import SCENES
@@ -15,9 +16,10 @@ from .work_precision import Curve, WorkPrecision
 #: Numerics -> colour (Okabe & Ito 2008) and marker
 LOOKS = {
     "velocity_verlet": ("#0072B2", "o"),
-    "velocity_verlet, touch": ("#009E73", "^"),
+    "velocity_verlet, second order": ("#009E73", "^"),
     "gear": ("#D55E00", "s"),
     "gear_3_20": ("#CC79A7", "v"),
+    "gear, second order": ("#E69F00", "D"),
 }
 
 #: Elastic law -> line
@@ -42,8 +44,9 @@ def work_precision(study: WorkPrecision, scene: str) -> Drawing:
             axis.axhspan(1e-300, floor, color="0.9", zorder=0)
         _limit(axis, study.curves_of(scene, model), floor)
         axis.set_title(model.replace("/", ", "), fontsize=8)
-    for axis in axes:
-        axis.set(xlabel="s per simulated s", ylabel=f"error of {SCENES[scene].measured}")
+        axis.set_xlabel("s per simulated s")
+        if axis.get_subplotspec().is_first_col():
+            axis.set_ylabel(f"error of {SCENES[scene].measured}")
     shared_legend(below, axes, columns=4)
     exact = SCENES[scene].reference == 0
     return Drawing(
@@ -108,6 +111,7 @@ def energy_drift(study: WorkPrecision) -> Drawing | None:
         lowest = min(smooth, key=lambda p: p.dt)
         left.plot(ends, lowest.rms * (ends / lowest.dt) ** 2, color="0.6", linewidth=0.8, label="second order")
     left.set(xscale="log", yscale="log", xlabel="dt [s]", ylabel="relative change of the kinetic energy")
+    left.xaxis.set_minor_formatter(NullFormatter())
     left.legend(fontsize=6.5)
     _draw_drifts(right, curves)
     return Drawing(

@@ -10,7 +10,7 @@ from .trajectory import ResultError
 from .work_precision import read_study
 
 #: Tables that stand on the page itself
-ON_THE_PAGE = ("recommendation", "fastest", "overall", "orders", "models", "left_out", "stopped")
+ON_THE_PAGE = ("recommendation", "fastest", "overall", "orders", "models", "energy", "left_out", "stopped")
 
 
 def write_precision_report(folder: Path, figures: bool = True) -> list[Path]:

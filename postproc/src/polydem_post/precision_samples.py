@@ -26,16 +26,17 @@ from .trajectory import ResultError, Trajectory
 #: Name of the file in the folder of a study
 FILE = "samples.csv"
 
-#: Numerics -> entries of the namelist; `touch` needs a damping that jumps at touch
+#: Numerics -> scheme, and whether contacts are integrated with second order, too
 NUMERICS = {
-    "velocity_verlet": ["integrate.scheme=velocity_verlet"],
-    "velocity_verlet, touch": ["integrate.scheme=velocity_verlet", "forces.damping_from_touch=.true."],
-    "gear": ["integrate.scheme=gear"],
-    "gear_3_20": ["integrate.scheme=gear_3_20"],
+    "velocity_verlet": ("velocity_verlet", False),
+    "velocity_verlet, second order": ("velocity_verlet", True),
+    "gear": ("gear", False),
+    "gear, second order": ("gear", True),
+    "gear_3_20": ("gear_3_20", False),
 }
 
-#: Damping that can begin at the touch
-JUMPS = ("rate",)
+#: Damping or friction -> entry that makes its integration one of second order
+SECOND_ORDER = {"rate": "forces.damping_from_touch=.true.", "cundall_strack": "forces.midstep_slip=.true."}
 
 #: Precisions that are compared, and the one that the references have
 PRECISIONS, REFERENCE = ("double", "single"), "quadruple"
@@ -213,7 +214,7 @@ class Study:
             f"output.frame_interval={scene.duration / scene.moments!r}",
             f"output.folder={result}",
             *model.overrides(),
-            *NUMERICS[choice.numerics],
+            *numerics_overrides(choice.numerics, model),
         ]
         code, message = _call(self.programs[choice.precision], scene.namelist, overrides)
         status = "finished" if code == 0 else "refused" if code == REFUSED else "stopped"
@@ -232,17 +233,28 @@ def references_of(scene: Scene) -> list[Choice]:
     """The reference of every model, and the run with half as many steps that tells how exact it is."""
     if scene.reference == 0:
         return []
+    best = "velocity_verlet, second order"
     return [
-        Choice(scene.name, model.name, numerics_of(model)[-1 if model.damping in JUMPS else 0], REFERENCE, steps)
+        Choice(scene.name, model.name, best if best in numerics_of(model) else "velocity_verlet", REFERENCE, steps)
         for model in scene.models
         for steps in (scene.reference, scene.reference // 2)
     ]
 
 
+def second_order_entries(model: Model) -> list[str]:
+    """Entries that integrate damping and friction of a model with second order, where they are not so anyway."""
+    return [SECOND_ORDER[part] for part in (model.damping, model.friction) if part in SECOND_ORDER]
+
+
+def numerics_overrides(numerics: str, model: Model) -> list[str]:
+    """Entries for --set."""
+    scheme, second = NUMERICS[numerics]
+    return [f"integrate.scheme={scheme}", *(second_order_entries(model) if second else [])]
+
+
 def numerics_of(model: Model) -> list[str]:
-    """The numerics that make sense for a model, the one from touch last."""
-    names = [name for name in NUMERICS if "touch" not in name]
-    return names + [name for name in NUMERICS if "touch" in name and model.damping in JUMPS]
+    """The numerics that make a difference for a model."""
+    return [name for name, (_, second) in NUMERICS.items() if not second or second_order_entries(model)]
 
 
 def choices_of(scene: Scene, precisions) -> list[Choice]:

@@ -290,14 +290,17 @@ def energy_changes(run: Trajectory) -> np.ndarray:
 
 
 def restitution(model: Model) -> float | None:
-    """Restitution of a flat impact of a square on a plate as thick as it is wide.
+    """Restitution of a flat impact of a square on a plate three times as wide.
 
     Dashpot: T. Schwager & T. Poeschel, Granular Matter 9 (2007) 465, with and without the book's limit of the damping
     to four times the elastic force; K.H. Hunt & F.R.E. Crossley, J. Appl. Mech. 42 (1975) 440.
     """
     if model.damping == "none":
         return 1.0
-    zeta = 0.5 * DAMPING["rate"]
+    stiffness = 1.0  # over E: both bodies are as thick as the square is wide
+    if model.law == "conservative":  # w^2/(l b) with the sides of squares of the areas of both bodies
+        stiffness = 0.5 * (1.0 + math.sqrt(1.0 / 3.0))
+    zeta = 0.5 * DAMPING["rate"] * math.sqrt(stiffness)
     s = math.sqrt(1.0 - zeta**2)
     e = math.exp(-zeta / s * (math.pi - math.atan2(2.0 * zeta * s, 1.0 - 2.0 * zeta**2)))
     if model.damping == "rate":
@@ -309,7 +312,8 @@ def restitution(model: Model) -> float | None:
         tau = math.atan2(s * x, v + zeta * x) / s
         return e * math.exp(zeta * tau) * math.hypot(s * x, v + zeta * x)
     if model.damping == "hunt_crossley":
-        return _hunt_crossley(DAMPING["hunt_crossley"] * math.sqrt(DENSITY * SIDE**2 / STIFFNESS) / SIDE * SPEED)
+        rate = DAMPING["hunt_crossley"] * math.sqrt(DENSITY * SIDE**2 / STIFFNESS) * stiffness / SIDE
+        return _hunt_crossley(rate * SPEED)
     return None
 
 

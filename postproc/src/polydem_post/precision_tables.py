@@ -21,7 +21,7 @@ CLOCK = (
 def all_tables(study: WorkPrecision) -> list[Table]:
     """Every table of a report."""
     tables = [recommendation(study), fastest_choices(study), overall(study), orders(study), models(study),
-              points(study), left_out(study), stopped(study)]
+              energy(study), points(study), left_out(study), stopped(study)]
     return [table for table in tables if table.rows]
 
 
@@ -85,7 +85,7 @@ def fastest_choices(study: WorkPrecision) -> Table:
         "workprecision_fastest", "For an error, the fastest choice of each scene and model",
         ("scene", "model", *(f"{error:g}" for error in ERRORS)), texts=2 + len(ERRORS),
     )
-    for scene in study.scenes:
+    for scene in _converging(study):
         for model in study.models_of(scene):
             curves = study.curves_of(scene, model)
             table.add(scene, model, *(_choice_text(fastest(curves, error)) for error in ERRORS))
@@ -117,7 +117,7 @@ def overall(study: WorkPrecision) -> Table:
     table.note = (
         "Counted are pairs of scene and model for which at least one choice reaches the error; fastest: within a "
         f"factor of {TIE:g}. The last column is the geometric mean over the pairs in which the choice reaches the "
-        "error; touch is offered only where damping jumps at touch."
+        "error; second order is offered only where damping or friction is of first order otherwise."
     )
     return table
 
@@ -137,7 +137,8 @@ def recommendation(study: WorkPrecision) -> Table:
                 best, value = (choice, ratios, asked), (-len(ratios) / asked, _mean(ratios))
         if best:
             (numerics, precision), ratios, asked = best
-            mine = [curve for curve in study.curves if (curve.numerics, curve.precision) == (numerics, precision)]
+            mine = [curve for scene in _converging(study) for curve in study.curves if curve.scene == scene
+                    and (curve.numerics, curve.precision) == (numerics, precision)]
             reached = [each for each in (curve.time_for(error) for curve in mine) if each is not None]
             shares = [share for _, _, share in reached if share > 0.0]
             spread = f"{number(min(shares), 2)} to {number(max(shares), 2)}" if shares else "-"
@@ -150,12 +151,32 @@ def recommendation(study: WorkPrecision) -> Table:
     return table
 
 
+def _converging(study: WorkPrecision) -> list[str]:
+    """Scenes whose errors are those of the integration alone, and so say which one is the best."""
+    return [scene for scene in study.scenes if SCENES[scene].reference > 0]
+
+
+def energy(study: WorkPrecision) -> Table:
+    """Change of the energy where it is conserved, over the step."""
+    table = Table(
+        "workprecision_energy", "Change of the kinetic energy of the elastic gas, which is an error",
+        ("law", "numerics", "precision", "dt [s]", "share of stable step", "rms", "greatest"), texts=3,
+    )
+    for curve in study.curves:
+        if SCENES[curve.scene].reference == 0:
+            for point in curve.points:
+                table.add(curve.model.split("/")[0], curve.numerics, curve.precision, number(point.dt),
+                          number(point.share), f"{point.rms:.2e}", f"{point.worst:.2e}")
+    table.note = "Relative to that at the start, over all moments without a contact."
+    return table
+
+
 def _ratios(study: WorkPrecision, error: float) -> dict:
     """(numerics, precision) -> ratios of its time to the fastest, where it reaches the error; where it was asked."""
     measured = {(curve.scene, curve.model, curve.numerics, curve.precision) for curve in study.curves}
     never = [key for key in study.stopped() if key not in measured]
     found = {(numerics, precision): ([], [0]) for numerics in NUMERICS for precision in PRECISIONS}
-    for scene in study.scenes:
+    for scene in _converging(study):
         for model in study.models_of(scene):
             curves = study.curves_of(scene, model)
             best = fastest(curves, error)
