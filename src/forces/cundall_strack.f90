@@ -52,7 +52,8 @@ contains
       do c = 1_ip, contacts%n
          slip = slip_of(bodies%velocity, bodies%angular_velocity, contacts, c)
          mean = slip
-         if (self%midstep) mean = slip - 0.5_wp*dt*slip_of(bodies%acceleration, bodies%angular_acceleration, contacts, c)
+         if (self%midstep) mean = slip &
+            - 0.5_wp*dt*slip_of(bodies%acceleration, bodies%angular_acceleration, contacts, c)
          limit = self%coefficient*contacts%normal_force(c)
          spring = memory%tangential(contacts%pair(c)) - self%stiffness*mean*dt
          spring = max(-limit, min(limit, spring))
