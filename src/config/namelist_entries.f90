@@ -153,6 +153,8 @@ module polydem_namelist_entries
       'Damping coefficient gamma; some hundreds with hunt_crossley, which takes little at low speed'), &
       entry_t('forces', 'restitution', 'real', 1, '0', '', '>= 0, <= 1', 'damping: rate', &
       'Restitution of flat contacts, 0.01 to 1, in place of `damping_coefficient`; left out: by the latter'), &
+      entry_t('forces', 'damping_from_touch', 'logical', 1, '.false.', '', '', 'damping: rate', &
+      'Whether damping begins at the touch within the step: restitution of second order in dt'), &
       entry_t('forces', 'tilt_damping', 'real', 1, '0', '', '>= 0, <= 1e6', '', &
       'Damping of tilts as a share of sqrt(k I), k = E L^3/(12 l); 0: none, 2: critical for two bodies'), &
       entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack exact none', '', &
@@ -165,6 +167,8 @@ module polydem_namelist_entries
       'Tangential stiffness as a share of E'), &
       entry_t('forces', 'tangential_damping', 'real', 1, '0.25', '', '>= 0, <= 1e6', 'friction: cundall_strack', &
       'Tangential damping as a share of sqrt(k_t m_t)'), &
+      entry_t('forces', 'midstep_slip', 'logical', 1, '.false.', '', '', 'friction: cundall_strack', &
+      'Whether the slip velocity is taken in the middle of the step: friction of second order in dt'), &
       entry_t('forces', 'friction_tolerance', 'real', 1, '1e-10', '', '> 0, <= 1e-3', 'friction: exact', &
       'Slip that may remain where contacts stick, as a share of the greatest that friction takes in a step')]
 
@@ -191,8 +195,8 @@ module polydem_namelist_entries
 
    !> Groups of the run
    type(entry_t), parameter :: run_entries(*) = [ &
-      entry_t('integrate', 'scheme', 'word', 1, 'velocity_verlet', '', 'velocity_verlet gear', '', &
-      'Integration scheme'), &
+      entry_t('integrate', 'scheme', 'word', 1, 'velocity_verlet', '', 'velocity_verlet gear gear_3_20', '', &
+      'Integration scheme; Gear corrects positions by 3/16, or 3/20, meant for forces of positions alone'), &
       entry_t('integrate', 'accumulation', 'word', 1, 'plain', '', 'plain compensated', 'scheme: velocity_verlet', &
       'Sums of positions and velocities over steps as they are, or with what rounding takes carried along'), &
       entry_t('integrate', 'dt', 'real', 1, '0', 's', '>= 0', '', &

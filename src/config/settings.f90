@@ -112,6 +112,8 @@ module polydem_settings
       character(len=:), allocatable :: damping
       !> Dimensionless damping coefficient gamma
       real(wp) :: damping_coefficient
+      !> Whether damping begins at the touch, not with the step in which it is first seen
+      logical :: damping_from_touch = .false.
       !> Restitution of a flat contact, in place of the damping coefficient; 0: not given
       real(wp) :: restitution
       !> Damping of tilts as a share of sqrt(k I_eff)
@@ -124,13 +126,15 @@ module polydem_settings
       real(wp) :: tangential_stiffness
       !> Tangential damping as a share of sqrt(k_t m_t)
       real(wp) :: tangential_damping
+      !> Whether the slip velocity in the middle of the step extends the tangential spring, not that at its end
+      logical :: midstep_slip = .false.
       !> Slip that exact friction may leave, as a share of the greatest slip velocity it takes from a contact in a step
       real(wp) :: friction_tolerance
    end type forces_settings_t
 
    !> Group &integrate
    type :: integrate_settings_t
-      !> 'velocity_verlet' or 'gear'
+      !> 'velocity_verlet', 'gear' or 'gear_3_20'
       character(len=:), allocatable :: scheme
       !> Sums of velocity Verlet over steps: 'plain' or 'compensated'
       character(len=:), allocatable :: accumulation

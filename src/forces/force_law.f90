@@ -10,6 +10,7 @@ module polydem_force_law
    use polydem_conservative_law, only: conservative_law_t, new_conservative_law
    use polydem_contacts, only: contact_memory_t, contacts_t
    use polydem_cundall_strack, only: cundall_strack_t
+   use polydem_damping_onset, only: damping_onset_t
    use polydem_exact_friction, only: exact_friction_t
    use polydem_force_part, only: force_part_t
    use polydem_hunt_crossley, only: hunt_crossley_t
@@ -68,6 +69,11 @@ contains
          call append(law, area_law_t(stiffness=settings%stiffness))
       end if
       call append_damping(settings, law)
+      if (settings%damping_from_touch) then
+         call append(law, damping_onset_t())
+         law%description = law%description//' from first touch'
+         law%needs_area = .true.
+      end if
       if (settings%tilt_damping > 0.0_wp) then
          call append(law, tilt_damping_t(stiffness=settings%stiffness, share=settings%tilt_damping))
          law%description = law%description//', damping of tilts'
@@ -77,7 +83,8 @@ contains
       case ('cundall_strack')
          call append(law, cundall_strack_t(coefficient=settings%friction_coefficient, &
                                            stiffness=settings%tangential_stiffness*settings%stiffness, &
-                                           damping=settings%tangential_damping))
+                                           damping=settings%tangential_damping, &
+                                           midstep=settings%midstep_slip))
          law%description = law%description//', Cundall-Strack friction'
          law%needs_tangential = .true.
       case ('exact')

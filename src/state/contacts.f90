@@ -69,7 +69,7 @@ module polydem_contacts
       integer(ip), allocatable :: separating_edge(:)
       !> Tangential force of the last step: of the spring, or of exact friction [N/m]
       real(wp), allocatable :: tangential(:)
-      !> Area at the last step [m2], for the book's backward difference
+      !> Area at the last step [m2], for the book's backward difference and to know new contacts
       real(wp), allocatable :: area(:)
    end type contact_memory_t
 

@@ -33,6 +33,8 @@ set_tests_properties(odd PROPERTIES SKIP_RETURN_CODE 1)
 PRESETS = """\
 {"version": 6, "configurePresets": [
   {"name": "release", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"},
+  {"name": "single", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"},
+  {"name": "quadruple", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"},
   {"name": "debug", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"}]}
 """
 
@@ -112,7 +114,7 @@ class Words(Toy):
     def test_help_needs_no_build(self):
         code, output, _ = self.call("--help")
         self.assertEqual(code, 0)
-        for verb in ("run", "check", "info", "plot", "replay", "bench", "test", "--no-install"):
+        for verb in ("run", "check", "info", "plot", "replay", "bench", "workprecision", "test", "--no-install"):
             self.assertIn(f"\n  {verb} ", output)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
 
@@ -168,6 +170,19 @@ class Build(Toy):
         code, output, messages = self.call("info", launcher=os.path.join(moved, "polydem"), POLYDEM_PRESET="debug")
         self.assertEqual((code, output), (0, "<info>\n"))
         self.assertIn("building", messages)
+
+    def test_workprecision_builds_three_precisions_and_hands_their_programs_on(self):
+        self.write(".venv/bin/python", '#!/bin/bash\nprintf "%s\\n" "$@"\n')
+        os.chmod(os.path.join(self.folder, ".venv", "bin", "python"), 0o755)
+        code, output, messages = self.call("workprecision", "stack", "--repeats", "2")
+        self.assertEqual(code, 0, messages)
+        expected = ["-m", "polydem_post", "workprecision"]
+        for precision, preset in (("double", "release"), ("single", "single"), ("quadruple", "quadruple")):
+            program = os.path.join(self.folder, "build", preset, "src", "app", "polydem")
+            self.assertTrue(os.access(program, os.X_OK))
+            expected += ["--program", f"{precision}={program}"]
+        self.assertEqual(output.splitlines(), [*expected, "stack", "--repeats", "2"])
+        self.assertEqual(self.call("workprecision", "--help")[1].splitlines(), [*expected[:3], "--help"])
 
     def test_simultaneous_first_calls_build_once(self):
         calls = [subprocess.Popen([self.launcher, "info"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

@@ -1,4 +1,4 @@
-"""Command line: python -m polydem_post plot, table, tables, cache or costs."""
+"""Command line: python -m polydem_post plot, table, tables, cache, costs or workprecision."""
 
 from __future__ import annotations
 
@@ -56,6 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     tables.add_argument("--no-figures", action="store_true", help="tables and verdicts only")
     _add_cache(verbs)
     _add_costs(verbs)
+    _add_workprecision(verbs)
     return parser
 
 
@@ -90,6 +91,28 @@ def _add_costs(verbs) -> None:
     costs.add_argument("--output", type=Path, default=Path("results/costs"), help="where to (default: results/costs)")
     costs.add_argument("--repeats", type=int, default=9, help="timed runs of each model (default: 9)")
     costs.add_argument("--threads", type=int, default=1, help="threads of each run (default: 1)")
+
+
+def _add_workprecision(verbs) -> None:
+    work = verbs.add_parser(
+        "workprecision", help="measure error against time over steps, integrators, laws and precisions",
+        description="Runs small scenes with all steps, integrators, force laws and precisions, and writes tables, "
+                    "figures and a recommendation to DIR/report. Goes on where an interrupted study was.")
+    work.set_defaults(action=_workprecision)
+    work.add_argument("scenes", nargs="*", metavar="SCENE", help="names in inputs/precision; all if absent")
+    work.add_argument("--output", type=Path, default=Path("results/workprecision"), metavar="DIR",
+                      help="folder of the study (default: results/workprecision)")
+    work.add_argument("--repeats", type=int, default=3, metavar="N", help="timed runs of every choice (default: 3)")
+    work.add_argument("--report-only", action="store_true", help="run nothing, write the report of what there is")
+    work.add_argument("--program", type=_program, action="append", default=[], metavar="PRECISION=PATH",
+                      help="a built program (the launcher says which)")
+
+
+def _program(text: str) -> tuple:
+    precision, equals, path = text.partition("=")
+    if not equals or precision not in ("single", "double", "quadruple"):
+        raise argparse.ArgumentTypeError(f"'{text}' is not like double=PATH")
+    return precision, Path(path)
 
 
 def _numbers(text: str) -> list[int]:
@@ -154,6 +177,22 @@ def _costs(options: argparse.Namespace) -> None:
     study = Study(options.program, options.inputs, options.output, options.threads)
     samples = measure_costs(study, options.repeats, say=_say)
     print(write_costs(samples, options.output).document("text"), end="")
+
+
+def _workprecision(options: argparse.Namespace) -> None:
+    from .precision_report import write_precision_report
+    from .precision_samples import Study
+    from .precision_scenes import SCENES
+
+    unknown = [name for name in options.scenes if name not in SCENES]
+    if unknown:
+        raise ResultError(f"there is no scene {', '.join(unknown)}; there are {', '.join(SCENES)}")
+    if options.repeats < 1:
+        raise ResultError("--repeats takes a number of at least 1")
+    if not options.report_only:
+        study = Study(options.output, dict(options.program), _say)
+        study.measure([SCENES[name] for name in options.scenes or SCENES], options.repeats)
+    print(write_precision_report(options.output)[-1])
 
 
 def _say(line: str) -> None:
