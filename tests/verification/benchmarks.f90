@@ -1,0 +1,54 @@
+!> The list of the verification benchmarks, the only file that knows all of them.
+!>
+!> To add one: write a module with a procedure that fills the table (see `b09_stopping.f90`), and name it here and in
+!> `CMakeLists.txt`.
+module benchmarks
+   use b01_free_flight, only: run_free_flight
+   use b02_mass_properties, only: run_mass_properties
+   use b03_momentum, only: run_momentum
+   use b08_incline, only: run_incline
+   use b09_stopping, only: run_stopping
+   use s32_flat_impact, only: run_flat_impact
+   use s33_corner_impact, only: run_corner_impact
+   use s34_oblique_impact, only: run_oblique_impact
+   use verification_table, only: table_t
+   implicit none
+   private
+   public :: benchmark_names, run_benchmark
+
+   !> Names in the order in which they run
+   character(len=8), parameter :: benchmark_names(*) = [character(len=8) :: 'B1', 'B2', 'B3', '3.2', '3.3', '3.4', &
+                                                        'B8', 'B9']
+
+contains
+
+   !> Run one benchmark.
+   subroutine run_benchmark(name, table, thorough)
+      !> One of benchmark_names
+      character(len=*), intent(in) :: name
+      !> Table to fill
+      type(table_t), intent(inout) :: table
+      !> Whether to run the long version
+      logical, intent(in) :: thorough
+
+      select case (name)
+      case ('B1')
+         call run_free_flight(table, thorough)
+      case ('B2')
+         call run_mass_properties(table, thorough)
+      case ('B3')
+         call run_momentum(table, thorough)
+      case ('3.2')
+         call run_flat_impact(table, thorough)
+      case ('3.3')
+         call run_corner_impact(table)
+      case ('3.4')
+         call run_oblique_impact(table)
+      case ('B8')
+         call run_incline(table, thorough)
+      case ('B9')
+         call run_stopping(table)
+      end select
+   end subroutine run_benchmark
+
+end module benchmarks
