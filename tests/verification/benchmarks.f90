@@ -8,6 +8,11 @@ module benchmarks
    use b03_momentum, only: run_momentum
    use b08_incline, only: run_incline
    use b09_stopping, only: run_stopping
+   use b11_sliding_to_rolling, only: run_sliding_to_rolling
+   use b12_rolling_polygons, only: run_rolling_polygons
+   use b13_rocking_block, only: run_rocking_block
+   use b14_stack, only: run_stack
+   use b15_overhang, only: run_overhang
    use s32_flat_impact, only: run_flat_impact
    use s33_corner_impact, only: run_corner_impact
    use s34_oblique_impact, only: run_oblique_impact
@@ -18,7 +23,7 @@ module benchmarks
 
    !> Names in the order in which they run
    character(len=8), parameter :: benchmark_names(*) = [character(len=8) :: 'B1', 'B2', 'B3', '3.2', '3.3', '3.4', &
-                                                        'B8', 'B9']
+                                                        'B8', 'B9', 'B11', 'B12', 'B13', 'B14', 'B15']
 
 contains
 
@@ -48,6 +53,16 @@ contains
          call run_incline(table, thorough)
       case ('B9')
          call run_stopping(table)
+      case ('B11')
+         call run_sliding_to_rolling(table)
+      case ('B12')
+         call run_rolling_polygons(table, thorough)
+      case ('B13')
+         call run_rocking_block(table, thorough)
+      case ('B14')
+         call run_stack(table, thorough)
+      case ('B15')
+         call run_overhang(table, thorough)
       end select
    end subroutine run_benchmark
 
