@@ -4,6 +4,7 @@
 !> R^2 cos(2 pi/n))/J, J = I + m R^2. From corner to corner the centre falls by s sin(a), s = 2 R sin(pi/n), so that J
 !> w-^2/2 = J (eta w-)^2/2 + m g s sin(a) in the steady state: w-^2 = 2 m g s sin(a)/(J (1 - eta^2)). It goes on if
 !> the body gets over its corner, J (eta w-)^2/2 > m g R (1 - cos(pi/n - a)); for squares at 15 degrees it does not.
+!> And it must not fly: w-^2 R is less than g cos(a + pi/n) here, which 12 and 16 corners are only on a gentle slope.
 !>
 !> That takes it that the impact acts on the next corner alone. So corners land on narrow supports in a row, which
 !> reach under a face by 1 % of it at either end; on a plane the force of a soft face passes from corner to corner
@@ -23,7 +24,6 @@ module b12_rolling_polygons
    public :: run_rolling_polygons
 
    real(wp), parameter :: radius = 0.01_wp
-   real(wp), parameter :: slope = pi/12.0_wp
 
 contains
 
@@ -34,42 +34,44 @@ contains
       !> Five polygons instead of one, wider supports and a plane, and a square
       logical, intent(in) :: thorough
       integer, parameter :: corners(*) = [5, 6, 8, 12, 16]
+      real(wp), parameter :: slopes(*) = [15.0_wp, 15.0_wp, 15.0_wp, 6.0_wp, 6.0_wp]
       integer :: k
 
-      call table%begin('B12', 'regular polygons of radius 1 cm roll down 15 degrees')
+      call table%begin('B12', 'regular polygons of radius 1 cm roll down a slope')
       if (.not. thorough) then
-         call compare(table, 8, 'on supports, E = 1e8', 0.01_wp, 1.0e8_wp, 40.0_wp, .true.)
+         call compare(table, 8, 15.0_wp, 'on supports, E = 1e8', 0.01_wp, 1.0e8_wp, 40.0_wp, .true.)
          return
       end if
       do k = 1, size(corners)
-         call compare(table, corners(k), 'on supports', 0.01_wp, 1.0e9_wp, 40.0_wp, .true.)
+         call compare(table, corners(k), slopes(k), 'on supports', 0.01_wp, 1.0e9_wp, 40.0_wp, .true.)
       end do
-      call compare(table, 5, 'on supports three times as wide', 0.03_wp, 1.0e9_wp, 20.0_wp, .false.)
-      call compare(table, 8, 'on a plane', 0.5_wp, 1.0e9_wp, 2.0_wp, .false.)
+      call compare(table, 5, 15.0_wp, 'on supports three times as wide', 0.03_wp, 1.0e9_wp, 20.0_wp, .false.)
+      call compare(table, 8, 15.0_wp, 'on a plane', 0.5_wp, 1.0e9_wp, 2.0_wp, .false.)
       call stop_square(table)
    end subroutine run_rolling_polygons
 
    !> `under` is how far a support reaches under a face, as a share of it; one half makes a plane.
-   subroutine compare(table, n, floor, under, young, damping, must_hold)
+   subroutine compare(table, n, degrees, floor, under, young, damping, must_hold)
       type(table_t), intent(inout) :: table
       integer, intent(in) :: n
       character(len=*), intent(in) :: floor
-      real(wp), intent(in) :: under, young, damping
+      real(wp), intent(in) :: degrees, under, young, damping
       logical, intent(in) :: must_hold
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error
-      real(wp) :: expected, before
+      real(wp) :: slope, expected, before
       character(len=:), allocatable :: name
 
-      expected = steady_rate(n)
+      slope = degrees*pi/180.0_wp
+      expected = steady_rate(n, slope)
       ! After 2 n impacts the memory of the start, a tenth too slow, is gone as eta^(4 n): less than 0.002 of it is
       ! left.
-      call put_on_slope(n, 0.9_wp*survival(n)*expected, under, young, damping, simulation, error)
+      call put_on_slope(n, slope, 0.9_wp*survival(n)*expected, under, young, damping, simulation, error)
       if (.not. allocated(error)) call roll(simulation, n, 1, 2*n, before, error)
       if (.not. allocated(error)) call roll(simulation, n, 2*n + 1, 3*n, before, error)
       call table%note_error(error)
       if (allocated(error)) return
-      name = to_text(n)//' corners '//floor//': rate before an impact [1/s]'
+      name = to_text(n)//' corners, '//to_text(nint(degrees))//' degrees, '//floor//': rate before an impact [1/s]'
       if (must_hold) then
          call table%expect_relative(name, expected, before, 0.05_wp)
       else
@@ -106,7 +108,8 @@ contains
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error
 
-      call put_on_slope(4, survival(4)*steady_rate(4), 0.01_wp, 1.0e9_wp, 40.0_wp, simulation, error)
+      call put_on_slope(4, pi/12.0_wp, survival(4)*steady_rate(4, pi/12.0_wp), 0.01_wp, 1.0e9_wp, 40.0_wp, &
+                        simulation, error)
       if (.not. allocated(error)) call steps(simulation, nint(0.3_wp/simulation%dt), error)
       call table%note_error(error)
       if (allocated(error)) return
@@ -117,9 +120,9 @@ contains
 
    !> A polygon with a face on the slope, which begins to turn clockwise about its lower corner, and supports under the
    !> corners to come.
-   subroutine put_on_slope(n, rate, under, young, damping, simulation, error)
+   subroutine put_on_slope(n, slope, rate, under, young, damping, simulation, error)
       integer, intent(in) :: n
-      real(wp), intent(in) :: rate, under, young, damping
+      real(wp), intent(in) :: slope, rate, under, young, damping
       type(simulation_t), intent(out) :: simulation
       type(error_t), allocatable, intent(inout) :: error
       type(body_list_t) :: list
@@ -152,8 +155,9 @@ contains
    end function survival
 
    !> Rate before an impact in the steady state [1/s]
-   pure real(wp) function steady_rate(n)
+   pure real(wp) function steady_rate(n, slope)
       integer, intent(in) :: n
+      real(wp), intent(in) :: slope
 
       steady_rate = sqrt(4.0_wp*gravity*sin(pi/real(n, wp))*sin(slope)/(radius*(1.0_wp + inertia_ratio(n)) &
                                                                          *(1.0_wp - survival(n)**2)))

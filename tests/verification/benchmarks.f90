@@ -13,6 +13,9 @@ module benchmarks
    use b13_rocking_block, only: run_rocking_block
    use b14_stack, only: run_stack
    use b15_overhang, only: run_overhang
+   use b16_arch, only: run_arch
+   use b17_dominoes, only: run_dominoes
+   use b18_cooling_gas, only: run_cooling_gas
    use s32_flat_impact, only: run_flat_impact
    use s33_corner_impact, only: run_corner_impact
    use s34_oblique_impact, only: run_oblique_impact
@@ -22,8 +25,8 @@ module benchmarks
    public :: benchmark_names, run_benchmark
 
    !> Names in the order in which they run
-   character(len=8), parameter :: benchmark_names(*) = [character(len=8) :: 'B1', 'B2', 'B3', '3.2', '3.3', '3.4', &
-                                                        'B8', 'B9', 'B11', 'B12', 'B13', 'B14', 'B15']
+   character(len=8), parameter :: benchmark_names(*) = [character(len=8) :: &
+      'B1', 'B2', 'B3', '3.2', '3.3', '3.4', 'B8', 'B9', 'B11', 'B12', 'B13', 'B14', 'B15', 'B16', 'B17', 'B18']
 
 contains
 
@@ -63,6 +66,12 @@ contains
          call run_stack(table, thorough)
       case ('B15')
          call run_overhang(table, thorough)
+      case ('B16')
+         call run_arch(table, thorough)
+      case ('B17')
+         call run_dominoes(table, thorough)
+      case ('B18')
+         call run_cooling_gas(table, thorough)
       end select
    end subroutine run_benchmark
 
