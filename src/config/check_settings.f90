@@ -14,6 +14,8 @@ module polydem_check_settings
    !> Greatest length of a container in grains; more are neither counted nor boxed in a reasonable time
    real(wp), parameter :: length_limit = 1.0e5_wp
    real(wp), parameter :: two_pi = 6.283185307179586_wp
+   !> Least restitution; below, the stable step falls like its root, and a step that resolves the impact with it
+   real(wp), parameter :: least_restitution = 0.01_wp
 
    !> Scenes of grains in a container whose width is not that of a block
    character(len=*), parameter :: grain_scenes(4) = [character(len=6) :: 'hopper', 'gas', 'bed', 'heap']
@@ -53,6 +55,12 @@ contains
                'must be given, or else', 'boxes', 'bodies', values, error)
             call require(scene%boxes == 0 .or. scene%bodies == 0, &
                'must be 0, or else', 'boxes', 'bodies', values, error)
+         end if
+      end associate
+      associate (given => values(first_row('forces', 'restitution')))
+         if (given%in_force .and. settings%forces%restitution < least_restitution) then
+            call raise(error, input_error, given%place//': ''restitution'' in &forces cannot be less than 0.01, '// &
+               'since no dashpot reaches 0 and the step falls with it; leave it out for ''damping_coefficient''')
          end if
       end associate
    end subroutine check_settings

@@ -144,10 +144,15 @@ module polydem_namelist_entries
       'Acceleration of gravity'), &
       entry_t('forces', 'stiffness', 'real', 1, '1e7', 'N/m2', '> 0, <= 1e30', '', &
       'Young''s modulus E in two dimensions'), &
-      entry_t('forces', 'damping', 'word', 1, 'rate', '', 'rate book none', '', &
-      'Normal damping by the exact rate of the area, by backward difference as in the book, or none'), &
-      entry_t('forces', 'damping_coefficient', 'real', 1, '0.0251', '', '>= 0, <= 1e6', 'damping: rate book', &
-      'Damping coefficient gamma'), &
+      entry_t('forces', 'law', 'word', 1, 'area', '', 'area conservative', '', &
+      'Elastic force: E A/l of the book, or the one with the energy E A^2/(2 l b)'), &
+      entry_t('forces', 'damping', 'word', 1, 'rate', '', 'rate hunt_crossley book none', '', &
+      'Normal damping by the rate of the area, by that times the elastic force, as in the book, or none'), &
+      entry_t('forces', 'damping_coefficient', 'real', 1, '0.0251', '', '>= 0, <= 1e6', &
+      'damping: rate hunt_crossley book', &
+      'Damping coefficient gamma; some hundreds with hunt_crossley, which takes little at low speed'), &
+      entry_t('forces', 'restitution', 'real', 1, '0', '', '>= 0, <= 1', 'damping: rate', &
+      'Restitution of flat contacts, 0.01 to 1, in place of `damping_coefficient`; left out: by the latter'), &
       entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack none', '', &
       'Friction law'), &
       entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', 'friction: cundall_strack', &

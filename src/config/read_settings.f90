@@ -5,6 +5,7 @@
 module polydem_read_settings
    use polydem_check_settings, only: check_settings
    use polydem_errors, only: error_t
+   use polydem_exclusive_entries, only: settle_exclusive_entries
    use polydem_fill_settings, only: fill_settings
    use polydem_namelist_tokens, only: source_t
    use polydem_namelist_values, only: value_t
@@ -52,6 +53,8 @@ contains
       source%name = trim(file_name)
       source%text = text
       call resolve_entries(source, .false., overrides, values, error)
+      if (allocated(error)) return
+      call settle_exclusive_entries(values, error)
       if (allocated(error)) return
       settings%file = trim(file_name)
       settings%text = with_plain_line_ends(text)

@@ -106,10 +106,14 @@ module polydem_settings
       real(wp) :: gravity(2)
       !> Young's modulus E in two dimensions [N/m2]
       real(wp) :: stiffness
-      !> Normal damping: 'rate', 'book' or 'none'
+      !> Elastic force: 'area' or 'conservative'
+      character(len=:), allocatable :: law
+      !> Normal damping: 'rate', 'hunt_crossley', 'book' or 'none'
       character(len=:), allocatable :: damping
       !> Dimensionless damping coefficient gamma
       real(wp) :: damping_coefficient
+      !> Restitution of a flat contact, in place of the damping coefficient; 0: not given
+      real(wp) :: restitution
       !> Friction: 'cundall_strack' or 'none'
       character(len=:), allocatable :: friction
       !> Friction coefficient mu

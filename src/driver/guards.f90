@@ -8,7 +8,7 @@ module polydem_guards
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: motion_guard_t, new_motion_guard, check_motion, check_step, check_contacts
+   public :: motion_guard_t, new_motion_guard, check_places, check_motion, check_step, check_contacts
 
    !> What is needed to see whether bodies move too far in a step
    type :: motion_guard_t
@@ -47,6 +47,47 @@ contains
          guard%limit = min(guard%limit, move_share*thickness)
       end do
    end subroutine new_motion_guard
+
+   !> Stop if a body is nowhere, before anybody looks for it by its place.
+   subroutine check_places(guard, bodies, step, error)
+      !> The guard
+      type(motion_guard_t), intent(in) :: guard
+      !> Bodies in the middle of a step
+      type(bodies_t), intent(in) :: bodies
+      !> Number of the step
+      integer(lp), intent(in) :: step
+      !> Names body and step
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: k
+      logical :: good
+
+      good = .true.
+      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp    shared(guard, bodies) private(k) reduction(.and.:good)
+      do k = 1_ip, size(guard%moving, kind=ip)
+         good = good .and. is_somewhere(bodies, guard%moving(k))
+      end do
+      !$omp end parallel do
+      if (good) return
+      do k = 1_ip, size(guard%moving, kind=ip)
+         associate (s => guard%moving(k))
+            if (is_somewhere(bodies, s)) cycle
+            call raise(error, run_error, 'step '//to_text(step)//': body '//to_text(bodies%id(s))//' at ('// &
+                       to_text(bodies%position(1, s))//', '//to_text(bodies%position(2, s))//') m, turned by '// &
+                       to_text(bodies%angle(s))//', is nowhere: these must be finite numbers. Look at its '// &
+                       'velocity and forces in the step before')
+         end associate
+         return
+      end do
+   end subroutine check_places
+
+   !> Whether place and angle of a body are finite
+   pure logical function is_somewhere(bodies, s)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+
+      is_somewhere = ieee_is_finite(bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s))
+   end function is_somewhere
 
    !> Stop if a body has left the finite numbers or moves too far in a step.
    subroutine check_motion(guard, bodies, step, dt, error)
@@ -95,7 +136,7 @@ contains
 
       move = dt*(abs(bodies%velocity(1, s)) + abs(bodies%velocity(2, s)) &
                  + guard%radius(s)*abs(bodies%angular_velocity(s)))
-      is_good = ieee_is_finite(move + (bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s)))
+      is_good = ieee_is_finite(move) .and. is_somewhere(bodies, s)
       if (is_good) is_good = move <= guard%limit
    end function is_good
 

@@ -8,7 +8,7 @@ module polydem_simulation
    use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_find_contacts, only: find_contacts
    use polydem_force_law, only: evaluate_law, force_law_t, new_force_law
-   use polydem_guards, only: check_contacts, check_motion, check_step, motion_guard_t, new_motion_guard
+   use polydem_guards, only: check_contacts, check_motion, check_places, check_step, motion_guard_t, new_motion_guard
    use polydem_integrator, only: integrator_t
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, lp, wp
@@ -106,7 +106,7 @@ contains
       self%settings = settings
       self%bodies = bodies
       self%motions = motions
-      call new_force_law(settings%forces, self%law)
+      call new_force_law(settings%forces, self%bodies, self%law)
       call new_integrator(settings%integrate, self%integrator)
       call choose_step(self, error)
       if (allocated(error)) return
@@ -138,6 +138,8 @@ contains
       call self%timers%start()
       call self%integrator%predict(self%dt, self%bodies)
       call move_walls(self, time_of(self))
+      call check_places(self%guard, self%bodies, self%step, error)
+      if (allocated(error)) return
       call turn_bodies(self%bodies, self%moving)
       call self%timers%lap(stage_integrate)
       call find_and_push(self, self%dt, error)

@@ -26,14 +26,14 @@ module polydem_area_law
 
 contains
 
-   !> Set the characteristic length and add the elastic force.
+   !> Set the characteristic length and add the elastic force, which acts at the centroid of the overlap.
    subroutine add(self, bodies, dt, contacts, memory)
       class(area_law_t), intent(in) :: self
       !> Bodies (not used: all that matters is in the contacts)
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
-      !> Contacts; `inverse_length`, `elastic` and `normal_force` change
+      !> Contacts; `inverse_length`, `lever`, `elastic` and `normal_force` change
       type(contacts_t), intent(inout) :: contacts
       !> Memory of the pairs (not used)
       type(contact_memory_t), intent(inout) :: memory
@@ -42,6 +42,7 @@ contains
 
       associate (unused_bodies => bodies, unused_dt => dt, unused_memory => memory)
       end associate
+      contacts%energy_is_quadratic = .false.
       !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
       !$omp    shared(self, contacts) private(c, r1, r2, length, force)
       do c = 1_ip, contacts%n
@@ -51,6 +52,7 @@ contains
          if (is_degenerate(contacts, c)) length = contacts%length(c)
          if (r1 + r2 > 0.0_wp) length = max(length, 4.0_wp*r1*r2/(r1 + r2))
          contacts%inverse_length(c) = 1.0_wp/length
+         contacts%lever(c) = 0.0_wp
          force = self%stiffness*contacts%area(c)*contacts%inverse_length(c)
          contacts%elastic(c) = contacts%elastic(c) + force
          contacts%normal_force(c) = contacts%normal_force(c) + force

@@ -6,11 +6,14 @@ module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
    use polydem_book_damping, only: book_damping_t
+   use polydem_conservative_law, only: conservative_law_t, new_conservative_law
    use polydem_contacts, only: contact_memory_t, contacts_t
    use polydem_cundall_strack, only: cundall_strack_t
    use polydem_force_part, only: force_part_t
+   use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
    use polydem_rate_damping, only: rate_damping_t
+   use polydem_restitution_damping, only: damping_ratio_of, restitution_damping_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -36,24 +39,24 @@ module polydem_force_law
 contains
 
    !> Make the law that the settings ask for; what is off is absent.
-   subroutine new_force_law(settings, law)
+   subroutine new_force_law(settings, bodies, law)
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
+      !> Bodies, for their shapes
+      type(bodies_t), intent(in) :: bodies
       !> The law
       type(force_law_t), intent(out) :: law
+      type(conservative_law_t) :: conservative
 
       allocate (law%parts(0))
-      law%description = 'area law'
-      call append(law, area_law_t(stiffness=settings%stiffness))
-      select case (settings%damping)
-      case ('rate')
-         call append(law, rate_damping_t(stiffness=settings%stiffness, coefficient=settings%damping_coefficient))
-         law%description = law%description//', rate damping'
-      case ('book')
-         call append(law, book_damping_t(stiffness=settings%stiffness, coefficient=settings%damping_coefficient))
-         law%description = law%description//', book damping'
-         law%needs_area = .true.
-      end select
+      law%description = settings%law//' law'
+      if (settings%law == 'conservative') then
+         call new_conservative_law(settings%stiffness, bodies, conservative)
+         call append(law, conservative)
+      else
+         call append(law, area_law_t(stiffness=settings%stiffness))
+      end if
+      call append_damping(settings, law)
       if (settings%friction == 'cundall_strack') then
          call append(law, cundall_strack_t(coefficient=settings%friction_coefficient, &
                                            stiffness=settings%tangential_stiffness*settings%stiffness, &
@@ -62,6 +65,32 @@ contains
          law%needs_tangential = .true.
       end if
    end subroutine new_force_law
+
+   subroutine append_damping(settings, law)
+      type(forces_settings_t), intent(in) :: settings
+      type(force_law_t), intent(inout) :: law
+
+      associate (stiffness => settings%stiffness, coefficient => settings%damping_coefficient)
+         select case (settings%damping)
+         case ('rate')
+            if (settings%restitution > 0.0_wp) then
+               call append(law, restitution_damping_t(stiffness=stiffness, &
+                                                      ratio=damping_ratio_of(settings%restitution)))
+               law%description = law%description//', damping of given restitution'
+            else
+               call append(law, rate_damping_t(stiffness=stiffness, coefficient=coefficient))
+               law%description = law%description//', rate damping'
+            end if
+         case ('hunt_crossley')
+            call append(law, hunt_crossley_t(stiffness=stiffness, coefficient=coefficient))
+            law%description = law%description//', Hunt-Crossley damping'
+         case ('book')
+            call append(law, book_damping_t(stiffness=stiffness, coefficient=coefficient))
+            law%description = law%description//', book damping'
+            law%needs_area = .true.
+         end select
+      end associate
+   end subroutine append_damping
 
    !> Compute the normal and tangential forces of all contacts.
    subroutine evaluate_law(law, bodies, dt, contacts, memory)

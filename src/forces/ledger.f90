@@ -3,7 +3,8 @@
 !> Work is the sum over steps of power times step (trapezoids between force evaluations): of the elastic
 !> normal forces, of damping and of friction (all contacts; usually negative), and of moving walls. With the
 !> potential of gravity, kinetic + potential - work stays constant up to the error of integration. The area law has
-!> no potential energy, so its elastic work does not return to zero when contacts open.
+!> no potential energy, so its elastic work does not return to zero when contacts open. That of the conservative law is
+!> no sum over steps but the energy that the contacts had at the start, less what they have now.
 !>
 !> Impulses of gravity and of the fixed bodies are summed likewise. For velocity Verlet these sums equal the
 !> change of momentum and angular momentum exactly, so that their residuals are rounding errors, if
@@ -19,8 +20,8 @@ module polydem_ledger
    public :: ledger_t, balance_t, open_ledger, book_step, balance_of
 
    !> Rates: power of elastic, damping and friction forces and of walls; force along x and y and torque from outside;
-   !> the sums of the absolute values of all forces and torques from outside
-   integer, parameter :: n_rates = 9
+   !> the sums of the absolute values of all forces and torques from outside. Last, no rate: the elastic energy
+   integer, parameter :: n_rates = 10
 
    !> Accumulated work and impulses
    type :: ledger_t
@@ -40,6 +41,8 @@ module polydem_ledger
       real(wp), private :: start(4) = 0.0_wp
       !> Rates at the last evaluation, in the order of n_rates
       real(wp), private :: rate(n_rates) = 0.0_wp
+      !> Elastic energy of the contacts at the start, if they have one [J/m]
+      real(wp), private :: elastic_start = 0.0_wp
       !> Greatest kinetic energy so far, the scale of the residual [J/m]
       real(wp), private :: energy_scale = 0.0_wp
       !> Sums of absolute impulses so far, the scales of the residuals
@@ -92,6 +95,7 @@ contains
       ledger%impulse_scale = abs(momentum(1)) + abs(momentum(2))
       ledger%angular_scale = abs(angular_momentum)
       ledger%rate = rates(gravity, bodies, contacts)
+      ledger%elastic_start = ledger%rate(n_rates)
    end subroutine open_ledger
 
    !> Book one step; call it after the forces of the step are known.
@@ -111,6 +115,7 @@ contains
       now = rates(gravity, bodies, contacts)
       change = (0.5_wp*dt)*(ledger%rate + now)
       ledger%elastic_work = ledger%elastic_work + change(1)
+      if (contacts%energy_is_quadratic) ledger%elastic_work = ledger%elastic_start - now(n_rates)
       ledger%damping_work = ledger%damping_work + change(2)
       ledger%friction_work = ledger%friction_work + change(3)
       ledger%wall_work = ledger%wall_work + change(4)
@@ -159,7 +164,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
       real(wp) :: rate(n_rates), torque
-      real(wp) :: partial(3, (contacts%n + block - 1_ip)/block)
+      real(wp) :: partial(4, (contacts%n + block - 1_ip)/block)
       integer(ip) :: b, n_blocks, s
 
       n_blocks = size(partial, 2, kind=ip)
@@ -171,7 +176,7 @@ contains
       !$omp end parallel do
       rate = 0.0_wp
       do b = 1_ip, n_blocks
-         rate(1:3) = rate(1:3) + partial(:, b)
+         rate([1, 2, 3, n_rates]) = rate([1, 2, 3, n_rates]) + partial(:, b)
       end do
       do s = 1_ip, bodies%n
          if (bodies%fixed(s)) then
@@ -193,12 +198,12 @@ contains
       end do
    end function rates
 
-   !> Power of the elastic, damping and friction forces of some contacts [W/m]
+   !> Power of the elastic, damping and friction forces of some contacts [W/m], and their elastic energy [J/m]
    pure function contact_power(bodies, contacts, low, high) result(power)
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: low, high
-      real(wp) :: power(3)
+      real(wp) :: power(4)
       real(wp) :: vx, vy, approach
       integer(ip) :: c
 
@@ -210,12 +215,16 @@ contains
             vy = (bodies%velocity(2, i) + bodies%angular_velocity(i)*contacts%arm_first(1, c)) &
                - (bodies%velocity(2, j) + bodies%angular_velocity(j)*contacts%arm_second(1, c))
          end associate
-         approach = contacts%direction(1, c)*vx + contacts%direction(2, c)*vy
+         approach = contacts%direction(1, c)*vx + contacts%direction(2, c)*vy &
+            + contacts%lever(c)*(bodies%angular_velocity(contacts%first(c)) &
+                                 - bodies%angular_velocity(contacts%second(c)))
          power(1) = power(1) + contacts%elastic(c)*approach
          power(2) = power(2) + (contacts%normal_force(c) - contacts%elastic(c))*approach
          power(3) = power(3) + contacts%tangential_force(c) &
             *(contacts%direction(1, c)*vy - contacts%direction(2, c)*vx)
+         power(4) = power(4) + 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)
       end do
+      if (.not. contacts%energy_is_quadratic) power(4) = 0.0_wp
    end function contact_power
 
    subroutine measure(gravity, bodies, kinetic, potential, momentum, angular_momentum)

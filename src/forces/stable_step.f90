@@ -1,15 +1,20 @@
 !> The largest stable time step, from actual contacts or, before there are any, from the shapes of the bodies.
 !>
-!> Each contact is an element of its own: with the normal stiffness K_n = E L/l, the tangential stiffness K_t and the
+!> Each contact is an element of its own: with the normal stiffness K_n, the tangential stiffness K_t and the
 !> mobilities G of its two bodies, each mass shared among the n contacts that it carries, the greatest
 !> eigenvalue of K^(1/2) G K^(1/2) is an upper bound of the square of the frequencies of the whole (element
 !> bound; in the spirit of C. O'Sullivan & J.D. Bray, Eng. Comput. 21 (2004) 278). The integrator says which
 !> product of frequency and step it stands, as a function of the damping ratio.
+!>
+!> K_n = E L/l, where l is that of the area law or l b/L (see `conservative_law`). The force of the latter steepens as
+!> L grows with the depth: the root of the overlap area of convex bodies is a concave function of their
+!> displacement (Brunn and Minkowski), so A'' <= A'^2/(2 A), and the stiffness is at most 3/2 of that value.
 module polydem_stable_step
    use polydem_assemble, only: incidence_t
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
+   use polydem_restitution_damping, only: damping_ratio_of
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -25,6 +30,8 @@ module polydem_stable_step
 
    !> Contacts per pair of bodies assumed before there are any: two equal bodies with four each
    real(wp), parameter :: assumed_contacts = 8.0_wp
+   !> Greatest stiffness of a contact of the conservative law over that of a face of the same length
+   real(wp), parameter :: steepening = 1.5_wp
 
 contains
 
@@ -44,13 +51,14 @@ contains
       real(wp), intent(out) :: step
       !> The contact that sets it, 0 if there is none
       integer(ip), intent(out) :: critical
-      real(wp) :: this
+      real(wp) :: damping_ratio, this
       integer(ip) :: c
 
       step = huge(step)
       critical = 0_ip
+      damping_ratio = damping_ratio_asked_for(settings)
       do c = 1_ip, contacts%n
-         this = step_of_contact(settings, table, bodies, incidence, contacts, c)
+         this = step_of_contact(settings, damping_ratio, table, bodies, incidence, contacts, c)
          if (this < step) then
             step = this
             critical = c
@@ -60,7 +68,7 @@ contains
 
    !> Stable step expected from the shapes of the free bodies [s], and the body that sets it.
    !>
-   !> A face contact on the longest edge: K_n = E times that edge over twice its distance from the centre.
+   !> A face contact on the longest edge: l is twice its distance from the centre, or the area over the edge.
    subroutine stable_step_of_shapes(settings, table, bodies, step, critical)
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
@@ -72,18 +80,20 @@ contains
       real(wp), intent(out) :: step
       !> Slot of the body that sets it, 0 if there is none
       integer(ip), intent(out) :: critical
-      real(wp) :: ratio, square, g_nn, g_tt, this
+      real(wp) :: damping_ratio, ratio, square, g_nn, g_tt, k_n, c_n, this
       integer(ip) :: k, s
 
       step = huge(step)
       critical = 0_ip
+      damping_ratio = damping_ratio_asked_for(settings)
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
-         call shape_of_body(bodies, s, ratio, square)
+         call shape_of_body(settings%law, bodies, s, ratio, square)
          g_nn = assumed_contacts*bodies%inverse_mass(s)
          g_tt = assumed_contacts*(bodies%inverse_mass(s) + square*bodies%inverse_inertia(s))
-         this = step_of_element(settings, table, ratio, [g_nn, g_tt, 0.0_wp], &
-                                0.5_wp*bodies%mass(s), 1.0_wp/(g_tt/assumed_contacts))
+         k_n = settings%stiffness*ratio
+         c_n = dashpot(settings, damping_ratio, ratio, 0.5_wp*bodies%mass(s))
+         this = step_of_element(settings, table, k_n, c_n, [g_nn, g_tt, 0.0_wp], 1.0_wp/(g_tt/assumed_contacts))
          if (this < step) then
             step = this
             critical = s
@@ -91,22 +101,33 @@ contains
       end do
    end subroutine stable_step_of_shapes
 
-   real(wp) function step_of_contact(settings, table, bodies, incidence, contacts, c)
+   real(wp) function step_of_contact(settings, damping_ratio, table, bodies, incidence, contacts, c)
       type(forces_settings_t), intent(in) :: settings
+      !> Damping ratio of all contacts, if a restitution is given
+      real(wp), intent(in) :: damping_ratio
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
       type(incidence_t), intent(in) :: incidence
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: c
-      real(wp) :: g(3), alone(3), mobility
+      real(wp) :: g(3), alone(3), mobility, ratio, k_n, c_n
 
       g = 0.0_wp
       alone = 0.0_wp
       call add_body(contacts%first(c), contacts%arm_first(:, c))
       call add_body(contacts%second(c), contacts%arm_second(:, c))
       mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
-      step_of_contact = step_of_element(settings, table, contacts%length(c)*contacts%inverse_length(c), g, &
-                                        1.0_wp/mobility, 1.0_wp/alone(2))
+      ratio = contacts%length(c)*contacts%inverse_length(c)
+      k_n = settings%stiffness*ratio
+      if (settings%law == 'conservative') k_n = steepening*k_n
+      c_n = dashpot(settings, damping_ratio, ratio, 1.0_wp/mobility)
+      if (settings%damping == 'hunt_crossley') then
+         ! Both the stiffness and the dashpot follow the force of the moment.
+         if (contacts%normal_force(c) > contacts%elastic(c)) k_n = k_n*(contacts%normal_force(c)/contacts%elastic(c))
+         c_n = settings%damping_coefficient*sqrt(1.0_wp/(mobility*settings%stiffness))*contacts%elastic(c)*ratio &
+            /max(contacts%length(c), sqrt(contacts%area(c)))
+      end if
+      step_of_contact = step_of_element(settings, table, k_n, c_n, g, 1.0_wp/alone(2))
 
    contains
 
@@ -117,7 +138,7 @@ contains
          real(wp) :: along, across, mine(3)
 
          if (bodies%fixed(s)) return
-         across = arm(1)*contacts%direction(2, c) - arm(2)*contacts%direction(1, c)
+         across = arm(1)*contacts%direction(2, c) - arm(2)*contacts%direction(1, c) + contacts%lever(c)
          along = arm(1)*contacts%direction(1, c) + arm(2)*contacts%direction(2, c)
          mine(1) = bodies%inverse_mass(s) + across*across*bodies%inverse_inertia(s)
          mine(2) = bodies%inverse_mass(s) + along*along*bodies%inverse_inertia(s)
@@ -137,22 +158,19 @@ contains
    end function contacts_of
 
    !> Stable step of one element [s].
-   pure real(wp) function step_of_element(settings, table, ratio, g, mass_normal, mass_tangential)
+   pure real(wp) function step_of_element(settings, table, k_n, c_n, g, mass_tangential)
       type(forces_settings_t), intent(in) :: settings
       type(stability_table_t), intent(in) :: table
-      !> L/l of the contact
-      real(wp), intent(in) :: ratio
+      !> Normal stiffness [N/m2] and dashpot [N s/m2]
+      real(wp), intent(in) :: k_n, c_n
       !> Mobilities: normal, tangential, mixed [m/kg]
       real(wp), intent(in) :: g(3)
-      !> Effective masses of the damping [kg/m]
-      real(wp), intent(in) :: mass_normal, mass_tangential
-      real(wp) :: k_n, k_t, c_n, c_t, a, b, frequency, damping
+      !> Effective mass of the tangential damping [kg/m]
+      real(wp), intent(in) :: mass_tangential
+      real(wp) :: k_t, c_t, a, b, frequency, damping
 
-      k_n = settings%stiffness*ratio
       k_t = 0.0_wp
-      c_n = 0.0_wp
       c_t = 0.0_wp
-      if (settings%damping /= 'none') c_n = settings%damping_coefficient*sqrt(mass_normal*settings%stiffness)*ratio
       if (settings%friction /= 'none') then
          k_t = settings%tangential_stiffness*settings%stiffness
          c_t = settings%tangential_damping*sqrt(mass_tangential*k_t)
@@ -163,6 +181,33 @@ contains
       damping = 0.5_wp*max(c_n*g(1), c_t*g(2))/frequency
       step_of_element = limit_at(table, damping)/frequency
    end function step_of_element
+
+   !> Damping ratio of a given restitution, 0 if there is none
+   pure real(wp) function damping_ratio_asked_for(settings) result(damping_ratio)
+      type(forces_settings_t), intent(in) :: settings
+
+      damping_ratio = 0.0_wp
+      if (settings%restitution > 0.0_wp) damping_ratio = damping_ratio_of(settings%restitution)
+   end function damping_ratio_asked_for
+
+   !> Normal damping of a contact per unit of velocity [N s/m2], as far as its force does not matter
+   pure real(wp) function dashpot(settings, damping_ratio, ratio, mass)
+      type(forces_settings_t), intent(in) :: settings
+      !> Damping ratio, if a restitution is given
+      real(wp), intent(in) :: damping_ratio
+      !> L/l of the contact
+      real(wp), intent(in) :: ratio
+      !> Effective mass [kg/m]
+      real(wp), intent(in) :: mass
+
+      if (settings%damping == 'none' .or. settings%damping == 'hunt_crossley') then
+         dashpot = 0.0_wp
+      else if (settings%restitution > 0.0_wp) then
+         dashpot = 2.0_wp*damping_ratio*sqrt(mass*settings%stiffness)*sqrt(ratio)
+      else
+         dashpot = settings%damping_coefficient*sqrt(mass*settings%stiffness)*ratio
+      end if
+   end function dashpot
 
    pure real(wp) function limit_at(table, ratio)
       type(stability_table_t), intent(in) :: table
@@ -182,18 +227,21 @@ contains
       limit_at = table%limit(k - 1) + share*(table%limit(k) - table%limit(k - 1))
    end function limit_at
 
-   !> Greatest ratio of an edge to twice its distance from the centre, and the square of the greatest radius.
-   pure subroutine shape_of_body(bodies, s, ratio, square)
+   !> Greatest ratio L/l of an edge to the length of the law, and the square of the greatest radius.
+   pure subroutine shape_of_body(law, bodies, s, ratio, square)
+      character(len=*), intent(in) :: law
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
       real(wp), intent(out) :: ratio, square
-      real(wp) :: dx, dy, length, distance
+      real(wp) :: dx, dy, length, distance, longest, area
       integer(ip) :: first, last, v, w
 
       first = bodies%vertex_start(s)
       last = bodies%vertex_start(s + 1_ip) - 1_ip
       ratio = 0.0_wp
       square = 0.0_wp
+      longest = 0.0_wp
+      area = 0.0_wp
       w = last
       do v = first, last
          dx = bodies%shape(1, v) - bodies%shape(1, w)
@@ -201,9 +249,12 @@ contains
          length = sqrt(dx*dx + dy*dy)
          distance = abs(dx*bodies%shape(2, w) - dy*bodies%shape(1, w))/length
          ratio = max(ratio, length/(2.0_wp*distance))
+         longest = max(longest, length)
+         area = area + 0.5_wp*length*distance
          square = max(square, bodies%shape(1, v)**2 + bodies%shape(2, v)**2)
          w = v
       end do
+      if (law == 'conservative') ratio = longest*longest/area
    end subroutine shape_of_body
 
 end module polydem_stable_step

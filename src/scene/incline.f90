@@ -22,7 +22,7 @@ contains
 
    !> List the bodies of the incline: block, slope, upper stop, lower stop.
    subroutine list_incline(settings, list)
-      !> Settings: slope, width and height of the block, speed (downhill); gravity, stiffness
+      !> Settings: slope, width and height of the block, speed (downhill); gravity, stiffness and law
       type(settings_t), intent(in) :: settings
       !> List to extend
       type(body_list_t), intent(inout) :: list
@@ -32,7 +32,7 @@ contains
       associate (width => settings%scene%width, height => settings%scene%height, &
                  density => settings%scene%density, gravity => settings%forces%gravity)
          load = density*width*height*max(0.0_wp, gravity(1)*along(2) - gravity(2)*along(1))
-         depth = static_depth(load, settings%forces%stiffness, width, height, height, &
+         depth = static_depth(settings%forces, load, [width, height], [(uphill + downhill)*width, height], &
                               0.5_wp*(downhill - uphill)*width)
          call list%append(tilted(rectangle(-0.5_wp*width, 0.5_wp*width, -depth, height - depth), along), &
                           density=density, velocity=settings%scene%speed*along)

@@ -16,22 +16,24 @@ contains
 
    !> List the bodies of the stack: blocks from the bottom up, then the floor, as thick as a block, top at 0.
    subroutine list_stack(settings, list)
-      !> Settings: bodies (blocks), width and height of a block; gravity, stiffness
+      !> Settings: bodies (blocks), width and height of a block; gravity, stiffness and law
       type(settings_t), intent(in) :: settings
       !> List to extend
       type(body_list_t), intent(inout) :: list
-      real(wp) :: weight, bottom
+      real(wp) :: weight, bottom, support(2)
       integer(ip) :: k
 
       bottom = 0.0_wp
       associate (n => settings%scene%bodies, width => settings%scene%width, height => settings%scene%height)
          weight = settings%scene%density*width*height*max(0.0_wp, -settings%forces%gravity(2))
+         support = [floor_width*width, height]
          do k = 1_ip, n
-            bottom = bottom - static_depth(real(n - k + 1_ip, wp)*weight, settings%forces%stiffness, &
-                                           width, height, height, 0.0_wp)
+            bottom = bottom - static_depth(settings%forces, real(n - k + 1_ip, wp)*weight, [width, height], &
+                                           support, 0.0_wp)
             call list%append(rectangle(-0.5_wp*width, 0.5_wp*width, bottom, bottom + height), &
                              density=settings%scene%density)
             bottom = bottom + height
+            support(1) = width
          end do
          call list%append(rectangle(-0.5_wp*floor_width*width, 0.5_wp*floor_width*width, -height, 0.0_wp), &
                           fixed=.true.)

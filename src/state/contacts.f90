@@ -17,6 +17,8 @@ module polydem_contacts
       integer(ip) :: n = 0_ip
       !> Number of contacts without a direction (one body inside the other, or crossing bars)
       integer(ip) :: n_degenerate = 0_ip
+      !> Whether the elastic force has an energy, quadratic in the area: half of elastic area/length
+      logical :: energy_is_quadratic = .false.
       !> Place in the pair list
       integer(ip), allocatable :: pair(:)
       !> Slot of the body with the lower identifier
@@ -41,6 +43,8 @@ module polydem_contacts
       real(wp), allocatable :: length(:)
       !> Reciprocal of the characteristic length of the force law [1/m]
       real(wp), allocatable :: inverse_length(:)
+      !> Torque of the normal force about the centroid of the overlap, on the first body, per unit of force [m]
+      real(wp), allocatable :: lever(:)
       !> Elastic part of the normal force, positive in repulsion [N/m]
       real(wp), allocatable :: elastic(:)
       !> Normal force, positive in repulsion [N/m]
@@ -85,15 +89,15 @@ contains
          if (size(contacts%pair) >= capacity) return
          deallocate (contacts%pair, contacts%first, contacts%second, contacts%area, contacts%rate, &
                      contacts%normal, contacts%moment, contacts%arm_first, contacts%arm_second, &
-                     contacts%direction, contacts%length, contacts%inverse_length, contacts%elastic, &
-                     contacts%normal_force, contacts%tangential_force, contacts%force)
+                     contacts%direction, contacts%length, contacts%inverse_length, contacts%lever, &
+                     contacts%elastic, contacts%normal_force, contacts%tangential_force, contacts%force)
       end if
       m = capacity + capacity/4_ip + 16_ip
       allocate (contacts%pair(m), contacts%first(m), contacts%second(m), contacts%area(m), &
                 contacts%rate(m), contacts%normal(2, m), contacts%moment(2, m), &
                 contacts%arm_first(2, m), contacts%arm_second(2, m), contacts%direction(2, m), &
-                contacts%length(m), contacts%inverse_length(m), contacts%elastic(m), &
-                contacts%normal_force(m), contacts%tangential_force(m), contacts%force(2, m))
+                contacts%length(m), contacts%inverse_length(m), contacts%lever(m), &
+                contacts%elastic(m), contacts%normal_force(m), contacts%tangential_force(m), contacts%force(2, m))
    end subroutine reserve_contacts
 
 end module polydem_contacts

@@ -49,6 +49,7 @@ contains
       contacts%arm_second(:, 1) = [0.0_wp, -arm]
       contacts%direction(:, 1) = [0.0_wp, -1.0_wp]
       contacts%length(1) = width
+      contacts%lever(1) = 0.0_wp
       contacts%elastic(1) = 0.0_wp
       contacts%normal_force(1) = 0.0_wp
       contacts%tangential_force(1) = 0.0_wp

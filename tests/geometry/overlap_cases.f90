@@ -1,19 +1,26 @@
 !> Shapes for the tests of overlaps, and one call that computes a case in many positions.
 module overlap_cases
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_convex_overlap, only: overlap_polygons, overlap_t
    use polydem_kinds, only: ip, wp
    use polydem_polygon, only: diameter
    use polydem_random, only: random_t
    implicit none
    private
-   public :: rectangle, regular, grain, turned, overlap_of, worst_area, worst_normal, worst_centroid, roundoff
-   public :: two_pi
+   public :: rectangle, regular, grain, turned, overlap_of, roundoff, two_pi
+   public :: worst_area, worst_normal, worst_normal_far, worst_moment, worst_centroid
 
    !> Full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586476925286766559_wp
    !> Angles at which every case is computed: none, odd ones, a quarter, a half [rad]
    real(wp), parameter :: angles(8) = [0.0_wp, 0.1_wp, 0.7853981_wp, 1.0_wp, 0.25_wp*two_pi, 2.3_wp, &
                                        0.5_wp*two_pi, 5.77_wp]
+   !> Units in which it is computed
+   real(wp), parameter :: scales(3) = [1.0_wp, 1.0e-9_wp, 1.0e9_wp]
+   !> Positions: two orders at every angle in every unit
+   integer, parameter :: n_positions = 2*size(angles)*size(scales)
+   !> A place far from the origin, in these units
+   real(wp), parameter :: far(2) = [1.0e6_wp, -0.7e6_wp]
 
 contains
 
@@ -117,7 +124,10 @@ contains
       end do
    end function perimeter
 
-   !> Greatest error of the area over all angles and both orders
+   !> Greatest error of the area over all positions, near the origin and far from it.
+   !>
+   !> Far away a position is rounded to its last digit, and the area changes by the distance times at most
+   !> half of the perimeter; this is not an error of the overlap, and is taken off.
    pure real(wp) function worst_area(a, b, offset, area)
       !> First polygon
       real(wp), intent(in) :: a(:, :)
@@ -127,17 +137,30 @@ contains
       real(wp), intent(in) :: offset(2)
       !> True area
       real(wp), intent(in) :: area
-      type(overlap_t) :: overlap
+      type(overlap_t) :: near_by, far_off
+      real(wp) :: rounding
       integer :: k
 
+      rounding = 0.5_wp*min(perimeter(a), perimeter(b))*epsilon(1.0_wp)*maxval(abs(far))
       worst_area = 0.0_wp
-      do k = 1, 2*size(angles)
-         overlap = placed(a, b, offset, k)
-         worst_area = worse(worst_area, abs(overlap%area - area))
+      do k = 1, n_positions
+         near_by = placed(a, b, offset, k, [0.0_wp, 0.0_wp])
+         far_off = placed(a, b, offset, k, far)
+         worst_area = worse(worst_area, abs(near_by%area - area))
+         worst_area = worse(worst_area, max(0.0_wp, abs(far_off%area - area) - rounding))
+         if (.not. (is_finite(near_by) .and. is_finite(far_off))) worst_area = huge(1.0_wp)
       end do
    end function worst_area
 
-   !> Greatest error of the normal vector over all angles and both orders
+   !> Whether all numbers of an overlap are finite
+   pure logical function is_finite(overlap)
+      type(overlap_t), intent(in) :: overlap
+
+      is_finite = all(ieee_is_finite([overlap%area, overlap%centroid, overlap%normal, overlap%moment_a, &
+                                      overlap%moment_b]))
+   end function is_finite
+
+   !> Greatest error of the normal vector over all positions near the origin
    pure real(wp) function worst_normal(a, b, offset, normal)
       !> First polygon
       real(wp), intent(in) :: a(:, :)
@@ -147,20 +170,73 @@ contains
       real(wp), intent(in) :: offset(2)
       !> True integral of the outward normal of a over its outline inside b
       real(wp), intent(in) :: normal(2)
+
+      worst_normal = worst_normal_at([0.0_wp, 0.0_wp], a, b, offset, normal)
+   end function worst_normal
+
+   !> The same far from it, for overlaps whose normal vector follows their position without a jump.
+   pure real(wp) function worst_normal_far(a, b, offset, normal)
+      !> First polygon
+      real(wp), intent(in) :: a(:, :)
+      !> Second polygon
+      real(wp), intent(in) :: b(:, :)
+      !> Centre of b minus centre of a
+      real(wp), intent(in) :: offset(2)
+      !> True integral of the outward normal of a over its outline inside b
+      real(wp), intent(in) :: normal(2)
+
+      worst_normal_far = worst_normal_at(far, a, b, offset, normal)
+   end function worst_normal_far
+
+   !> Greatest error of the normal vector over all positions at a place
+   pure real(wp) function worst_normal_at(place, a, b, offset, normal)
+      real(wp), intent(in) :: place(2)
+      real(wp), intent(in) :: a(:, :)
+      real(wp), intent(in) :: b(:, :)
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: normal(2)
       type(overlap_t) :: overlap
       real(wp) :: image(2, 1)
       integer :: k
 
-      worst_normal = 0.0_wp
-      do k = 1, 2*size(angles)
-         overlap = placed(a, b, offset, k)
+      worst_normal_at = 0.0_wp
+      do k = 1, n_positions
+         overlap = placed(a, b, offset, k, place)
          image = turned(reshape(normal, [2, 1]), angle_of(k))
          if (modulo(k, 2) == 0) image = -image
-         worst_normal = worse(worst_normal, norm2(overlap%normal - image(:, 1)))
+         worst_normal_at = worse(worst_normal_at, norm2(overlap%normal - image(:, 1)))
       end do
-   end function worst_normal
+   end function worst_normal_at
 
-   !> Greatest error of the centroid over all angles and both orders
+   !> Greatest error of both moments over all positions near the origin
+   pure real(wp) function worst_moment(a, b, offset, moment_a, moment_b)
+      !> First polygon
+      real(wp), intent(in) :: a(:, :)
+      !> Second polygon
+      real(wp), intent(in) :: b(:, :)
+      !> Centre of b minus centre of a
+      real(wp), intent(in) :: offset(2)
+      !> True moment of the normal vector about the centre of a
+      real(wp), intent(in) :: moment_a
+      !> True moment of the normal vector about the centre of b
+      real(wp), intent(in) :: moment_b
+      type(overlap_t) :: overlap
+      real(wp) :: moments(2)
+      integer :: k
+
+      worst_moment = 0.0_wp
+      do k = 1, n_positions
+         overlap = placed(a, b, offset, k, [0.0_wp, 0.0_wp])
+         if (modulo(k, 2) == 0) then
+            moments = -[overlap%moment_b, overlap%moment_a]
+         else
+            moments = [overlap%moment_a, overlap%moment_b]
+         end if
+         worst_moment = worse(worst_moment, maxval(abs(moments - [moment_a, moment_b])))
+      end do
+   end function worst_moment
+
+   !> Greatest error of the centroid over all positions near the origin
    pure real(wp) function worst_centroid(a, b, offset, centroid)
       !> First polygon
       real(wp), intent(in) :: a(:, :)
@@ -175,8 +251,8 @@ contains
       integer :: k
 
       worst_centroid = 0.0_wp
-      do k = 1, 2*size(angles)
-         overlap = placed(a, b, offset, k)
+      do k = 1, n_positions
+         overlap = placed(a, b, offset, k, [0.0_wp, 0.0_wp])
          image(:, 1) = centroid
          if (modulo(k, 2) == 0) image(:, 1) = centroid - offset
          image = turned(image, angle_of(k))
@@ -196,25 +272,36 @@ contains
    pure real(wp) function angle_of(k)
       integer, intent(in) :: k
 
-      angle_of = angles(1 + ishft(k - 1, -1))
+      angle_of = angles(1 + modulo((k - 1)/2, size(angles)))
    end function angle_of
 
-   !> Overlap at one of the angles: odd k in the order given, even k in the other
-   pure function placed(a, b, offset, k) result(overlap)
+   !> Overlap in one of the positions, back in units of 1: odd k in the order given, even k in the other.
+   !>
+   !> The first polygon lies at a place, and the offset is the difference of both places, as in a run.
+   pure function placed(a, b, offset, k, place) result(overlap)
       real(wp), intent(in) :: a(:, :)
       real(wp), intent(in) :: b(:, :)
       real(wp), intent(in) :: offset(2)
       integer, intent(in) :: k
+      real(wp), intent(in) :: place(2)
       type(overlap_t) :: overlap
-      real(wp) :: arm(2, 1), angle
+      real(wp) :: arm(2, 1), first(2), second(2), scale, angle
 
+      scale = scales(1 + (k - 1)/(2*size(angles)))
       angle = angle_of(k)
-      arm = turned(reshape(offset, [2, 1]), angle)
+      arm = turned(reshape(scale*offset, [2, 1]), angle)
+      first = scale*place
+      second = first + arm(:, 1)
       if (modulo(k, 2) == 1) then
-         overlap = overlap_of(turned(a, angle), turned(b, angle), arm(:, 1))
+         overlap = overlap_of(turned(scale*a, angle), turned(scale*b, angle), second - first)
       else
-         overlap = overlap_of(turned(b, angle), turned(a, angle), -arm(:, 1))
+         overlap = overlap_of(turned(scale*b, angle), turned(scale*a, angle), first - second)
       end if
+      overlap%area = overlap%area/scale**2
+      overlap%normal = overlap%normal/scale
+      overlap%centroid = overlap%centroid/scale
+      overlap%moment_a = overlap%moment_a/scale**2
+      overlap%moment_b = overlap%moment_b/scale**2
    end function placed
 
 end module overlap_cases

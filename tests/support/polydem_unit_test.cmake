@@ -3,11 +3,15 @@
 # The tests of one room: the program test_ROOM, and in ctest ROOM with the label ROOM, and unit if ROOM is a room of
 # src. Built with an
 # installed pFUnit if CMake finds one, else with the stand-in of this folder. A test finds files of the repository
-# through the environment variable POLYDEM_SOURCE_DIR, and may write into its working directory.
+# through the environment variable POLYDEM_SOURCE_DIR, and may write into its working directory,
+# which is empty at the start.
 find_package(PFUNIT QUIET)
 
 # pFUnit up to 4.12 ends with code 0 after failures; undefined behaviour does not end a program at all.
 set(polydem_words_of_failure "Encountered 1 or more failures" "[(]0 tests?[)]" "runtime error:" "Sanitizer")
+
+# Working directories of the unit tests
+set(polydem_scratch "${PROJECT_BINARY_DIR}/tests/scratch")
 
 function(polydem_unit_test room)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HELPERS;USES")
@@ -34,9 +38,22 @@ function(polydem_unit_test room)
     LABELS "${labels}"
     FAIL_REGULAR_EXPRESSION "${polydem_words_of_failure}"
     ENVIRONMENT "POLYDEM_SOURCE_DIR=${PROJECT_SOURCE_DIR};OMP_NUM_THREADS=2;OMP_WAIT_POLICY=passive"
-    WORKING_DIRECTORY "${CMAKE_CURRENT_BINARY_DIR}"
+    WORKING_DIRECTORY "${polydem_scratch}/${room}"
+    FIXTURES_REQUIRED empty_folders
     PROCESSORS 2
     TIMEOUT 600)
+  set_property(GLOBAL APPEND PROPERTY polydem_test_folders "${polydem_scratch}/${room}")
+endfunction()
+
+# polydem_empty_folders()
+#
+# The test that runs before all unit tests and empties their working directories, so that none sees what an earlier
+# call, perhaps of another revision, left there. Call it after the last unit test.
+function(polydem_empty_folders)
+  get_property(folders GLOBAL PROPERTY polydem_test_folders)
+  add_test(NAME empty_folders COMMAND ${CMAKE_COMMAND} -D "folders=${folders}"
+    -P "${PROJECT_SOURCE_DIR}/tests/support/empty_folders.cmake")
+  set_tests_properties(empty_folders PROPERTIES FIXTURES_SETUP empty_folders LABELS support)
 endfunction()
 
 # One executable of translated test files.

@@ -14,7 +14,6 @@ module b08_incline
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_simulation, only: simulation_t
-   use polydem_static_depth, only: static_depth
    use polydem_strings, only: to_text
    use trial, only: begin, block_at, steps
    use verification_table, only: table_t
@@ -186,10 +185,11 @@ contains
       !> What went wrong
       type(error_t), allocatable, intent(inout) :: error
       type(body_list_t) :: list
-      real(wp) :: distance, load
+      real(wp) :: distance, depth
 
-      load = density*size(1)*size(2)*gravity*cos(slope)
-      distance = 0.5_wp*(size(2) + thickness) - static_depth(load, young, size(1), size(2), thickness, 0.0_wp)
+      ! E w d/l with l = 2 h T/(h + T), up to d/h.
+      depth = density*size(2)*gravity*cos(slope)/young*2.0_wp*size(2)*thickness/(size(2) + thickness)
+      distance = 0.5_wp*(size(2) + thickness) - depth
       call list%append(block_at(0.0_wp, 0.0_wp, 2.0_wp, thickness, -slope), fixed=.true.)
       call list%append(block_at(sin(slope)*distance, cos(slope)*distance, size(1), size(2), -slope), &
                        velocity=[speed*cos(slope), -speed*sin(slope)])

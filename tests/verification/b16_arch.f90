@@ -29,36 +29,40 @@ contains
       type(table_t), intent(inout) :: table
       !> 28 wedges as well as 14, and thicknesses nearer to the critical one
       logical, intent(in) :: thorough
+      real(wp) :: sunk
 
-      call table%begin('B16', 'semicircular arches, t/R their thickness over the mean radius, mu = 2, E = 1e10')
-      call stand_or_fall(table, 14_ip, 0.12_wp, 0.095_wp)
+      call table%begin('B16', 'semicircular arches, t/R their thickness over the mean radius, mu = 2')
+      call stand_or_fall(table, 14_ip, 0.12_wp, 0.095_wp, 1.0e10_wp)
       if (.not. thorough) return
-      call stand_or_fall(table, 28_ip, 0.12_wp, 0.095_wp)
-      call stand_or_fall(table, 28_ip, 1.03_wp*critical_thickness(28_ip), 0.97_wp*critical_thickness(28_ip))
+      call stand_or_fall(table, 28_ip, 0.12_wp, 0.095_wp, 1.0e10_wp)
+      ! A hinge of a soft arch takes a share of its thickness, which falls with E^(-1/3) only (see b08_incline).
+      call load(table, 28_ip, 1.03_wp*critical_thickness(28_ip), 1.0_wp, 1.0e10_wp, sunk)
+      call table%show('28 wedges, E = 1e10, 1.03 of the critical t/R: the crown sinks in 1 s by [m]', sunk)
+      call stand_or_fall(table, 28_ip, 1.03_wp*critical_thickness(28_ip), 0.97_wp*critical_thickness(28_ip), 1.0e12_wp)
    end subroutine run_arch
 
-   subroutine stand_or_fall(table, n, thick, thin)
+   subroutine stand_or_fall(table, n, thick, thin, young)
       type(table_t), intent(inout) :: table
       integer(ip), intent(in) :: n
-      real(wp), intent(in) :: thick, thin
+      real(wp), intent(in) :: thick, thin, young
       real(wp) :: sunk
       character(len=:), allocatable :: name
 
-      name = to_text(n)//' wedges, t/R = '
+      name = to_text(n)//' wedges, E = '//to_text(young, 1)//', t/R = '
       call table%show(to_text(n)//' wedges: critical t/R by lines of thrust', critical_thickness(n))
-      call load(table, n, thick, 1.0_wp, sunk)
+      call load(table, n, thick, 1.0_wp, young, sunk)
       call table%expect_absolute(name//to_text(thick, 4)//' stands: the crown sinks in 1 s by [m]', 0.0_wp, sunk, &
                                  1.0e-3_wp)
-      call load(table, n, thin, 4.0_wp, sunk)
+      call load(table, n, thin, 4.0_wp, young, sunk)
       call table%expect_true(name//to_text(thin, 4)//' falls: the crown sinks by more than 0.2 m within 4 s', &
                              sunk > 0.2_wp)
    end subroutine stand_or_fall
 
    !> How far the highest wedge sinks within a time, or until that is 0.2 m.
-   subroutine load(table, n, thickness, time, sunk)
+   subroutine load(table, n, thickness, time, young, sunk)
       type(table_t), intent(inout) :: table
       integer(ip), intent(in) :: n
-      real(wp), intent(in) :: thickness, time
+      real(wp), intent(in) :: thickness, time, young
       real(wp), intent(out) :: sunk
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error
@@ -71,8 +75,8 @@ contains
       end do
       call list%append(block_at(1.0_wp, -0.1_wp, 0.5_wp, 0.2_wp, 0.0_wp), fixed=.true.)
       call list%append(block_at(-1.0_wp, -0.1_wp, 0.5_wp, 0.2_wp, 0.0_wp), fixed=.true.)
-      call begin('&forces friction_coefficient = 2 damping_coefficient = 1 stiffness = 1e10 /'// &
-                 integrate_text(1.0e-5_wp), list, simulation, error)
+      call begin('&forces friction_coefficient = 2 damping_coefficient = 1 stiffness = '//to_text(young)//' /'// &
+                 integrate_text(1.0e-5_wp*sqrt(1.0e10_wp/young)), list, simulation, error)
       sunk = 0.0_wp
       if (.not. allocated(error)) start = simulation%bodies%position(2, n/2_ip)
       do k = 1_ip, 100_ip

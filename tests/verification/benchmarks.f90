@@ -6,6 +6,10 @@ module benchmarks
    use b01_free_flight, only: run_free_flight
    use b02_mass_properties, only: run_mass_properties
    use b03_momentum, only: run_momentum
+   use b04_energy, only: run_energy
+   use b05_closed_loops, only: run_closed_loops
+   use b06_area_rate, only: run_area_rate
+   use b07_reversal, only: run_reversal
    use b08_incline, only: run_incline
    use b09_stopping, only: run_stopping
    use b11_sliding_to_rolling, only: run_sliding_to_rolling
@@ -26,7 +30,8 @@ module benchmarks
 
    !> Names in the order in which they run
    character(len=8), parameter :: benchmark_names(*) = [character(len=8) :: &
-      'B1', 'B2', 'B3', '3.2', '3.3', '3.4', 'B8', 'B9', 'B11', 'B12', 'B13', 'B14', 'B15', 'B16', 'B17', 'B18']
+      'B1', 'B2', 'B3', '3.2', '3.3', '3.4', 'B4', 'B5', 'B6', 'B7', 'B8', 'B9', 'B11', 'B12', 'B13', 'B14', &
+      'B15', 'B16', 'B17', 'B18']
 
 contains
 
@@ -52,6 +57,14 @@ contains
          call run_corner_impact(table)
       case ('3.4')
          call run_oblique_impact(table)
+      case ('B4')
+         call run_energy(table)
+      case ('B5')
+         call run_closed_loops(table)
+      case ('B6')
+         call run_area_rate(table, thorough)
+      case ('B7')
+         call run_reversal(table)
       case ('B8')
          call run_incline(table, thorough)
       case ('B9')

@@ -4,7 +4,7 @@ module trial
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
-   use polydem_motion, only: motion_t
+   use polydem_motion, only: motion_t, new_motion
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
    use polydem_simulation, only: advance, simulation_t, start_simulation
@@ -15,7 +15,7 @@ module trial
 contains
 
    !> Start from a list of bodies and a namelist without the group &scene.
-   subroutine begin(text, list, simulation, error)
+   subroutine begin(text, list, simulation, error, motion, moved)
       !> Groups of the namelist
       character(len=*), intent(in) :: text
       !> Bodies
@@ -24,9 +24,13 @@ contains
       type(simulation_t), intent(out) :: simulation
       !> What went wrong
       type(error_t), allocatable, intent(inout) :: error
+      !> Prescribed motion of some bodies
+      type(motion_t), intent(in), optional :: motion
+      !> Slots of the bodies that it moves, given with it
+      integer(ip), intent(in), optional :: moved(:)
       type(settings_t) :: settings
       type(bodies_t) :: bodies
-      type(motion_t) :: motions(0)
+      type(motion_t), allocatable :: motions(:)
       character(len=1) :: no_overrides(0)
 
       call read_settings_text('trial.nml', "&scene name = 'file' bodies_file = 'none' /"//new_line('a')//text, &
@@ -34,6 +38,8 @@ contains
       if (allocated(error)) return
       call new_bodies(list, bodies, error)
       if (allocated(error)) return
+      allocate (motions(merge(1, 0, present(motion))))
+      if (present(motion)) call new_motion(motions(1), motion, bodies, moved)
       call start_simulation(settings, bodies, motions, simulation, error)
    end subroutine begin
 

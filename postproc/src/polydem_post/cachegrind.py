@@ -23,6 +23,10 @@ HELPERS = ("sort", "sort_reals")
 #: Procedures of finders that only report
 REPORTS = "survey|report|bytes|pool_bytes"
 
+#: Large arrays begin on a page in runs of any length. Else glibc moves its threshold with what was freed before, arrays
+#: lie otherwise towards each other, and the misses of the first step no longer cancel between a short and a long run.
+SAME_PLACES = {"MALLOC_MMAP_THRESHOLD_": "65536"}
+
 #: Counters of the hardware that are asked for
 HARDWARE = ("instructions", "L1-dcache-load-misses", "LLC-load-misses", "branch-misses")
 
@@ -72,7 +76,7 @@ def finder_functions(sources: Path) -> re.Pattern:
     if not modules:
         raise ResultError(f"{sources}: the sources of the finders are not there; they tell which functions to count")
     names = "|".join(map(re.escape, [*modules, *HELPERS]))
-    return re.compile(rf"__polydem_(?:{names})(?:_\w+)?_MOD_(?!(?:{REPORTS})(?:\W|$))")
+    return re.compile(rf"__polydem_(?:{names})(?:_inlined|_called|_o2)?_MOD_(?!(?:{REPORTS})(?:\W|$))")
 
 
 def simulate(command: list[str], model: Model, functions: re.Pattern, branches: bool = False) -> dict:
@@ -140,4 +144,4 @@ def _run(command: list[str]) -> None:
 
 
 def _environment() -> dict:
-    return {**os.environ, "OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "passive", "LC_ALL": "C"}
+    return {**os.environ, "OMP_NUM_THREADS": "1", "OMP_WAIT_POLICY": "passive", "LC_ALL": "C", **SAME_PLACES}

@@ -1,0 +1,83 @@
+"""Test of tests/hard_cases.md: all cases are there, and every row names tests that exist, and all tests of its case."""
+
+import pathlib
+import re
+import unittest
+
+TESTS = pathlib.Path(__file__).resolve().parent.parent
+CASES = [f"{letter}{number}" for letter, last in (("G", 30), ("D", 21), ("N", 15)) for number in range(1, last + 1)]
+# What the program cannot do yet; such a row has a dash instead of a test.
+ABSENT = {"D20"}
+
+ROW = re.compile(r"^\|\s*([GDN]\d+)\s*\|([^|]+)\|([^|]+)\|([^|]*)\|$", re.MULTILINE)
+UNIT_TEST = re.compile(r"^\s*@test\s*\n\s*subroutine\s+(\w+)", re.MULTILINE)
+CTEST = re.compile(r"\badd_test\(\s*NAME\s+(\w+)")
+
+
+def rows_of(text):
+    """Case, expected outcome, tests and remark of every row."""
+    return [(case, expected.strip(), re.findall(r"`(\w+)`", tests), tests.strip())
+            for case, expected, tests, _ in ROW.findall(text)]
+
+
+def tests_of(folder):
+    """Names of all tests below a folder."""
+    names = []
+    for path in sorted(folder.rglob("*.pf")):
+        names += UNIT_TEST.findall(path.read_text(encoding="utf-8"))
+    for path in sorted(folder.rglob("CMakeLists.txt")):
+        names += CTEST.findall(path.read_text(encoding="utf-8"))
+    return names
+
+
+def wrong_in(text, names):
+    """What is wrong with a table, given the names of all tests."""
+    rows = rows_of(text)
+    wrong = []
+    if [case for case, _, _, _ in rows] != CASES:
+        wrong.append("the cases are not all there, once each and in order")
+    for case, expected, tests, cell in rows:
+        start = case.lower() + "_"
+        if not expected:
+            wrong.append(f"{case} expects nothing")
+        if case in ABSENT and cell != "–":
+            wrong.append(f"{case} is said to be absent")
+        if case not in ABSENT and not (tests and tests[0].startswith(start)):
+            wrong.append(f"{case} has no test of its own first")
+        wrong += [f"{case}: there is no test {test}" for test in tests if test not in names]
+        wrong += [f"{case} lacks {name}" for name in names if name.startswith(start) and name not in tests]
+    return wrong
+
+
+class HardCases(unittest.TestCase):
+    def setUp(self):
+        self.text = (TESTS / "hard_cases.md").read_text(encoding="utf-8")
+        self.names = tests_of(TESTS)
+
+    def test_the_table_is_complete_and_true(self):
+        self.assertEqual(wrong_in(self.text, self.names), [])
+
+    def test_a_missing_row_is_found(self):
+        text = re.sub(r"^\| N3 .*\n", "", self.text, flags=re.MULTILINE)
+        self.assertEqual(wrong_in(text, self.names), ["the cases are not all there, once each and in order"])
+
+    def test_a_row_with_a_test_that_does_not_exist_is_found(self):
+        text = self.text.replace("`n1_no_box", "`n1_no_fox")
+        found = wrong_in(text, self.names)
+        self.assertEqual(len(found), 2)
+        self.assertIn("N1: there is no test n1_no_fox", found[0])
+        self.assertIn("N1 lacks n1_no_box", found[1])
+
+    def test_a_row_without_a_test_is_found(self):
+        text = re.sub(r"`g1_\w+`", "–", self.text)
+        self.assertIn("G1 has no test of its own first", wrong_in(text, self.names))
+
+    def test_a_test_that_no_row_names_is_found(self):
+        self.assertEqual(wrong_in(self.text, self.names + ["d4_another"]), ["D4 lacks d4_another"])
+
+    def test_what_is_absent_has_no_test(self):
+        self.assertEqual(wrong_in(self.text, self.names + ["d20_a_restart"]), ["D20 lacks d20_a_restart"])
+
+
+if __name__ == "__main__":
+    unittest.main()

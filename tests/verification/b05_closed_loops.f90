@@ -1,0 +1,98 @@
+!> Benchmark B5: work of the elastic force along closed paths of one body against another at rest.
+!>
+!> The body goes round an ellipse in the space of its three coordinates. A force with a potential does no work on the
+!> way; where no corner enters or leaves the other body, the trapezoidal rule of the periodic integrand is exact to
+!> rounding, elsewhere it converges. The area law does work, whatever the step. The work is given as a share of the
+!> sum of the absolute works of all steps.
+module b05_closed_loops
+   use outlines, only: pi
+   use polydem_kinds, only: ip, wp
+   use polydem_strings, only: to_text
+   use posed_pair, only: new_pair, pair_t, press
+   use trial, only: block_at
+   use verification_table, only: table_t
+   implicit none
+   private
+   public :: run_closed_loops
+
+   !> A path: the coordinates x, y and angle are middle + reach*cos(t + phase)
+   type :: path_t
+      !> Side of the moving square; that of the other is 1 [m]
+      real(wp) :: side
+      !> Middle of x, y [m] and the angle [rad]
+      real(wp) :: middle(3)
+      !> Greatest distances from it
+      real(wp) :: reach(3)
+      !> Phases [rad]
+      real(wp) :: phase(3)
+   end type path_t
+
+   !> A corner in a side, turning and not; corner in corner; a side in a side; a corner in a side, turning on the spot
+   type(path_t), parameter :: smooth(5) = [ &
+      path_t(1.0_wp, [0.1_wp, 1.1_wp, 0.25_wp*pi], [0.1_wp, 0.03_wp, 0.1_wp], [0.0_wp, 0.5_wp*pi, 1.0_wp]), &
+      path_t(1.0_wp, [0.1_wp, 1.1_wp, 0.2_wp*pi], [0.2_wp, 0.03_wp, 0.0_wp], [0.0_wp, 0.5_wp*pi, 0.0_wp]), &
+      path_t(1.0_wp, [0.85_wp, 0.85_wp, 0.0_wp], [0.1_wp, 0.1_wp, 0.1_wp], [0.0_wp, 0.5_wp*pi, 1.0_wp]), &
+      path_t(0.3_wp, [0.1_wp, 0.6_wp, 0.0_wp], [0.2_wp, 0.03_wp, 0.1_wp], [0.0_wp, 0.5_wp*pi, 1.0_wp]), &
+      path_t(1.0_wp, [0.1_wp, 1.1_wp, 0.25_wp*pi], [0.1_wp, 0.0_wp, 0.15_wp], [0.0_wp, 0.0_wp, 0.5_wp*pi])]
+
+   !> A side tilts until one of its corners leaves
+   type(path_t), parameter :: tilting = &
+      path_t(0.6_wp, [0.0_wp, 0.75_wp, 0.0_wp], [0.1_wp, 0.02_wp, 0.25_wp], [0.0_wp, 0.5_wp*pi, 1.0_wp])
+
+contains
+
+   !> Five smooth paths and one on which corners come and go.
+   subroutine run_closed_loops(table)
+      !> Table to fill
+      type(table_t), intent(inout) :: table
+      real(wp) :: coarse, fine
+      integer :: k
+
+      call table%begin('B5', 'work of the elastic force on closed paths, as a share of the absolute work')
+      do k = 1, size(smooth)
+         call table%expect_absolute('conservative law, path '//to_text(int(k, ip))//', 400 steps', 0.0_wp, &
+                                    work('conservative', smooth(k), 400), 1.0e-13_wp)
+      end do
+      coarse = work('conservative', tilting, 250)
+      fine = work('conservative', tilting, 16000)
+      call table%expect_absolute('conservative law, path 6 with events, 250 steps', 0.0_wp, coarse, 1.0e-4_wp)
+      call table%expect_absolute('conservative law, path 6 with events, 16000 steps', 0.0_wp, fine, 1.0e-7_wp)
+      do k = 1, size(smooth)
+         fine = work('area', smooth(k), 1600)
+         call table%expect_relative('area law, path '//to_text(int(k, ip))//': 400 steps as 1600 steps', fine, &
+                                    work('area', smooth(k), 400), 2.0e-4_wp)
+      end do
+      fine = work('area', tilting, 16000)
+      call table%expect_relative('area law, path 6: 4000 steps as 16000 steps', fine, work('area', tilting, 4000), &
+                                 2.0e-4_wp)
+   end subroutine run_closed_loops
+
+   !> Work on a body along a path in n steps, as a share of the sum of absolute works
+   function work(law, path, n) result(share)
+      character(len=*), intent(in) :: law
+      type(path_t), intent(in) :: path
+      integer, intent(in) :: n
+      real(wp) :: share
+      type(pair_t) :: pair
+      real(wp) :: angle(3), pose(3), rate(3), piece, total
+      integer :: k
+
+      call new_pair(law, block_at(0.0_wp, 0.0_wp, 1.0_wp, 1.0_wp, 0.0_wp), &
+                    block_at(0.0_wp, 0.0_wp, path%side, path%side, 0.0_wp), pair)
+      share = 0.0_wp
+      total = 0.0_wp
+      do k = 1, n
+         angle = 2.0_wp*pi*real(k, wp)/real(n, wp) + path%phase
+         pose = path%middle + path%reach*cos(angle)
+         rate = -path%reach*sin(angle)
+         pair%bodies%position(:, 2) = pose(1:2)
+         pair%bodies%angle(2) = pose(3)
+         call press(pair)
+         piece = pair%bodies%force(1, 2)*rate(1) + pair%bodies%force(2, 2)*rate(2) + pair%bodies%torque(2)*rate(3)
+         share = share + piece
+         total = total + abs(piece)
+      end do
+      share = share/total
+   end function work
+
+end module b05_closed_loops

@@ -1,0 +1,66 @@
+!> Two bodies in given poses and the elastic forces between them, without a time step.
+module posed_pair
+   use polydem_assemble, only: assemble_forces, incidence_t, index_contacts
+   use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_body_list, only: body_list_t, new_bodies
+   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_errors, only: error_t
+   use polydem_find_contacts, only: find_contacts
+   use polydem_force_law, only: evaluate_law, force_law_t, new_force_law
+   use polydem_kinds, only: ip, wp
+   use polydem_settings, only: forces_settings_t
+   implicit none
+   private
+   public :: pair_t, new_pair, press, young
+
+   !> Young's modulus of every pair [N/m2]
+   real(wp), parameter :: young = 1.0e7_wp
+
+   !> Two bodies and what acts between them
+   type :: pair_t
+      !> The bodies; poses and velocities may be changed before `press`
+      type(bodies_t) :: bodies
+      !> Their contact, if there is one
+      type(contacts_t) :: contacts
+      type(contact_memory_t) :: memory
+      type(incidence_t) :: incidence
+      type(force_law_t) :: law
+   end type pair_t
+
+contains
+
+   !> Two bodies where their polygons are.
+   subroutine new_pair(law, first, second, pair)
+      !> Entry `law` of &forces
+      character(len=*), intent(in) :: law
+      !> Corners of each body, (2, corner) [m]
+      real(wp), intent(in) :: first(:, :), second(:, :)
+      !> The pair
+      type(pair_t), intent(out) :: pair
+      type(body_list_t) :: list
+      type(forces_settings_t) :: settings
+      type(error_t), allocatable :: error
+
+      call list%append(first)
+      call list%append(second)
+      call new_bodies(list, pair%bodies, error)
+      settings%stiffness = young
+      settings%law = law
+      settings%damping = 'none'
+      settings%friction = 'none'
+      call new_force_law(settings, pair%bodies, pair%law)
+   end subroutine new_pair
+
+   !> Forces and torques of the poses.
+   subroutine press(pair)
+      !> The pair
+      type(pair_t), intent(inout) :: pair
+
+      call turn_bodies(pair%bodies, [1_ip, 2_ip])
+      call find_contacts(pair%bodies, 1_ip, [1_ip], [2_ip], pair%memory, pair%contacts)
+      call evaluate_law(pair%law, pair%bodies, 0.0_wp, pair%contacts, pair%memory)
+      call index_contacts(2_ip, pair%contacts, pair%incidence)
+      call assemble_forces([0.0_wp, 0.0_wp], pair%incidence, pair%contacts, pair%bodies)
+   end subroutine press
+
+end module posed_pair
