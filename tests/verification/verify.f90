@@ -1,13 +1,15 @@
 !> The verification benchmarks: runs against what theory or a publication expects.
 !>
-!> usage: verify [--quick] [NAME...]     all benchmarks or those named, such as B8; --quick: their short versions
+!> usage: verify [--quick] [NAME...]     all benchmarks or those named, such as B8
+!>
+!> --quick runs short versions, and leaves out those that have none unless they are named.
 !>
 !> The table is printed row by row and written to results/verify, as table.csv and table.md. The exit code is 1
 !> if a row misses its tolerance, 2 if there is no such benchmark, 3 if the table cannot be written.
 program verify
    use, intrinsic :: iso_c_binding, only: c_int
    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
-   use benchmarks, only: benchmark_names, run_benchmark
+   use benchmarks, only: benchmark_names, long_names, run_benchmark
    use polydem_errors, only: error_t
    use polydem_line_writer, only: line_writer_t
    use polydem_kinds, only: ip
@@ -73,7 +75,10 @@ contains
             call c_exit(2_c_int)
          end if
       end do
-      if (.not. any(chosen)) chosen = .true.
+      if (any(chosen)) return
+      do k = 1, size(benchmark_names)
+         chosen(k) = thorough .or. all(long_names /= benchmark_names(k))
+      end do
    end subroutine read_arguments
 
    !> What ran where and when, for the table in Markdown
