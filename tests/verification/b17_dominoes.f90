@@ -98,7 +98,8 @@ contains
       end do
       call list%append(block_at(0.5_wp*real(n, wp)*pitch, -0.5_wp*row%height, 2.0_wp*real(n, wp)*pitch, row%height, &
                                 0.0_wp), fixed=.true.)
-      call begin('&forces friction_coefficient = 0.5 damping_coefficient = 4 tangential_damping = 1 stiffness = 1e7 /'// &
+      call begin('&forces friction_coefficient = 0.5 damping_coefficient = 4 tangential_damping = 1 '// &
+                 'stiffness = 1e7 /'// &
                  '&integrate duration = 1000 / &output ledger = .false. /', list, simulation, error)
    end subroutine build
 
