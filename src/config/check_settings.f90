@@ -63,6 +63,10 @@ contains
                'since no dashpot reaches 0 and the step falls with it; leave it out for ''damping_coefficient''')
          end if
       end associate
+      if (settings%guards%energy /= 'off' .and. .not. settings%output%ledger) then
+         call raise(error, input_error, values(first_row('guards', 'energy'))%place// &
+            ': ''energy'' in &guards needs ''ledger'' in &output')
+      end if
    end subroutine check_settings
 
    !> Refuse containers that are too large for the grains; lengths that are not in force are 0.

@@ -163,10 +163,33 @@ module polydem_namelist_entries
       entry_t('forces', 'tangential_damping', 'real', 1, '0.25', '', '>= 0, <= 1e6', 'friction: cundall_strack', &
       'Tangential damping as a share of sqrt(k_t m_t)')]
 
+   !> What is watched; a body that is nowhere (NaN) stops every run
+   type(entry_t), parameter :: guard_entries(*) = [ &
+      entry_t('guards', 'displacement', 'word', 1, 'stop', '', 'stop warn off', '', &
+      'A body that moves so far in a step that it could pass through another'), &
+      entry_t('guards', 'displacement_limit', 'real', 1, '0.25', '', '> 0, <= 1e6', 'displacement: stop warn', &
+      'Greatest move of a point in a step, as a share of the thinnest body'), &
+      entry_t('guards', 'step', 'word', 1, 'stop', '', 'stop warn off', '', &
+      'A time step above the stable one of the contacts; above half of that there is a warning'), &
+      entry_t('guards', 'overlap', 'word', 1, 'off', '', 'stop warn off', '', &
+      'A contact that is deep against its bodies'), &
+      entry_t('guards', 'overlap_limit', 'real', 1, '0.25', '', '> 0, <= 1e6', 'overlap: stop warn', &
+      'Greatest depth (area over length) of a contact, as a share of the thinner body'), &
+      entry_t('guards', 'energy', 'word', 1, 'off', '', 'stop warn off', '', &
+      'Energy that neither gravity nor walls gave; needs the ledger, looks every 100 steps'), &
+      entry_t('guards', 'energy_limit', 'real', 1, '0.1', '', '> 0, <= 1e6', 'energy: stop warn', &
+      'Greatest such energy, as a share of the energy turned over'), &
+      entry_t('guards', 'listed_depth', 'real', 1, '1e-3', '', '>= 0, <= 1e6', '', &
+      'Contacts at the start that are deeper than this share of the thinner body are listed one by one'), &
+      entry_t('guards', 'relaxed_depth', 'real', 1, '0', '', '>= 0, <= 1e6', '', &
+      'Bodies are pushed apart before time 0 until no contact is deeper than this share; 0: they are not')]
+
    !> Groups of the run
    type(entry_t), parameter :: run_entries(*) = [ &
       entry_t('integrate', 'scheme', 'word', 1, 'velocity_verlet', '', 'velocity_verlet gear', '', &
       'Integration scheme'), &
+      entry_t('integrate', 'accumulation', 'word', 1, 'plain', '', 'plain compensated', 'scheme: velocity_verlet', &
+      'Sums of positions and velocities over steps as they are, or with what rounding takes carried along'), &
       entry_t('integrate', 'dt', 'real', 1, '0', 's', '>= 0', '', &
       'Time step; 0: `fraction` of the stable step'), &
       entry_t('integrate', 'fraction', 'real', 1, '0.3', '', '> 0', '', &
@@ -214,7 +237,7 @@ module polydem_namelist_entries
       'Folder of traces and samples; empty: results/ and the name of the namelist file')]
 
    !> The table
-   type(entry_t), parameter :: entries(*) = [scene_entries, stage_entries, run_entries, bench_entries]
+   type(entry_t), parameter :: entries(*) = [scene_entries, stage_entries, guard_entries, run_entries, bench_entries]
 
 contains
 

@@ -6,7 +6,7 @@ module polydem_settings
    implicit none
    private
    public :: settings_t, scene_settings_t, boxes_settings_t, neighbours_settings_t, overlap_settings_t
-   public :: forces_settings_t, integrate_settings_t, output_settings_t
+   public :: forces_settings_t, integrate_settings_t, guards_settings_t, output_settings_t
 
    !> Group &scene: what there is at the start
    type :: scene_settings_t
@@ -128,6 +128,8 @@ module polydem_settings
    type :: integrate_settings_t
       !> 'velocity_verlet' or 'gear'
       character(len=:), allocatable :: scheme
+      !> Sums of velocity Verlet over steps: 'plain' or 'compensated'
+      character(len=:), allocatable :: accumulation
       !> Time step [s]; 0: `fraction` of the stable step
       real(wp) :: dt
       !> Share of the stable step that is taken if dt is 0
@@ -135,6 +137,28 @@ module polydem_settings
       !> Simulated time [s]
       real(wp) :: duration
    end type integrate_settings_t
+
+   !> Group &guards: what is watched, and whether it stops the run, warns or is 'off'
+   type :: guards_settings_t
+      !> Move of a body in a step: 'stop', 'warn' or 'off'
+      character(len=:), allocatable :: displacement
+      !> Greatest move in a step as a share of the thinnest body
+      real(wp) :: displacement_limit
+      !> Time step against the stable one of the contacts: 'stop', 'warn' or 'off'
+      character(len=:), allocatable :: step
+      !> Depth of contacts: 'stop', 'warn' or 'off'
+      character(len=:), allocatable :: overlap
+      !> Greatest depth as a share of the thinner body
+      real(wp) :: overlap_limit
+      !> Energy that neither gravity nor walls gave: 'stop', 'warn' or 'off'
+      character(len=:), allocatable :: energy
+      !> Greatest such energy as a share of the energy turned over
+      real(wp) :: energy_limit
+      !> Contacts at the start deeper than this share of the thinner body are listed
+      real(wp) :: listed_depth
+      !> Contacts at the start are pushed apart to this share of the thinner body; 0: not
+      real(wp) :: relaxed_depth
+   end type guards_settings_t
 
    !> Group &output
    type :: output_settings_t
@@ -178,6 +202,8 @@ module polydem_settings
       type(forces_settings_t) :: forces
       !> Group &integrate
       type(integrate_settings_t) :: integrate
+      !> Group &guards
+      type(guards_settings_t) :: guards
       !> Group &output
       type(output_settings_t) :: output
    end type settings_t

@@ -44,7 +44,7 @@ module polydem_ledger
       !> Elastic energy of the contacts at the start, if they have one [J/m]
       real(wp), private :: elastic_start = 0.0_wp
       !> Greatest kinetic energy so far, the scale of the residual [J/m]
-      real(wp), private :: energy_scale = 0.0_wp
+      real(wp) :: energy_scale = 0.0_wp
       !> Sums of absolute impulses so far, the scales of the residuals
       real(wp), private :: impulse_scale = 0.0_wp, angular_scale = 0.0_wp
    end type ledger_t

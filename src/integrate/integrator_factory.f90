@@ -1,5 +1,6 @@
 !> Integrators by name. The only file that knows all of them.
 module polydem_integrator_factory
+   use polydem_compensated_verlet, only: compensated_verlet_t
    use polydem_gear, only: gear_t
    use polydem_integrator, only: integrator_t
    use polydem_settings, only: integrate_settings_t
@@ -22,7 +23,11 @@ contains
          allocate (gear_t :: integrator)
          integrator%starts_from_forces = .false.
       case default
-         allocate (velocity_verlet_t :: integrator)
+         if (settings%accumulation == 'compensated') then
+            allocate (compensated_verlet_t :: integrator)
+         else
+            allocate (velocity_verlet_t :: integrator)
+         end if
       end select
    end subroutine new_integrator
 

@@ -5,6 +5,7 @@
 !>     profile.h5                 times, counters, provenance; its presence says that the run ended
 !>     trace.h5                   recorded boxes, if asked for
 !>     steps.h5                   times and counts of every step, if asked for
+!>     overlaps.csv               contacts that were deep at the start, if there were any
 !>     log.txt                    what the run printed
 module polydem_result_folder
    use polydem_errors, only: error_t
@@ -13,7 +14,7 @@ module polydem_result_folder
    use polydem_segment_path, only: open_suffix, segment_path
    implicit none
    private
-   public :: segment_path, profile_path, log_path, trace_path, steps_path, default_folder
+   public :: segment_path, profile_path, log_path, trace_path, steps_path, overlaps_path, default_folder
    public :: holds_result, clear_result, open_suffix, unfinished
 
    !> End of the name of any other file that is not complete
@@ -72,6 +73,15 @@ contains
       path = folder//'/steps.h5'
    end function steps_path
 
+   !> Path of the table of deep contacts at the start
+   pure function overlaps_path(folder) result(path)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      character(len=:), allocatable :: path
+
+      path = folder//'/overlaps.csv'
+   end function overlaps_path
+
    !> Whether a folder holds a result that a run would overwrite
    logical function holds_result(folder)
       !> Folder of the result
@@ -95,6 +105,7 @@ contains
 
       call remove_if_there(profile_path(folder), error)
       call remove_if_there(log_path(folder), error)
+      call remove_if_there(overlaps_path(folder), error)
       call remove_if_there(trace_path(folder), error)
       call remove_if_there(trace_path(folder)//unfinished, error)
       call remove_if_there(steps_path(folder), error)

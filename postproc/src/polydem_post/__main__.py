@@ -1,4 +1,4 @@
-"""Command line: python -m polydem_post plot, table, tables or cache."""
+"""Command line: python -m polydem_post plot, table, tables, cache or costs."""
 
 from __future__ import annotations
 
@@ -55,6 +55,7 @@ def _parser() -> argparse.ArgumentParser:
     tables.add_argument("--output", type=Path, metavar="DIR", help="where to; report in the first folder if absent")
     tables.add_argument("--no-figures", action="store_true", help="tables and verdicts only")
     _add_cache(verbs)
+    _add_costs(verbs)
     return parser
 
 
@@ -76,6 +77,19 @@ def _add_cache(verbs) -> None:
     for level in ("D1", "LL"):
         cache.add_argument(f"--{level}", metavar="SIZE,WAYS,LINE", help=f"simulate this {level} [bytes, ways, bytes]")
     cache.add_argument("--branch-sim", action="store_true", help="count mispredicted branches too")
+
+
+def _add_costs(verbs) -> None:
+    costs = verbs.add_parser(
+        "costs", help="measure what each optional model costs",
+        description="Runs a packed drum with one optional model after the other, on and off in turns, and writes what "
+        "each costs of a step and in memory. An interrupted call goes on; samples of another build are refused.")
+    costs.set_defaults(action=_costs)
+    costs.add_argument("--program", type=Path, required=True, help="the built program (the launcher says which)")
+    costs.add_argument("--inputs", type=Path, default=Path("inputs"), help="folder of the scenes (default: inputs)")
+    costs.add_argument("--output", type=Path, default=Path("results/costs"), help="where to (default: results/costs)")
+    costs.add_argument("--repeats", type=int, default=9, help="timed runs of each model (default: 9)")
+    costs.add_argument("--threads", type=int, default=1, help="threads of each run (default: 1)")
 
 
 def _numbers(text: str) -> list[int]:
@@ -130,6 +144,16 @@ def _cache(options: argparse.Namespace) -> None:
     finders = options.finders or read_bench([options.folder]).named("finder")
     steps, branches = tuple(options.steps), options.branch_sim
     count_misses(options.folder, options.program, finders, model, steps, options.scenes, branches, say=_say)
+
+
+def _costs(options: argparse.Namespace) -> None:
+    from .costs import Study, measure_costs, write_costs
+
+    if options.repeats < 1 or options.threads < 1:
+        raise ResultError("--repeats and --threads take numbers from 1 on")
+    study = Study(options.program, options.inputs, options.output, options.threads)
+    samples = measure_costs(study, options.repeats, say=_say)
+    print(write_costs(samples, options.output).document("text"), end="")
 
 
 def _say(line: str) -> None:

@@ -178,12 +178,14 @@ class Trajectory:
 
     @cached_property
     def profile(self) -> dict:
-        """Per stage: `stage` (list), `calls`, `total`, `least`, `most` [s]; `seconds` of the whole run."""
+        """Per stage: `stage` (list), `calls`, `total`, `least`, `most` [s]; of the run `seconds`, `memory` [KiB]."""
         with self._open_profile() as file:
             group = file["profile"]
             profile = {name: group[name][:] for name in ("calls", "total", "least", "most")}
             profile["stage"] = [str(name) for name in group["stage"].asstr()[:]]
             profile["seconds"] = float(group["seconds"][()])
+            if "memory" in group:
+                profile["memory"] = int(group["memory"][()])
             return profile
 
     @cached_property
