@@ -24,11 +24,11 @@ module b19_hopper
 
 contains
 
-   !> Openings of 6 to 16 diameters.
+   !> Openings of 6 to 12 diameters; wider ones would empty the silo before the flow is steady.
    subroutine run_hopper(table)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      real(wp), parameter :: openings(*) = [6.0_wp, 8.0_wp, 11.0_wp, 16.0_wp]
+      real(wp), parameter :: openings(*) = [6.0_wp, 8.0_wp, 10.0_wp, 12.0_wp]
       real(wp) :: rate(size(openings)), early(size(openings)), late(size(openings)), change
       integer :: k
 
