@@ -1,8 +1,13 @@
-!> Benchmark B14: a stack of squares that starts in its static depths stays there.
+!> Benchmark B14: a stack of squares that starts in its static depths stays there, unless it is so high that it buckles.
 !>
 !> Interface i from the top carries i blocks: its depth is d_i = i m g l/(E w), where l = w - d_i since both force
 !> points lie half a depth inside the blocks. Everything is in balance from the start; rounding alone could move the
 !> stack. The damping must be strong, since the slowest mode of 50 blocks decays with 2 gamma 1/s only.
+!>
+!> A face that tilts by t shifts the centroid of its overlap by w^2 t/(12 d), so it bends back with the moment
+!> E w^2 t/12, whatever it carries. A stack is thus a column of bending stiffness B = E w^3/12 under its own weight
+!> q = rho g w per height, and buckles at the height (7.837 B/q)^(1/3) (A.G. Greenhill, Proc. Camb. Phil. Soc. 4 (1881)
+!> 65): n = (0.653 E/(rho g w))^(1/3) blocks, 29.9 at E = 1e7 and 64 at E = 1e8. Stacks of 24 and 36 blocks get a nudge.
 module b14_stack
    use outlines, only: gravity
    use polydem_errors, only: error_t
@@ -18,7 +23,6 @@ module b14_stack
    public :: run_stack
 
    real(wp), parameter :: width = 0.01_wp
-   real(wp), parameter :: young = 1.0e7_wp
    real(wp), parameter :: weight = 2500.0_wp*width**2*gravity
 
 contains
@@ -29,19 +33,66 @@ contains
       type(table_t), intent(inout) :: table
       !> The high stack
       logical, intent(in) :: thorough
+      real(wp) :: leaning
 
       if (thorough) then
-         call stand(table, 50, 1000000)
+         call stand(table, 50, 1000000, 1.0e8_wp)
       else
-         call stand(table, 10, 20000)
+         call stand(table, 10, 20000, 1.0e7_wp)
       end if
+      call table%show('blocks at which a stack buckles, E = 1e7', &
+                      (7.837_wp/12.0_wp*1.0e7_wp*width/weight)**(1.0_wp/3.0_wp))
+      call nudge(table, 24_ip, leaning)
+      call table%expect_absolute('24 blocks, E = 1e7, nudged: the top leans after 2 s by [m]', 0.0_wp, leaning, &
+                                 1.0e-4_wp)
+      call nudge(table, 36_ip, leaning)
+      call table%expect_true('36 blocks, E = 1e7, nudged: the top leans by a width within 2 s', leaning > width)
    end subroutine run_stack
 
-   subroutine stand(table, n, n_steps)
+   !> Push a stack sideways so that its top has 1 mm/s; distance of the top from the middle after 2 s, or when that
+   !> exceeds a width.
+   subroutine nudge(table, n, leaning)
       type(table_t), intent(inout) :: table
-      integer, intent(in) :: n, n_steps
+      integer(ip), intent(in) :: n
+      real(wp), intent(out) :: leaning
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+      integer(ip) :: k
+
+      call build(n, 1.0e7_wp, simulation, error)
+      leaning = 0.0_wp
+      do k = 1_ip, n
+         if (.not. allocated(error)) simulation%bodies%velocity(1, k) = 1.0e-3_wp*real(k, wp)/real(n, wp)
+      end do
+      do k = 1_ip, 20_ip
+         if (.not. allocated(error)) call steps(simulation, nint(0.1_wp/simulation%dt), error)
+         if (allocated(error)) exit
+         leaning = abs(simulation%bodies%position(1, n))
+         if (leaning > width) exit
+      end do
+      call table%note_error(error)
+   end subroutine nudge
+
+   subroutine build(n, young, simulation, error)
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: young
+      type(simulation_t), intent(out) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
       character(len=1) :: no_overrides(0)
       type(settings_t) :: settings
+
+      call read_settings_text('stack.nml', '&scene name = ''stack'' width = 0.01 height = 0.01 bodies = '// &
+                              to_text(n)// &
+                              ' / &forces damping_coefficient = 1 stiffness = '//to_text(young)// &
+                              ' / &integrate duration = 1000 / &output ledger = .false. /', no_overrides, settings, &
+                              error)
+      if (.not. allocated(error)) call new_simulation(settings, simulation, error)
+   end subroutine build
+
+   subroutine stand(table, n, n_steps, young)
+      type(table_t), intent(inout) :: table
+      integer, intent(in) :: n, n_steps
+      real(wp), intent(in) :: young
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error
       real(wp), allocatable :: start(:, :)
@@ -50,11 +101,7 @@ contains
 
       call table%begin('B14', 'a stack of '//to_text(int(n, ip))//' squares from its static depths, '// &
                        to_text(int(n_steps, ip))//' steps')
-      call read_settings_text('stack.nml', '&scene name = ''stack'' width = 0.01 height = 0.01 bodies = '// &
-                              to_text(int(n, &
-                                      ip))//' / &forces damping_coefficient = 1 / &integrate duration = 1000 /'// &
-                              ' &output ledger = .false. /', no_overrides, settings, error)
-      if (.not. allocated(error)) call new_simulation(settings, simulation, error)
+      call build(int(n, ip), young, simulation, error)
       if (.not. allocated(error)) start = simulation%bodies%position
       if (.not. allocated(error)) call steps(simulation, n_steps, error)
       call table%note_error(error)
@@ -68,7 +115,8 @@ contains
             worst = max(worst, abs(depth/(weight*above(c)/(young*width)*(width - depth)) - 1.0_wp))
          end do
          call table%expect_absolute('number of contacts', real(n, wp), real(contacts%n, wp), 0.0_wp)
-         call table%expect_relative('depth of the lowest interface [m]', depth_below(n), contacts%area(2)/width, &
+         call table%expect_relative('depth of the lowest interface [m]', depth_below(n, young), &
+                                    contacts%area(2)/width, &
                                     1.0e-6_wp)
          call table%expect_absolute('worst relative error of a depth', 0.0_wp, worst, 1.0e-6_wp)
       end associate
@@ -96,8 +144,9 @@ contains
    end subroutine stand
 
    !> Depth d of an interface below n blocks, d = n weight (w - d)/(E w) [m]
-   pure real(wp) function depth_below(n)
+   pure real(wp) function depth_below(n, young)
       integer, intent(in) :: n
+      real(wp), intent(in) :: young
 
       depth_below = real(n, wp)*weight/(young*width)
       depth_below = depth_below*width/(1.0_wp + depth_below)

@@ -19,23 +19,34 @@ module b21_drum_froude
 
 contains
 
-   !> A drum of 400 grains at both gravities.
+   !> A drum of 400 grains at both gravities, from three seeds.
    subroutine run_drum_froude(table)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      real(wp) :: angles(2)
+      integer(ip), parameter :: n_seeds = 3_ip
+      real(wp) :: angles(n_seeds, 2), means(2)
+      integer(ip) :: seed
 
       call table%begin('B21', 'a drum of 400 grains at equal Froude numbers, 0.5 revolutions per second at 9.81 m/s2')
-      call turn(table, 1.0_wp, angles(1))
-      call table%show('at g: angle of the centre of mass [degrees]', angles(1))
-      call turn(table, 0.1_wp, angles(2))
-      call table%expect_absolute('at g/10: angle of the centre of mass [degrees]', angles(1), angles(2), 1.0_wp)
+      do seed = 1_ip, n_seeds
+         call turn(table, 1.0_wp, seed, angles(seed, 1))
+         call turn(table, 0.1_wp, seed, angles(seed, 2))
+      end do
+      means = sum(angles, 1)/real(n_seeds, wp)
+      call table%show('at g: angle of the centre of mass, mean over 3 seeds [degrees]', means(1))
+      call table%show('at g: greatest less least of the seeds [degrees]', maxval(angles(:, 1)) - minval(angles(:, 1)))
+      call table%show('at g/10: greatest less least of the seeds [degrees]', maxval(angles(:, 2)) - minval(angles(:, &
+                      2)))
+      call table%expect_absolute('at g/10: angle of the centre of mass, mean over 3 seeds [degrees]', means(1), &
+                                 means(2), &
+                                 1.0_wp)
    end subroutine run_drum_froude
 
    !> Mean angle from 1 s to 3 s, or as many times of free fall.
-   subroutine turn(table, share, angle)
+   subroutine turn(table, share, seed, angle)
       type(table_t), intent(inout) :: table
       real(wp), intent(in) :: share
+      integer(ip), intent(in) :: seed
       real(wp), intent(out) :: angle
       integer, parameter :: samples = 200
       character(len=1) :: no_overrides(0)
@@ -46,7 +57,8 @@ contains
       integer :: k
 
       stretch = 1.0_wp/sqrt(share)
-      call read_settings_text('drum.nml', '&scene name = ''drum'' bodies = 400 motion = ''rotation'' motion_rate = '// &
+      call read_settings_text('drum.nml', '&scene name = ''drum'' bodies = 400 seed = '// &
+                              to_text(seed)//' motion = ''rotation'' motion_rate = '// &
                               to_text(0.5_wp/stretch, 17)//' motion_start = '//to_text(0.3_wp*stretch, 17)// &
                               ' motion_ramp = '//to_text(0.1_wp*stretch, 17)//' / &forces gravity = 0, '// &
                               to_text(-share*gravity, 17)//' friction_coefficient = 0.4 damping_coefficient = 0.5 '// &
