@@ -97,7 +97,7 @@ contains
       type(simulation_t) :: simulation
       type(reference_t) :: reference
       type(error_t), allocatable :: error
-      real(wp) :: stop_time
+      real(wp) :: stop_time, before
       integer :: k
 
       call build(drive, friction, simulation, error)
@@ -106,13 +106,16 @@ contains
       worst = 0.0_wp
       stop_time = 0.0_wp
       do k = 1, nint(8.0_wp*pi/(frequency*dt))
-         if (.not. allocated(error)) call steps(simulation, 1, error)
+         if (allocated(error)) exit
+         before = simulation%bodies%position(1, 1)
+         call steps(simulation, 1, error)
          if (allocated(error)) exit
          call follow(drive, reference)
          worst = max(worst, abs(simulation%bodies%position(1, 1) - reference%x)/unit)
-         ! The first stop comes after a start with a speed.
-         if (stop_time <= 0.0_wp .and. drive%velocity > 0.0_wp .and. simulation%bodies%velocity(1, 1) <= 0.0_wp) &
-            stop_time = real(k, wp)*dt
+         ! The first stop comes after a start with a speed. Velocities that move the block are those in the middle of steps:
+         ! the last step forward ended at the stop, half a step more or less.
+         if (stop_time <= 0.0_wp .and. drive%velocity > 0.0_wp .and. simulation%bodies%position(1, 1) <= before) &
+            stop_time = real(k - 1, wp)*dt
       end do
       call table%note_error(error)
       if (allocated(error)) return
