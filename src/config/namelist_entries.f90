@@ -145,7 +145,7 @@ module polydem_namelist_entries
       entry_t('forces', 'stiffness', 'real', 1, '1e7', 'N/m2', '> 0, <= 1e30', '', &
       'Young''s modulus E in two dimensions'), &
       entry_t('forces', 'law', 'word', 1, 'area', '', 'area conservative', '', &
-      'Elastic force: E A/l of the book, or the one with the energy E A^2/(2 l b)'), &
+      'Elastic force: E A/l of the book, or with the energy E G^2/(2 l b), G the effective area'), &
       entry_t('forces', 'damping', 'word', 1, 'rate', '', 'rate hunt_crossley book none', '', &
       'Normal damping by the rate of the area, by that times the elastic force, as in the book, or none'), &
       entry_t('forces', 'damping_coefficient', 'real', 1, '0.0251', '', '>= 0, <= 1e6', &
@@ -155,9 +155,12 @@ module polydem_namelist_entries
       'Restitution of flat contacts, 0.01 to 1, in place of `damping_coefficient`; left out: by the latter'), &
       entry_t('forces', 'damping_from_touch', 'logical', 1, '.false.', '', '', 'damping: rate', &
       'Whether damping begins at the touch within the step: restitution of second order in dt'), &
-      entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack none', '', &
-      'Friction law'), &
-      entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', 'friction: cundall_strack', &
+      entry_t('forces', 'tilt_damping', 'real', 1, '0', '', '>= 0, <= 1e6', '', &
+      'Damping of tilts as a share of sqrt(k I), k = E L^3/(12 l); 0: none, 2: critical for two bodies'), &
+      entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack exact none', '', &
+      'Friction by a tangential spring, without one (needs `scheme` velocity_verlet), or none'), &
+      entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', &
+      'friction: cundall_strack exact', &
       'Friction coefficient mu'), &
       entry_t('forces', 'tangential_stiffness', 'real', 1, '0.2857142857142857', '', '> 0, <= 1e6', &
       'friction: cundall_strack', &
@@ -165,7 +168,9 @@ module polydem_namelist_entries
       entry_t('forces', 'tangential_damping', 'real', 1, '0.25', '', '>= 0, <= 1e6', 'friction: cundall_strack', &
       'Tangential damping as a share of sqrt(k_t m_t)'), &
       entry_t('forces', 'midstep_slip', 'logical', 1, '.false.', '', '', 'friction: cundall_strack', &
-      'Whether the slip velocity is taken in the middle of the step: friction of second order in dt')]
+      'Whether the slip velocity is taken in the middle of the step: friction of second order in dt'), &
+      entry_t('forces', 'friction_tolerance', 'real', 1, '1e-10', '', '> 0, <= 1e-3', 'friction: exact', &
+      'Slip that may remain where contacts stick, as a share of the greatest that friction takes in a step')]
 
    !> What is watched; a body that is nowhere (NaN) stops every run
    type(entry_t), parameter :: guard_entries(*) = [ &

@@ -116,7 +116,9 @@ module polydem_settings
       logical :: damping_from_touch = .false.
       !> Restitution of a flat contact, in place of the damping coefficient; 0: not given
       real(wp) :: restitution
-      !> Friction: 'cundall_strack' or 'none'
+      !> Damping of tilts as a share of sqrt(k I_eff)
+      real(wp) :: tilt_damping = 0.0_wp
+      !> Friction: 'cundall_strack', 'exact' or 'none'
       character(len=:), allocatable :: friction
       !> Friction coefficient mu
       real(wp) :: friction_coefficient
@@ -126,6 +128,8 @@ module polydem_settings
       real(wp) :: tangential_damping
       !> Whether the slip velocity in the middle of the step extends the tangential spring, not that at its end
       logical :: midstep_slip = .false.
+      !> Slip that exact friction may leave, as a share of the greatest slip velocity it takes from a contact in a step
+      real(wp) :: friction_tolerance
    end type forces_settings_t
 
    !> Group &integrate

@@ -114,6 +114,8 @@ contains
       self%bodies = bodies
       self%motions = motions
       call new_force_law(settings%forces, self%bodies, self%law)
+      self%contacts%area_is_effective = self%law%needs_effective_area
+      self%contacts%has_twist = self%law%needs_twist
       call new_integrator(settings%integrate, self%integrator)
       call choose_step(self, error)
       if (allocated(error)) return
@@ -151,11 +153,12 @@ contains
       call self%timers%lap(stage_integrate)
       call find_and_push(self, self%dt, error)
       if (allocated(error)) return
+      call self%integrator%correct(self%dt, self%bodies)
+      call self%timers%lap(stage_integrate)
       if (self%settings%output%ledger) then
          call book_step(self%ledger, self%dt, self%settings%forces%gravity, self%bodies, self%contacts)
          call self%timers%lap(stage_forces)
       end if
-      call self%integrator%correct(self%dt, self%bodies)
       call check_motion(self%guard, self%bodies, self%step, self%dt, error)
       call self%timers%lap(stage_integrate)
    end subroutine advance
@@ -208,6 +211,7 @@ contains
       call counters%set('contacts', self%sums(2))
       call counters%set('contacts without direction', self%sums(5))
       call self%neighbours%report(counters)
+      if (allocated(self%law%constraint)) call self%law%constraint%report(counters)
    end subroutine report_counters
 
    !> From the poses of the bodies to the forces on them: the middle of the step.
@@ -237,8 +241,20 @@ contains
       call evaluate_law(self%law, self%bodies, dt, self%contacts, self%memory)
       call index_contacts(self%bodies%n, self%contacts, self%incidence)
       call assemble_forces(self%settings%forces%gravity, self%incidence, self%contacts, self%bodies)
+      if (allocated(self%law%constraint)) call constrain(self, error)
       call self%timers%lap(stage_forces)
    end subroutine find_and_push
+
+   !> Add the forces that keep velocities to a constraint.
+   subroutine constrain(self, error)
+      type(simulation_t), intent(inout) :: self
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      call self%law%constraint%apply(self%dt, self%incidence, self%bodies, self%contacts, self%memory, error)
+      if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
+      call assemble_forces(self%settings%forces%gravity, self%incidence, self%contacts, self%bodies)
+   end subroutine constrain
 
    !> Move the columns of memory along with the pair list.
    subroutine carry_memory(self)

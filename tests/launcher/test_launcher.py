@@ -21,6 +21,7 @@ CMAKE_LISTS = """\
 cmake_minimum_required(VERSION 3.25)
 project(toy LANGUAGES Fortran)
 add_subdirectory(src/app)
+add_subdirectory(tests/verification)
 enable_testing()
 add_test(NAME good COMMAND ${CMAKE_COMMAND} -E true)
 add_test(NAME bad COMMAND ${CMAKE_COMMAND} -E false)
@@ -75,6 +76,7 @@ class Toy(unittest.TestCase):
         self.write("CMakePresets.json", PRESETS)
         self.write("src/app/CMakeLists.txt", "add_executable(polydem main.f90)\n")
         self.write("src/app/main.f90", PROGRAM)
+        self.write("tests/verification/CMakeLists.txt", "add_executable(verify ../../src/app/main.f90)\n")
         self.write("postproc/pyproject.toml", "")
         self.write(".venv/.made", self.folder + "\n")
         self.environment = {name: value for name, value in os.environ.items()
@@ -114,8 +116,9 @@ class Words(Toy):
     def test_help_needs_no_build(self):
         code, output, _ = self.call("--help")
         self.assertEqual(code, 0)
-        for verb in ("run", "check", "info", "plot", "replay", "bench", "workprecision", "test", "--no-install"):
-            self.assertIn(f"\n  {verb} ", output)
+        verbs = "run check info plot replay bench workprecision costs test verify"
+        for word in [*verbs.split(), "--no-install"]:
+            self.assertIn(f"\n  {word} ", output)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
 
     def test_wrong_verbs_and_options_give_2(self):
@@ -148,6 +151,12 @@ class Build(Toy):
             self.assertEqual(self.call("info"), (0, "<info>\n", ""))
             seconds.append(time.perf_counter() - start)
         self.assertLess(statistics.median(seconds), 0.2)
+
+    def test_verify_builds_and_becomes_the_benchmarks_alone(self):
+        code, output, messages = self.call("verify", "B8")
+        self.assertEqual((code, output, messages), (0, "<B8>\n", "polydem: building verify in build/release\n"))
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build", "release", "src", "app", "polydem")))
+        self.assertEqual(self.call("verify"), (0, "", ""))
 
     def test_a_changed_source_is_built_and_an_error_shown(self):
         self.call("--version")
