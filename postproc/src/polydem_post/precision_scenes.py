@@ -368,7 +368,7 @@ SCENES = {
         Scene("drum", "Drum", "position of the grains",
               _models("area/rate/cundall_strack", "area/hunt_crossley/cundall_strack",
                       "conservative/rate/cundall_strack", "area/rate/exact"),
-              _doubled(512, 5), 32768, grain_positions, moments=8),
+              _doubled(2048, 4), 65536, grain_positions, moments=8),
         Scene("gas", "Elastic gas", "kinetic energy", _models("area/none/none", "conservative/none/none"),
               _doubled(3600, 5), 0, energy_changes, gas, moments=100),
     ]
