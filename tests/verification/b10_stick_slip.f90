@@ -112,8 +112,8 @@ contains
          if (allocated(error)) exit
          call follow(drive, reference)
          worst = max(worst, abs(simulation%bodies%position(1, 1) - reference%x)/unit)
-         ! The first stop comes after a start with a speed. Velocities that move the block are those in the middle of steps:
-         ! the last step forward ended at the stop, half a step more or less.
+         ! The first stop comes after a start with a speed. Velocities that move the block are those in the middle of
+         ! steps: the last step forward ended at the stop, half a step more or less.
          if (stop_time <= 0.0_wp .and. drive%velocity > 0.0_wp .and. simulation%bodies%position(1, 1) <= before) &
             stop_time = real(k - 1, wp)*dt
       end do
