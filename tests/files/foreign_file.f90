@@ -5,8 +5,8 @@ module foreign_file
    use, intrinsic :: iso_fortran_env, only: int8, int32, int64, real32
    use hdf5, only: h5aclose_f, h5acreate_f, h5dclose_f, h5dcreate_f, h5dwrite_f, h5f_acc_trunc_f, h5f_obj_all_f, &
       h5fclose_f, h5fcreate_f, h5fget_obj_count_f, h5kind_to_type, h5open_f, h5p_dataset_create_f, h5pclose_f, &
-      h5pcreate_f, h5pset_chunk_f, h5sclose_f, h5screate_f, h5screate_simple_f, h5tclose_f, h5tcopy_f, h5tenum_create_f, &
-      h5tenum_insert_f, h5tset_size_f
+      h5pcreate_f, h5pset_chunk_f, h5sclose_f, h5screate_f, h5screate_simple_f, h5tclose_f, h5tcopy_f, &
+      h5tenum_create_f, h5tenum_insert_f, h5tset_size_f
    use hdf5, only: h5_integer_kind, h5_real_kind, h5s_scalar_f, h5t_fortran_s1, h5t_ieee_f64le, &
       h5t_std_i16be, h5t_std_i64le, h5t_std_u8le, h5t_string, hid_t, hsize_t, size_t
    implicit none
