@@ -116,7 +116,7 @@ class Words(Toy):
     def test_help_needs_no_build(self):
         code, output, _ = self.call("--help")
         self.assertEqual(code, 0)
-        verbs = "run check info plot replay bench workprecision costs test verify"
+        verbs = "run check info plot replay bench workprecision costs sweep test verify"
         for word in [*verbs.split(), "--no-install"]:
             self.assertIn(f"\n  {word} ", output)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))

@@ -1,4 +1,4 @@
-"""Command line: python -m polydem_post plot, table, tables, cache, costs or workprecision."""
+"""Command line: python -m polydem_post plot, table, tables, cache, costs, workprecision or sweep."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     warnings.showwarning = lambda message, *_: print(f"warning: {message}", file=sys.stderr)
     try:
-        options.action(options)
+        return options.action(options) or 0
     except ResultError as error:
         print(f"error: {error}", file=sys.stderr)
         return INPUT_ERROR
-    return 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -57,6 +56,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_cache(verbs)
     _add_costs(verbs)
     _add_workprecision(verbs)
+    _add_sweep(verbs)
     return parser
 
 
@@ -113,6 +113,45 @@ def _program(text: str) -> tuple:
     if not equals or precision not in ("single", "double", "quadruple"):
         raise argparse.ArgumentTypeError(f"'{text}' is not like double=PATH")
     return precision, Path(path)
+
+
+def _add_sweep(verbs) -> None:
+    sweep = verbs.add_parser("sweep", help="run a table of runs that differ in some entries of one namelist")
+    sweep.add_argument("--program", type=Path, help="the built program (the launcher says which)")
+    steps = sweep.add_subparsers(dest="step", required=True, metavar="make|run|collect")
+
+    make = steps.add_parser(
+        "make", help="check a table of runs, and lay out their folders",
+        usage="./polydem sweep make [TABLE.csv] BASE.nml [group.key=A,B,...]... --output FOLDER",
+        description="The table has a column name and one for each entry that differs, as scene.seed; an empty cell "
+                    "leaves the entry as BASE.nml has it. Listed values are combined with each other and with all "
+                    "rows; values with commas stand between semicolons: 'forces.gravity=0,-9.81;0,-1.62'.")
+    make.set_defaults(action=_sweep_make)
+    make.add_argument("words", nargs="+", metavar="WORD", help="table, namelist, lists of values")
+    make.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="folder of the sweep")
+    make.add_argument("--cores", type=_count, default=1, metavar="N", help="checks at once (default: 1)")
+
+    run = steps.add_parser(
+        "run", help="run what is not finished",
+        description="Ends with 0 if all runs are finished, 1 if some failed, 75 if it was asked to end (INT, TERM, "
+                    "HUP, USR1) before: the same command then goes on.")
+    run.set_defaults(action=_sweep_run)
+    run.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the sweep")
+    run.add_argument("--cores", type=_count, metavar="N", help="cores to use (default: all that there are)")
+    run.add_argument("--threads", type=_count, default=1, metavar="T", help="threads of each run (default: 1)")
+    run.add_argument("--rows", type=_numbers, metavar="A,B,C", help="only these rows of the table, counted from 1")
+    run.add_argument("--names", type=_words, metavar="A,B,C", help="only the runs of these names")
+    run.add_argument("--retry", action="store_true", help="run again what failed")
+
+    collect = steps.add_parser("collect", help="write results.csv and results.h5 of what there is")
+    collect.set_defaults(action=_sweep_collect)
+    collect.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the sweep")
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or not 0 < int(text) < 1000000:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 on")
+    return int(text)
 
 
 def _numbers(text: str) -> list[int]:
@@ -193,6 +232,43 @@ def _workprecision(options: argparse.Namespace) -> None:
         study = Study(options.output, dict(options.program), _say)
         study.measure([SCENES[name] for name in options.scenes or SCENES], options.repeats)
     print(write_precision_report(options.output)[-1])
+
+
+def _sweep_make(options: argparse.Namespace) -> None:
+    from .sweep import LISTED_ENTRY, make_sweep
+
+    lists = [word for word in options.words if LISTED_ENTRY.fullmatch(word)]
+    files = [word for word in options.words if word not in lists]
+    tables = [word for word in files if word.lower().endswith(".csv")]
+    bases = [word for word in files if word not in tables]
+    if len(bases) != 1 or len(tables) > 1:
+        raise ResultError("sweep make takes one namelist, and a table (.csv) or lists as scene.seed=1,2,3; see --help")
+    table = Path(tables[0]) if tables else None
+    sweep = make_sweep(Path(bases[0]), options.output, _sweep_program(options), table, lists, options.cores)
+    _say(f"{sweep.folder}: {len(sweep.runs)} runs; next: ./polydem sweep run {sweep.folder}")
+
+
+def _sweep_run(options: argparse.Namespace) -> int:
+    from .sweep import Sweep
+    from .sweep_run import Runner, available_cores
+
+    runs = Sweep(options.folder).choose(options.rows, options.names)
+    runner = Runner(_sweep_program(options), options.cores or len(available_cores()), options.threads, _say)
+    return runner.run(runs, options.retry)
+
+
+def _sweep_collect(options: argparse.Namespace) -> None:
+    from .sweep import Sweep
+    from .sweep_collect import CSV_FILE, HDF5_FILE, collect_sweep
+
+    collect_sweep(Sweep(options.folder), _say)
+    _say(f"{options.folder / CSV_FILE}\n{options.folder / HDF5_FILE}")
+
+
+def _sweep_program(options: argparse.Namespace) -> Path:
+    if options.program is None:
+        raise ResultError("--program is missing: call ./polydem sweep, which knows it")
+    return options.program
 
 
 def _say(line: str) -> None:
