@@ -112,7 +112,7 @@ class Words(Toy):
     def test_help_needs_no_build(self):
         code, output, _ = self.call("--help")
         self.assertEqual(code, 0)
-        for verb in ("run", "check", "info", "plot", "replay", "bench", "test", "--no-install"):
+        for verb in ("run", "check", "info", "plot", "replay", "bench", "sweep", "test", "--no-install"):
             self.assertIn(f"\n  {verb} ", output)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
 
@@ -146,6 +146,17 @@ class Build(Toy):
             self.assertEqual(self.call("info"), (0, "<info>\n", ""))
             seconds.append(time.perf_counter() - start)
         self.assertLess(statistics.median(seconds), 0.2)
+
+    def test_a_sweep_knows_the_program_and_its_help_needs_none(self):
+        self.write(".venv/bin/python", '#!/bin/bash\nprintf "<%s>\\n" "$@"\n')
+        os.chmod(os.path.join(self.folder, ".venv/bin/python"), 0o755)
+        program = os.path.join(self.folder, "build/release/src/app/polydem")
+        code, output, messages = self.call("sweep", "make", "--help")
+        self.assertEqual((code, messages, os.path.exists(program)), (0, "", False))
+        code, output, _ = self.call("sweep", "run", "my sweep", "--cores", "2")
+        self.assertEqual((code, os.path.exists(program)), (0, True))
+        words = ["-m", "polydem_post", "sweep", "--program", program, "run", "my sweep", "--cores", "2"]
+        self.assertEqual(output, "".join(f"<{word}>\n" for word in words))
 
     def test_a_changed_source_is_built_and_an_error_shown(self):
         self.call("--version")
