@@ -64,6 +64,8 @@ contains
       if (.not. allocated(error)) call read_reach(path, file, trace, error)
       if (.not. allocated(error)) call read_polygons(path, file, trace, error)
       if (.not. allocated(error)) call file%read_real_attribute('/', 'dt', trace%dt, error)
+      if (.not. ieee_is_finite(trace%dt) .or. trace%dt < 0.0_dp) call raise(error, input_error, path// &
+         ': the attribute dt must be finite and not negative')
       if (allocated(error)) then
          call file%close(ignored)
       else

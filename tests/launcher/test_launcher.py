@@ -158,6 +158,17 @@ class Build(Toy):
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build", "release", "src", "app", "polydem")))
         self.assertEqual(self.call("verify"), (0, "", ""))
 
+    def test_a_sweep_knows_the_program_and_its_help_needs_none(self):
+        self.write(".venv/bin/python", '#!/bin/bash\nprintf "<%s>\\n" "$@"\n')
+        os.chmod(os.path.join(self.folder, ".venv/bin/python"), 0o755)
+        program = os.path.join(self.folder, "build/release/src/app/polydem")
+        code, output, messages = self.call("sweep", "make", "--help")
+        self.assertEqual((code, messages, os.path.exists(program)), (0, "", False))
+        code, output, _ = self.call("sweep", "run", "my sweep", "--cores", "2")
+        self.assertEqual((code, os.path.exists(program)), (0, True))
+        words = ["-m", "polydem_post", "sweep", "--program", program, "run", "my sweep", "--cores", "2"]
+        self.assertEqual(output, "".join(f"<{word}>\n" for word in words))
+
     def test_a_changed_source_is_built_and_an_error_shown(self):
         self.call("--version")
         self.write("src/app/main.f90", PROGRAM.replace("'<'", "'['"))

@@ -120,8 +120,9 @@ class Runner:
             command.append("--continue")
         elif run.result.exists():
             command.append("--force")
-        if not slot.start(run, command, self.threads):
-            self.say(f"{run.name}: left out, since another sweep runs it now")
+        hindrance = slot.start(run, command, self.threads)
+        if hindrance:
+            self.say(f"{run.name}: left out, since another sweep {hindrance}")
 
     def _verdict(self, runs: list[Run]) -> int:
         states = [state_of(run) for run in runs]
@@ -191,21 +192,24 @@ class _Slot:
     def is_busy(self) -> bool:
         return self.process is not None
 
-    def start(self, run: Run, command: list[str], threads: int) -> bool:
-        """Start a run, unless another sweep has it."""
+    def start(self, run: Run, command: list[str], threads: int) -> str:
+        """Start a run, unless another sweep has it or, since it was found due, had it; gives what hinders."""
         self.record = (run.folder / ATTEMPTS).open("a", newline="", encoding="utf-8")
         try:
             fcntl.flock(self.record, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             self.record.close()
-            return False
+            return "runs it now"
+        if state_of(run) == FINISHED:
+            self.record.close()
+            return "has just finished it"
         self.run, self.threads, self.began = run, threads, time.monotonic()
         self.started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         with (run.folder / OUTPUT).open("ab") as output:
             # A session of its own: the terminal's Ctrl-C goes to the sweep, which passes it on.
             self.process = subprocess.Popen(command, env=self.environment, stdin=subprocess.DEVNULL, stdout=output,
                                             stderr=subprocess.STDOUT, start_new_session=True)
-        return True
+        return ""
 
     def signal(self, number: int) -> None:
         """Send a signal to the run, if there is one."""
