@@ -23,6 +23,8 @@ module b08_incline
 
    real(wp), parameter :: young = 1.0e7_wp
    real(wp), parameter :: density = 2500.0_wp
+   !> Friction coefficient and sides of the block, but for toppling [m]
+   real(wp), parameter :: mu = 0.3_wp, size_of_block(2) = [0.02_wp, 0.01_wp]
    !> Thickness of the plank [m]
    real(wp), parameter :: thickness = 0.05_wp
 
@@ -36,29 +38,31 @@ contains
       logical, intent(in) :: thorough
 
       call table%begin('B8', 'block on an incline')
-      call slide(table, 0.5_wp)
-      call slide(table, 0.32_wp)
+      call slide(table, 0.5_wp, 'cundall_strack')
+      call slide(table, 0.32_wp, 'cundall_strack')
+      call slide(table, atan(1.01_wp*mu), 'exact')
       call rest(table, merge(500000, 50000, thorough))
+      call rest_exactly(table, merge(500000, 50000, thorough))
       call topple(table, 1.0e7_wp)
       if (thorough) call topple(table, 1.0e9_wp)
    end subroutine run_incline
 
-   subroutine slide(table, slope)
+   subroutine slide(table, slope, friction)
       type(table_t), intent(inout) :: table
       real(wp), intent(in) :: slope
-      real(wp), parameter :: mu = 0.3_wp
+      character(len=*), intent(in) :: friction
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error
       real(wp) :: early, late
 
-      call put_on_slope(slope, 0.0_wp, [0.02_wp, 0.01_wp], mu, simulation, error)
+      call put_on_slope(slope, 0.0_wp, size_of_block, mu, 'friction = '''//friction//'''', simulation, error)
       if (.not. allocated(error)) call steps(simulation, 10000, error)
       early = downhill(slope, simulation%bodies%velocity(:, 2))
       if (.not. allocated(error)) call steps(simulation, 10000, error)
       late = downhill(slope, simulation%bodies%velocity(:, 2))
       call table%note_error(error)
       if (allocated(error)) return
-      call table%expect_relative('slides at '//to_text(slope, 2)//' rad, mu = 0.3: acceleration [m/s2]', &
+      call table%expect_relative(friction//', tan a = '//to_text(tan(slope)/mu, 3)//' mu: acceleration [m/s2]', &
                                  gravity*(sin(slope) - mu*cos(slope)), (late - early)/0.1_wp, 1.0e-3_wp)
    end subroutine slide
 
@@ -66,12 +70,12 @@ contains
    subroutine rest(table, n)
       type(table_t), intent(inout) :: table
       integer, intent(in) :: n
-      real(wp), parameter :: slope = 0.1_wp, size(2) = [0.02_wp, 0.01_wp]
+      real(wp), parameter :: slope = 0.1_wp, size(2) = size_of_block
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error
       real(wp) :: start(2), middle(2), load
 
-      call put_on_slope(slope, 0.0_wp, size, 0.3_wp, simulation, error)
+      call put_on_slope(slope, 0.0_wp, size, mu, '', simulation, error)
       if (allocated(error)) return
       start = simulation%bodies%position(:, 2)
       call steps(simulation, n, error)
@@ -90,6 +94,27 @@ contains
                                  0.0_wp, &
                                  downhill(slope, simulation%bodies%position(:, 2) - middle), 1.0e-14_wp)
    end subroutine rest
+
+   !> At 0.99 of the critical slope, after it has settled, exact friction lets nothing creep: 2 units in the last place
+   !> of 1 m are allowed.
+   subroutine rest_exactly(table, n)
+      type(table_t), intent(inout) :: table
+      integer, intent(in) :: n
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+      real(wp) :: middle(2), slope
+
+      slope = atan(0.99_wp*mu)
+      call put_on_slope(slope, 0.0_wp, size_of_block, mu, 'friction = ''exact''', simulation, error)
+      if (.not. allocated(error)) call steps(simulation, n, error)
+      if (.not. allocated(error)) middle = simulation%bodies%position(:, 2)
+      if (.not. allocated(error)) call steps(simulation, n, error)
+      call table%note_error(error)
+      if (allocated(error)) return
+      call table%expect_absolute('exact, tan a = 0.99 mu: move in the second half of '//to_text(2*n)//' steps [m]', &
+                                 0.0_wp, downhill(slope, simulation%bodies%position(:, 2) - middle), &
+                                 2.0_wp*epsilon(1.0_wp))
+   end subroutine rest_exactly
 
    !> A block four times as high as wide, from its position of equilibrium just below the slope where it topples, and
    !> from flat just above it.
@@ -171,7 +196,7 @@ contains
    end subroutine put_on_edge
 
    !> A long fixed plank and a block in its static depth on it, body 2, at steps of 1e-5 s.
-   subroutine put_on_slope(slope, speed, size, mu, simulation, error)
+   subroutine put_on_slope(slope, speed, size, mu, forces, simulation, error)
       !> Angle of the plank, downhill to the right [rad]
       real(wp), intent(in) :: slope
       !> Speed downhill at the start [m/s]
@@ -180,6 +205,8 @@ contains
       real(wp), intent(in) :: size(2)
       !> Friction coefficient
       real(wp), intent(in) :: mu
+      !> Further entries of &forces
+      character(len=*), intent(in) :: forces
       !> Ready to advance
       type(simulation_t), intent(out) :: simulation
       !> What went wrong
@@ -193,7 +220,8 @@ contains
       call list%append(block_at(0.0_wp, 0.0_wp, 2.0_wp, thickness, -slope), fixed=.true.)
       call list%append(block_at(sin(slope)*distance, cos(slope)*distance, size(1), size(2), -slope), &
                        velocity=[speed*cos(slope), -speed*sin(slope)])
-      call begin('&forces friction_coefficient = '//to_text(mu, 17)//' damping_coefficient = 1 /'// &
+      call begin('&forces '//forces//' friction_coefficient = '//to_text(mu, &
+                 17)//' damping_coefficient = 1 /'// &
                  integrate_text(1.0e-5_wp), list, simulation, error)
    end subroutine put_on_slope
 

@@ -36,9 +36,11 @@ contains
       real(wp) :: leaning
 
       if (thorough) then
-         call stand(table, 50, 1000000, 1.0e8_wp)
+         call stand(table, 50, 1000000, 1.0e8_wp, 'cundall_strack')
+         call stand(table, 50, 1000000, 1.0e8_wp, 'exact')
       else
-         call stand(table, 10, 20000, 1.0e7_wp)
+         call stand(table, 10, 20000, 1.0e7_wp, 'cundall_strack')
+         call stand(table, 10, 20000, 1.0e7_wp, 'exact')
       end if
       call table%show('blocks at which a stack buckles, E = 1e7', &
                       (7.837_wp/12.0_wp*1.0e7_wp*width/weight)**(1.0_wp/3.0_wp))
@@ -59,7 +61,7 @@ contains
       type(error_t), allocatable :: error
       integer(ip) :: k
 
-      call build(n, 1.0e7_wp, simulation, error)
+      call build(n, 1.0e7_wp, 'cundall_strack', simulation, error)
       leaning = 0.0_wp
       do k = 1_ip, n
          if (.not. allocated(error)) simulation%bodies%velocity(1, k) = 1.0e-3_wp*real(k, wp)/real(n, wp)
@@ -73,9 +75,10 @@ contains
       call table%note_error(error)
    end subroutine nudge
 
-   subroutine build(n, young, simulation, error)
+   subroutine build(n, young, friction, simulation, error)
       integer(ip), intent(in) :: n
       real(wp), intent(in) :: young
+      character(len=*), intent(in) :: friction
       type(simulation_t), intent(out) :: simulation
       type(error_t), allocatable, intent(inout) :: error
       character(len=1) :: no_overrides(0)
@@ -83,16 +86,18 @@ contains
 
       call read_settings_text('stack.nml', '&scene name = ''stack'' width = 0.01 height = 0.01 bodies = '// &
                               to_text(n)// &
-                              ' / &forces damping_coefficient = 1 stiffness = '//to_text(young)// &
+                              ' / &forces friction = '''//friction//''' damping_coefficient = 1 stiffness = '// &
+                                 to_text(young)// &
                               ' / &integrate duration = 1000 / &output ledger = .false. /', no_overrides, settings, &
                               error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
    end subroutine build
 
-   subroutine stand(table, n, n_steps, young)
+   subroutine stand(table, n, n_steps, young, friction)
       type(table_t), intent(inout) :: table
       integer, intent(in) :: n, n_steps
       real(wp), intent(in) :: young
+      character(len=*), intent(in) :: friction
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error
       real(wp), allocatable :: start(:, :)
@@ -100,8 +105,8 @@ contains
       integer :: c
 
       call table%begin('B14', 'a stack of '//to_text(int(n, ip))//' squares from its static depths, '// &
-                       to_text(int(n_steps, ip))//' steps')
-      call build(int(n, ip), young, simulation, error)
+                       to_text(int(n_steps, ip))//' steps, friction '//friction)
+      call build(int(n, ip), young, friction, simulation, error)
       if (.not. allocated(error)) start = simulation%bodies%position
       if (.not. allocated(error)) call steps(simulation, n_steps, error)
       call table%note_error(error)
