@@ -64,9 +64,9 @@ module polydem_simulation
       !> Watches how far bodies move
       type(motion_guard_t), private :: guard
       !> Slots that may move: free bodies, then those of motions; the first n_free of them are the free ones
-      integer(ip), allocatable, private :: moving(:)
+      integer(ip), allocatable :: moving(:)
       !> Sums over all steps: pairs, contacts, pairs that began, pairs that ended, degenerate contacts
-      integer(lp), private :: sums(5) = 0_lp
+      integer(lp) :: sums(5) = 0_lp
    end type simulation_t
 
    !> More steps than any run can do
