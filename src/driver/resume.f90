@@ -8,7 +8,8 @@ module polydem_resume
    use polydem_kinds, only: ip, lp
    use polydem_log, only: log_t
    use polydem_paths, only: exists, remove_file
-   use polydem_result_folder, only: checkpoint_path, last_number, n_checkpoints, profile_path, segment_path
+   use polydem_result_folder, only: checkpoint_path, holds_result, last_number, n_checkpoints, profile_path, &
+      segment_path
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
@@ -74,7 +75,7 @@ contains
       if (past%checkpoint == 0_ip) then
          past%former = former_settings(profile_path(folder))
          if (past%former == '') past%former = former_settings(segment_path(folder, 1_ip))
-         past%remark = 'there is no checkpoint in '//folder//': the run begins anew'
+         if (holds_result(folder)) past%remark = 'there is no checkpoint in '//folder//': the run begins anew'
       end if
       changes = ''
       if (past%former /= '') changes = changed_entries(past%former, settings%resolved)

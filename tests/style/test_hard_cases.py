@@ -13,8 +13,8 @@ CTEST = re.compile(r"\badd_test\(\s*NAME\s+(\w+)")
 
 
 def rows_of(text):
-    """Case, expected outcome, tests and remark of every row."""
-    return [(case, expected.strip(), re.findall(r"`(\w+)`", tests), tests.strip())
+    """Case, expected outcome and tests of every row."""
+    return [(case, expected.strip(), re.findall(r"`(\w+)`", tests))
             for case, expected, tests, _ in ROW.findall(text)]
 
 
@@ -32,9 +32,9 @@ def wrong_in(text, names):
     """What is wrong with a table, given the names of all tests."""
     rows = rows_of(text)
     wrong = []
-    if [case for case, _, _, _ in rows] != CASES:
+    if [case for case, _, _ in rows] != CASES:
         wrong.append("the cases are not all there, once each and in order")
-    for case, expected, tests, cell in rows:
+    for case, expected, tests in rows:
         start = case.lower() + "_"
         if not expected:
             wrong.append(f"{case} expects nothing")
