@@ -19,7 +19,7 @@ module polydem_resume
 
    !> What former attempts left
    type :: past_t
-      !> Number of the checkpoint to go on from; 0: there is none, the run begins anew
+      !> Number of the checkpoint to go on from; 0: there is none, the run begins with its first step
       integer(ip) :: checkpoint = 0_ip
       !> Its step
       integer(lp) :: step = 0_lp
@@ -53,15 +53,18 @@ contains
       if (.not. allocated(error)) call file%read('/status', status, error)
       call file%close(error)
       if (.not. allocated(error)) is_finished = status == 'finished'
-      if (is_finished) is_finished = changed_entries(former_settings(profile_path(folder)), settings%resolved) == ''
+      if (is_finished) is_finished = changed_entries(origin_of(profile_path(folder), 'resolved_input'), &
+                                                     settings%resolved) == ''
    end function is_finished
 
    !> Choose the newest good checkpoint, and see to it that the settings are as they were.
-   subroutine look_back(folder, settings, may_change, past, error)
+   subroutine look_back(folder, settings, scene, may_change, past, error)
       !> Folder of the result, which nobody else writes to
       character(len=*), intent(in) :: folder
       !> Settings of the run
       type(settings_t), intent(in) :: settings
+      !> Hash of its bodies at the start, as in the provenance of results
+      character(len=*), intent(in) :: scene
       !> Whether the settings may be others
       logical, intent(in) :: may_change
       !> What was found
@@ -73,23 +76,42 @@ contains
       call choose_checkpoint(folder, past, error)
       if (allocated(error)) return
       if (past%checkpoint == 0_ip) then
-         past%former = former_settings(profile_path(folder))
-         if (past%former == '') past%former = former_settings(segment_path(folder, 1_ip))
-         if (holds_result(folder)) past%remark = 'there is no checkpoint in '//folder//': the run begins anew'
+         call look_without_checkpoint(folder, settings, scene, past, error)
+         return
       end if
-      changes = ''
-      if (past%former /= '') changes = changed_entries(past%former, settings%resolved)
-      if (changes /= '' .and. past%checkpoint == 0_ip) then
-         call raise(error, input_error, folder//' holds the result of other settings, and no checkpoint: '//changes// &
-                    '. Give --force instead of --continue to overwrite it')
-      else if (changes /= '' .and. .not. may_change) then
+      changes = changed_entries(past%former, settings%resolved)
+      if (changes /= '' .and. .not. may_change) then
          call raise(error, input_error, 'the settings are not those of the run in '//folder//': '//changes// &
                     '. Undo that, or give --changed to go on with them from step '//to_text(past%step))
       end if
-      if (allocated(error) .or. past%checkpoint == 0_ip) return
+      if (allocated(error)) return
       if (changes /= '') past%remark = past%remark//new_line('a')//'changed    '//changes
       call count_segments(folder, changes /= '', past, error)
    end subroutine look_back
+
+   !> Begin with the first step, but keep the closed segments of a run of the same scene and settings.
+   subroutine look_without_checkpoint(folder, settings, scene, past, error)
+      character(len=*), intent(in) :: folder, scene
+      type(settings_t), intent(in) :: settings
+      type(past_t), intent(inout) :: past
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: path, changes, former
+
+      if (holds_result(folder)) past%remark = 'there is no checkpoint in '//folder// &
+         ': the run begins with its first step'
+      path = segment_path(folder, 1_ip)
+      if (.not. exists(path)) path = profile_path(folder)
+      if (.not. exists(path)) return
+      changes = changed_entries(origin_of(path, 'resolved_input'), settings%resolved)
+      former = origin_of(path, 'scene')
+      if (changes == '' .and. former /= scene) changes = 'the bodies at the start are others'
+      if (changes == '') then
+         call count_segments(folder, .false., past, error)
+      else
+         call raise(error, input_error, folder//' holds the result of another run, and no checkpoint: '//changes// &
+                    '. Give --force instead of --continue to overwrite it')
+      end if
+   end subroutine look_without_checkpoint
 
    !> Look at all checkpoints, and take the one of the greatest step.
    subroutine choose_checkpoint(folder, past, error)
@@ -137,20 +159,19 @@ contains
       call file%close(error)
    end subroutine read_progress
 
-   !> Settings in the provenance of a file; empty if they cannot be read
-   function former_settings(path) result(settings)
-      character(len=*), intent(in) :: path
-      character(len=:), allocatable :: settings
+   !> An entry in the provenance of a file; empty if it cannot be read
+   function origin_of(path, entry) result(text)
+      character(len=*), intent(in) :: path, entry
+      character(len=:), allocatable :: text
       type(hdf5_file_t) :: file
       type(error_t), allocatable :: error
 
-      settings = ''
-      if (.not. exists(path)) return
+      text = ''
       call file%open(path, error)
-      if (.not. allocated(error)) call file%read('/provenance/resolved_input', settings, error)
+      if (.not. allocated(error)) call file%read('/provenance/'//entry, text, error)
       call file%close(error)
-      if (allocated(error)) settings = ''
-   end function former_settings
+      if (allocated(error)) text = ''
+   end function origin_of
 
    !> Find the last frame in closed segments. With other settings, frames after the checkpoint are removed.
    subroutine count_segments(folder, is_changed, past, error)

@@ -8,6 +8,7 @@ module polydem_run
    use polydem_counters, only: counters_t
    use polydem_description, only: describe
    use polydem_errors, only: error_t, input_error, raise, stopped_early
+   use polydem_hash, only: hexadecimal
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ledger, only: balance_t
    use polydem_ledger_row, only: ledger_row_t
@@ -163,17 +164,22 @@ contains
       character(len=:), allocatable, intent(in) :: note
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
+      logical :: goes_on
 
       ! Again, now that nobody else can write there.
       call check_free(run, force, error)
       if (allocated(error)) return
-      if (run%attempt%continues) call look_back(run%folder, settings, run%attempt%may_change, run%past, error)
-      if (allocated(error)) return
-      if (run%past%checkpoint == 0_ip) call clear_result(run%folder, error)
-      if (run%past%checkpoint > 0_ip) call clear_unfinished(run%folder, error)
-      call run%log%open(run%folder, error, appended=run%past%checkpoint > 0_ip)
-      if (allocated(error)) return
+      run%history%scene = scene_hash(run%simulation%bodies)
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
+      run%provenance%scene = hexadecimal(run%history%scene)
+      if (run%attempt%continues) call look_back(run%folder, settings, run%provenance%scene, run%attempt%may_change, &
+                                                run%past, error)
+      if (allocated(error)) return
+      goes_on = run%past%checkpoint > 0_ip .or. run%past%segments > 0_ip
+      if (goes_on) call clear_unfinished(run%folder, error)
+      if (.not. goes_on) call clear_result(run%folder, error)
+      call run%log%open(run%folder, error, appended=goes_on)
+      if (allocated(error)) return
       call write_header(run%log, run%provenance, run%folder)
       if (allocated(note)) call run%log%write_line(note)
       call describe(run%simulation, run%log)
@@ -191,7 +197,6 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       call run%checkpoints%open(run%simulation%settings%checkpoint, run%simulation%dt, run%began, run%attempt%limit)
-      run%history%scene = scene_hash(run%simulation%bodies)
       if (allocated(run%past%remark)) call run%log%write_line(run%past%remark)
       if (run%past%checkpoint == 0_ip) return
       run%provenance%parent = checkpoint_path(run%folder, run%past%checkpoint)//', step '//to_text(run%past%step)

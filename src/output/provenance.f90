@@ -64,6 +64,8 @@ module polydem_provenance
       character(len=:), allocatable :: resolved_input
       !> Seed of the scene
       integer(ip) :: seed = 0_ip
+      !> Hash of the bodies at the start; empty if there are none
+      character(len=:), allocatable :: scene
       !> When the run, or this attempt of it, started (UTC)
       character(len=:), allocatable :: started
       !> Checkpoint that this attempt went on from; 'none' at the start of a run
@@ -113,6 +115,7 @@ contains
       provenance%seed = seed
       provenance%started = utc_now()
       provenance%parent = 'none'
+      provenance%scene = ''
    end subroutine collect_provenance
 
    !> Whether OpenMP binds its threads to processors
@@ -157,6 +160,7 @@ contains
       call file%write('/provenance/seed', provenance%seed, error)
       call file%write('/provenance/started', provenance%started, error)
       call file%write('/provenance/parent', provenance%parent, error)
+      call file%write('/provenance/scene', provenance%scene, error)
       call file%write('/provenance/written', utc_now(), error)
    end subroutine write_provenance
 

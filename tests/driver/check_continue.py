@@ -159,12 +159,22 @@ def a_finished_run_stays_as_it_is(case):
     assert code == BAD_INPUT and "give --continue to go on with it" in message, (code, message)
 
 
-def a_run_without_checkpoint_begins_anew(case):
+def a_run_without_checkpoint_begins_with_its_first_step(case):
     assert "no checkpoint" not in case.finish("fresh")
     os.makedirs("early")
     with open("early/trajectory_0001.h5.open", "w", encoding="utf-8") as file:
         file.write("what a kill left")
-    assert "there is no checkpoint in early: the run begins anew" in case.finish("early")
+    assert "there is no checkpoint in early: the run begins with its first step" in case.finish("early")
+    # A kill between the end of a segment and the checkpoint leaves a segment, which stays as it is.
+    case.interrupt("segment")
+    for path in checkpoints_of("segment"):
+        os.remove(path)
+    code, _, message = case.run("segment", "--continue", "--changed", "--set", "scene.seed=2")
+    assert code == BAD_INPUT and "scene.seed was 1 and is 2" in message and "--force" in message, (code, message)
+    before = closed_segments("segment")
+    case.finish("segment")
+    after = closed_segments("segment")
+    assert before and all(after[name] == content for name, content in before.items())
 
 
 def a_missing_segment_is_noticed(case):
@@ -200,11 +210,10 @@ def a_disk_that_is_full_loses_nothing(case):
             assert code == NO_FILE and "disk/result" in message, (code, message)
             assert not [name for name in os.listdir("disk/result") if name.endswith(".h5.unfinished")]
             before = closed_segments("disk/result")
-            had_checkpoint = bool(checkpoints_of("disk/result"))
             subprocess.run(["mount", "-o", "remount,size=64m", "disk"], check=True)
             case.finish("disk/result")
             after = closed_segments("disk/result")
-            assert not had_checkpoint or all(after[name] == content for name, content in before.items())
+            assert all(after[name] == content for name, content in before.items())
         finally:
             subprocess.run(["umount", "disk"], check=True)
 
@@ -224,9 +233,9 @@ def a_folder_that_cannot_be_written_is_named(case):
 
 TESTS = (a_signal_ends_a_run_with_a_checkpoint, a_second_signal_ends_it_at_once, elapsed_time_ends_a_run_in_time,
          a_damaged_checkpoint_is_passed_over, changed_settings_are_refused_unless_allowed,
-         a_finished_run_stays_as_it_is, a_run_without_checkpoint_begins_anew, a_missing_segment_is_noticed,
-         a_run_that_a_guard_stops_leaves_frames_and_checkpoint, a_disk_that_is_full_loses_nothing,
-         a_folder_that_cannot_be_written_is_named)
+         a_finished_run_stays_as_it_is, a_run_without_checkpoint_begins_with_its_first_step,
+         a_missing_segment_is_noticed, a_run_that_a_guard_stops_leaves_frames_and_checkpoint,
+         a_disk_that_is_full_loses_nothing, a_folder_that_cannot_be_written_is_named)
 
 
 def main():
