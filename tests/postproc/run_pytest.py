@@ -1,4 +1,4 @@
-"""Run the tests of the Python package: run_pytest.py ROOT TESTS WRITE_SAMPLE.
+"""Run the tests of the Python package: run_pytest.py ROOT TESTS WRITE_SAMPLE PROGRAM.
 
 Takes the Python of ROOT/.venv, which the launcher makes, or else the Python that runs this file.
 """
@@ -12,7 +12,7 @@ NEEDED = "import h5py, matplotlib, numpy, pytest"
 
 
 def main() -> int:
-    root, tests, write_sample = (Path(word) for word in sys.argv[1:4])
+    root, tests, write_sample, program = (Path(word) for word in sys.argv[1:5])
     python = root / ".venv" / "bin" / "python"
     if not python.exists():
         python = Path(sys.executable)
@@ -24,6 +24,7 @@ def main() -> int:
     environment["PYTHONPATH"] = str(root / "postproc" / "src")
     environment["PYTHONDONTWRITEBYTECODE"] = "1"
     environment["POLYDEM_WRITE_SAMPLE"] = str(write_sample)
+    environment["POLYDEM_PROGRAM"] = str(program)
     command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests)]
     return subprocess.run(command, env=environment).returncode
 
