@@ -22,6 +22,12 @@ module polydem_command_line
       integer :: threads = 0
       !> Whether results may be overwritten
       logical :: force = .false.
+      !> Whether an interrupted run goes on from its last checkpoint
+      logical :: continues = .false.
+      !> Whether it may do so with other settings
+      logical :: may_change = .false.
+      !> Elapsed time after which a run must have ended [s]; 0: none
+      integer :: limit = 0
       !> Neighbour finder of a replay
       character(len=:), allocatable :: finder
       !> How often a replay is repeated
@@ -80,6 +86,11 @@ module polydem_command_line
       option_t('--threads', 'T', 'run check replay', &
       'number of threads (default: all that the system offers; replay: one)'), &
       option_t('--force', '', 'run', 'overwrite results that are there already'), &
+      option_t('--continue', '', 'run', &
+      'go on from the last checkpoint, or begin if there is none; do nothing if all is done'), &
+      option_t('--changed', '', 'run', 'go on although the settings have changed since'), &
+      option_t('--walltime', 'HH:MM:SS', 'run', &
+      'end within this elapsed time, with a checkpoint and exit code 75'), &
       option_t('--finder', 'NAME', 'replay', 'neighbour finder (default: quadtree)'), &
       option_t('--repeat', 'R', 'replay', 'how often the trace is replayed (default: 1)'), &
       option_t('--steps', 'N', 'replay', 'replay the first steps of the trace only (default: all)'), &
@@ -239,6 +250,12 @@ contains
          call read_count('--threads', value, command%threads, error)
       case ('--force')
          command%force = .true.
+      case ('--continue')
+         command%continues = .true.
+      case ('--changed')
+         command%may_change = .true.
+      case ('--walltime')
+         call read_duration('--walltime', value, command%limit, error)
       case ('--finder')
          command%finder = value
          if (all(choices_of('neighbours', 'finder') /= value)) call raise(error, input_error, '--finder '// &
@@ -274,6 +291,29 @@ contains
       end if
    end subroutine read_count
 
+   !> Hours, minutes and seconds as seconds
+   pure subroutine read_duration(name, text, seconds, error)
+      character(len=*), intent(in) :: name, text
+      integer, intent(inout) :: seconds
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: colon, hours, minutes, rest
+      logical :: good
+
+      colon = index(text, ':')
+      good = len(text) == colon + 5 .and. colon > 1 .and. colon <= 6
+      if (good) good = verify(text(:colon - 1)//text(colon + 1:colon + 2)//text(colon + 4:), '0123456789') == 0 &
+         .and. text(colon + 3:colon + 3) == ':'
+      if (good) then
+         read (text(:colon - 1), *) hours
+         read (text(colon + 1:colon + 2), *) minutes
+         read (text(colon + 4:), *) rest
+         good = minutes < 60 .and. rest < 60 .and. hours + minutes + rest > 0
+      end if
+      if (good) seconds = 3600*hours + 60*minutes + rest
+      if (.not. good) call raise(error, input_error, name//' '//text//': hours, minutes and seconds were expected, '// &
+         'as in 23:30:00')
+   end subroutine read_duration
+
    !> The verb must be there with its file, and take every option used.
    pure subroutine check_command(command, used, error)
       type(command_t), intent(in) :: command
@@ -293,6 +333,9 @@ contains
             return
          end if
       end do
+      if (command%continues .and. command%force) call raise(error, input_error, &
+         '--continue does not go with --force, which begins anew; give one of them')
+      if (command%may_change .and. .not. command%continues) call raise(error, input_error, '--changed needs --continue')
       if (command%help .or. command%version .or. command%file /= '') return
       do k = 1, size(verbs)
          if (verbs(k)%name /= command%verb .or. verbs(k)%file_is_optional) cycle

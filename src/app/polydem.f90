@@ -10,11 +10,11 @@ program polydem
    use polydem_command_line, only: command_t, read_command_line, usage
    use polydem_errors, only: error_t
    use polydem_info, only: describe_program, describe_result
-   use polydem_kinds, only: ip
+   use polydem_kinds, only: dp, ip
    use polydem_read_bench, only: read_bench
    use polydem_read_settings, only: read_settings
    use polydem_replay, only: replay_trace
-   use polydem_run, only: run_simulation
+   use polydem_run, only: attempt_t, run_simulation
    use polydem_settings, only: settings_t
    implicit none
 
@@ -60,7 +60,8 @@ contains
          call read_settings(command%file, command%overrides, settings, error)
          if (allocated(error)) return
          if (command%verb == 'check') call check_simulation(settings, error)
-         if (command%verb == 'run') call run_simulation(settings, command%force, error)
+         if (command%verb == 'run') call run_simulation(settings, command%force, error, attempt_t( &
+            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp)))
       case ('replay')
          call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error, &
                            int(command%steps, ip), command%samples, command%oracle)

@@ -5,7 +5,7 @@
 module polydem_errors
    implicit none
    private
-   public :: error_t, raise, run_error, input_error, io_error
+   public :: error_t, raise, run_error, input_error, io_error, stopped_early
 
    !> Exit code of a run that failed numerically or at run time
    integer, parameter :: run_error = 1
@@ -13,10 +13,12 @@ module polydem_errors
    integer, parameter :: input_error = 2
    !> Exit code of files and folders that cannot be read or written
    integer, parameter :: io_error = 3
+   !> Exit code of a run that was asked to end before its time and can go on from a checkpoint (EX_TEMPFAIL of sysexits)
+   integer, parameter :: stopped_early = 75
 
    !> What went wrong
    type :: error_t
-      !> Exit code: run_error, input_error or io_error
+      !> Exit code: run_error, input_error, io_error or stopped_early
       integer :: code = run_error
       !> What is wrong, where (file and line, or body, position and step), and what to do
       character(len=:), allocatable :: message
@@ -28,7 +30,7 @@ contains
    pure subroutine raise(error, code, message)
       !> Error to allocate
       type(error_t), allocatable, intent(inout) :: error
-      !> run_error, input_error or io_error
+      !> run_error, input_error, io_error or stopped_early
       integer, intent(in) :: code
       !> What is wrong, where, and what to do
       character(len=*), intent(in) :: message

@@ -61,6 +61,9 @@ contains
          call take(values, 'output.trace_start', output%trace_start)
          call take(values, 'output.step_profile', output%step_profile)
       end associate
+      call take(values, 'checkpoint.steps', settings%checkpoint%steps)
+      call take(values, 'checkpoint.interval', settings%checkpoint%interval)
+      call take(values, 'checkpoint.elapsed', settings%checkpoint%elapsed)
    end subroutine fill_settings
 
    !> Fill every component of a bench from the entry of its name.

@@ -222,7 +222,13 @@ module polydem_namelist_entries
       entry_t('output', 'trace_start', 'real', 1, '0', 's', '>= 0, <= 1e12', '', &
       'Simulated time at which the recording of boxes starts'), &
       entry_t('output', 'step_profile', 'logical', 1, '.false.', '', '', '', &
-      'Whether steps.h5 tells the times and counts of every single step')]
+      'Whether steps.h5 tells the times and counts of every single step'), &
+      entry_t('checkpoint', 'steps', 'integer', 1, '0', '', '>= 0', '', &
+      'Steps between two checkpoints, from which a run can go on; 0: not by steps'), &
+      entry_t('checkpoint', 'interval', 'real', 1, '0', 's', '>= 0', '', &
+      'Simulated time between two checkpoints; 0: not by simulated time'), &
+      entry_t('checkpoint', 'elapsed', 'real', 1, '600', 's', '>= 0', '', &
+      'Elapsed time between two checkpoints; 0: not by elapsed time')]
 
    !> The group of a bench
    type(entry_t), parameter :: bench_entries(*) = [ &

@@ -6,7 +6,7 @@ module polydem_settings
    implicit none
    private
    public :: settings_t, scene_settings_t, boxes_settings_t, neighbours_settings_t, overlap_settings_t
-   public :: forces_settings_t, integrate_settings_t, guards_settings_t, output_settings_t
+   public :: forces_settings_t, integrate_settings_t, guards_settings_t, output_settings_t, checkpoint_settings_t
 
    !> Group &scene: what there is at the start
    type :: scene_settings_t
@@ -190,6 +190,16 @@ module polydem_settings
       logical :: step_profile
    end type output_settings_t
 
+   !> Group &checkpoint; whichever of the intervals has passed first makes the next checkpoint
+   type :: checkpoint_settings_t
+      !> Steps between two checkpoints; 0: not by steps
+      integer(ip) :: steps
+      !> Simulated time between two checkpoints [s]; 0: not by simulated time
+      real(wp) :: interval
+      !> Elapsed time between two checkpoints [s]; 0: not by elapsed time
+      real(wp) :: elapsed
+   end type checkpoint_settings_t
+
    !> All settings of a run
    type :: settings_t
       !> Path of the namelist file, for messages
@@ -214,6 +224,8 @@ module polydem_settings
       type(guards_settings_t) :: guards
       !> Group &output
       type(output_settings_t) :: output
+      !> Group &checkpoint
+      type(checkpoint_settings_t) :: checkpoint
    end type settings_t
 
 end module polydem_settings

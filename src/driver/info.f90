@@ -1,6 +1,6 @@
 !> What this program is, and what a result holds.
 module polydem_info
-   use polydem_errors, only: error_t, input_error, raise
+   use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
@@ -8,6 +8,7 @@ module polydem_info
    use polydem_paths, only: exists
    use polydem_provenance, only: collect_provenance, provenance_t
    use polydem_result_folder, only: open_suffix, profile_path, segment_path
+   use polydem_sealed_file, only: check_seal
    use polydem_strings, only: to_text
    implicit none
    private
@@ -88,6 +89,7 @@ contains
       is_profile = file%has('/state_hash')
       call describe_origin(file, is_profile, log, error)
       if (.not. allocated(error)) call describe_frames(file, log, error)
+      if (.not. allocated(error)) call describe_checkpoint(path, file, log, error)
       if (.not. allocated(error) .and. is_profile) call describe_end(file, log, error)
       if (allocated(error)) then
          call file%close(ignored)
@@ -129,6 +131,22 @@ contains
                           ' bodies, from '//to_text(real(times(1), wp))//' s to '// &
                           to_text(real(times(size(times)), wp))//' s')
    end subroutine describe_frames
+
+   subroutine describe_checkpoint(path, file, log, error)
+      character(len=*), intent(in) :: path
+      type(hdf5_file_t), intent(inout) :: file
+      type(log_t), intent(inout) :: log
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp), allocatable :: step(:)
+      character(len=:), allocatable :: problem
+
+      if (.not. file%has('/run/step')) return
+      call file%read('/run/step', step, error)
+      if (allocated(error)) return
+      call log%write_line('   checkpoint      of step '//to_text(step(1)))
+      call check_seal(path, problem)
+      if (allocated(problem)) call raise(error, io_error, path//': is damaged: '//problem)
+   end subroutine describe_checkpoint
 
    subroutine describe_end(file, log, error)
       type(hdf5_file_t), intent(inout) :: file

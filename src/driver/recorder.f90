@@ -2,10 +2,11 @@
 !>
 !> Nothing is done, and no time spent, unless it is asked for. What it costs is in no stage of the profile.
 module polydem_recorder
-   use polydem_errors, only: error_t
+   use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_list_hash, only: list_hash
    use polydem_log, only: log_t
+   use polydem_paths, only: exists
    use polydem_provenance, only: provenance_t
    use polydem_result_folder, only: steps_path, trace_path
    use polydem_simulation, only: simulation_t
@@ -43,10 +44,10 @@ module polydem_recorder
 
 contains
 
-   !> Prepare what the settings of the simulation ask for, and record step 0.
+   !> Prepare what the settings of the simulation ask for, and record the present step if it is the first one.
    subroutine open_recorder(self, simulation, folder, provenance, log, error)
       class(recorder_t), intent(inout) :: self
-      !> Simulation before its first step
+      !> Simulation before its first step, or where it goes on
       type(simulation_t), intent(inout) :: simulation
       !> Folder of the result
       character(len=*), intent(in) :: folder
@@ -59,8 +60,10 @@ contains
 
       associate (output => simulation%settings%output, boxes => simulation%boxes)
          self%trace_steps = output%trace_steps
-         if (self%trace_steps > 0_ip) then
-            self%first_step = first_trace_step(output%trace_start, simulation%dt)
+         self%first_step = first_trace_step(output%trace_start, simulation%dt)
+         call check_past(self, simulation%step, trace_path(folder), output%step_profile, error)
+         if (allocated(error)) return
+         if (self%trace_steps > 0_ip .and. simulation%step <= self%first_step) then
             if (self%first_step + int(self%trace_steps, lp) - 1_lp > simulation%n_steps) call log%write_line( &
                'warning: the run ends before the trace is complete')
             call self%trace%open(trace_path(folder), boxes%body(:boxes%n), boxes%fixed(:boxes%n), &
@@ -74,6 +77,25 @@ contains
       end associate
       if (.not. allocated(error)) call record_boxes(self, simulation, error)
    end subroutine open_recorder
+
+   !> A run that goes on cannot go on recording, but may have recorded before or record later.
+   subroutine check_past(self, step, path, step_profile, error)
+      type(recorder_t), intent(in) :: self
+      integer(lp), intent(in) :: step
+      character(len=*), intent(in) :: path
+      logical, intent(in) :: step_profile
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: is_whole
+
+      if (step == 0_lp) return
+      if (step_profile) call raise(error, input_error, 'a run that records every step (step_profile in &output) '// &
+         'cannot go on after an interruption; begin it anew with --force instead of --continue')
+      if (self%trace_steps == 0_ip .or. self%first_step > step) return
+      is_whole = self%first_step + int(self%trace_steps, lp) - 1_lp <= step
+      if (is_whole) is_whole = exists(path)
+      if (.not. is_whole) call raise(error, input_error, 'the run was interrupted while it recorded a trace '// &
+         '(trace_steps in &output), which cannot go on; begin it anew with --force instead of --continue')
+   end subroutine check_past
 
    !> Record the step that was just done.
    subroutine record(self, simulation, error)

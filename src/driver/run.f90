@@ -3,11 +3,14 @@ module polydem_run
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_bodies, only: state_hash
    use polydem_books, only: fill_row, write_books
+   use polydem_checkpoint, only: checkpoints_t
+   use polydem_checkpoint_contents, only: history_t, scene_hash
    use polydem_clock, only: wall_seconds
    use polydem_counters, only: counters_t
    use polydem_description, only: describe, list_overlaps
-   use polydem_errors, only: error_t, input_error, raise, run_error
-   use polydem_kinds, only: dp, lp, wp
+   use polydem_errors, only: error_t, input_error, raise, run_error, stopped_early
+   use polydem_hash, only: hexadecimal
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ledger, only: balance_t
    use polydem_ledger_row, only: ledger_row_t
    use polydem_log, only: log_t
@@ -17,7 +20,9 @@ module polydem_run
    use polydem_profile, only: write_profile
    use polydem_provenance, only: collect_provenance, provenance_t
    use polydem_recorder, only: recorder_t
-   use polydem_result_folder, only: clear_result, default_folder, holds_result
+   use polydem_result_folder, only: checkpoint_path, clear_result, clear_unfinished, default_folder, holds_result, &
+      n_checkpoints
+   use polydem_resume, only: go_on, is_finished, look_back, past_t
    use polydem_run_lock, only: lock_result, unlock_result
    use polydem_settings, only: settings_t
    use polydem_simulation, only: advance, new_simulation, report_counters, simulation_t, time_of
@@ -27,13 +32,33 @@ module polydem_run
    use polydem_watch, only: look, new_watch, sum_up, watch_t
    implicit none
    private
-   public :: run_simulation, result_folder
+   public :: run_simulation, result_folder, attempt_t
 
    !> Lines of the log if no interval is given
    integer(lp), parameter :: default_lines = 20_lp
 
+   !> How to deal with what former attempts left, and when to end
+   type :: attempt_t
+      !> Whether to go on from the last checkpoint
+      logical :: continues = .false.
+      !> Whether the settings may be others than at that checkpoint
+      logical :: may_change = .false.
+      !> Elapsed time after which the attempt must have ended [s]; 0: none
+      real(dp) :: limit = 0.0_dp
+   end type attempt_t
+
    !> A run under way
    type :: run_t
+      !> How it was asked for
+      type(attempt_t) :: attempt
+      !> When it began, by the clock [s]
+      real(dp) :: began = 0.0_dp
+      !> What former attempts left
+      type(past_t) :: past
+      !> Former attempts, and this one
+      type(history_t) :: history
+      !> Checkpoints
+      type(checkpoints_t) :: checkpoints
       !> What is simulated
       type(simulation_t) :: simulation
       !> Frames
@@ -63,57 +88,77 @@ module polydem_run
 contains
 
    !> Run a simulation, and leave trajectory, profile and log in its folder.
-   subroutine run_simulation(settings, force, error)
+   subroutine run_simulation(settings, force, error, attempt)
       !> Checked settings
       type(settings_t), intent(in) :: settings
       !> Whether an older result may be overwritten
       logical, intent(in) :: force
-      !> Why the run could not start or go on
+      !> Why the run could not start or go on, or that it ended early
       type(error_t), allocatable, intent(inout) :: error
+      !> How to deal with former attempts; a new run without a limit if absent
+      type(attempt_t), intent(in), optional :: attempt
       type(run_t) :: run
       character(len=:), allocatable :: note
-      real(dp) :: began
 
-      began = wall_seconds()
+      run%began = wall_seconds()
+      if (present(attempt)) run%attempt = attempt
       run%folder = result_folder(settings)
-      call check_free(run%folder, force, error)
+      if (run%attempt%continues) then
+         if (is_finished(run%folder, settings)) then
+            call tell_finished(run%folder)
+            return
+         end if
+      end if
+      call check_free(run, force, error)
       if (.not. allocated(error)) call new_simulation(settings, run%simulation, error)
       if (.not. allocated(error)) call make_folder(run%folder, error)
       if (.not. allocated(error)) call lock_result(run%folder, note, error)
       if (allocated(error)) return
       call prepare(settings, force, note, run, error)
-      if (.not. allocated(error)) call go(run, began, error)
+      if (.not. allocated(error)) call go(run, error)
       call unlock_result(run%folder)
    end subroutine run_simulation
 
-   !> The first frame, all steps, and the end.
-   subroutine go(run, began, error)
+   !> The first frame, unless a former attempt wrote it, all steps, and the end.
+   subroutine go(run, error)
       type(run_t), intent(inout) :: run
-      real(dp), intent(in) :: began
       type(error_t), allocatable, intent(inout) :: error
 
-      call end_step(run, error)
+      if (run%past%checkpoint == 0_ip) call end_step(run, error)
       do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
          call advance(run%simulation, error)
          if (.not. allocated(error)) call end_step(run, error)
          call run%simulation%timers%lap(stage_output)
          call run%simulation%timers%end_step()
          if (.not. allocated(error)) call run%recorder%record(run%simulation, error)
+         if (.not. allocated(error)) call save(run, error)
       end do
-      call finish(run, wall_seconds() - began, error)
+      call finish(run, run%history%seconds + (wall_seconds() - run%began), error)
    end subroutine go
 
    !> Refuse to overwrite a result unless that is wanted.
-   subroutine check_free(folder, force, error)
-      character(len=*), intent(in) :: folder
+   subroutine check_free(run, force, error)
+      type(run_t), intent(in) :: run
       logical, intent(in) :: force
       type(error_t), allocatable, intent(inout) :: error
 
-      if (holds_result(folder) .and. .not. force) call raise(error, input_error, folder// &
-         ' holds a result; give --force to overwrite it, or another folder with --set output.folder=NAME')
+      if (force .or. run%attempt%continues) return
+      if (holds_result(run%folder)) call raise(error, input_error, run%folder//' holds a result; give --continue '// &
+         'to go on with it, --force to overwrite it, or another folder with --set output.folder=NAME')
    end subroutine check_free
 
-   !> Log, description and guards, in a folder that belongs to this run.
+   !> Say that there is nothing to do.
+   subroutine tell_finished(folder)
+      character(len=*), intent(in) :: folder
+      type(log_t) :: log
+      type(error_t), allocatable :: ignored
+
+      call log%open('', ignored)
+      call log%write_line(folder//' holds the finished result of these settings: nothing to do')
+      call log%close()
+   end subroutine tell_finished
+
+   !> Log, description and guards, and what former attempts left, in a folder that belongs to this run.
    subroutine prepare(settings, force, note, run, error)
       type(settings_t), intent(in) :: settings
       logical, intent(in) :: force
@@ -121,24 +166,72 @@ contains
       character(len=:), allocatable, intent(in) :: note
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
+      logical :: goes_on
 
       ! Again, now that nobody else can write there.
-      call check_free(run%folder, force, error)
+      call check_free(run, force, error)
       if (allocated(error)) return
-      call clear_result(run%folder, error)
-      call run%log%open(run%folder, error)
-      if (allocated(error)) return
+      run%history%scene = scene_hash(run%simulation%bodies)
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
+      run%provenance%scene = hexadecimal(run%history%scene)
+      if (run%attempt%continues) call look_back(run%folder, settings, run%provenance%scene, run%attempt%may_change, &
+                                                run%past, error)
+      if (allocated(error)) return
+      goes_on = run%past%checkpoint > 0_ip .or. run%past%segments > 0_ip
+      if (goes_on) call clear_unfinished(run%folder, error)
+      if (.not. goes_on) call clear_result(run%folder, error)
+      call run%log%open(run%folder, error, appended=goes_on)
+      if (allocated(error)) return
       call write_header(run%log, run%provenance, run%folder)
       if (allocated(note)) call run%log%write_line(note)
       call describe(run%simulation, run%log)
       call list_overlaps(run%simulation, run%folder, run%log, error)
       call new_watch(run%watch, run%simulation)
       call choose_intervals(run)
+      if (.not. allocated(error)) call recall(run, error)
       if (allocated(error)) return
-      call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error)
+      call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error, run%past%segments)
       if (.not. allocated(error)) call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, error)
    end subroutine prepare
+
+   !> Look after checkpoints from now on, and go on from one if that is wanted.
+   subroutine recall(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+
+      call run%checkpoints%open(run%simulation%settings%checkpoint, run%simulation%dt, run%began, run%attempt%limit)
+      if (allocated(run%past%remark)) call run%log%write_line(run%past%remark)
+      if (run%past%checkpoint == 0_ip) return
+      run%provenance%parent = checkpoint_path(run%folder, run%past%checkpoint)//', step '//to_text(run%past%step)
+      call go_on(run%folder, run%past, run%provenance%revision, run%simulation, run%history, run%log, error)
+      run%checkpoints%last_step = run%past%step
+      run%checkpoints%next = modulo(run%past%checkpoint, n_checkpoints) + 1_ip
+   end subroutine recall
+
+   !> Write a checkpoint when it is time for one, and end the run early if that is wanted.
+   subroutine save(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: reason
+      type(history_t) :: history
+      logical :: is_due
+
+      associate (s => run%simulation)
+         if (s%step == s%n_steps) return
+         call run%checkpoints%look(s%step, is_due, reason)
+         if (is_due) then
+            ! The frames up to the checkpoint are safe before it is.
+            call run%trajectory%close(error)
+            if (allocated(error)) return
+            history = run%history
+            history%segments = int(run%trajectory%number, lp)
+            history%seconds = history%seconds + (wall_seconds() - run%began)
+            call run%checkpoints%write(run%folder, run%provenance, s, history, error)
+         end if
+         if (allocated(reason)) call raise(error, stopped_early, 'stopped early by '//reason//' after step '// &
+            to_text(s%step)//' of '//to_text(s%n_steps)//'; the same command with --continue goes on')
+      end associate
+   end subroutine save
 
    !> Guards, frame and line, when it is time for them.
    subroutine end_step(run, error)
@@ -165,6 +258,7 @@ contains
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
 
+      if (run%simulation%step <= run%past%last_frame) return
       associate (s => run%simulation, output => run%simulation%settings%output)
          if (output%contacts .and. output%ledger) then
             call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, row=run%row)
@@ -215,6 +309,7 @@ contains
          if (allocated(error)) call write_last_frame(run, error%code, late_error)
          call run%trajectory%close(late_error)
          call run%recorder%close(run%log, late_error)
+         call run%checkpoints%close(run%log)
          call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, status, late_error, &
                             memory)
          call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n)

@@ -67,9 +67,9 @@ module polydem_simulation
       !> How bodies were pushed apart before time 0
       type(relaxation_t) :: relaxation
       !> Slots that may move: free bodies, then those of motions; the first n_free of them are the free ones
-      integer(ip), allocatable, private :: moving(:)
+      integer(ip), allocatable :: moving(:)
       !> Sums over all steps: pairs, contacts, pairs that began, pairs that ended, degenerate contacts
-      integer(lp), private :: sums(5) = 0_lp
+      integer(lp) :: sums(5) = 0_lp
    end type simulation_t
 
    !> More steps than any run can do

@@ -1,11 +1,11 @@
 !> An HDF5 file that is opened, flushed, asked and closed; what is in it is read and written by extensions.
 module polydem_hdf5_handle
    use hdf5, only: h5f_acc_rdonly_f, h5f_acc_trunc_f, h5f_scope_global_f, h5fclose_f, h5fcreate_f, &
-      h5fflush_f, h5fopen_f, hid_t, hsize_t
+      h5fflush_f, h5fopen_f, h5p_file_create_f, h5pclose_f, h5pcreate_f, h5pset_userblock_f, hid_t, hsize_t
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_claim, only: believable_shape
    use polydem_hdf5_dataset, only: has_link, place_t, start_library
-   use polydem_kinds, only: lp
+   use polydem_kinds, only: ip, lp
    use polydem_paths, only: exists, is_folder
    implicit none
    private
@@ -42,7 +42,7 @@ module polydem_hdf5_handle
 contains
 
    !> Create a file for writing; a file of the same name is lost.
-   subroutine create(self, path, error, compressed)
+   subroutine create(self, path, error, compressed, user_block)
       class(hdf5_handle_t), intent(inout) :: self
       !> Path of the file
       character(len=*), intent(in) :: path
@@ -50,14 +50,20 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Whether data sets to which rows are added are compressed, without loss; no if absent
       logical, intent(in), optional :: compressed
-      integer :: status
+      !> First bytes of the file that HDF5 leaves to its users: 0, 512 or a greater power of two; 0 if absent
+      integer(ip), intent(in), optional :: user_block
+      integer(hid_t) :: properties
+      integer :: status, ignored
 
       call start_library(error)
       if (allocated(error)) return
       self%path = path
       self%compressed = .false.
       if (present(compressed)) self%compressed = compressed
-      call h5fcreate_f(path, h5f_acc_trunc_f, self%id, status)
+      call h5pcreate_f(h5p_file_create_f, properties, status)
+      if (status >= 0 .and. present(user_block)) call h5pset_userblock_f(properties, int(user_block, hsize_t), status)
+      if (status >= 0) call h5fcreate_f(path, h5f_acc_trunc_f, self%id, status, creation_prp=properties)
+      call h5pclose_f(properties, ignored)
       if (status >= 0) return
       self%id = -1_hid_t
       call raise(error, io_error, path//': cannot be created; is there such a folder, room and '// &

@@ -5,7 +5,7 @@ module polydem_line_writer
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_loc, c_new_line, c_null_char, c_ptr, c_size_t
    use, intrinsic :: iso_fortran_env, only: output_unit
    use polydem_errors, only: error_t, io_error, raise
-   use polydem_paths, only: last_failure
+   use polydem_paths, only: exists, last_failure
    implicit none
    private
    public :: line_writer_t
@@ -31,6 +31,8 @@ module polydem_line_writer
    integer(c_int), parameter :: standard_output = 1_c_int
    !> Permissions of a new file before umask: rw-rw-rw-
    integer(c_int), parameter :: read_and_write = int(o'666', c_int)
+   !> O_WRONLY and O_APPEND of Linux
+   integer(c_int), parameter :: write_at_the_end = int(o'2001', c_int)
 
    interface
       !> POSIX creat(2)
@@ -39,6 +41,13 @@ module polydem_line_writer
          character(kind=c_char), intent(in) :: path(*)
          integer(c_int), value :: mode
       end function c_creat
+
+      !> POSIX open(2) of a file that is there
+      integer(c_int) function c_open(path, flags) bind(C, name='open')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: flags
+      end function c_open
 
       !> POSIX write(2), whose ssize_t is as wide as size_t
       integer(c_size_t) function c_write(descriptor, bytes, length) bind(C, name='write')
@@ -57,17 +66,24 @@ module polydem_line_writer
 
 contains
 
-   !> Begin a file; a former one of the same name is lost.
-   subroutine open_writer(self, path, error)
+   !> Begin a file; a former one of the same name is lost, unless it is to be continued.
+   subroutine open_writer(self, path, error, appended)
       class(line_writer_t), intent(inout) :: self
       !> Path of the file
       character(len=*), intent(in) :: path
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
+      !> Whether to write behind what is there; no if absent
+      logical, intent(in), optional :: appended
+      logical :: goes_on
 
       self%name = path
       if (allocated(self%failure)) deallocate (self%failure)
-      self%descriptor = c_creat(path//c_null_char, read_and_write)
+      goes_on = exists(path)
+      if (goes_on) goes_on = present(appended)
+      if (goes_on) goes_on = appended
+      if (goes_on) self%descriptor = c_open(path//c_null_char, write_at_the_end)
+      if (.not. goes_on) self%descriptor = c_creat(path//c_null_char, read_and_write)
       if (self%descriptor < 0_c_int) call raise(error, io_error, path//': cannot be written: '//last_failure())
    end subroutine open_writer
 

@@ -4,7 +4,7 @@ module polydem_segment_path
    use polydem_paths, only: exists
    implicit none
    private
-   public :: segment_path, last_segment, open_suffix
+   public :: segment_path, last_segment, last_number, open_suffix
 
    !> End of the name of a segment that is being written
    character(len=*), parameter :: open_suffix = '.open'
@@ -29,14 +29,20 @@ contains
       !> Folder of the result
       character(len=*), intent(in) :: folder
       character(len=:), allocatable :: path
-      integer(ip) :: number
 
       path = ''
-      number = 1_ip
-      do while (exists(segment_path(folder, number)))
-         path = segment_path(folder, number)
-         number = number + 1_ip
-      end do
+      if (last_number(folder) > 0_ip) path = segment_path(folder, last_number(folder))
    end function last_segment
+
+   !> Number of the last closed segment of a result; 0 if there is none
+   integer(ip) function last_number(folder)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+
+      last_number = 0_ip
+      do while (exists(segment_path(folder, last_number + 1_ip)))
+         last_number = last_number + 1_ip
+      end do
+   end function last_number
 
 end module polydem_segment_path

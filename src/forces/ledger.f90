@@ -15,12 +15,13 @@
 !>
 !> Sums run over fixed blocks and then over blocks in order: the same bits for any number of threads.
 module polydem_ledger
+   use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: ledger_t, balance_t, open_ledger, book_step, balance_of
+   public :: ledger_t, balance_t, open_ledger, book_step, balance_of, keep_ledger
 
    !> Rates: power of elastic, damping and friction forces and of walls; force along x and y and torque from outside;
    !> the sums of the absolute values of all forces and torques from outside. Last, no rate: the elastic energy
@@ -153,6 +154,28 @@ contains
       balance%relative_momentum_residual = share(abs(missing(1)) + abs(missing(2)), ledger%impulse_scale)
       balance%relative_angular_residual = share(missing_angular, ledger%angular_scale)
    end subroutine balance_of
+
+   !> Keep the books in an archive.
+   subroutine keep_ledger(ledger, archive)
+      !> Books
+      type(ledger_t), intent(inout) :: ledger
+      !> Archive
+      class(archive_t), intent(inout) :: archive
+
+      call archive%keep('/run/elastic_work', ledger%elastic_work, 'J/m', 'work of the elastic normal forces')
+      call archive%keep('/run/damping_work', ledger%damping_work, 'J/m', 'work of the normal damping')
+      call archive%keep('/run/friction_work', ledger%friction_work, 'J/m', 'work of the tangential forces')
+      call archive%keep('/run/wall_work', ledger%wall_work, 'J/m', 'work done by moving walls')
+      call archive%keep('/run/impulse', ledger%impulse, 'N s/m', 'impulse of gravity and fixed bodies')
+      call archive%keep('/run/angular_impulse', ledger%angular_impulse, 'N s', 'their angular impulse')
+      call archive%keep('/run/ledger_start', ledger%start, 'J/m, N s/m, N s', &
+                        'energy, momentum and angular momentum at the start')
+      call archive%keep('/run/ledger_rate', ledger%rate, 'W/m, N/m, N, J/m', 'rates of the books at the last step')
+      call archive%keep('/run/elastic_start', ledger%elastic_start, 'J/m', 'elastic energy at the start')
+      call archive%keep('/run/energy_scale', ledger%energy_scale, 'J/m', 'greatest energy turned over')
+      call archive%keep('/run/impulse_scale', ledger%impulse_scale, 'N s/m', 'sum of absolute impulses')
+      call archive%keep('/run/angular_scale', ledger%angular_scale, 'N s', 'sum of absolute angular impulses')
+   end subroutine keep_ledger
 
    pure real(wp) function share(part, whole)
       real(wp), intent(in) :: part, whole

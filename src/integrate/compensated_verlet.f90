@@ -5,6 +5,7 @@
 !> (W. Kahan, Commun. ACM 8 (1965) 40). So millions of steps lose no more than one. The larger part of each number
 !> is what everybody else sees. It takes a compiler that leaves sums as they stand (no -ffast-math).
 module polydem_compensated_verlet
+   use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t
    use polydem_kinds, only: ip, wp, worth_threads
    use polydem_velocity_verlet, only: velocity_verlet_t
@@ -23,6 +24,7 @@ module polydem_compensated_verlet
       procedure :: start
       procedure :: predict
       procedure :: correct
+      procedure :: keep
    end type compensated_verlet_t
 
 contains
@@ -89,6 +91,16 @@ contains
       end do
       !$omp end parallel do
    end subroutine correct
+
+   !> Keep what rounding took.
+   subroutine keep(self, archive)
+      class(compensated_verlet_t), intent(inout) :: self
+      !> Archive
+      class(archive_t), intent(inout) :: archive
+
+      call archive%keep('/bodies/lost_place', self%lost_place, 'm, rad', 'what rounding took from x, y and angle')
+      call archive%keep('/bodies/lost_speed', self%lost_speed, 'm/s, rad/s', 'what it took from their velocities')
+   end subroutine keep
 
    !> One coordinate: its velocity in the middle of the step, its place at the end, its velocity predicted there.
    pure subroutine move(dt, acceleration, place, velocity, half, lost_place, lost_speed)

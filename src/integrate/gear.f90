@@ -6,6 +6,7 @@
 !> those that do not). One evaluation per step, at the predicted state. The scheme starts from gravity alone, with
 !> zero higher derivatives.
 module polydem_gear
+   use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t
    use polydem_integrator, only: integrator_t
    use polydem_kinds, only: ip, wp, worth_threads
@@ -30,6 +31,7 @@ module polydem_gear
       procedure :: predict
       procedure :: correct
       procedure :: stability
+      procedure :: keep
    end type gear_t
 
    real(wp), parameter :: c1 = 251.0_wp/360.0_wp
@@ -91,6 +93,16 @@ contains
       end do
       !$omp end parallel do
    end subroutine correct
+
+   !> Keep the derivatives above the second.
+   subroutine keep(self, archive)
+      class(gear_t), intent(inout) :: self
+      !> Archive
+      class(archive_t), intent(inout) :: archive
+
+      call archive%keep('/bodies/gear_higher', self%higher, 'm, rad', &
+                        'third to fifth derivatives of x, y and angle times dt^k/k!')
+   end subroutine keep
 
    pure subroutine expand(dt, x, v, a, r)
       real(wp), intent(in) :: dt

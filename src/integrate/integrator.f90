@@ -5,6 +5,7 @@
 !> state of them. While forces are computed, velocity - dt/2 acceleration is the velocity in the middle of the step, to
 !> second order. Turned vertices and fixed bodies are not its business.
 module polydem_integrator
+   use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t
    use polydem_kinds, only: wp
    use polydem_stable_step, only: stability_table_t
@@ -25,6 +26,7 @@ module polydem_integrator
       procedure(advance), deferred :: correct
       !> Products of frequency and step that the scheme stands
       procedure(stability), deferred :: stability
+      procedure :: keep
    end type integrator_t
 
    abstract interface
@@ -53,5 +55,17 @@ module polydem_integrator
          type(stability_table_t) :: table
       end function stability
    end interface
+
+contains
+
+   !> Keep in an archive what the scheme remembers from step to step; to be replaced by schemes that remember anything.
+   subroutine keep(self, archive)
+      class(integrator_t), intent(inout) :: self
+      !> Archive, which takes or gives back columns over /bodies
+      class(archive_t), intent(inout) :: archive
+
+      associate (no_memory => self, unused => archive)
+      end associate
+   end subroutine keep
 
 end module polydem_integrator

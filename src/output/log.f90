@@ -46,7 +46,7 @@ module polydem_log
 contains
 
    !> Begin a log.
-   subroutine open_log(self, folder, error, quiet)
+   subroutine open_log(self, folder, error, quiet, appended)
       class(log_t), intent(inout) :: self
       !> Folder of the result, which must be there; empty: no log.txt
       character(len=*), intent(in) :: folder
@@ -54,6 +54,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Whether the screen stays silent; no if absent
       logical, intent(in), optional :: quiet
+      !> Whether the log goes on behind that of a former attempt; no if absent
+      logical, intent(in), optional :: appended
       logical :: on_screen
 
       on_screen = .true.
@@ -61,7 +63,7 @@ contains
       if (on_screen) call self%screen%open_screen()
       self%live = terminal_watches() .and. on_screen
       self%has_heading = .false.
-      if (folder /= '') call self%file%open(log_path(folder), error)
+      if (folder /= '') call self%file%open(log_path(folder), error, appended)
    end subroutine open_log
 
    !> Write a line on the screen and into the file.

@@ -64,8 +64,12 @@ module polydem_provenance
       character(len=:), allocatable :: resolved_input
       !> Seed of the scene
       integer(ip) :: seed = 0_ip
-      !> When the run started (UTC)
+      !> Hash of the bodies at the start; empty if there are none
+      character(len=:), allocatable :: scene
+      !> When the run, or this attempt of it, started (UTC)
       character(len=:), allocatable :: started
+      !> Checkpoint that this attempt went on from; 'none' at the start of a run
+      character(len=:), allocatable :: parent
    end type provenance_t
 
 contains
@@ -110,6 +114,8 @@ contains
       provenance%resolved_input = resolved_input
       provenance%seed = seed
       provenance%started = utc_now()
+      provenance%parent = 'none'
+      provenance%scene = ''
    end subroutine collect_provenance
 
    !> Whether OpenMP binds its threads to processors
@@ -153,6 +159,8 @@ contains
       call file%write('/provenance/resolved_input', provenance%resolved_input, error)
       call file%write('/provenance/seed', provenance%seed, error)
       call file%write('/provenance/started', provenance%started, error)
+      call file%write('/provenance/parent', provenance%parent, error)
+      call file%write('/provenance/scene', provenance%scene, error)
       call file%write('/provenance/written', utc_now(), error)
    end subroutine write_provenance
 

@@ -7,20 +7,25 @@
 !>     steps.h5                   times and counts of every step, if asked for
 !>     overlaps.csv               contacts that were deep at the start, if there were any
 !>     log.txt                    what the run printed
+!>     checkpoint_1.h5, _2.h5     the last two checkpoints, in turns
 module polydem_result_folder
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip
    use polydem_paths, only: exists, remove_file
-   use polydem_segment_path, only: open_suffix, segment_path
+   use polydem_segment_path, only: last_number, open_suffix, segment_path
+   use polydem_strings, only: to_text
    implicit none
    private
-   public :: segment_path, profile_path, log_path, trace_path, steps_path, overlaps_path, default_folder
-   public :: holds_result, clear_result, open_suffix, unfinished
+   public :: segment_path, profile_path, log_path, trace_path, steps_path, overlaps_path, checkpoint_path
+   public :: default_folder, holds_result, clear_result, clear_unfinished, open_suffix, unfinished, last_number
+   public :: n_checkpoints
 
    !> End of the name of any other file that is not complete
    character(len=*), parameter :: unfinished = '.unfinished'
    !> Segments are looked for until so many numbers in a row are missing
    integer(ip), parameter :: greatest_gap = 100_ip
+   !> Checkpoints that are kept
+   integer(ip), parameter :: n_checkpoints = 2_ip
 
 contains
 
@@ -82,6 +87,17 @@ contains
       path = folder//'/overlaps.csv'
    end function overlaps_path
 
+   !> Path of a checkpoint
+   pure function checkpoint_path(folder, number) result(path)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      !> 1 to n_checkpoints
+      integer(ip), intent(in) :: number
+      character(len=:), allocatable :: path
+
+      path = folder//'/checkpoint_'//to_text(number)//'.h5'
+   end function checkpoint_path
+
    !> Whether a folder holds a result that a run would overwrite
    logical function holds_result(folder)
       !> Folder of the result
@@ -93,6 +109,9 @@ contains
       do number = 1_ip, greatest_gap
          if (.not. holds_result) holds_result = has_segment(folder, number)
       end do
+      do number = 1_ip, n_checkpoints
+         if (.not. holds_result) holds_result = exists(checkpoint_path(folder, number))
+      end do
    end function holds_result
 
    !> Remove a former result, so that its segments do not mix with new ones; other files stay.
@@ -103,13 +122,15 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: number, last
 
-      call remove_if_there(profile_path(folder), error)
+      ! The checkpoints first: without one, nobody goes on with what a kill in the middle of this would leave.
+      do number = 1_ip, n_checkpoints
+         call remove_if_there(checkpoint_path(folder, number), error)
+      end do
       call remove_if_there(log_path(folder), error)
       call remove_if_there(overlaps_path(folder), error)
       call remove_if_there(trace_path(folder), error)
-      call remove_if_there(trace_path(folder)//unfinished, error)
       call remove_if_there(steps_path(folder), error)
-      call remove_if_there(steps_path(folder)//unfinished, error)
+      call clear_unfinished(folder, error)
       last = 0_ip
       number = 1_ip
       do while (number <= last + greatest_gap)
@@ -119,6 +140,25 @@ contains
          number = number + 1_ip
       end do
    end subroutine clear_result
+
+   !> Remove what a run that did not end left unfinished: files that were not complete, and the open segment. What is
+   !> complete stays, but for the profile, which says that a run has ended.
+   subroutine clear_unfinished(folder, error)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: number
+
+      call remove_if_there(profile_path(folder), error)
+      call remove_if_there(profile_path(folder)//unfinished, error)
+      call remove_if_there(trace_path(folder)//unfinished, error)
+      call remove_if_there(steps_path(folder)//unfinished, error)
+      do number = 1_ip, n_checkpoints
+         call remove_if_there(checkpoint_path(folder, number)//unfinished, error)
+      end do
+      call remove_if_there(segment_path(folder, last_number(folder) + 1_ip)//open_suffix, error)
+   end subroutine clear_unfinished
 
    logical function has_segment(folder, number)
       character(len=*), intent(in) :: folder

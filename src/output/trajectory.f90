@@ -30,7 +30,7 @@ module polydem_trajectory
       !> Whether there is an open segment
       logical :: is_open = .false.
       !> Number of the last segment
-      integer(ip) :: number = 0_ip
+      integer(ip), public :: number = 0_ip
       !> Frames per segment
       integer(ip) :: capacity = 1_ip
       !> Frames in the open segment
@@ -45,8 +45,8 @@ module polydem_trajectory
 
 contains
 
-   !> Prepare to write; the folder is made if it is not there and should hold no result.
-   subroutine open_trajectory(self, folder, frames_per_segment, provenance, error)
+   !> Prepare to write; the folder is made if it is not there and should hold no result but the segments to go on from.
+   subroutine open_trajectory(self, folder, frames_per_segment, provenance, error, last_number)
       class(trajectory_t), intent(inout) :: self
       !> Folder of the result
       character(len=*), intent(in) :: folder
@@ -56,11 +56,14 @@ contains
       type(provenance_t), intent(in) :: provenance
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
+      !> Number of the last segment that is there; 0 if absent
+      integer(ip), intent(in), optional :: last_number
 
       self%folder = folder
       self%capacity = max(1_ip, frames_per_segment)
       self%provenance = provenance
       self%number = 0_ip
+      if (present(last_number)) self%number = last_number
       self%is_open = .false.
       call make_folder(folder, error)
    end subroutine open_trajectory

@@ -1,0 +1,86 @@
+!> What differs between the settings of two runs, in words.
+module polydem_changed_entries
+   use polydem_words, only: text_t
+   implicit none
+   private
+   public :: changed_entries
+
+   !> Entries that do not touch the result; it was found where it is
+   character(len=*), parameter :: harmless(*) = [character(len=19) :: 'output.folder', 'checkpoint.steps', &
+                                                 'checkpoint.interval', 'checkpoint.elapsed']
+
+contains
+
+   !> The entries that differ, like 'forces.stiffness was 1.0e7 and is 2.0e7; ...'; empty if none does.
+   pure function changed_entries(former, present) result(text)
+      !> Resolved settings of the former run, one entry per line, as in `settings_t`
+      character(len=*), intent(in) :: former
+      !> Those of the present one
+      character(len=*), intent(in) :: present
+      character(len=:), allocatable :: text
+      type(text_t), allocatable :: old_name(:), old_value(:), new_name(:), new_value(:)
+      integer :: j, k
+
+      call list_entries(former, old_name, old_value)
+      call list_entries(present, new_name, new_value)
+      text = ''
+      do k = 1, size(old_name)
+         j = place_of(old_name(k)%text, new_name)
+         if (j == 0) then
+            call add(old_name(k)%text//' was '//old_value(k)%text//' and is not in force', text)
+         else if (new_value(j)%text /= old_value(k)%text) then
+            call add(old_name(k)%text//' was '//old_value(k)%text//' and is '//new_value(j)%text, text)
+         end if
+      end do
+      do k = 1, size(new_name)
+         if (place_of(new_name(k)%text, old_name) > 0) cycle
+         call add(new_name(k)%text//' was not in force and is '//new_value(k)%text, text)
+      end do
+   end function changed_entries
+
+   pure subroutine add(sentence, text)
+      character(len=*), intent(in) :: sentence
+      character(len=:), allocatable, intent(inout) :: text
+
+      if (text /= '') text = text//'; '
+      text = text//sentence
+   end subroutine add
+
+   !> Split resolved settings into names 'group.key' and values; harmless entries are left out.
+   pure subroutine list_entries(settings, names, values)
+      character(len=*), intent(in) :: settings
+      type(text_t), allocatable, intent(out) :: names(:), values(:)
+      character(len=:), allocatable :: group, line, name
+      integer :: equals, first, last
+
+      allocate (names(0), values(0))
+      group = ''
+      first = 1
+      do while (first <= len(settings))
+         last = index(settings(first:)//new_line('a'), new_line('a')) + first - 2
+         line = trim(adjustl(settings(first:last)))
+         first = last + 2
+         equals = index(line, ' = ')
+         if (index(line, '&') == 1) then
+            group = line(2:)
+         else if (equals > 0) then
+            name = group//'.'//line(:equals - 1)
+            if (any(harmless == name)) cycle
+            names = [names, text_t(name)]
+            values = [values, text_t(line(equals + 3:))]
+         end if
+      end do
+   end subroutine list_entries
+
+   !> Place of a name in a list; 0 if it is not there
+   pure integer function place_of(name, names)
+      character(len=*), intent(in) :: name
+      type(text_t), intent(in) :: names(:)
+
+      do place_of = 1, size(names)
+         if (names(place_of)%text == name) return
+      end do
+      place_of = 0
+   end function place_of
+
+end module polydem_changed_entries

@@ -1,0 +1,256 @@
+!> Finding out where an interrupted run can go on, and bringing its simulation there.
+module polydem_resume
+   use polydem_changed_entries, only: changed_entries
+   use polydem_checkpoint_contents, only: history_t, keep_progress, keep_run
+   use polydem_checkpoint_file, only: checkpoint_file_t
+   use polydem_errors, only: error_t, input_error, io_error, raise
+   use polydem_hdf5_file, only: hdf5_file_t
+   use polydem_kinds, only: ip, lp
+   use polydem_log, only: log_t
+   use polydem_paths, only: exists, remove_file
+   use polydem_result_folder, only: checkpoint_path, holds_result, last_number, n_checkpoints, profile_path, &
+      segment_path
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: simulation_t
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: past_t, is_finished, look_back, go_on
+
+   !> What former attempts left
+   type :: past_t
+      !> Number of the checkpoint to go on from; 0: there is none, the run begins with its first step
+      integer(ip) :: checkpoint = 0_ip
+      !> Its step
+      integer(lp) :: step = 0_lp
+      !> Closed segments of the trajectory that stay
+      integer(ip) :: segments = 0_ip
+      !> Step of the last frame in them; negative if there is none. Frames up to it are not written again.
+      integer(lp) :: last_frame = -1_lp
+      !> What is to be said about it, for the log
+      character(len=:), allocatable :: remark
+      !> Closed segments when the checkpoint was written
+      integer(lp), private :: segments_then = 0_lp
+      !> Commit of the program that wrote the checkpoint, and the settings in force then
+      character(len=:), allocatable, private :: revision, former
+   end type past_t
+
+contains
+
+   !> Whether a folder holds the finished result of the same settings.
+   logical function is_finished(folder, settings)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      !> Settings of the run
+      type(settings_t), intent(in) :: settings
+      type(hdf5_file_t) :: file
+      type(error_t), allocatable :: error
+      character(len=:), allocatable :: status
+
+      is_finished = .false.
+      if (.not. exists(profile_path(folder))) return
+      call file%open(profile_path(folder), error)
+      if (.not. allocated(error)) call file%read('/status', status, error)
+      call file%close(error)
+      if (.not. allocated(error)) is_finished = status == 'finished'
+      if (is_finished) is_finished = changed_entries(origin_of(profile_path(folder), 'resolved_input'), &
+                                                     settings%resolved) == ''
+   end function is_finished
+
+   !> Choose the newest good checkpoint, and see to it that the settings are as they were.
+   subroutine look_back(folder, settings, scene, may_change, past, error)
+      !> Folder of the result, which nobody else writes to
+      character(len=*), intent(in) :: folder
+      !> Settings of the run
+      type(settings_t), intent(in) :: settings
+      !> Hash of its bodies at the start, as in the provenance of results
+      character(len=*), intent(in) :: scene
+      !> Whether the settings may be others
+      logical, intent(in) :: may_change
+      !> What was found
+      type(past_t), intent(out) :: past
+      !> Why the run cannot go on
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: changes
+
+      call choose_checkpoint(folder, past, error)
+      if (allocated(error)) return
+      if (past%checkpoint == 0_ip) then
+         call look_without_checkpoint(folder, settings, scene, past, error)
+         return
+      end if
+      changes = changed_entries(past%former, settings%resolved)
+      if (changes /= '' .and. .not. may_change) then
+         call raise(error, input_error, 'the settings are not those of the run in '//folder//': '//changes// &
+                    '. Undo that, or give --changed to go on with them from step '//to_text(past%step))
+      end if
+      if (allocated(error)) return
+      if (changes /= '') past%remark = past%remark//new_line('a')//'changed    '//changes
+      call count_segments(folder, changes /= '', past, error)
+   end subroutine look_back
+
+   !> Begin with the first step, but keep the closed segments of a run of the same scene and settings.
+   subroutine look_without_checkpoint(folder, settings, scene, past, error)
+      character(len=*), intent(in) :: folder, scene
+      type(settings_t), intent(in) :: settings
+      type(past_t), intent(inout) :: past
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: path, changes, former
+
+      if (holds_result(folder)) past%remark = 'there is no checkpoint in '//folder// &
+         ': the run begins with its first step'
+      path = segment_path(folder, 1_ip)
+      if (.not. exists(path)) path = profile_path(folder)
+      if (.not. exists(path)) return
+      changes = changed_entries(origin_of(path, 'resolved_input'), settings%resolved)
+      former = origin_of(path, 'scene')
+      if (changes == '' .and. former /= scene) changes = 'the bodies at the start are others'
+      if (changes == '') then
+         call count_segments(folder, .false., past, error)
+      else
+         call raise(error, input_error, folder//' holds the result of another run, and no checkpoint: '//changes// &
+                    '. Give --force instead of --continue to overwrite it')
+      end if
+   end subroutine look_without_checkpoint
+
+   !> Look at all checkpoints, and take the one of the greatest step.
+   subroutine choose_checkpoint(folder, past, error)
+      character(len=*), intent(in) :: folder
+      type(past_t), intent(inout) :: past
+      type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: problem
+      type(past_t) :: candidate
+      character(len=:), allocatable :: damage
+      integer(ip) :: k
+
+      damage = ''
+      do k = 1_ip, n_checkpoints
+         if (.not. exists(checkpoint_path(folder, k))) cycle
+         candidate = past_t(checkpoint=k)
+         call read_progress(checkpoint_path(folder, k), candidate, problem)
+         if (allocated(problem)) then
+            damage = damage//problem%message//new_line('a')
+            deallocate (problem)
+         else if (past%checkpoint == 0_ip .or. candidate%step > past%step) then
+            past = candidate
+         end if
+      end do
+      if (past%checkpoint > 0_ip) then
+         past%remark = 'continued  from '//checkpoint_path(folder, past%checkpoint)//', step '//to_text(past%step)
+         if (damage /= '') past%remark = 'warning: '//damage//past%remark//', the newest good one'
+      else if (damage /= '') then
+         call raise(error, io_error, folder//': no checkpoint can be used. '//damage//'The run can only begin '// &
+                    'anew, with --force instead of --continue')
+      end if
+   end subroutine choose_checkpoint
+
+   subroutine read_progress(path, past, error)
+      character(len=*), intent(in) :: path
+      type(past_t), intent(inout) :: past
+      type(error_t), allocatable, intent(inout) :: error
+      type(checkpoint_file_t) :: file
+      type(history_t) :: history
+
+      call file%open(path, error)
+      if (allocated(error)) return
+      call keep_progress(file, past%step, history)
+      past%segments_then = history%segments
+      call file%read_origin(past%revision, past%former, error)
+      call file%close(error)
+   end subroutine read_progress
+
+   !> An entry in the provenance of a file; empty if it cannot be read
+   function origin_of(path, entry) result(text)
+      character(len=*), intent(in) :: path, entry
+      character(len=:), allocatable :: text
+      type(hdf5_file_t) :: file
+      type(error_t), allocatable :: error
+
+      text = ''
+      call file%open(path, error)
+      if (.not. allocated(error)) call file%read('/provenance/'//entry, text, error)
+      call file%close(error)
+      if (allocated(error)) text = ''
+   end function origin_of
+
+   !> Find the last frame in closed segments. With other settings, frames after the checkpoint are removed.
+   subroutine count_segments(folder, is_changed, past, error)
+      character(len=*), intent(in) :: folder
+      logical, intent(in) :: is_changed
+      type(past_t), intent(inout) :: past
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp), allocatable :: steps(:)
+      character(len=:), allocatable :: path
+
+      past%segments = last_number(folder)
+      if (int(past%segments, lp) < past%segments_then) then
+         call raise(error, io_error, segment_path(folder, past%segments + 1_ip)//' is missing, though it was there '// &
+                    'at the checkpoint of step '//to_text(past%step)//'. Bring it back, or begin anew with --force '// &
+                    'instead of --continue')
+      end if
+      do while (past%segments > 0_ip .and. .not. allocated(error))
+         path = segment_path(folder, past%segments)
+         call read_steps(path, steps, error)
+         if (allocated(error)) return
+         past%last_frame = steps(size(steps))
+         if (.not. is_changed .or. past%last_frame <= past%step) return
+         if (steps(1) <= past%step) then
+            call raise(error, input_error, path//' holds frames before and after step '//to_text(past%step)// &
+                       ', at which the settings would change. Go on without changes until step '// &
+                       to_text(past%last_frame)//' is passed')
+         else
+            call remove_file(path, error)
+            past%remark = past%remark//new_line('a')//'removed    '//path//', whose frames are of former settings'
+         end if
+         past%segments = past%segments - 1_ip
+         past%last_frame = -1_lp
+      end do
+   end subroutine count_segments
+
+   subroutine read_steps(path, steps, error)
+      character(len=*), intent(in) :: path
+      integer(lp), allocatable, intent(out) :: steps(:)
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+
+      call file%open(path, error)
+      if (allocated(error)) return
+      call file%read('/frames/step', steps, error)
+      call file%close(error)
+      if (allocated(error)) return
+      if (size(steps) == 0) call raise(error, io_error, path//': holds no frame')
+   end subroutine read_steps
+
+   !> Bring a simulation to the state of the checkpoint.
+   subroutine go_on(folder, past, revision, simulation, history, log, error)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      !> What was found there, with a checkpoint
+      type(past_t), intent(in) :: past
+      !> Commit that this program was built from
+      character(len=*), intent(in) :: revision
+      !> A simulation of the same scene at its start
+      type(simulation_t), intent(inout) :: simulation
+      !> The scene, to which the former attempts are added
+      type(history_t), intent(inout) :: history
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Why the checkpoint does not fit
+      type(error_t), allocatable, intent(inout) :: error
+      type(checkpoint_file_t) :: file
+
+      call file%open(checkpoint_path(folder, past%checkpoint), error)
+      if (allocated(error)) return
+      call keep_run(file, simulation, history)
+      call file%close(error)
+      if (allocated(error)) then
+         error%message = checkpoint_path(folder, past%checkpoint)//' does not fit this run: '//error%message
+         return
+      end if
+      history%attempts = history%attempts + 1_lp
+      call log%write_line('attempt    '//to_text(history%attempts))
+      if (revision /= past%revision) call log%write_line('warning: the checkpoint was written by another revision ('// &
+         past%revision//') of this program; the same bits are not promised')
+   end subroutine go_on
+
+end module polydem_resume
