@@ -63,7 +63,23 @@ contains
                'since no dashpot reaches 0 and the step falls with it; leave it out for ''damping_coefficient''')
          end if
       end associate
+      if (settings%guards%energy /= 'off' .and. .not. settings%output%ledger) then
+         call raise(error, input_error, values(first_row('guards', 'energy'))%place// &
+            ': ''energy'' in &guards needs ''ledger'' in &output')
+      end if
+      call check_friction(settings, values, error)
    end subroutine check_settings
+
+   !> Refuse exact friction with schemes that know no velocity in the middle of a step.
+   pure subroutine check_friction(settings, values, error)
+      type(settings_t), intent(in) :: settings
+      type(value_t), intent(in) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (settings%forces%friction /= 'exact' .or. settings%integrate%scheme == 'velocity_verlet') return
+      call raise(error, input_error, values(first_row('integrate', 'scheme'))%place//': ''scheme'' in &integrate '// &
+                 'must be velocity_verlet, since ''friction'' in &forces is exact')
+   end subroutine check_friction
 
    !> Refuse containers that are too large for the grains; lengths that are not in force are 0.
    pure subroutine check_container(length, key, scene, values, error)

@@ -25,6 +25,7 @@ contains
       type(settings_t), intent(inout) :: settings
 
       call fill_scene(values, settings)
+      call fill_guards(values, settings)
       call take(values, 'boxes.largest_ratio', settings%boxes%largest_ratio)
       call take(values, 'boxes.margin', settings%boxes%margin)
       call take(values, 'neighbours.finder', settings%neighbours%finder)
@@ -36,12 +37,17 @@ contains
          call take(values, 'forces.law', forces%law)
          call take(values, 'forces.damping', forces%damping)
          call take(values, 'forces.damping_coefficient', forces%damping_coefficient)
+         call take(values, 'forces.damping_from_touch', forces%damping_from_touch)
          call take(values, 'forces.restitution', forces%restitution)
+         call take(values, 'forces.tilt_damping', forces%tilt_damping)
          call take(values, 'forces.friction', forces%friction)
          call take(values, 'forces.friction_coefficient', forces%friction_coefficient)
          call take(values, 'forces.tangential_stiffness', forces%tangential_stiffness)
          call take(values, 'forces.tangential_damping', forces%tangential_damping)
+         call take(values, 'forces.midstep_slip', forces%midstep_slip)
+         call take(values, 'forces.friction_tolerance', forces%friction_tolerance)
          call take(values, 'integrate.scheme', integrate%scheme)
+         call take(values, 'integrate.accumulation', integrate%accumulation)
          call take(values, 'integrate.dt', integrate%dt)
          call take(values, 'integrate.fraction', integrate%fraction)
          call take(values, 'integrate.duration', integrate%duration)
@@ -120,6 +126,23 @@ contains
          call take(values, 'scene.motion_ramp', scene%motion_ramp)
       end associate
    end subroutine fill_scene
+
+   pure subroutine fill_guards(values, settings)
+      type(value_t), intent(in) :: values(:)
+      type(settings_t), intent(inout) :: settings
+
+      associate (guards => settings%guards)
+         call take(values, 'guards.displacement', guards%displacement)
+         call take(values, 'guards.displacement_limit', guards%displacement_limit)
+         call take(values, 'guards.step', guards%step)
+         call take(values, 'guards.overlap', guards%overlap)
+         call take(values, 'guards.overlap_limit', guards%overlap_limit)
+         call take(values, 'guards.energy', guards%energy)
+         call take(values, 'guards.energy_limit', guards%energy_limit)
+         call take(values, 'guards.listed_depth', guards%listed_depth)
+         call take(values, 'guards.relaxed_depth', guards%relaxed_depth)
+      end associate
+   end subroutine fill_guards
 
    pure subroutine take_real(values, name, component)
       type(value_t), intent(in) :: values(:)

@@ -145,7 +145,7 @@ module polydem_namelist_entries
       entry_t('forces', 'stiffness', 'real', 1, '1e7', 'N/m2', '> 0, <= 1e30', '', &
       'Young''s modulus E in two dimensions'), &
       entry_t('forces', 'law', 'word', 1, 'area', '', 'area conservative', '', &
-      'Elastic force: E A/l of the book, or the one with the energy E A^2/(2 l b)'), &
+      'Elastic force: E A/l of the book, or with the energy E G^2/(2 l b), G the effective area'), &
       entry_t('forces', 'damping', 'word', 1, 'rate', '', 'rate hunt_crossley book none', '', &
       'Normal damping by the rate of the area, by that times the elastic force, as in the book, or none'), &
       entry_t('forces', 'damping_coefficient', 'real', 1, '0.0251', '', '>= 0, <= 1e6', &
@@ -153,20 +153,52 @@ module polydem_namelist_entries
       'Damping coefficient gamma; some hundreds with hunt_crossley, which takes little at low speed'), &
       entry_t('forces', 'restitution', 'real', 1, '0', '', '>= 0, <= 1', 'damping: rate', &
       'Restitution of flat contacts, 0.01 to 1, in place of `damping_coefficient`; left out: by the latter'), &
-      entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack none', '', &
-      'Friction law'), &
-      entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', 'friction: cundall_strack', &
+      entry_t('forces', 'damping_from_touch', 'logical', 1, '.false.', '', '', 'damping: rate', &
+      'Whether damping begins at the touch within the step: restitution of second order in dt'), &
+      entry_t('forces', 'tilt_damping', 'real', 1, '0', '', '>= 0, <= 1e6', '', &
+      'Damping of tilts as a share of sqrt(k I), k = E L^3/(12 l); 0: none, 2: critical for two bodies'), &
+      entry_t('forces', 'friction', 'word', 1, 'cundall_strack', '', 'cundall_strack exact none', '', &
+      'Friction by a tangential spring, without one (needs `scheme` velocity_verlet), or none'), &
+      entry_t('forces', 'friction_coefficient', 'real', 1, '0.23', '', '>= 0, <= 1e12', &
+      'friction: cundall_strack exact', &
       'Friction coefficient mu'), &
       entry_t('forces', 'tangential_stiffness', 'real', 1, '0.2857142857142857', '', '> 0, <= 1e6', &
       'friction: cundall_strack', &
       'Tangential stiffness as a share of E'), &
       entry_t('forces', 'tangential_damping', 'real', 1, '0.25', '', '>= 0, <= 1e6', 'friction: cundall_strack', &
-      'Tangential damping as a share of sqrt(k_t m_t)')]
+      'Tangential damping as a share of sqrt(k_t m_t)'), &
+      entry_t('forces', 'midstep_slip', 'logical', 1, '.false.', '', '', 'friction: cundall_strack', &
+      'Whether the slip velocity is taken in the middle of the step: friction of second order in dt'), &
+      entry_t('forces', 'friction_tolerance', 'real', 1, '1e-10', '', '> 0, <= 1e-3', 'friction: exact', &
+      'Slip that may remain where contacts stick, as a share of the greatest that friction takes in a step')]
+
+   !> What is watched; a body that is nowhere (NaN) stops every run
+   type(entry_t), parameter :: guard_entries(*) = [ &
+      entry_t('guards', 'displacement', 'word', 1, 'stop', '', 'stop warn off', '', &
+      'A body that moves so far in a step that it could pass through another'), &
+      entry_t('guards', 'displacement_limit', 'real', 1, '0.25', '', '> 0, <= 1e6', 'displacement: stop warn', &
+      'Greatest move of a point in a step, as a share of the thinnest body'), &
+      entry_t('guards', 'step', 'word', 1, 'stop', '', 'stop warn off', '', &
+      'A time step above the stable one of the contacts; above half of that there is a warning'), &
+      entry_t('guards', 'overlap', 'word', 1, 'off', '', 'stop warn off', '', &
+      'A contact that is deep against its bodies'), &
+      entry_t('guards', 'overlap_limit', 'real', 1, '0.25', '', '> 0, <= 1e6', 'overlap: stop warn', &
+      'Greatest depth (area over length) of a contact, as a share of the thinner body'), &
+      entry_t('guards', 'energy', 'word', 1, 'off', '', 'stop warn off', '', &
+      'Energy that neither gravity nor walls gave; needs the ledger, looks every 100 steps'), &
+      entry_t('guards', 'energy_limit', 'real', 1, '0.1', '', '> 0, <= 1e6', 'energy: stop warn', &
+      'Greatest such energy, as a share of the energy turned over'), &
+      entry_t('guards', 'listed_depth', 'real', 1, '1e-3', '', '>= 0, <= 1e6', '', &
+      'Contacts at the start that are deeper than this share of the thinner body are listed one by one'), &
+      entry_t('guards', 'relaxed_depth', 'real', 1, '0', '', '>= 0, <= 1e6', '', &
+      'Bodies are pushed apart before time 0 until no contact is deeper than this share; 0: they are not')]
 
    !> Groups of the run
    type(entry_t), parameter :: run_entries(*) = [ &
-      entry_t('integrate', 'scheme', 'word', 1, 'velocity_verlet', '', 'velocity_verlet gear', '', &
-      'Integration scheme'), &
+      entry_t('integrate', 'scheme', 'word', 1, 'velocity_verlet', '', 'velocity_verlet gear gear_3_20', '', &
+      'Integration scheme; Gear corrects positions by 3/16, or 3/20, meant for forces of positions alone'), &
+      entry_t('integrate', 'accumulation', 'word', 1, 'plain', '', 'plain compensated', 'scheme: velocity_verlet', &
+      'Sums of positions and velocities over steps as they are, or with what rounding takes carried along'), &
       entry_t('integrate', 'dt', 'real', 1, '0', 's', '>= 0', '', &
       'Time step; 0: `fraction` of the stable step'), &
       entry_t('integrate', 'fraction', 'real', 1, '0.3', '', '> 0', '', &
@@ -220,7 +252,7 @@ module polydem_namelist_entries
       'Folder of traces and samples; empty: results/ and the name of the namelist file')]
 
    !> The table
-   type(entry_t), parameter :: entries(*) = [scene_entries, stage_entries, run_entries, bench_entries]
+   type(entry_t), parameter :: entries(*) = [scene_entries, stage_entries, guard_entries, run_entries, bench_entries]
 
 contains
 

@@ -199,20 +199,22 @@ contains
       type(source_t), intent(in) :: source
       type(token_t), intent(in) :: token
       type(literal_t), intent(inout) :: literal
-      integer :: k
+      character(len=:), allocatable :: inside
+      integer :: k, n
 
       literal%has_quotes = token%kind == quoted_token
-      if (literal%has_quotes) then
-         literal%text = ''
-         k = token%first + 1
-         do while (k < token%last)
-            literal%text = literal%text//source%text(k:k)
-            if (source%text(k:k) == source%text(token%first:token%first)) k = k + 1
-            k = k + 1
-         end do
-      else
-         literal%text = text_of(source, token)
-      end if
+      literal%text = text_of(source, token)
+      if (.not. literal%has_quotes) return
+      inside = literal%text(2:len(literal%text) - 1)
+      n = 0
+      k = 1
+      do while (k <= len(inside))
+         n = n + 1
+         literal%text(n:n) = inside(k:k)
+         if (inside(k:k) == source%text(token%first:token%first)) k = k + 1
+         k = k + 1
+      end do
+      literal%text = literal%text(:n)
    end subroutine read_literal
 
    pure function text_of(source, token) result(text)

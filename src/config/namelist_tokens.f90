@@ -80,7 +80,7 @@ contains
          case (' ', tab, carriage_return)
             next = next + 1
          case ('!')
-            next = next + scan(source%text(next:)//line_feed, line_feed) - 1
+            next = place_of_any(source%text, next, line_feed)
          case default
             call read_token(source, next, line, token, error)
             if (allocated(error)) return
@@ -131,8 +131,17 @@ contains
       character(len=*), intent(in) :: text
       integer, intent(in) :: first
 
-      end_of_bare = first + scan(text(first:)//' ', separators) - 2
+      end_of_bare = place_of_any(text, first, separators) - 1
    end function end_of_bare
+
+   !> First place from `first` on where one of some letters stands; one behind the text if there is none
+   pure integer function place_of_any(text, first, letters)
+      character(len=*), intent(in) :: text, letters
+      integer, intent(in) :: first
+
+      place_of_any = first - 1 + scan(text(first:), letters)
+      if (place_of_any < first) place_of_any = len(text) + 1
+   end function place_of_any
 
    !> Place of the quote that closes the one at `first`; 0 if there is none on the line
    pure integer function end_of_quote(text, first)

@@ -16,6 +16,9 @@ module polydem_resolve_entries
    private
    public :: resolve_entries, resolved_text
 
+   !> More letters of an override are not shown in messages
+   integer, parameter :: longest_name = 200
+
 contains
 
    !> Find the value of every row of the table.
@@ -135,7 +138,9 @@ contains
       character(len=*), parameter :: line_end = new_line('a')
       integer :: dot, equals
 
-      source%name = '--set '//override
+      ! Every statement carries the name: a long override is not repeated in each.
+      source%name = '--set '//override(:min(len(override), longest_name))
+      if (len(override) > longest_name) source%name = source%name//' ...'
       source%has_lines = .false.
       equals = index(override, '=')
       dot = index(override(:max(0, equals - 1)), '.')

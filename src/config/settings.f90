@@ -6,7 +6,7 @@ module polydem_settings
    implicit none
    private
    public :: settings_t, scene_settings_t, boxes_settings_t, neighbours_settings_t, overlap_settings_t
-   public :: forces_settings_t, integrate_settings_t, output_settings_t, checkpoint_settings_t
+   public :: forces_settings_t, integrate_settings_t, guards_settings_t, output_settings_t, checkpoint_settings_t
 
    !> Group &scene: what there is at the start
    type :: scene_settings_t
@@ -112,9 +112,13 @@ module polydem_settings
       character(len=:), allocatable :: damping
       !> Dimensionless damping coefficient gamma
       real(wp) :: damping_coefficient
+      !> Whether damping begins at the touch, not with the step in which it is first seen
+      logical :: damping_from_touch = .false.
       !> Restitution of a flat contact, in place of the damping coefficient; 0: not given
       real(wp) :: restitution
-      !> Friction: 'cundall_strack' or 'none'
+      !> Damping of tilts as a share of sqrt(k I_eff)
+      real(wp) :: tilt_damping = 0.0_wp
+      !> Friction: 'cundall_strack', 'exact' or 'none'
       character(len=:), allocatable :: friction
       !> Friction coefficient mu
       real(wp) :: friction_coefficient
@@ -122,12 +126,18 @@ module polydem_settings
       real(wp) :: tangential_stiffness
       !> Tangential damping as a share of sqrt(k_t m_t)
       real(wp) :: tangential_damping
+      !> Whether the slip velocity in the middle of the step extends the tangential spring, not that at its end
+      logical :: midstep_slip = .false.
+      !> Slip that exact friction may leave, as a share of the greatest slip velocity it takes from a contact in a step
+      real(wp) :: friction_tolerance
    end type forces_settings_t
 
    !> Group &integrate
    type :: integrate_settings_t
-      !> 'velocity_verlet' or 'gear'
+      !> 'velocity_verlet', 'gear' or 'gear_3_20'
       character(len=:), allocatable :: scheme
+      !> Sums of velocity Verlet over steps: 'plain' or 'compensated'
+      character(len=:), allocatable :: accumulation
       !> Time step [s]; 0: `fraction` of the stable step
       real(wp) :: dt
       !> Share of the stable step that is taken if dt is 0
@@ -135,6 +145,28 @@ module polydem_settings
       !> Simulated time [s]
       real(wp) :: duration
    end type integrate_settings_t
+
+   !> Group &guards: what is watched, and whether it stops the run, warns or is 'off'
+   type :: guards_settings_t
+      !> Move of a body in a step: 'stop', 'warn' or 'off'
+      character(len=:), allocatable :: displacement
+      !> Greatest move in a step as a share of the thinnest body
+      real(wp) :: displacement_limit
+      !> Time step against the stable one of the contacts: 'stop', 'warn' or 'off'
+      character(len=:), allocatable :: step
+      !> Depth of contacts: 'stop', 'warn' or 'off'
+      character(len=:), allocatable :: overlap
+      !> Greatest depth as a share of the thinner body
+      real(wp) :: overlap_limit
+      !> Energy that neither gravity nor walls gave: 'stop', 'warn' or 'off'
+      character(len=:), allocatable :: energy
+      !> Greatest such energy as a share of the energy turned over
+      real(wp) :: energy_limit
+      !> Contacts at the start deeper than this share of the thinner body are listed
+      real(wp) :: listed_depth
+      !> Contacts at the start are pushed apart to this share of the thinner body; 0: not
+      real(wp) :: relaxed_depth
+   end type guards_settings_t
 
    !> Group &output
    type :: output_settings_t
@@ -188,6 +220,8 @@ module polydem_settings
       type(forces_settings_t) :: forces
       !> Group &integrate
       type(integrate_settings_t) :: integrate
+      !> Group &guards
+      type(guards_settings_t) :: guards
       !> Group &output
       type(output_settings_t) :: output
       !> Group &checkpoint

@@ -31,14 +31,20 @@ contains
       !> Text of any length
       character(len=*), intent(in) :: text
       character(len=:), allocatable :: literal
-      integer :: k
+      integer :: k, n
 
-      literal = "'"
+      allocate (character(len=2*len(text) + 2) :: literal)
+      literal(1:1) = "'"
+      n = 1
       do k = 1, len(text)
-         literal = literal//text(k:k)
-         if (text(k:k) == "'") literal = literal//"'"
+         if (text(k:k) == "'") then
+            n = n + 1
+            literal(n:n) = "'"
+         end if
+         n = n + 1
+         literal(n:n) = text(k:k)
       end do
-      literal = literal//"'"
+      literal = literal(:n)//"'"
    end function quoted
 
    !> Number of words in a text; blanks and commas stand between them
@@ -86,7 +92,9 @@ contains
       near = (len(small) + 2)/3 + 1
       best = 0
       do k = 1, size(candidates)
-         distance = edit_distance(small, trim(candidates(k)))
+         ! The distance is at least the difference of the lengths, and its table may be large.
+         distance = abs(len(small) - len_trim(candidates(k)))
+         if (distance < near) distance = edit_distance(small, trim(candidates(k)))
          if (len(small) > 2 .and. index(candidates(k), small) > 0) distance = min(distance, 1)
          if (distance < near) then
             near = distance

@@ -1,9 +1,10 @@
 !> What a run would do, without running it.
 module polydem_check
-   use polydem_description, only: describe
+   use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t
    use polydem_kinds, only: lp, wp
    use polydem_log, only: log_t
+   use polydem_machine, only: resident_memory
    use polydem_settings, only: settings_t
    use polydem_simulation, only: check_stability, new_simulation, simulation_t
    use polydem_strings, only: to_text
@@ -33,6 +34,7 @@ contains
       if (allocated(error)) return
       call write_lines(log, settings%resolved)
       call describe(simulation, log)
+      call list_overlaps(simulation, '', log, error)
       call check_stability(simulation, stable, warning, error)
       if (allocated(warning)) call log%write_line('warning: '//warning)
       call log%write_line('memory     '//to_text(after)//' KiB resident, of which '//to_text(after - before)// &
@@ -54,21 +56,5 @@ contains
          first = first + length + 1
       end do
    end subroutine write_lines
-
-   !> Memory resident in this process as Linux counts it [KiB], 0 where it does not
-   integer(lp) function resident_memory()
-      character(len=128) :: line
-      integer :: unit, status
-
-      resident_memory = 0_lp
-      open (newunit=unit, file='/proc/self/status', action='read', status='old', iostat=status)
-      do while (status == 0)
-         read (unit, '(a)', iostat=status) line
-         if (status /= 0 .or. line(1:6) /= 'VmRSS:') cycle
-         read (line(7:), *, iostat=status) resident_memory
-         exit
-      end do
-      close (unit, iostat=status)
-   end function resident_memory
 
 end module polydem_check

@@ -1,12 +1,16 @@
 !> What a run consists of, in words: for `check` and for the head of the log.
 module polydem_description
+   use polydem_body_sizes, only: thickness_of_bodies
+   use polydem_depths, only: count_deeper, deepest_contact, depth_text, write_depths
+   use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_log, only: log_t
+   use polydem_result_folder, only: overlaps_path
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: describe
+   public :: describe, list_overlaps
 
 contains
 
@@ -32,8 +36,43 @@ contains
          if (s%contacts%n > 0_ip) then
             call log%write_line('at start   '//to_text(s%contacts%n)//' contacts, the deepest '//deepest(s))
          end if
+         if (s%relaxation%sweeps > 0_ip) then
+            call log%write_line('relaxed    in '//to_text(s%relaxation%sweeps)//' sweeps: the deepest contact from '// &
+                                to_text(s%relaxation%before, 3)//' to '//to_text(s%relaxation%after, 3)// &
+                                ' of the thinner body; no centre moved more than '//to_text(s%relaxation%move, 3)//' m')
+         end if
       end associate
    end subroutine describe
+
+   !> Write how deep contacts are at the start, and a table of the deep ones.
+   subroutine list_overlaps(simulation, folder, log, error)
+      !> A simulation at time 0
+      type(simulation_t), intent(in) :: simulation
+      !> Folder in which a table of the deep ones is made; empty: none is made
+      character(len=*), intent(in) :: folder
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Allocated if the table cannot be written
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp), allocatable :: thickness(:)
+      integer(ip) :: n
+
+      associate (s => simulation, limit => simulation%settings%guards%listed_depth)
+         thickness = thickness_of_bodies(s%bodies)
+         n = count_deeper(s%contacts, thickness, limit)
+         if (n == 0_ip) return
+         call log%write_line('deep       '//to_text(n)//' contacts by more than '//to_text(limit, 3)// &
+                             ' of the thinner body, most of all')
+         call log%write_line('           '//depth_text(s%bodies, s%contacts, thickness, &
+                                                       deepest_contact(s%contacts, thickness)))
+         if (folder == '') then
+            call log%write_line('           (a run lists them in overlaps.csv)')
+         else
+            call write_depths(overlaps_path(folder), s%bodies, s%contacts, thickness, limit, error)
+            call log%write_line('           all of them: '//overlaps_path(folder))
+         end if
+      end associate
+   end subroutine list_overlaps
 
    !> A remark if a whole number of steps does not make the duration that was asked for
    function rounding_text(duration, wanted) result(text)

@@ -2,35 +2,42 @@
 module polydem_guards
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_bodies, only: bodies_t
+   use polydem_body_sizes, only: measure_body
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: ip, lp, wp, worth_threads
+   use polydem_settings, only: guards_settings_t
    use polydem_strings, only: to_text
+   use polydem_warnings, only: warning_t
    implicit none
    private
    public :: motion_guard_t, new_motion_guard, check_places, check_motion, check_step, check_contacts
 
    !> What is needed to see whether bodies move too far in a step
    type :: motion_guard_t
-      !> Greatest distance that a point of a body may move in a step [m]
+      !> Greatest distance that a point of a body may move in a step [m]; huge if that is not watched
       real(wp) :: limit = 0.0_wp
+      !> Entry `displacement` of &guards
+      character(len=:), allocatable :: choice
+      !> Warnings so far
+      type(warning_t) :: warning
       !> Greatest distance of a vertex from the centre of each body [m]
       real(wp), allocatable :: radius(:)
       !> Slots of the bodies that may move
       integer(ip), allocatable :: moving(:)
    end type motion_guard_t
 
-   !> Greatest move in a step, as a share of the thinnest body
-   real(wp), parameter :: move_share = 0.25_wp
    !> Share of the stable step above which a run warns
    real(wp), parameter :: warn_share = 0.5_wp
 
 contains
 
    !> Prepare to watch bodies.
-   subroutine new_motion_guard(guard, bodies, moving)
+   subroutine new_motion_guard(guard, settings, bodies, moving)
       !> The guard
       type(motion_guard_t), intent(out) :: guard
+      !> Group &guards
+      type(guards_settings_t), intent(in) :: settings
       !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
       !> Slots of the bodies that may move
@@ -38,13 +45,13 @@ contains
       real(wp) :: thickness
       integer(ip) :: s
 
+      guard%choice = settings%displacement
       guard%moving = moving
       guard%limit = huge(1.0_wp)
       allocate (guard%radius(bodies%n))
       do s = 1_ip, bodies%n
-         call measure(bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip), thickness, &
-                      guard%radius(s))
-         guard%limit = min(guard%limit, move_share*thickness)
+         call measure_body(bodies, s, thickness, guard%radius(s))
+         if (guard%choice /= 'off') guard%limit = min(guard%limit, settings%displacement_limit*thickness)
       end do
    end subroutine new_motion_guard
 
@@ -89,10 +96,10 @@ contains
       is_somewhere = ieee_is_finite(bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s))
    end function is_somewhere
 
-   !> Stop if a body has left the finite numbers or moves too far in a step.
+   !> Stop if a body has left the finite numbers; stop or warn if it moves too far in a step.
    subroutine check_motion(guard, bodies, step, dt, error)
       !> The guard
-      type(motion_guard_t), intent(in) :: guard
+      type(motion_guard_t), intent(inout) :: guard
       !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies
       !> Number of the step
@@ -102,7 +109,7 @@ contains
       !> Names body, position, velocity and step
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: k, s
-      logical :: good
+      logical :: good, is_first
 
       good = .true.
       !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
@@ -112,19 +119,36 @@ contains
       end do
       !$omp end parallel do
       if (good) return
+      is_first = .true.
       do k = 1_ip, size(guard%moving, kind=ip)
          s = guard%moving(k)
          if (is_good(guard, bodies, s, dt)) cycle
-         call raise(error, run_error, 'step '//to_text(step)//': body '//to_text(bodies%id(s))//' at ('// &
-                    to_text(bodies%position(1, s))//', '//to_text(bodies%position(2, s))//') m has the velocity ('// &
-                    to_text(bodies%velocity(1, s))//', '//to_text(bodies%velocity(2, s))// &
-                    ') m/s and the angular velocity '//to_text(bodies%angular_velocity(s))// &
-                    ' 1/s; no point of it may move more than '//to_text(guard%limit)// &
-                    ' m in a step, or bodies could pass through each other. Take a smaller dt, or look for deep '// &
-                    'overlaps at the start')
-         return
+         if (.not. is_finite(guard, bodies, s, dt)) then
+            call raise(error, run_error, motion_text(guard, bodies, s, step))
+         else if (is_first) then
+            call guard%warning%respond(guard%choice, motion_text(guard, bodies, s, step), error)
+         end if
+         if (allocated(error)) return
+         is_first = .false.
       end do
    end subroutine check_motion
+
+   !> How a body moves, and what to do about it
+   function motion_text(guard, bodies, s, step) result(text)
+      type(motion_guard_t), intent(in) :: guard
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      integer(lp), intent(in) :: step
+      character(len=:), allocatable :: text
+
+      text = 'step '//to_text(step)//': body '//to_text(bodies%id(s))//' at ('// &
+         to_text(bodies%position(1, s))//', '//to_text(bodies%position(2, s))//') m has the velocity ('// &
+         to_text(bodies%velocity(1, s))//', '//to_text(bodies%velocity(2, s))// &
+         ') m/s and the angular velocity '//to_text(bodies%angular_velocity(s))// &
+         ' 1/s; no point of it may move more than '//to_text(guard%limit)// &
+         ' m in a step, or bodies could pass through each other. Take a smaller dt, or look for deep '// &
+         'overlaps at the start'
+   end function motion_text
 
    !> Whether a body is finite and none of its points moves too far in a step; false for NaN
    pure logical function is_good(guard, bodies, s, dt)
@@ -132,31 +156,32 @@ contains
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: dt
-      real(wp) :: move
 
-      move = dt*(abs(bodies%velocity(1, s)) + abs(bodies%velocity(2, s)) &
-                 + guard%radius(s)*abs(bodies%angular_velocity(s)))
-      is_good = ieee_is_finite(move) .and. is_somewhere(bodies, s)
-      if (is_good) is_good = move <= guard%limit
+      is_good = is_finite(guard, bodies, s, dt)
+      if (is_good) is_good = move_of(guard, bodies, s, dt) <= guard%limit
    end function is_good
 
-   !> Twice the least distance of an edge from the centre, and the greatest distance of a vertex [m].
-   pure subroutine measure(shape, thickness, radius)
-      real(wp), intent(in) :: shape(:, :)
-      real(wp), intent(out) :: thickness, radius
-      real(wp) :: edge(2)
-      integer(ip) :: v, w
+   !> Whether place, angle and velocities of a body are finite
+   pure logical function is_finite(guard, bodies, s, dt)
+      type(motion_guard_t), intent(in) :: guard
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      real(wp), intent(in) :: dt
 
-      thickness = huge(1.0_wp)
-      radius = 0.0_wp
-      w = size(shape, 2, kind=ip)
-      do v = 1_ip, size(shape, 2, kind=ip)
-         edge = shape(:, v) - shape(:, w)
-         thickness = min(thickness, 2.0_wp*abs(edge(1)*shape(2, w) - edge(2)*shape(1, w))/hypot(edge(1), edge(2)))
-         radius = max(radius, hypot(shape(1, v), shape(2, v)))
-         w = v
-      end do
-   end subroutine measure
+      is_finite = ieee_is_finite(move_of(guard, bodies, s, dt) &
+                                 + (bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s)))
+   end function is_finite
+
+   !> Greatest distance that a point of a body moves in a step [m]
+   pure real(wp) function move_of(guard, bodies, s, dt)
+      type(motion_guard_t), intent(in) :: guard
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      real(wp), intent(in) :: dt
+
+      move_of = dt*(abs(bodies%velocity(1, s)) + abs(bodies%velocity(2, s)) &
+                    + guard%radius(s)*abs(bodies%angular_velocity(s)))
+   end function move_of
 
    !> Compare the step with the stable step of the contacts: a warning above a half, an error above one.
    subroutine check_step(bodies, contacts, step, dt, stable, critical, warning, error)

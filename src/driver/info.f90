@@ -80,37 +80,57 @@ contains
       type(log_t), intent(inout) :: log
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      character(len=:), allocatable :: text
-      real(dp), allocatable :: times(:)
-      integer(lp), allocatable :: shape(:)
+      type(error_t), allocatable :: ignored
       logical :: is_profile
-      integer :: k
 
       call file%open(path, error)
       if (allocated(error)) return
       call log%write_line(path)
       is_profile = file%has('/state_hash')
+      call describe_origin(file, is_profile, log, error)
+      if (.not. allocated(error)) call describe_frames(file, log, error)
+      if (.not. allocated(error)) call describe_checkpoint(path, file, log, error)
+      if (.not. allocated(error) .and. is_profile) call describe_end(file, log, error)
+      if (allocated(error)) then
+         call file%close(ignored)
+      else
+         call file%close(error)
+      end if
+   end subroutine describe_file
+
+   subroutine describe_origin(file, is_profile, log, error)
+      type(hdf5_file_t), intent(inout) :: file
+      logical, intent(in) :: is_profile
+      type(log_t), intent(inout) :: log
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: text
+      integer :: k
+
       do k = 1, size(facts)
-         if (allocated(error)) return
-         if (k > 2 .and. .not. is_profile) cycle
+         if (k > 2 .and. .not. is_profile) return
          if (.not. file%has('/provenance/'//trim(facts(k)))) cycle
          call file%read('/provenance/'//trim(facts(k)), text, error)
-         if (.not. allocated(error)) call log%write_line('   '//facts(k)//text)
+         if (allocated(error)) return
+         call log%write_line('   '//facts(k)//text)
       end do
+   end subroutine describe_origin
+
+   subroutine describe_frames(file, log, error)
+      type(hdf5_file_t), intent(inout) :: file
+      type(log_t), intent(inout) :: log
+      type(error_t), allocatable, intent(inout) :: error
+      real(dp), allocatable :: times(:)
+      integer(lp), allocatable :: shape(:)
+
+      if (.not. file%has('/frames/time')) return
+      call file%read('/frames/time', times, error)
+      if (.not. allocated(error)) call file%shape_of('/frames/position', shape, error)
       if (allocated(error)) return
-      if (file%has('/frames/time')) then
-         call file%read('/frames/time', times, error)
-         call file%shape_of('/frames/position', shape, error)
-         if (.not. allocated(error) .and. size(times) > 0) then
-            call log%write_line('   frames          '//to_text(size(times, kind=ip))//' of '//to_text(shape(2))// &
-                                ' bodies, from '//to_text(real(times(1), wp))//' s to '// &
-                                to_text(real(times(size(times)), wp))//' s')
-         end if
-      end if
-      if (file%has('/run/step')) call describe_checkpoint(path, file, log, error)
-      if (is_profile) call describe_end(file, log, error)
-      call file%close(error)
-   end subroutine describe_file
+      if (size(times) == 0 .or. size(shape) /= 3) return
+      call log%write_line('   frames          '//to_text(size(times, kind=ip))//' of '//to_text(shape(2))// &
+                          ' bodies, from '//to_text(real(times(1), wp))//' s to '// &
+                          to_text(real(times(size(times)), wp))//' s')
+   end subroutine describe_frames
 
    subroutine describe_checkpoint(path, file, log, error)
       character(len=*), intent(in) :: path
@@ -120,7 +140,7 @@ contains
       integer(lp), allocatable :: step(:)
       character(len=:), allocatable :: problem
 
-      if (allocated(error)) return
+      if (.not. file%has('/run/step')) return
       call file%read('/run/step', step, error)
       if (allocated(error)) return
       call log%write_line('   checkpoint      of step '//to_text(step(1)))
@@ -134,9 +154,9 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
 
-      if (allocated(error)) return
       call file%read('/status', text, error)
-      if (.not. allocated(error)) call log%write_line('   status          '//text)
+      if (allocated(error)) return
+      call log%write_line('   status          '//text)
       call file%read('/state_hash', text, error)
       if (.not. allocated(error)) call log%write_line('   state hash      '//text)
    end subroutine describe_end

@@ -1,19 +1,21 @@
 !> A run from its settings to its result.
 module polydem_run
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_bodies, only: state_hash
    use polydem_books, only: fill_row, write_books
    use polydem_checkpoint, only: checkpoints_t
    use polydem_checkpoint_contents, only: history_t, scene_hash
    use polydem_clock, only: wall_seconds
    use polydem_counters, only: counters_t
-   use polydem_description, only: describe
-   use polydem_errors, only: error_t, input_error, raise, stopped_early
+   use polydem_description, only: describe, list_overlaps
+   use polydem_errors, only: error_t, input_error, raise, run_error, stopped_early
    use polydem_hash, only: hexadecimal
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ledger, only: balance_t
    use polydem_ledger_row, only: ledger_row_t
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_counters, write_hash, write_header, write_timings
+   use polydem_machine, only: resident_memory
    use polydem_paths, only: make_folder
    use polydem_profile, only: write_profile
    use polydem_provenance, only: collect_provenance, provenance_t
@@ -23,16 +25,15 @@ module polydem_run
    use polydem_resume, only: go_on, is_finished, look_back, past_t
    use polydem_run_lock, only: lock_result, unlock_result
    use polydem_settings, only: settings_t
-   use polydem_simulation, only: advance, check_stability, new_simulation, report_counters, simulation_t, time_of
+   use polydem_simulation, only: advance, new_simulation, report_counters, simulation_t, time_of
    use polydem_strings, only: to_text
    use polydem_timers, only: stage_output
    use polydem_trajectory, only: trajectory_t
+   use polydem_watch, only: look, new_watch, sum_up, watch_t
    implicit none
    private
    public :: run_simulation, result_folder, attempt_t
 
-   !> Steps between two looks at the stable step
-   integer(lp), parameter :: stability_interval = 100_lp
    !> Lines of the log if no interval is given
    integer(lp), parameter :: default_lines = 20_lp
 
@@ -78,10 +79,10 @@ module polydem_run
       integer(lp) :: frame_steps = 0_lp
       !> Steps between two lines of the log
       integer(lp) :: log_steps = 0_lp
-      !> Greatest share of the stable step that was warned of
-      real(wp) :: warned = 0.0_wp
-      !> Greatest share of the stable step seen
-      real(wp) :: greatest_share = 0.0_wp
+      !> Guards
+      type(watch_t) :: watch
+      !> Step of the last frame, negative if there is none
+      integer(lp) :: last_frame = -1_lp
    end type run_t
 
 contains
@@ -118,14 +119,15 @@ contains
       call unlock_result(run%folder)
    end subroutine run_simulation
 
-   !> All steps, and the end.
+   !> The first frame, unless the run goes on; all steps, and the end.
    subroutine go(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
 
+      if (run%past%checkpoint == 0_ip) call end_step(run, error)
       do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
          call advance(run%simulation, error)
-         if (.not. allocated(error)) call watch(run, error)
+         if (.not. allocated(error)) call end_step(run, error)
          call run%simulation%timers%lap(stage_output)
          call run%simulation%timers%end_step()
          if (.not. allocated(error)) call run%recorder%record(run%simulation, error)
@@ -156,7 +158,7 @@ contains
       call log%close()
    end subroutine tell_finished
 
-   !> Log, description, first frame, in a folder that belongs to this run.
+   !> Log, description and guards, in a folder that belongs to this run.
    subroutine prepare(settings, force, note, run, error)
       type(settings_t), intent(in) :: settings
       logical, intent(in) :: force
@@ -183,12 +185,13 @@ contains
       call write_header(run%log, run%provenance, run%folder)
       if (allocated(note)) call run%log%write_line(note)
       call describe(run%simulation, run%log)
+      call list_overlaps(run%simulation, run%folder, run%log, error)
+      call new_watch(run%watch, run%simulation)
       call choose_intervals(run)
-      call recall(run, error)
+      if (.not. allocated(error)) call recall(run, error)
       if (allocated(error)) return
       call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error, run%past%segments)
       if (.not. allocated(error)) call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, error)
-      if (.not. allocated(error) .and. run%past%checkpoint == 0_ip) call watch(run, error)
    end subroutine prepare
 
    !> Look after checkpoints from now on, and go on from one if that is wanted.
@@ -200,7 +203,7 @@ contains
       if (allocated(run%past%remark)) call run%log%write_line(run%past%remark)
       if (run%past%checkpoint == 0_ip) return
       run%provenance%parent = checkpoint_path(run%folder, run%past%checkpoint)//', step '//to_text(run%past%step)
-      call go_on(run%folder, run%past, run%provenance%revision, run%simulation, run%history, run%log, error)
+      call go_on(run%folder, run%past, run%provenance%revision, run%simulation, run%history, run%watch, run%log, error)
       run%checkpoints%last_step = run%past%step
       run%checkpoints%next = modulo(run%past%checkpoint, n_checkpoints) + 1_ip
    end subroutine recall
@@ -223,15 +226,15 @@ contains
             history = run%history
             history%segments = int(run%trajectory%number, lp)
             history%seconds = history%seconds + (wall_seconds() - run%began)
-            call run%checkpoints%write(run%folder, run%provenance, s, history, error)
+            call run%checkpoints%write(run%folder, run%provenance, s, history, run%watch, error)
          end if
          if (allocated(reason)) call raise(error, stopped_early, 'stopped early by '//reason//' after step '// &
             to_text(s%step)//' of '//to_text(s%n_steps)//'; the same command with --continue goes on')
       end associate
    end subroutine save
 
-   !> Frame, line and look at the stable step, when it is time for them.
-   subroutine watch(run, error)
+   !> Guards, frame and line, when it is time for them.
+   subroutine end_step(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
       logical :: frame_due, line_due
@@ -239,7 +242,7 @@ contains
       associate (s => run%simulation)
          frame_due = s%step == s%n_steps .or. is_due(s%step, run%frame_steps)
          line_due = s%step == s%n_steps .or. is_due(s%step, run%log_steps)
-         if (line_due .or. is_due(s%step, stability_interval)) call look_at_step(run, error)
+         call look(run%watch, s, line_due, run%log, error)
          if (allocated(error)) return
          if ((frame_due .or. line_due) .and. s%settings%output%ledger) call fill_row(s, run%balance, run%row)
          if (line_due) then
@@ -249,7 +252,7 @@ contains
          if (frame_due) call write_frame(run, error)
          call run%log%show_progress(s%step, s%n_steps)
       end associate
-   end subroutine watch
+   end subroutine end_step
 
    subroutine write_frame(run, error)
       type(run_t), intent(inout) :: run
@@ -266,24 +269,26 @@ contains
          else
             call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error)
          end if
+         run%last_frame = s%step
       end associate
    end subroutine write_frame
 
-   !> Compare the step with the stable step of the contacts, and warn when the share has grown by a tenth.
-   subroutine look_at_step(run, error)
+   !> After a numerical failure, write the state in which the run stopped, if every body is somewhere; else the last
+   !> frame stays the one that was due before.
+   subroutine write_last_frame(run, code, error)
       type(run_t), intent(inout) :: run
+      !> Exit code of the failure
+      integer, intent(in) :: code
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: warning
-      real(wp) :: stable, share
 
-      call check_stability(run%simulation, stable, warning, error)
-      share = 0.0_wp
-      if (stable < huge(stable)) share = run%simulation%dt/stable
-      run%greatest_share = max(run%greatest_share, share)
-      if (.not. allocated(warning) .or. share <= 1.1_wp*run%warned) return
-      run%warned = share
-      call run%log%write_line('warning: '//warning)
-   end subroutine look_at_step
+      associate (s => run%simulation, bodies => run%simulation%bodies)
+         if (code /= run_error .or. run%last_frame == s%step) return
+         if (.not. all(ieee_is_finite(bodies%position)) .or. .not. all(ieee_is_finite(bodies%velocity))) return
+         if (.not. all(ieee_is_finite(bodies%angle)) .or. .not. all(ieee_is_finite(bodies%angular_velocity))) return
+         if (s%settings%output%ledger) call fill_row(s, run%balance, run%row)
+      end associate
+      call write_frame(run, error)
+   end subroutine write_last_frame
 
    !> Close the trajectory, write the profile and the end of the log, also after a failure.
    subroutine finish(run, seconds, error)
@@ -293,22 +298,24 @@ contains
       type(error_t), allocatable :: late_error
       type(counters_t) :: counters
       character(len=:), allocatable :: status
-      integer(lp) :: hash
+      integer(lp) :: hash, memory
 
+      memory = resident_memory()
       status = 'finished'
       if (allocated(error)) status = error%message
       associate (s => run%simulation)
          hash = state_hash(s%bodies)
          call report_counters(s, counters)
+         if (allocated(error)) call write_last_frame(run, error%code, late_error)
          call run%trajectory%close(late_error)
          call run%recorder%close(run%log, late_error)
          call run%checkpoints%close(run%log)
-         call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, status, late_error)
+         call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, status, late_error, &
+                            memory)
          call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n)
          call write_counters(run%log, counters)
          if (s%settings%output%ledger) call write_books(s, run%log)
-         if (run%greatest_share > 0.0_wp) call run%log%write_line( &
-            'greatest share of the stable step of the contacts: '//to_text(run%greatest_share, 3))
+         call sum_up(run%watch, s, run%log)
       end associate
       if (allocated(error)) call run%log%write_line('stopped: '//status)
       call write_hash(run%log, hash)

@@ -16,6 +16,7 @@ module polydem_simulation
    use polydem_make_boxes, only: box_maker_t, new_box_maker, update_boxes
    use polydem_motion, only: motion_t, move_bodies
    use polydem_neighbours, only: neighbours_t, new_neighbours
+   use polydem_relax, only: relax_bodies, relaxation_t
    use polydem_scene, only: build_scene
    use polydem_settings, only: settings_t
    use polydem_stable_step, only: stable_step_of_contacts, stable_step_of_shapes
@@ -62,7 +63,9 @@ module polydem_simulation
       !> Stable step expected from the shapes [s]
       real(wp) :: expected_stable_step = 0.0_wp
       !> Watches how far bodies move
-      type(motion_guard_t), private :: guard
+      type(motion_guard_t) :: guard
+      !> How bodies were pushed apart before time 0
+      type(relaxation_t) :: relaxation
       !> Slots that may move: free bodies, then those of motions; the first n_free of them are the free ones
       integer(ip), allocatable :: moving(:)
       !> Sums over all steps: pairs, contacts, pairs that began, pairs that ended, degenerate contacts
@@ -84,10 +87,14 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(bodies_t) :: bodies
       type(motion_t), allocatable :: motions(:)
+      type(relaxation_t) :: relaxation
 
       call build_scene(settings, bodies, motions, error)
       if (allocated(error)) return
+      if (settings%guards%relaxed_depth > 0.0_wp) call relax_bodies(settings, bodies, relaxation, error)
+      if (allocated(error)) return
       call start_simulation(settings, bodies, motions, self, error)
+      self%relaxation = relaxation
    end subroutine new_simulation
 
    !> Start from given bodies, and compute the forces at time 0.
@@ -107,11 +114,13 @@ contains
       self%bodies = bodies
       self%motions = motions
       call new_force_law(settings%forces, self%bodies, self%law)
+      self%contacts%area_is_effective = self%law%needs_effective_area
+      self%contacts%has_twist = self%law%needs_twist
       call new_integrator(settings%integrate, self%integrator)
       call choose_step(self, error)
       if (allocated(error)) return
       call list_moving(self)
-      call new_motion_guard(self%guard, self%bodies, self%moving)
+      call new_motion_guard(self%guard, settings%guards, self%bodies, self%moving)
       associate (choice => settings%boxes)
          call new_box_maker(self%maker, self%bodies, choice%largest_ratio, choice%margin, self%boxes, error)
       end associate
@@ -144,11 +153,12 @@ contains
       call self%timers%lap(stage_integrate)
       call find_and_push(self, self%dt, error)
       if (allocated(error)) return
+      call self%integrator%correct(self%dt, self%bodies)
+      call self%timers%lap(stage_integrate)
       if (self%settings%output%ledger) then
          call book_step(self%ledger, self%dt, self%settings%forces%gravity, self%bodies, self%contacts)
          call self%timers%lap(stage_forces)
       end if
-      call self%integrator%correct(self%dt, self%bodies)
       call check_motion(self%guard, self%bodies, self%step, self%dt, error)
       call self%timers%lap(stage_integrate)
    end subroutine advance
@@ -167,15 +177,22 @@ contains
       type(simulation_t), intent(in) :: self
       !> Stable step of the present contacts [s], huge if there are none
       real(wp), intent(out) :: stable
-      !> Set if the step is large
+      !> Set if the step is large, or unstable and that does not stop the run
       character(len=:), allocatable, intent(out) :: warning
-      !> Set if the step is unstable
+      !> Set if the step is unstable and that stops the run
       type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: failure
       integer(ip) :: critical
 
       call stable_step_of_contacts(self%settings%forces, self%integrator%stability(), self%bodies, self%incidence, &
                                    self%contacts, stable, critical)
-      call check_step(self%bodies, self%contacts, self%step, self%dt, stable, critical, warning, error)
+      call check_step(self%bodies, self%contacts, self%step, self%dt, stable, critical, warning, failure)
+      if (.not. allocated(failure)) return
+      if (self%settings%guards%step /= 'stop') then
+         warning = failure%message
+      else if (.not. allocated(error)) then
+         call move_alloc(failure, error)
+      end if
    end subroutine check_stability
 
    !> Exact counts of the work done so far.
@@ -194,6 +211,7 @@ contains
       call counters%set('contacts', self%sums(2))
       call counters%set('contacts without direction', self%sums(5))
       call self%neighbours%report(counters)
+      if (allocated(self%law%constraint)) call self%law%constraint%report(counters)
    end subroutine report_counters
 
    !> From the poses of the bodies to the forces on them: the middle of the step.
@@ -223,8 +241,20 @@ contains
       call evaluate_law(self%law, self%bodies, dt, self%contacts, self%memory)
       call index_contacts(self%bodies%n, self%contacts, self%incidence)
       call assemble_forces(self%settings%forces%gravity, self%incidence, self%contacts, self%bodies)
+      if (allocated(self%law%constraint)) call constrain(self, error)
       call self%timers%lap(stage_forces)
    end subroutine find_and_push
+
+   !> Add the forces that keep velocities to a constraint.
+   subroutine constrain(self, error)
+      type(simulation_t), intent(inout) :: self
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      call self%law%constraint%apply(self%dt, self%incidence, self%bodies, self%contacts, self%memory, error)
+      if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
+      call assemble_forces(self%settings%forces%gravity, self%incidence, self%contacts, self%bodies)
+   end subroutine constrain
 
    !> Move the columns of memory along with the pair list.
    subroutine carry_memory(self)

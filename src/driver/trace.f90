@@ -64,6 +64,8 @@ contains
       if (.not. allocated(error)) call read_reach(path, file, trace, error)
       if (.not. allocated(error)) call read_polygons(path, file, trace, error)
       if (.not. allocated(error)) call file%read_real_attribute('/', 'dt', trace%dt, error)
+      if (.not. ieee_is_finite(trace%dt) .or. trace%dt < 0.0_dp) call raise(error, input_error, path// &
+         ': the attribute dt must be finite and not negative')
       if (allocated(error)) then
          call file%close(ignored)
       else
@@ -97,16 +99,17 @@ contains
       integer(lp), allocatable :: extent(:)
       integer(ip), allocatable :: is_wall(:)
       integer(ip) :: first, n_rows, s
+      integer :: status
       logical :: fit
 
       call file%shape_of('/aabb', extent, error)
       if (.not. allocated(error)) call file%read('/is_wall', is_wall, error)
       if (allocated(error)) return
       fit = size(extent) == 3
-      if (fit) fit = minval(extent) >= 1_lp .and. extent(3) == 4_lp
+      if (fit) fit = minval(extent) >= 1_lp .and. maxval(extent) < huge(1_ip) .and. extent(3) == 4_lp
       if (.not. fit) then
-         call raise(error, input_error, path//': aabb must have the shape (steps, boxes, 4), with at least one '// &
-                    'step and one box')
+         call raise(error, input_error, path//': aabb must have the shape (steps, boxes, 4), from 1 to '// &
+                    to_text(huge(1_ip) - 1_ip)//' steps and boxes')
          return
       end if
       call check_size(path, 'is_wall', size(is_wall, kind=lp), extent(2), 'boxes', error)
@@ -114,7 +117,12 @@ contains
       if (trace%n_steps == 0_ip) trace%n_steps = int(extent(1), ip)
       trace%n_steps = min(trace%n_steps, int(extent(1), ip))
       trace%fixed = is_wall /= 0_ip
-      allocate (trace%bounds(4, extent(2), trace%n_steps))
+      allocate (trace%bounds(4, extent(2), trace%n_steps), stat=status)
+      if (status /= 0) then
+         call raise(error, input_error, path//': there is no memory for '//to_text(trace%n_steps)//' steps of '// &
+                    to_text(extent(2))//' boxes; replay fewer with --steps')
+         return
+      end if
       ! Many steps at once: in a compressed trace one step alone costs as much as all of its chunk.
       n_rows = int(max(1_lp, block_numbers/(4_lp*extent(2))), ip)
       do first = 1_ip, trace%n_steps, n_rows

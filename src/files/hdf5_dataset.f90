@@ -7,12 +7,13 @@
 module polydem_hdf5_dataset
    use, intrinsic :: iso_c_binding, only: c_ptr
    use hdf5, only: h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dont_atexit_f, h5dopen_f, &
-      h5dread_f, h5dset_extent_f, h5dwrite_f, h5eset_auto_f, h5get_libversion_f, h5kind_to_type, h5lexists_f, &
-      h5open_f, h5pclose_f, h5pcreate_f, h5pset_chunk_f, h5pset_create_inter_group_f, h5pset_deflate_f, &
+      h5dread_f, h5dset_extent_f, h5dwrite_f, h5eset_auto_f, h5get_libversion_f, h5iis_valid_f, h5kind_to_type, &
+      h5lexists_f, h5open_f, h5pclose_f, h5pcreate_f, h5pset_chunk_f, h5pset_create_inter_group_f, h5pset_deflate_f, &
       h5pset_shuffle_f, h5sclose_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
       h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, h5tclose_f, h5tget_class_f, h5tget_size_f, h5zfilter_avail_f
    use hdf5, only: h5_integer_kind, h5_real_kind, h5p_dataset_create_f, h5p_link_create_f, h5s_select_set_f, &
-      h5s_unlimited_f, h5t_enum_f, h5t_float_f, h5t_integer_f, h5z_filter_deflate_f, hid_t, hsize_t, size_t
+      h5s_unlimited_f, h5t_enum_f, h5t_float_f, h5t_integer_f, h5t_native_double, h5z_filter_deflate_f, hid_t, &
+      hsize_t, size_t
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_strings, only: to_text
@@ -46,15 +47,18 @@ contains
 
    !> Make the library ready; may be called again.
    !>
+   !> HDF5 1.10 makes its 55 types anew whenever h5open_f is called, and keeps the former ones: so it is called once.
    !> HDF5 does nothing when the program exits: it would try again to write files that could not be written, and crash.
    !> All others are closed by then. It has to be told before its first work; told again, it only returns a status.
    subroutine start_library(error)
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
+      logical :: is_open
       integer :: status
 
       call h5dont_atexit_f(status)
-      call h5open_f(status)
+      call h5iis_valid_f(h5t_native_double, is_open, status)
+      if (.not. is_open) call h5open_f(status)
       if (status == 0) call h5eset_auto_f(0, status)
       if (status /= 0) call raise(error, io_error, 'the HDF5 library does not start')
    end subroutine start_library

@@ -9,11 +9,12 @@ module polydem_hdf5_file
    use hdf5, only: hsize_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_appender, only: hdf5_appender_t
-   use polydem_hdf5_dataset, only: dataset_shape, double_type, holds_integers, holds_reals, library_version, &
+   use polydem_hdf5_claim, only: believable_shape, shape_text
+   use polydem_hdf5_dataset, only: double_type, holds_integers, holds_reals, library_version, &
       long_type, place_t, read_dataset
    use polydem_hdf5_text, only: read_attribute_value, read_text
    use polydem_kinds, only: dp, ip, lp
-   use polydem_strings, only: join, to_text
+   use polydem_strings, only: to_text
    implicit none
    private
    public :: hdf5_file_t, library_version
@@ -167,20 +168,14 @@ contains
       integer, intent(in) :: rank
       !> Its shape, fastest dimension first
       integer(hsize_t), allocatable, intent(out) :: extent(:)
-      !> Allocated if there is no such data set or it has another rank
+      !> Allocated if there is no such data set, it has another rank or claims more than the file can hold
       type(error_t), allocatable, intent(inout) :: error
-      character(len=24), allocatable :: words(:)
-      integer :: k
 
-      call dataset_shape(place, extent, error)
+      call believable_shape(place, extent, error)
       if (allocated(error)) return
       if (size(extent) == rank) return
-      allocate (words(size(extent)))
-      do k = 1, size(extent)
-         words(k) = to_text(int(extent(size(extent) + 1 - k), lp))
-      end do
-      call raise(error, input_error, place%path//': '//place%name//' has the shape ('//join(words, ', ')// &
-                 ') but must have '//to_text(int(rank, ip))//' dimensions')
+      call raise(error, input_error, place%path//': '//place%name//' has the shape '//shape_text(extent)// &
+                 ' but must have '//to_text(int(rank, ip))//' dimensions')
    end subroutine expect_rank
 
 end module polydem_hdf5_file

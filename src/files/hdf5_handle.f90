@@ -3,7 +3,8 @@ module polydem_hdf5_handle
    use hdf5, only: h5f_acc_rdonly_f, h5f_acc_trunc_f, h5f_scope_global_f, h5fclose_f, h5fcreate_f, &
       h5fflush_f, h5fopen_f, h5p_file_create_f, h5pclose_f, h5pcreate_f, h5pset_userblock_f, hid_t, hsize_t
    use polydem_errors, only: error_t, input_error, io_error, raise
-   use polydem_hdf5_dataset, only: dataset_shape, has_link, place_t, start_library
+   use polydem_hdf5_claim, only: believable_shape
+   use polydem_hdf5_dataset, only: has_link, place_t, start_library
    use polydem_kinds, only: ip, lp
    use polydem_paths, only: exists, is_folder
    implicit none
@@ -150,11 +151,11 @@ contains
       character(len=*), intent(in) :: name
       !> Its shape; empty for a scalar
       integer(lp), allocatable, intent(out) :: shape(:)
-      !> Allocated if there is no such data set
+      !> Allocated if there is no such data set, or if it claims more than the file can hold
       type(error_t), allocatable, intent(inout) :: error
       integer(hsize_t), allocatable :: extent(:)
 
-      call dataset_shape(self%place_of(name), extent, error)
+      call believable_shape(self%place_of(name), extent, error)
       if (allocated(error)) return
       shape = int(extent(size(extent):1:-1), lp)
    end subroutine shape_of

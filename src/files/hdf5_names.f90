@@ -8,44 +8,54 @@ module polydem_hdf5_names
    use polydem_hdf5_dataset, only: expect, place_t
    implicit none
    private
-   public :: list_names, is_dataset
+   public :: count_names, read_name, is_dataset
 
 contains
 
-   !> List the names at the top level in alphabetical order.
-   subroutine list_names(place, names, error)
+   !> Number of names at the top level
+   subroutine count_names(place, n, error)
       !> File; the name is that of the top level, /
       type(place_t), intent(in) :: place
-      !> Names, all as long as the longest
-      character(len=:), allocatable, intent(out) :: names(:)
+      !> Their number
+      integer, intent(out) :: n
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: buffer
       integer(hid_t) :: group
-      integer(size_t) :: length, longest
-      integer(hsize_t) :: k
-      integer :: kind_of_links, last_order, n, pass, status, ignored
+      integer :: kind_of_links, last_order, status, ignored
 
+      n = 0
       call h5gopen_f(place%file, '/', group, status)
       call expect(status, 'open', place, error)
       if (allocated(error)) return
       call h5gget_info_f(group, kind_of_links, n, last_order, status)
-      longest = 1_size_t
-      ! Once for the greatest length, once for the names.
-      do pass = 1, 2
-         allocate (character(len=longest) :: buffer)
-         if (pass == 2) allocate (character(len=longest) :: names(n))
-         do k = 1_hsize_t, int(n, hsize_t)
-            if (status < 0) exit
-            call h5lget_name_by_idx_f(group, '.', h5_index_name_f, h5_iter_inc_f, k - 1_hsize_t, buffer, status, length)
-            longest = max(longest, length)
-            if (pass == 2) names(k) = buffer
-         end do
-         deallocate (buffer)
-      end do
-      call expect(status, 'list the names in', place, error)
+      call expect(status, 'count the names in', place, error)
       call h5gclose_f(group, ignored)
-   end subroutine list_names
+   end subroutine count_names
+
+   !> One of the names at the top level, in alphabetical order; one at a time, since together they may be large.
+   subroutine read_name(place, k, name, error)
+      !> File; the name is that of the top level, /
+      type(place_t), intent(in) :: place
+      !> Number of the name, from 1
+      integer, intent(in) :: k
+      !> The name
+      character(len=:), allocatable, intent(out) :: name
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(size_t) :: length
+      integer :: status, pass
+
+      ! Once for its length, once for the name.
+      length = 1_size_t
+      do pass = 1, 2
+         if (allocated(name)) deallocate (name)
+         allocate (character(len=length) :: name)
+         call h5lget_name_by_idx_f(place%file, '/', h5_index_name_f, h5_iter_inc_f, int(k - 1, hsize_t), name, status, &
+                                   length)
+         call expect(status, 'read the names in', place, error)
+         if (allocated(error)) return
+      end do
+   end subroutine read_name
 
    !> Whether a name stands for a data set, rather than a group, a type, or a link to nowhere
    logical function is_dataset(place)

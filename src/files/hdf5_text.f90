@@ -2,11 +2,14 @@
 !>
 !> HDF5 handles them as addresses of texts that end with a null character.
 module polydem_hdf5_text
-   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_loc, c_null_char, c_null_ptr, c_ptr, c_size_t
-   use hdf5, only: h5aclose_f, h5acreate_f, h5adelete_f, h5aexists_f, h5aopen_f, h5aread_f, h5awrite_f, h5dclose_f, &
-      h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dvlen_reclaim_f, h5oclose_f, h5oopen_f, &
-      h5sclose_f, h5screate_f, h5tclose_f, h5tcopy_f, h5tis_variable_str_f, h5tset_cset_f
-   use hdf5, only: h5p_default_f, h5s_scalar_f, h5t_cset_utf8_f, h5t_string, hid_t, hsize_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_loc, c_null_char, c_null_ptr, c_ptr, &
+      c_size_t
+   use hdf5, only: h5aclose_f, h5acreate_f, h5adelete_f, h5aexists_f, h5aget_space_f, h5aget_type_f, h5aopen_f, &
+      h5aread_f, h5awrite_f, h5dclose_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, &
+      h5dvlen_reclaim_f, h5oclose_f, h5oopen_f, h5sclose_f, h5screate_f, h5sget_simple_extent_npoints_f, &
+      h5tclose_f, h5tcopy_f, h5tget_class_f, h5tis_variable_str_f, h5tset_cset_f
+   use hdf5, only: h5p_default_f, h5s_scalar_f, h5t_cset_utf8_f, h5t_float_f, h5t_integer_f, h5t_no_class_f, &
+      h5t_string, hid_t, hsize_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_dataset, only: dataset_shape, expect, place_t, write_dataset
    implicit none
@@ -103,6 +106,8 @@ contains
       call h5tis_variable_str_f(kind_in_file, variable, status)
       if (status < 0 .or. size(extent) > 0) variable = .false.
       if (variable) then
+         ! A text that was never written is an address of nothing.
+         address = c_null_ptr
          buffer = c_loc(address)
          call h5dread_f(dataset, kind_in_file, buffer, status)
          call expect(status, 'read', place, error)
@@ -126,6 +131,10 @@ contains
       character(kind=c_char), pointer :: letters(:)
       integer :: k
 
+      if (.not. c_associated(address)) then
+         text = ''
+         return
+      end if
       call c_f_pointer(address, letters, [c_strlen(address)])
       allocate (character(len=size(letters)) :: text)
       do k = 1, size(letters)
@@ -185,7 +194,7 @@ contains
       call h5oclose_f(object, ignored)
    end subroutine write_attribute_value
 
-   !> Read one value that is attached to a group or data set.
+   !> Read one number that is attached to a group or data set.
    subroutine read_attribute_value(place, name, kind_in_memory, address, there, error)
       !> File and the name of the group or data set
       type(place_t), intent(in) :: place
@@ -197,10 +206,11 @@ contains
       type(c_ptr), intent(in) :: address
       !> Whether there is such an attribute
       logical, intent(out) :: there
-      !> Allocated if it cannot be read
+      !> Allocated if it cannot be read, or is anything but one number
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: object, attribute
       type(c_ptr) :: buffer
+      logical :: is_number
       integer :: status, ignored
 
       there = .false.
@@ -211,11 +221,38 @@ contains
       if (status >= 0 .and. there) then
          buffer = address
          call h5aopen_f(object, name, attribute, status)
-         if (status >= 0) call h5aread_f(attribute, kind_in_memory, buffer, status)
-         call h5aclose_f(attribute, ignored)
+         if (status >= 0) then
+            ! There is room for one number only.
+            is_number = holds_one_number(attribute)
+            if (is_number) call h5aread_f(attribute, kind_in_memory, buffer, status)
+            if (.not. is_number) call raise(error, input_error, place%path//": the attribute '"//name//"' of "// &
+                                            place%name//' must be one number')
+            call h5aclose_f(attribute, ignored)
+         end if
       end if
       call expect(status, "read the attribute '"//name//"' of", place, error)
       call h5oclose_f(object, ignored)
    end subroutine read_attribute_value
+
+   logical function holds_one_number(attribute)
+      integer(hid_t), intent(in) :: attribute
+      integer(hid_t) :: kind_in_file, space
+      integer(hsize_t) :: n
+      integer :: class, status, ignored
+
+      n = 0_hsize_t
+      class = h5t_no_class_f
+      call h5aget_space_f(attribute, space, status)
+      if (status >= 0) then
+         call h5sget_simple_extent_npoints_f(space, n, status)
+         call h5sclose_f(space, ignored)
+      end if
+      call h5aget_type_f(attribute, kind_in_file, status)
+      if (status >= 0) then
+         call h5tget_class_f(kind_in_file, class, status)
+         call h5tclose_f(kind_in_file, ignored)
+      end if
+      holds_one_number = n == 1_hsize_t .and. (class == h5t_float_f .or. class == h5t_integer_f)
+   end function holds_one_number
 
 end module polydem_hdf5_text

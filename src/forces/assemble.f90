@@ -1,7 +1,8 @@
 !> From forces of contacts to forces and torques of bodies.
 !>
 !> The force of a contact acts at the centroid of the overlap, with a torque where the line of action of the normal
-!> force does not run through it (`lever`); the second body feels the opposite of both.
+!> force does not run through it (`lever`), and with a torque of its own if there is one (`twist`); the second body
+!> feels the opposite of all.
 !>
 !> Every body sums over its contacts in ascending order of the partner's identifier, whatever the number of
 !> threads, so that results have the same bits. A contact table is ascending in the first body already;
@@ -90,6 +91,7 @@ contains
             torque = torque - (contacts%arm_second(1, c)*contacts%force(2, c) &
                                - contacts%arm_second(2, c)*contacts%force(1, c) &
                                + contacts%lever(c)*contacts%normal_force(c))
+            if (contacts%has_twist) torque = torque - contacts%twist(c)
          end do
          do c = incidence%start_first(s), incidence%start_first(s + 1_ip) - 1_ip
             fx = fx + contacts%force(1, c)
@@ -97,6 +99,7 @@ contains
             torque = torque + (contacts%arm_first(1, c)*contacts%force(2, c) &
                                - contacts%arm_first(2, c)*contacts%force(1, c) &
                                + contacts%lever(c)*contacts%normal_force(c))
+            if (contacts%has_twist) torque = torque + contacts%twist(c)
          end do
          if (.not. bodies%fixed(s)) then
             fx = fx + bodies%mass(s)*gravity(1)

@@ -1,20 +1,24 @@
-!> Elastic force from an energy of the overlap area: W = w(A), w = E A^2/(2 l b).
+!> Elastic force from an energy of the overlap: W = E G^2/(2 l b), where G is its effective area (see `effective_area`).
 !>
-!> With N and M of `overlap_integrals`, dA/dt = N . (v1 - v2) + M1 w1 - M2 w2. So the first body feels the force -w' N
-!> and the torque -w' M1, the second w' N and w' M2: energy returns on every closed path, and momentum and angular
-!> momentum balance (the energy of a contact as a function of its volume: Y. T. Feng, Comput. Methods Appl. Mech.
-!> Eng. 373 (2021)). A power of 2 makes faces linear springs; corners are softer, F ~ d^3.
+!> With N and M of `effective_area`, dG/dt = N . (v1 - v2) + M1 w1 - M2 w2. So the first body feels the force -w' N and
+!> the torque -w' M1, the second w' N and w' M2, w' = E G/(l b): energy returns on every closed path, and momentum and
+!> angular momentum balance. (The energy of a contact as a function of its volume: Y. T. Feng, Comput. Methods Appl.
+!> Mech. Eng. 373 (2021). A function of the area alone gives nothing against tilts of a face, whose area stays as it is
+!> while its corners stay inside; the effective area, which is ours, has the second moments besides.)
+!>
+!> Seen from the outline, the bodies press on each other with p(x) = w' G/4 (x - c)^T S^-1 (x - c). A face of width w
+!> and depth d is a bed of springs: stiffness E w^2/(l b) against approach, w^2/12 of that against tilts as long as
+!> these are small against d/w, and less when a corner comes to leave, where the force is still continuous. Corners are
+!> softer, F ~ d^3. (p is least in the middle of a face: only its sum and moment are meant, not its distribution.)
 !>
 !> l and b belong to the pair, not to the contact: with s the side of the square of a body's area, l = 2 s1 s2/(s1 + s2)
 !> and b = min(s1, s2). Two equal squares face to face have the stiffness E, a square on a large plate E/2, and two bars
 !> of length a and height h E a/h side to side and E h/a end to end, as with the area law.
 !>
-!> A face that tilts keeps its area as long as its corners stay inside, so nothing drives it back within tilts of twice
-!> the depth over the width, and no damping sees it (dA/dt = 0). The area law drives it back, since it acts at the
-!> centroid of the overlap, at the price of work on closed paths. With this law stacks stand, but they sway.
-!>
-!> A contact without a direction (one body inside the other) has no force of that kind. The one it gets, along the
-!> line of centres, leads out but has no energy; whoever cannot accept that sets degenerate = 'stop' in &overlap.
+!> Where one body is inside the other, or bars cross, G is that of the body or of the parallelogram in common: it does
+!> not depend on small shifts, and such a contact has no direction and no force of that kind (crossed bars have their
+!> torque). The force it gets, along the line of centres, leads out but has no energy; whoever cannot accept that sets
+!> degenerate = 'stop' in &overlap.
 module polydem_conservative_law
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contact_memory_t, contacts_t
@@ -74,7 +78,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
-      !> Contacts; `inverse_length`, `lever`, `elastic` and `normal_force` change
+      !> Contacts with the effective area; `inverse_length`, `lever`, `elastic` and `normal_force` change
       type(contacts_t), intent(inout) :: contacts
       !> Memory of the pairs (not used)
       type(contact_memory_t), intent(inout) :: memory

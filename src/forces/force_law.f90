@@ -1,7 +1,8 @@
 !> The force law of a run: the list of its parts. The only file that knows all parts by name.
 !>
 !> To add a part: write it as a `force_part_t` in a file of its own, add its name to the choices of the
-!> namelist, and append it here in the order in which parts must act (elastic, damping, friction).
+!> namelist, and append it here in the order in which parts must act (elastic, damping, friction). A law may end with a
+!> constraint on velocities, which acts when all other forces on the bodies are known.
 module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
@@ -9,12 +10,16 @@ module polydem_force_law
    use polydem_conservative_law, only: conservative_law_t, new_conservative_law
    use polydem_contacts, only: contact_memory_t, contacts_t
    use polydem_cundall_strack, only: cundall_strack_t
+   use polydem_damping_onset, only: damping_onset_t
+   use polydem_exact_friction, only: exact_friction_t
    use polydem_force_part, only: force_part_t
    use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
    use polydem_rate_damping, only: rate_damping_t
    use polydem_restitution_damping, only: damping_ratio_of, restitution_damping_t
    use polydem_settings, only: forces_settings_t
+   use polydem_tilt_damping, only: tilt_damping_t
+   use polydem_velocity_constraint, only: velocity_constraint_t
    implicit none
    private
    public :: force_law_t, new_force_law, evaluate_law
@@ -28,10 +33,16 @@ module polydem_force_law
    !> Parts in the order in which they act, and which columns of memory they need
    type :: force_law_t
       type(part_holder_t), allocatable, private :: parts(:)
-      !> Whether a part remembers tangential springs
+      !> What acts after all parts; unallocated if there is none
+      class(velocity_constraint_t), allocatable :: constraint
+      !> Whether a part remembers tangential forces
       logical :: needs_tangential = .false.
       !> Whether a part remembers the area of the last step
       logical :: needs_area = .false.
+      !> Whether the law asks for the effective area of overlaps
+      logical :: needs_effective_area = .false.
+      !> Whether a part adds torques of its own
+      logical :: needs_twist = .false.
       !> Names of the parts, for `check` and the log
       character(len=:), allocatable :: description
    end type force_law_t
@@ -53,17 +64,35 @@ contains
       if (settings%law == 'conservative') then
          call new_conservative_law(settings%stiffness, bodies, conservative)
          call append(law, conservative)
+         law%needs_effective_area = .true.
       else
          call append(law, area_law_t(stiffness=settings%stiffness))
       end if
       call append_damping(settings, law)
-      if (settings%friction == 'cundall_strack') then
+      if (settings%damping_from_touch) then
+         call append(law, damping_onset_t())
+         law%description = law%description//' from first touch'
+         law%needs_area = .true.
+      end if
+      if (settings%tilt_damping > 0.0_wp) then
+         call append(law, tilt_damping_t(stiffness=settings%stiffness, share=settings%tilt_damping))
+         law%description = law%description//', damping of tilts'
+         law%needs_twist = .true.
+      end if
+      select case (settings%friction)
+      case ('cundall_strack')
          call append(law, cundall_strack_t(coefficient=settings%friction_coefficient, &
                                            stiffness=settings%tangential_stiffness*settings%stiffness, &
-                                           damping=settings%tangential_damping))
+                                           damping=settings%tangential_damping, &
+                                           midstep=settings%midstep_slip))
          law%description = law%description//', Cundall-Strack friction'
          law%needs_tangential = .true.
-      end if
+      case ('exact')
+         law%constraint = exact_friction_t(coefficient=settings%friction_coefficient, &
+                                           tolerance=settings%friction_tolerance)
+         law%description = law%description//', exact friction'
+         law%needs_tangential = .true.
+      end select
    end subroutine new_force_law
 
    subroutine append_damping(settings, law)
@@ -100,7 +129,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0 at the start of a run
       real(wp), intent(in) :: dt
-      !> Contacts; `elastic`, `normal_force` and `tangential_force` are set
+      !> Contacts; `elastic`, `normal_force`, `tangential_force` and `twist` are set
       type(contacts_t), intent(inout) :: contacts
       !> What is remembered of the pairs
       type(contact_memory_t), intent(inout) :: memory
@@ -109,6 +138,7 @@ contains
       contacts%elastic(1:contacts%n) = 0.0_wp
       contacts%normal_force(1:contacts%n) = 0.0_wp
       contacts%tangential_force(1:contacts%n) = 0.0_wp
+      if (contacts%has_twist) contacts%twist(1:contacts%n) = 0.0_wp
       do k = 1, size(law%parts)
          call law%parts(k)%part%add(bodies, dt, contacts, memory)
       end do

@@ -1,10 +1,13 @@
 !> The books of a run: where energy and momentum come from and go to.
 !>
-!> Work is the sum over steps of power times step (trapezoids between force evaluations): of the elastic
-!> normal forces, of damping and of friction (all contacts; usually negative), and of moving walls. With the
-!> potential of gravity, kinetic + potential - work stays constant up to the error of integration. The area law has
-!> no potential energy, so its elastic work does not return to zero when contacts open. That of the conservative law is
-!> no sum over steps but the energy that the contacts had at the start, less what they have now.
+!> Work is the sum over steps of power times step (trapezoids between the ends of steps): of the elastic
+!> normal forces, of damping and of friction (all contacts; usually negative), and of moving walls. Powers are those of
+!> the final velocities of a step: with the predicted ones each jump of a force would leave a residual, whereas force
+!> times final velocity is what velocity Verlet exactly adds to the kinetic energy from the middle of a step to
+!> that of the next. With the potential of gravity, kinetic + potential - work stays constant up to the error of
+!> integration. The area law has no potential energy, so its elastic work does not return to zero when contacts open.
+!> That of the conservative law is no sum over steps but the energy that the contacts had at the start, less what they
+!> have now.
 !>
 !> Impulses of gravity and of the fixed bodies are summed likewise. For velocity Verlet these sums equal the
 !> change of momentum and angular momentum exactly, so that their residuals are rounding errors, if
@@ -28,7 +31,7 @@ module polydem_ledger
    type :: ledger_t
       !> Work of the elastic normal forces on both bodies [J/m]
       real(wp) :: elastic_work = 0.0_wp
-      !> Work of the normal damping [J/m]
+      !> Work of the normal damping and of that of tilts [J/m]
       real(wp) :: damping_work = 0.0_wp
       !> Work of the tangential forces [J/m]
       real(wp) :: friction_work = 0.0_wp
@@ -45,7 +48,7 @@ module polydem_ledger
       !> Elastic energy of the contacts at the start, if they have one [J/m]
       real(wp), private :: elastic_start = 0.0_wp
       !> Greatest kinetic energy so far, the scale of the residual [J/m]
-      real(wp), private :: energy_scale = 0.0_wp
+      real(wp) :: energy_scale = 0.0_wp
       !> Sums of absolute impulses so far, the scales of the residuals
       real(wp), private :: impulse_scale = 0.0_wp, angular_scale = 0.0_wp
    end type ledger_t
@@ -99,7 +102,7 @@ contains
       ledger%elastic_start = ledger%rate(n_rates)
    end subroutine open_ledger
 
-   !> Book one step; call it after the forces of the step are known.
+   !> Book one step; call it when the step is done.
    subroutine book_step(ledger, dt, gravity, bodies, contacts)
       !> Books
       type(ledger_t), intent(inout) :: ledger
@@ -107,7 +110,7 @@ contains
       real(wp), intent(in) :: dt
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
-      !> Bodies with the forces of this step
+      !> Bodies at the end of this step, with its forces
       type(bodies_t), intent(in) :: bodies
       !> Contacts with the forces of this step
       type(contacts_t), intent(in) :: contacts
@@ -243,6 +246,10 @@ contains
                                  - bodies%angular_velocity(contacts%second(c)))
          power(1) = power(1) + contacts%elastic(c)*approach
          power(2) = power(2) + (contacts%normal_force(c) - contacts%elastic(c))*approach
+         if (contacts%has_twist) then
+            power(2) = power(2) + contacts%twist(c)*(bodies%angular_velocity(contacts%first(c)) &
+                                                     - bodies%angular_velocity(contacts%second(c)))
+         end if
          power(3) = power(3) + contacts%tangential_force(c) &
             *(contacts%direction(1, c)*vy - contacts%direction(2, c)*vx)
          power(4) = power(4) + 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)

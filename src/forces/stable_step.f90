@@ -7,8 +7,11 @@
 !> product of frequency and step it stands, as a function of the damping ratio.
 !>
 !> K_n = E L/l, where l is that of the area law or l b/L (see `conservative_law`). The force of the latter steepens as
-!> L grows with the depth: the root of the overlap area of convex bodies is a concave function of their
-!> displacement (Brunn and Minkowski), so A'' <= A'^2/(2 A), and the stiffness is at most 3/2 of that value.
+!> L grows with the depth. The root of the effective area G is a concave function of the displacement of convex bodies:
+!> it is the least, over all linear maps of determinant 1, of a multiple of the fourth root of the polar moment of
+!> inertia, which is concave (H. Hadwiger, Comment. Math. Helv. 30 (1956) 285). So G'' <= G'^2/(2 G), and the stiffness
+!> is at most 3/2 of that value. That law also resists tilts, like a face: K = K_n L^2/12. (No bound for rotations, but
+!> of 2600 random contacts of all kinds none had a frequency more than 8 % above.)
 module polydem_stable_step
    use polydem_assemble, only: incidence_t
    use polydem_bodies, only: bodies_t
@@ -16,6 +19,7 @@ module polydem_stable_step
    use polydem_kinds, only: ip, wp
    use polydem_restitution_damping, only: damping_ratio_of
    use polydem_settings, only: forces_settings_t
+   use polydem_tilt_damping, only: tilt_stiffness
    implicit none
    private
    public :: stability_table_t, stable_step_of_contacts, stable_step_of_shapes
@@ -80,7 +84,7 @@ contains
       real(wp), intent(out) :: step
       !> Slot of the body that sets it, 0 if there is none
       integer(ip), intent(out) :: critical
-      real(wp) :: damping_ratio, ratio, square, g_nn, g_tt, k_n, c_n, this
+      real(wp) :: damping_ratio, ratio, square, g_nn, g_tt, g_rr, k_n, c_n, tilt(2), this
       integer(ip) :: k, s
 
       step = huge(step)
@@ -93,7 +97,10 @@ contains
          g_tt = assumed_contacts*(bodies%inverse_mass(s) + square*bodies%inverse_inertia(s))
          k_n = settings%stiffness*ratio
          c_n = dashpot(settings, damping_ratio, ratio, 0.5_wp*bodies%mass(s))
-         this = step_of_element(settings, table, k_n, c_n, [g_nn, g_tt, 0.0_wp], 1.0_wp/(g_tt/assumed_contacts))
+         ! No edge is longer than two greatest radii; one of the two bodies against which it tilts may be fixed.
+         g_rr = assumed_contacts*bodies%inverse_inertia(s)
+         tilt = [0.0_wp, settings%tilt_damping*sqrt(k_n*square/3.0_wp*bodies%inertia(s))*g_rr]
+         this = step_of_element(settings, table, k_n, c_n, [g_nn, g_tt, 0.0_wp], 1.0_wp/(g_tt/assumed_contacts), tilt)
          if (this < step) then
             step = this
             critical = s
@@ -110,7 +117,7 @@ contains
       type(incidence_t), intent(in) :: incidence
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: c
-      real(wp) :: g(3), alone(3), mobility, ratio, k_n, c_n
+      real(wp) :: g(4), alone(4), mobility, ratio, k_n, c_n, tilt(2)
 
       g = 0.0_wp
       alone = 0.0_wp
@@ -119,7 +126,12 @@ contains
       mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
       ratio = contacts%length(c)*contacts%inverse_length(c)
       k_n = settings%stiffness*ratio
-      if (settings%law == 'conservative') k_n = steepening*k_n
+      tilt = 0.0_wp
+      tilt(2) = settings%tilt_damping*sqrt(tilt_stiffness(settings%stiffness, contacts, c)/alone(4))*g(4)
+      if (settings%law == 'conservative') then
+         k_n = steepening*k_n
+         tilt(1) = steepening*tilt_stiffness(settings%stiffness, contacts, c)*g(4)
+      end if
       c_n = dashpot(settings, damping_ratio, ratio, 1.0_wp/mobility)
       if (settings%damping == 'hunt_crossley') then
          ! Both the stiffness and the dashpot follow the force of the moment.
@@ -127,15 +139,15 @@ contains
          c_n = settings%damping_coefficient*sqrt(1.0_wp/(mobility*settings%stiffness))*contacts%elastic(c)*ratio &
             /max(contacts%length(c), sqrt(contacts%area(c)))
       end if
-      step_of_contact = step_of_element(settings, table, k_n, c_n, g, 1.0_wp/alone(2))
+      step_of_contact = step_of_element(settings, table, k_n, c_n, g(1:3), 1.0_wp/alone(2), tilt)
 
    contains
 
-      !> Add the normal, tangential and mixed mobility of one body.
+      !> Add the normal, tangential, mixed and rotational mobility of one body.
       subroutine add_body(s, arm)
          integer(ip), intent(in) :: s
          real(wp), intent(in) :: arm(2)
-         real(wp) :: along, across, mine(3)
+         real(wp) :: along, across, mine(4)
 
          if (bodies%fixed(s)) return
          across = arm(1)*contacts%direction(2, c) - arm(2)*contacts%direction(1, c) + contacts%lever(c)
@@ -143,6 +155,7 @@ contains
          mine(1) = bodies%inverse_mass(s) + across*across*bodies%inverse_inertia(s)
          mine(2) = bodies%inverse_mass(s) + along*along*bodies%inverse_inertia(s)
          mine(3) = along*across*bodies%inverse_inertia(s)
+         mine(4) = bodies%inverse_inertia(s)
          alone = alone + mine
          g = g + mine*real(contacts_of(incidence, s), wp)
       end subroutine add_body
@@ -158,7 +171,7 @@ contains
    end function contacts_of
 
    !> Stable step of one element [s].
-   pure real(wp) function step_of_element(settings, table, k_n, c_n, g, mass_tangential)
+   pure real(wp) function step_of_element(settings, table, k_n, c_n, g, mass_tangential, tilt)
       type(forces_settings_t), intent(in) :: settings
       type(stability_table_t), intent(in) :: table
       !> Normal stiffness [N/m2] and dashpot [N s/m2]
@@ -167,18 +180,21 @@ contains
       real(wp), intent(in) :: g(3)
       !> Effective mass of the tangential damping [kg/m]
       real(wp), intent(in) :: mass_tangential
+      !> Stiffness [1/s2] and dashpot [1/s] against tilts, times the rotational mobility
+      real(wp), intent(in) :: tilt(2)
       real(wp) :: k_t, c_t, a, b, frequency, damping
 
       k_t = 0.0_wp
       c_t = 0.0_wp
-      if (settings%friction /= 'none') then
+      if (settings%friction == 'cundall_strack') then
          k_t = settings%tangential_stiffness*settings%stiffness
          c_t = settings%tangential_damping*sqrt(mass_tangential*k_t)
       end if
       a = k_n*g(1)
       b = k_t*g(2)
       frequency = sqrt(0.5_wp*(a + b) + sqrt(0.25_wp*(a - b)**2 + k_n*k_t*g(3)**2))
-      damping = 0.5_wp*max(c_n*g(1), c_t*g(2))/frequency
+      if (tilt(1) > 0.0_wp) frequency = sqrt(frequency**2 + tilt(1))
+      damping = 0.5_wp*max(c_n*g(1), c_t*g(2), tilt(2))/frequency
       step_of_element = limit_at(table, damping)/frequency
    end function step_of_element
 

@@ -12,6 +12,7 @@
 !>
 !> The remembered edge saves time and changes no result: whatever it decides, the full search decides too.
 module polydem_convex_overlap
+   use polydem_effective_area, only: weigh_by_shape
    use polydem_exact_cross, only: exact_cross
    use polydem_kinds, only: ip, wp
    use polydem_overlap_integrals, only: integrate_loop, overlap_t
@@ -34,7 +35,7 @@ contains
    !>
    !> Costs of the order of the product of the numbers of vertices at worst, and of the vertices of one body
    !> if the remembered edge still separates them.
-   pure subroutine overlap_polygons(a, b, offset, separating_edge, overlap)
+   pure subroutine overlap_polygons(a, b, offset, separating_edge, overlap, effective)
       !> Vertices of the first polygon, anticlockwise, relative to its centre, which is inside, (2, n) [m]
       real(wp), intent(in), contiguous :: a(:, :)
       !> Vertices of the second polygon, anticlockwise, relative to its own centre, (2, m) [m]
@@ -45,8 +46,14 @@ contains
       integer(ip), intent(in) :: separating_edge
       !> The overlap
       type(overlap_t), intent(out) :: overlap
+      !> Whether area, normal and moments are those of the effective area (see `effective_area`; no)
+      logical, intent(in), optional :: effective
       real(wp) :: reach_a, reach_b, scale
       integer(ip) :: edge
+      logical :: by_shape
+
+      by_shape = .false.
+      if (present(effective)) by_shape = effective
 
       reach_a = reach(a)
       reach_b = reach(b)
@@ -59,12 +66,12 @@ contains
       end if
 
       if (reach_a <= reach_b) then
-         call clip(a, b, offset, scale, overlap)
+         call clip(a, b, offset, scale, by_shape, overlap)
          overlap%normal = -overlap%normal
          overlap%moment_a = -overlap%moment_a
          overlap%moment_b = -overlap%moment_b
       else
-         call clip(b, a, -offset, scale, overlap)
+         call clip(b, a, -offset, scale, by_shape, overlap)
          call swap(overlap%moment_a, overlap%moment_b)
          overlap%centroid = overlap%centroid + offset
       end if
@@ -155,13 +162,15 @@ contains
    !>
    !> The normal and the moments are those of the clipper's outline inside the subject; `moment_a` is about
    !> the subject's centre, `moment_b` about the clipper's.
-   pure subroutine clip(subject, clipper, offset, scale, overlap)
+   pure subroutine clip(subject, clipper, offset, scale, by_shape, overlap)
       real(wp), intent(in), contiguous :: subject(:, :)
       real(wp), intent(in), contiguous :: clipper(:, :)
       !> Centre of the clipper minus centre of the subject
       real(wp), intent(in) :: offset(2)
       !> Size of the subject
       real(wp), intent(in) :: scale
+      !> Whether the effective area is wanted
+      logical, intent(in) :: by_shape
       type(overlap_t), intent(inout) :: overlap
       real(wp) :: vertex(usual_corners, 2, 2), depth(usual_corners), level(usual_corners)
       logical :: on_clipper(usual_corners, 2)
@@ -170,34 +179,36 @@ contains
       ! Each edge of the clipper adds one vertex at most.
       corners = size(subject, 2, kind=ip) + size(clipper, 2, kind=ip)
       if (corners <= usual_corners) then
-         call clip_in(subject, clipper, offset, scale, usual_corners, vertex, on_clipper, depth, level, &
-                      overlap)
+         call clip_in(subject, clipper, offset, scale, by_shape, usual_corners, vertex, on_clipper, depth, &
+                      level, overlap)
       else
-         call clip_many(subject, clipper, offset, scale, corners, overlap)
+         call clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
       end if
    end subroutine clip
 
    !> The same with work arrays made to measure
-   pure subroutine clip_many(subject, clipper, offset, scale, corners, overlap)
+   pure subroutine clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
       real(wp), intent(in), contiguous :: subject(:, :)
       real(wp), intent(in), contiguous :: clipper(:, :)
       real(wp), intent(in) :: offset(2)
       real(wp), intent(in) :: scale
+      logical, intent(in) :: by_shape
       integer(ip), intent(in) :: corners
       type(overlap_t), intent(inout) :: overlap
       real(wp) :: vertex(corners, 2, 2), depth(corners), level(corners)
       logical :: on_clipper(corners, 2)
 
-      call clip_in(subject, clipper, offset, scale, corners, vertex, on_clipper, depth, level, overlap)
+      call clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, depth, level, overlap)
    end subroutine clip_many
 
    !> The same in given work arrays, whose last index tells the loop before a cut from the loop after it
-   pure subroutine clip_in(subject, clipper, offset, scale, corners, vertex, on_clipper, depth, level, &
-                           overlap)
+   pure subroutine clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, depth, &
+                           level, overlap)
       real(wp), intent(in), contiguous :: subject(:, :)
       real(wp), intent(in), contiguous :: clipper(:, :)
       real(wp), intent(in) :: offset(2)
       real(wp), intent(in) :: scale
+      logical, intent(in) :: by_shape
       !> Room for vertices
       integer(ip), intent(in) :: corners
       !> Vertices (corner, x or y, loop)
@@ -237,6 +248,8 @@ contains
          k = merge(1_ip, k + 1_ip, k == m)
       end do
       call integrate_loop(n, corners, vertex(:, :, now), on_clipper(:, now), offset, overlap)
+      if (.not. (by_shape .and. overlap%area > 0.0_wp)) return
+      call weigh_by_shape(n, corners, vertex(:, :, now), on_clipper(:, now), offset, vertex(:, :, 3_ip - now), overlap)
    end subroutine clip_in
 
    !> Depth of the subject's centre below all edges of the clipper

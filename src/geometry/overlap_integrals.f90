@@ -17,11 +17,11 @@ module polydem_overlap_integrals
 
    !> Where two polygons overlap, and how
    type :: overlap_t
-      !> Area, 0 if they are apart or touch [m2]
+      !> Area, 0 if they are apart or touch; or the effective area where asked for [m2]
       real(wp) :: area = 0.0_wp
       !> Centroid relative to the centre of a [m]
       real(wp) :: centroid(2) = 0.0_wp
-      !> Integral of the outward normal of a over its outline inside b [m]
+      !> Integral of the outward normal of a over its outline inside b, the gradient of the area [m]
       real(wp) :: normal(2) = 0.0_wp
       !> Moment of that integral about the centre of a [m2]
       real(wp) :: moment_a = 0.0_wp

@@ -2,8 +2,9 @@
 !>
 !> C.W. Gear, Numerical Initial Value Problems in Ordinary Differential Equations (1971); Matuttis & Chen 2014: scaled
 !> derivatives r_k = x^(k) dt^k/k!, predicted by the Pascal triangle and corrected by c_k times the difference of r_2,
-!> c = 3/16, 251/360, 1, 11/18, 1/6, 1/60 (forces that depend on velocities). One evaluation per step, at the
-!> predicted state. The scheme starts from gravity alone, with zero higher derivatives.
+!> c = 3/16, 251/360, 1, 11/18, 1/6, 1/60 (forces that depend on velocities; 3/20 instead of 3/16 is meant for
+!> those that do not). One evaluation per step, at the predicted state. The scheme starts from gravity alone, with
+!> zero higher derivatives.
 module polydem_gear
    use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t
@@ -12,10 +13,17 @@ module polydem_gear
    use polydem_stable_step, only: stability_table_t
    implicit none
    private
-   public :: gear_t
+   public :: gear_t, for_velocities, for_positions
+
+   !> First corrector for forces that depend on velocities
+   real(wp), parameter :: for_velocities = 3.0_wp/16.0_wp
+   !> First corrector for forces that depend on positions alone
+   real(wp), parameter :: for_positions = 3.0_wp/20.0_wp
 
    !> Gear's scheme of fifth order
    type, extends(integrator_t) :: gear_t
+      !> First corrector, of the position
+      real(wp) :: c0 = for_velocities
       !> Scaled third to fifth derivatives of x, y and angle, (3..5, 3, slot)
       real(wp), allocatable, private :: higher(:, :, :)
    contains
@@ -26,7 +34,6 @@ module polydem_gear
       procedure :: keep
    end type gear_t
 
-   real(wp), parameter :: c0 = 3.0_wp/16.0_wp
    real(wp), parameter :: c1 = 251.0_wp/360.0_wp
    real(wp), parameter :: c_higher(3:5) = [11.0_wp/18.0_wp, 1.0_wp/6.0_wp, 1.0_wp/60.0_wp]
 
@@ -77,12 +84,12 @@ contains
       !$omp    shared(self, bodies, dt) private(k, s)
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
-         call adjust(dt, bodies%force(1, s)*bodies%inverse_mass(s), bodies%position(1, s), bodies%velocity(1, s), &
-                     bodies%acceleration(1, s), self%higher(:, 1, s))
-         call adjust(dt, bodies%force(2, s)*bodies%inverse_mass(s), bodies%position(2, s), bodies%velocity(2, s), &
-                     bodies%acceleration(2, s), self%higher(:, 2, s))
-         call adjust(dt, bodies%torque(s)*bodies%inverse_inertia(s), bodies%angle(s), bodies%angular_velocity(s), &
-                     bodies%angular_acceleration(s), self%higher(:, 3, s))
+         call adjust(self%c0, dt, bodies%force(1, s)*bodies%inverse_mass(s), bodies%position(1, s), &
+                     bodies%velocity(1, s), bodies%acceleration(1, s), self%higher(:, 1, s))
+         call adjust(self%c0, dt, bodies%force(2, s)*bodies%inverse_mass(s), bodies%position(2, s), &
+                     bodies%velocity(2, s), bodies%acceleration(2, s), self%higher(:, 2, s))
+         call adjust(self%c0, dt, bodies%torque(s)*bodies%inverse_inertia(s), bodies%angle(s), &
+                     bodies%angular_velocity(s), bodies%angular_acceleration(s), self%higher(:, 3, s))
       end do
       !$omp end parallel do
    end subroutine correct
@@ -113,8 +120,8 @@ contains
       a = 2.0_wp*r2/(dt*dt)
    end subroutine expand
 
-   pure subroutine adjust(dt, computed, x, v, a, r)
-      real(wp), intent(in) :: dt, computed
+   pure subroutine adjust(c0, dt, computed, x, v, a, r)
+      real(wp), intent(in) :: c0, dt, computed
       real(wp), intent(inout) :: x, v, a, r(3:5)
       real(wp) :: difference
 
@@ -126,15 +133,20 @@ contains
    end subroutine adjust
 
    !> Limits for x'' + 2 z w x' + w^2 x = 0 with one evaluation per step: where the spectral radius leaves 1.
+   !>
+   !> With 3/20 an undamped oscillation grows at any step: by 1e-6 per step at the limit given here, by 1e-9 at 0.1.
    function stability(self) result(table)
       class(gear_t), intent(in) :: self
       type(stability_table_t) :: table
 
-      associate (unused => self)
-      end associate
       table%damping_ratio = [0.0_wp, 0.0125_wp, 0.05_wp, 0.1_wp, 0.2_wp, 0.35_wp, 0.5_wp, 0.75_wp, 1.0_wp, 2.0_wp]
-      table%limit = [0.313_wp, 0.7516_wp, 0.6271_wp, 0.4986_wp, 0.3361_wp, 0.2163_wp, 0.157_wp, 0.107_wp, 0.0809_wp, &
-                     0.0408_wp]
+      if (self%c0 < for_velocities) then
+         table%limit = [0.248_wp, 0.7879_wp, 0.6515_wp, 0.5127_wp, 0.3411_wp, 0.2177_wp, 0.1575_wp, 0.1071_wp, &
+                        0.0809_wp, 0.0408_wp]
+      else
+         table%limit = [0.313_wp, 0.7516_wp, 0.6271_wp, 0.4986_wp, 0.3361_wp, 0.2163_wp, 0.157_wp, 0.107_wp, &
+                        0.0809_wp, 0.0408_wp]
+      end if
    end function stability
 
 end module polydem_gear

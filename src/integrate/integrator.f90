@@ -2,7 +2,8 @@
 !>
 !> A step is predict, forces, correct: `predict` brings positions, angles and velocities of the free bodies to the end
 !> of the step as far as the past allows; forces are computed there once; `correct` makes the final
-!> state of them. Turned vertices and fixed bodies are not its business.
+!> state of them. While forces are computed, velocity - dt/2 acceleration is the velocity in the middle of the step, to
+!> second order. Turned vertices and fixed bodies are not its business.
 module polydem_integrator
    use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t

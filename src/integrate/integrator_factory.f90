@@ -1,6 +1,7 @@
 !> Integrators by name. The only file that knows all of them.
 module polydem_integrator_factory
-   use polydem_gear, only: gear_t
+   use polydem_compensated_verlet, only: compensated_verlet_t
+   use polydem_gear, only: for_positions, gear_t
    use polydem_integrator, only: integrator_t
    use polydem_settings, only: integrate_settings_t
    use polydem_velocity_verlet, only: velocity_verlet_t
@@ -21,8 +22,14 @@ contains
       case ('gear')
          allocate (gear_t :: integrator)
          integrator%starts_from_forces = .false.
+      case ('gear_3_20')
+         allocate (integrator, source=gear_t(starts_from_forces=.false., c0=for_positions))
       case default
-         allocate (velocity_verlet_t :: integrator)
+         if (settings%accumulation == 'compensated') then
+            allocate (compensated_verlet_t :: integrator)
+         else
+            allocate (velocity_verlet_t :: integrator)
+         end if
       end select
    end subroutine new_integrator
 

@@ -14,7 +14,7 @@ module polydem_velocity_verlet
    !> Velocity Verlet
    type, extends(integrator_t) :: velocity_verlet_t
       !> Velocity and angular velocity half a step back, (3, slot) [m/s, m/s, rad/s]
-      real(wp), allocatable, private :: half(:, :)
+      real(wp), allocatable :: half(:, :)
    contains
       procedure :: start
       procedure :: predict

@@ -1,12 +1,12 @@
 !> The machine a run is on (Linux): its name and parts, how busy it is, the time, and whether a person watches.
 module polydem_machine
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_long, c_null_char, c_null_ptr, c_ptr, c_size_t
-   use polydem_kinds, only: dp, ip
+   use polydem_kinds, only: dp, ip, lp
    implicit none
    private
    public :: host_name, processor_name, processor_clock, cache_sizes, memory_size, frequency_governor
    public :: kernel_release, cores_online
-   public :: load_average, environment, utc_now, terminal_watches
+   public :: load_average, environment, utc_now, terminal_watches, resident_memory
 
    interface
       !> POSIX gethostname(2)
@@ -229,5 +229,21 @@ contains
    logical function terminal_watches()
       terminal_watches = isatty(standard_output) == 1_c_int
    end function terminal_watches
+
+   !> Memory resident in this process as Linux counts it [KiB], 0 where it does not
+   integer(lp) function resident_memory()
+      character(len=128) :: line
+      integer :: unit, status
+
+      resident_memory = 0_lp
+      open (newunit=unit, file='/proc/self/status', action='read', status='old', iostat=status)
+      do while (status == 0)
+         read (unit, '(a)', iostat=status) line
+         if (status /= 0 .or. line(1:6) /= 'VmRSS:') cycle
+         read (line(7:), *, iostat=status) resident_memory
+         exit
+      end do
+      close (unit, iostat=status)
+   end function resident_memory
 
 end module polydem_machine

@@ -18,7 +18,7 @@ module polydem_profile
 contains
 
    !> Write profile.h5 into the folder of a result.
-   subroutine write_profile(folder, timers, seconds, counters, provenance, state_hash, status, error)
+   subroutine write_profile(folder, timers, seconds, counters, provenance, state_hash, status, error, memory)
       !> Folder of the result
       character(len=*), intent(in) :: folder
       !> Seconds per stage
@@ -35,12 +35,15 @@ contains
       character(len=*), intent(in) :: status
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
+      !> Memory resident after the last step [KiB]; not written if absent
+      integer(lp), intent(in), optional :: memory
       type(hdf5_file_t) :: file
       character(len=:), allocatable :: path
 
       path = profile_path(folder)
       call begin_file(file, path, error)
       call fill_profile(file, timers, seconds, counters, state_hash, status, error)
+      if (present(memory)) call file%write('/profile/memory', memory, error, 'KiB', 'resident after the last step')
       if (.not. allocated(error)) call write_provenance(provenance, file, error)
       call complete_file(file, path, error)
    end subroutine write_profile

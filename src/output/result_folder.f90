@@ -5,6 +5,7 @@
 !>     profile.h5                 times, counters, provenance; its presence says that the run ended
 !>     trace.h5                   recorded boxes, if asked for
 !>     steps.h5                   times and counts of every step, if asked for
+!>     overlaps.csv               contacts that were deep at the start, if there were any
 !>     log.txt                    what the run printed
 !>     checkpoint_1.h5, _2.h5     the last two checkpoints, in turns
 module polydem_result_folder
@@ -15,8 +16,9 @@ module polydem_result_folder
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: segment_path, profile_path, log_path, trace_path, steps_path, checkpoint_path, default_folder
-   public :: holds_result, clear_result, clear_unfinished, open_suffix, unfinished, last_number, n_checkpoints
+   public :: segment_path, profile_path, log_path, trace_path, steps_path, overlaps_path, checkpoint_path
+   public :: default_folder, holds_result, clear_result, clear_unfinished, open_suffix, unfinished, last_number
+   public :: n_checkpoints
 
    !> End of the name of any other file that is not complete
    character(len=*), parameter :: unfinished = '.unfinished'
@@ -76,6 +78,15 @@ contains
       path = folder//'/steps.h5'
    end function steps_path
 
+   !> Path of the table of deep contacts at the start
+   pure function overlaps_path(folder) result(path)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      character(len=:), allocatable :: path
+
+      path = folder//'/overlaps.csv'
+   end function overlaps_path
+
    !> Path of a checkpoint
    pure function checkpoint_path(folder, number) result(path)
       !> Folder of the result
@@ -116,6 +127,7 @@ contains
          call remove_if_there(checkpoint_path(folder, number), error)
       end do
       call remove_if_there(log_path(folder), error)
+      call remove_if_there(overlaps_path(folder), error)
       call remove_if_there(trace_path(folder), error)
       call remove_if_there(steps_path(folder), error)
       call clear_unfinished(folder, error)

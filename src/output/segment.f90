@@ -145,10 +145,11 @@ contains
          call file%append_rows('/contacts/second', second, error, '1', &
                                'identifier of the second body')
          call file%append_rows('/contacts/area', real(contacts%area(:n), dp), error, 'm2', &
-                               'area of the overlap')
+                               'area of the overlap; with the conservative law its effective area')
          call file%append_rows('/contacts/point', point, error, 'm', 'centroid of the overlap in the world')
          call file%append_rows('/contacts/normal', real(contacts%normal(:, :n), dp), error, 'm', &
-                               'integral of the outward normal over the outline of first inside second')
+                               'integral of the outward normal over the outline of first inside second, '// &
+                               'the gradient of that area')
          call file%append_rows('/contacts/force', real(contacts%force(:, :n), dp), error, 'N/m', &
                                'force on the first body; the second feels the opposite')
       end associate

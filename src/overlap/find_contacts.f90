@@ -51,7 +51,7 @@ contains
       !> Memory of the pairs: `touching` and `separating_edge` are brought up to date, `tangential` and `area`
       !> are cleared where the polygons are apart; any column may be missing
       type(contact_memory_t), intent(inout) :: memory
-      !> Contacts; the columns that forces fill are left alone
+      !> Contacts, with `area_is_effective` set; the columns that forces fill are left alone
       type(contacts_t), intent(inout) :: contacts
       type(run_t) :: runs(0:most_threads - 1_ip)
       integer(ip) :: threads, me
@@ -102,7 +102,8 @@ contains
             offset = bodies%position(:, j) - bodies%position(:, i)
             if (allocated(memory%separating_edge)) edge = memory%separating_edge(p)
             call overlap_polygons(turned(:, start(i):start(i + 1_ip) - 1_ip), &
-                                  turned(:, start(j):start(j + 1_ip) - 1_ip), offset, edge, overlap)
+                                  turned(:, start(j):start(j + 1_ip) - 1_ip), offset, edge, overlap, &
+                                  contacts%area_is_effective)
             call remember(p, overlap, memory)
             if (overlap%area > 0.0_wp) then
                n = n + 1_ip

@@ -18,7 +18,7 @@ module polydem_bodies_file
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_file, only: hdf5_file_t
-   use polydem_hdf5_names, only: is_dataset, list_names
+   use polydem_hdf5_names, only: count_names, is_dataset, read_name
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_sort, only: sort_keys
    use polydem_strings, only: to_text
@@ -97,18 +97,18 @@ contains
       type(hdf5_file_t), intent(in) :: file
       character(len=*), intent(in) :: path
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: names(:)
-      integer :: k
+      character(len=:), allocatable :: name
+      integer :: k, n
 
-      call list_names(file%place_of('/'), names, error)
-      if (allocated(error)) return
-      do k = 1, size(names)
-         if (any(known_names == names(k)) .eqv. is_dataset(file%place_of(trim(names(k))))) cycle
-         if (any(known_names == names(k))) then
-            call raise(error, input_error, path//': '//trim(names(k))//' must be a data set, but is a group or a link')
+      call count_names(file%place_of('/'), n, error)
+      do k = 1, n
+         call read_name(file%place_of('/'), k, name, error)
+         if (allocated(error)) return
+         if (any(known_names == name) .eqv. is_dataset(file%place_of(name))) cycle
+         if (any(known_names == name)) then
+            call raise(error, input_error, path//': '//name//' must be a data set, but is a group or a link')
          else
-            call raise(error, input_error, path//': unknown data set '//quoted(trim(names(k)))// &
-                       suggestion(trim(names(k)), known_names))
+            call raise(error, input_error, path//': unknown data set '//quoted(name)//suggestion(name, known_names))
          end if
          return
       end do
@@ -182,6 +182,7 @@ contains
                     //to_text(n_vertices)//' rows')
       end if
       do k = 1_ip, table%n
+         if (allocated(error)) return
          if (table%vertex_start(k + 1_ip) <= table%vertex_start(k)) then
             call raise(error, input_error, path//': '//entry_text('vertex_start', k + 1_ip)// &
                        ' must be greater than the entry before it')
@@ -202,6 +203,7 @@ contains
       if (allocated(error)) return
       call check_length(path, 'fixed', size(table%fixed, kind=ip), table%n, error)
       do k = 1_ip, size(table%fixed, kind=ip)
+         if (allocated(error)) return
          if (any(table%fixed(k) == [0_ip, 1_ip])) cycle
          call raise(error, input_error, path//': '//entry_text('fixed', k)//' is ' &
                     //to_text(table%fixed(k))//', but must be 0 or 1')
@@ -235,6 +237,7 @@ contains
       allocate (spare_key(table%n), spare(table%n))
       call sort_keys(table%n, key, row, spare_key, spare)
       do k = 1_ip, table%n
+         if (allocated(error)) return
          if (key(k) < 0_lp) then
             call raise(error, input_error, path//': '//entry_text('id', row(k))//' is negative')
          else if (key(k) == key(max(k - 1_ip, 1_ip)) .and. k > 1_ip) then
@@ -264,6 +267,7 @@ contains
       end if
       call check_length(path, 'velocity', size(table%velocity, 2, kind=ip), table%n, error)
       do k = 1_ip, size(table%velocity, 2, kind=ip)
+         if (allocated(error)) return
          if (all(ieee_is_finite(table%velocity(:, k)))) cycle
          call raise(error, input_error, path//': '//entry_text('velocity', k)//' is not finite')
       end do
@@ -288,6 +292,7 @@ contains
       if (allocated(error)) return
       call check_length(path, name, size(values, kind=ip), table%n, error)
       do k = 1_ip, size(values, kind=ip)
+         if (allocated(error)) return
          if (.not. ieee_is_finite(values(k))) then
             call raise(error, input_error, path//': '//entry_text(name, k)//' is not finite')
          else if (values(k) < least) then

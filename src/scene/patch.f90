@@ -97,6 +97,10 @@ contains
       if (.not. allocated(error)) call file%read('/frames/position', position, error)
       if (.not. allocated(error)) call file%read('/frames/angle', angle, error)
       if (allocated(error)) return
+      if (.not. fit(fixed, start, shape, position, angle)) then
+         call raise(error, input_error, 'the parts of its segment of a trajectory do not fit together')
+         return
+      end if
       last = size(angle, 2, kind=ip)
       do k = 1_ip, size(fixed, kind=ip)
          c = cos(real(angle(k, last), wp))
@@ -109,6 +113,18 @@ contains
          call list%append(corners, fixed=fixed(k) == 1_ip)
       end do
    end subroutine list_last_frame
+
+   !> Whether the parts of a segment belong to the same bodies and frames, at least one frame
+   pure logical function fit(fixed, start, shape, position, angle)
+      integer(ip), intent(in) :: fixed(:), start(:)
+      real(dp), intent(in) :: shape(:, :), position(:, :, :), angle(:, :)
+      integer :: n
+
+      n = size(fixed)
+      fit = size(start) == n + 1 .and. size(shape, 1) == 2 .and. size(angle, 1) == n .and. size(angle, 2) > 0 .and. &
+            size(position, 1) == 2 .and. size(position, 2) == n .and. size(position, 3) == size(angle, 2)
+      if (fit) fit = start(1) == 0_ip .and. start(n + 1) == size(shape, 2) .and. all(start(2:) >= start(:n))
+   end function fit
 
    !> Cut a patch from the free bodies of a packing.
    subroutine cut_patch(bodies, patch, error)

@@ -4,7 +4,7 @@
 !> has the lower identifier. All vectors point in world directions.
 !>
 !> Memory rides on the pair list: entry `p` belongs to pair `p`, follows it when the list changes, and is
-!> cleared when the polygons part. A column that no model of the scene needs is never allocated.
+!> cleared when the polygons part. A column of memory, or `twist`, that no model of the scene needs is never allocated.
 module polydem_contacts
    use polydem_kinds, only: ip, wp
    implicit none
@@ -17,19 +17,25 @@ module polydem_contacts
       integer(ip) :: n = 0_ip
       !> Number of contacts without a direction (one body inside the other, or crossing bars)
       integer(ip) :: n_degenerate = 0_ip
-      !> Whether the elastic force has an energy, quadratic in the area: half of elastic area/length
+      !> Whether the elastic force has an energy, quadratic in `area`: half of elastic area/length
       logical :: energy_is_quadratic = .false.
+      !> Whether `area` and what follows from it (`rate`, `normal`, `moment`, `direction`, `length`) are to be those of
+      !> the effective area, which differs from the area by the shape of the overlap
+      logical :: area_is_effective = .false.
+      !> Whether the law needs the column `twist`
+      logical :: has_twist = .false.
       !> Place in the pair list
       integer(ip), allocatable :: pair(:)
       !> Slot of the body with the lower identifier
       integer(ip), allocatable :: first(:)
       !> Slot of the body with the higher identifier
       integer(ip), allocatable :: second(:)
-      !> Area of the overlap [m2]
+      !> Area of the overlap, true or effective [m2]
       real(wp), allocatable :: area(:)
       !> Rate of change of the area, exact from positions and velocities [m2/s]
       real(wp), allocatable :: rate(:)
-      !> Integral of the outward normal over the outline of the first body inside the second, (2, contact) [m]
+      !> Integral of the outward normal over the outline of the first body inside the second, weighted if the area is
+      !> effective, (2, contact) [m]
       real(wp), allocatable :: normal(:, :)
       !> Moment of that integral about the centres of the first and of the second body, (2, contact) [m2]
       real(wp), allocatable :: moment(:, :)
@@ -51,6 +57,8 @@ module polydem_contacts
       real(wp), allocatable :: normal_force(:)
       !> Tangential force on the first body along (-direction_y, direction_x) [N/m]
       real(wp), allocatable :: tangential_force(:)
+      !> Torque on the first body besides those of the forces, the opposite on the second, where a model needs it [N]
+      real(wp), allocatable :: twist(:)
       !> Force on the first body; the second feels the opposite, (2, contact) [N/m]
       real(wp), allocatable :: force(:, :)
    end type contacts_t
@@ -59,9 +67,9 @@ module polydem_contacts
    type :: contact_memory_t
       !> Edge that separated the pair last: +k of the first body, -k of the second, 0 unknown
       integer(ip), allocatable :: separating_edge(:)
-      !> Stored tangential spring force [N/m]
+      !> Tangential force of the last step: of the spring, or of exact friction [N/m]
       real(wp), allocatable :: tangential(:)
-      !> Area at the last step [m2], for the book's backward difference
+      !> Area at the last step [m2], for the book's backward difference and to know new contacts
       real(wp), allocatable :: area(:)
    end type contact_memory_t
 
@@ -91,6 +99,7 @@ contains
                      contacts%normal, contacts%moment, contacts%arm_first, contacts%arm_second, &
                      contacts%direction, contacts%length, contacts%inverse_length, contacts%lever, &
                      contacts%elastic, contacts%normal_force, contacts%tangential_force, contacts%force)
+         if (allocated(contacts%twist)) deallocate (contacts%twist)
       end if
       m = capacity + capacity/4_ip + 16_ip
       allocate (contacts%pair(m), contacts%first(m), contacts%second(m), contacts%area(m), &
@@ -98,6 +107,7 @@ contains
                 contacts%arm_first(2, m), contacts%arm_second(2, m), contacts%direction(2, m), &
                 contacts%length(m), contacts%inverse_length(m), contacts%lever(m), &
                 contacts%elastic(m), contacts%normal_force(m), contacts%tangential_force(m), contacts%force(2, m))
+      if (contacts%has_twist) allocate (contacts%twist(m))
    end subroutine reserve_contacts
 
 end module polydem_contacts

@@ -58,13 +58,13 @@ contains
       motion%angle = bodies%angle(slots)
    end subroutine new_motion
 
-   !> Put the bodies of a motion where they are at a time, with their velocities.
+   !> Put the bodies of a motion where they are at a time, with their velocities and accelerations.
    subroutine move_bodies(motion, time, bodies)
       !> The motion
       type(motion_t), intent(in) :: motion
       !> Time since the start of the run [s]
       real(wp), intent(in) :: time
-      !> Bodies; position, angle and velocities of the moved ones change
+      !> Bodies; position, angle, velocities and accelerations of the moved ones change
       type(bodies_t), intent(inout) :: bodies
 
       select case (motion%kind)
@@ -81,11 +81,12 @@ contains
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: time
       type(bodies_t), intent(inout) :: bodies
-      real(wp) :: turn, rate, c, s, arm(2)
+      real(wp) :: turn, rate, growth, c, s, arm(2)
       integer(ip) :: k, slot
 
       turn = motion%rate*elapsed(motion, time)
       rate = motion%rate*ramp_factor(motion, time)
+      growth = motion%rate*ramp_growth(motion, time)
       c = cos(turn)
       s = sin(turn)
       do k = 1_ip, size(motion%slots, kind=ip)
@@ -96,6 +97,8 @@ contains
          bodies%angle(slot) = motion%angle(k) + turn
          bodies%velocity(:, slot) = [-rate*arm(2), rate*arm(1)]
          bodies%angular_velocity(slot) = rate
+         bodies%acceleration(:, slot) = [-growth*arm(2), growth*arm(1)] - rate**2*arm
+         bodies%angular_acceleration(slot) = growth
       end do
    end subroutine rotate
 
@@ -109,6 +112,7 @@ contains
          associate (slot => motion%slots(k))
             bodies%position(:, slot) = motion%position(:, k) + motion%velocity*elapsed(motion, time)
             bodies%velocity(:, slot) = motion%velocity*ramp_factor(motion, time)
+            bodies%acceleration(:, slot) = motion%velocity*ramp_growth(motion, time)
          end associate
       end do
    end subroutine translate
@@ -118,15 +122,18 @@ contains
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: time
       type(bodies_t), intent(inout) :: bodies
-      real(wp) :: phase, speed
+      real(wp) :: phase, rate, speed, change
       integer(ip) :: k
 
       phase = motion%frequency*elapsed(motion, time)
-      speed = motion%frequency*ramp_factor(motion, time)*cos(phase)
+      rate = motion%frequency*ramp_factor(motion, time)
+      speed = rate*cos(phase)
+      change = motion%frequency*ramp_growth(motion, time)*cos(phase) - rate**2*sin(phase)
       do k = 1_ip, size(motion%slots, kind=ip)
          associate (slot => motion%slots(k))
             bodies%position(:, slot) = motion%position(:, k) + motion%amplitude*sin(phase)
             bodies%velocity(:, slot) = motion%amplitude*speed
+            bodies%acceleration(:, slot) = motion%amplitude*change
          end associate
       end do
    end subroutine oscillate
@@ -146,6 +153,18 @@ contains
          ramp_factor = u*u*(3.0_wp - 2.0_wp*u)
       end if
    end function ramp_factor
+
+   !> Derivative of the ramp factor [1/s]
+   pure real(wp) function ramp_growth(motion, time)
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: time
+      real(wp) :: u
+
+      ramp_growth = 0.0_wp
+      if (time <= motion%start .or. time - motion%start >= motion%ramp) return
+      u = (time - motion%start)/motion%ramp
+      ramp_growth = 6.0_wp*u*(1.0_wp - u)/motion%ramp
+   end function ramp_growth
 
    !> Integral of the ramp factor from the start to a time [s]
    pure real(wp) function elapsed(motion, time)

@@ -1,15 +1,17 @@
-!> An HDF5 file as others write it: h5py's booleans, small and wide integers, single precision, fixed texts.
+!> HDF5 files as others write them: h5py's booleans, small and wide integers, single precision, fixed texts; and as
+!> nobody should: claims without contents.
 module foreign_file
    use, intrinsic :: iso_c_binding, only: c_loc
    use, intrinsic :: iso_fortran_env, only: int8, int32, int64, real32
-   use hdf5, only: h5dclose_f, h5dcreate_f, h5dwrite_f, h5f_acc_trunc_f, h5fclose_f, h5fcreate_f, h5kind_to_type, &
-      h5open_f, h5sclose_f, h5screate_f, h5screate_simple_f, h5tclose_f, h5tcopy_f, h5tenum_create_f, &
-      h5tenum_insert_f, h5tset_size_f
-   use hdf5, only: h5_integer_kind, h5_real_kind, h5s_scalar_f, h5t_fortran_s1, h5t_std_i16be, &
-      h5t_std_i64le, h5t_std_u8le, hid_t, hsize_t, size_t
+   use hdf5, only: h5aclose_f, h5acreate_f, h5dclose_f, h5dcreate_f, h5dwrite_f, h5f_acc_trunc_f, h5f_obj_all_f, &
+      h5fclose_f, h5fcreate_f, h5fget_obj_count_f, h5kind_to_type, h5open_f, h5p_dataset_create_f, h5pclose_f, &
+      h5pcreate_f, h5pset_chunk_f, h5sclose_f, h5screate_f, h5screate_simple_f, h5tclose_f, h5tcopy_f, &
+      h5tenum_create_f, h5tenum_insert_f, h5tset_size_f
+   use hdf5, only: h5_integer_kind, h5_real_kind, h5s_scalar_f, h5t_fortran_s1, h5t_ieee_f64le, &
+      h5t_std_i16be, h5t_std_i64le, h5t_std_u8le, h5t_string, hid_t, hsize_t, size_t
    implicit none
    private
-   public :: write_foreign_file
+   public :: write_foreign_file, write_hollow_file, count_open_objects
 
 contains
 
@@ -81,5 +83,64 @@ contains
       end subroutine put_fixed_text
 
    end subroutine write_foreign_file
+
+   !> Write claims (2^40 numbers, none of them stored), unwritten (a thousand numbers, none stored), unwritten_text, and
+   !> the attributes three (three numbers) and word (a text) of the top level.
+   subroutine write_hollow_file(path)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      integer(hid_t) :: file, text
+      integer :: status
+
+      call h5open_f(status)
+      call h5fcreate_f(path, h5f_acc_trunc_f, file, status)
+      call h5tcopy_f(h5t_string, text, status)
+      call put_hollow('claims', h5t_ieee_f64le, [2_hsize_t**40])
+      call put_hollow('unwritten', h5t_ieee_f64le, [1000_hsize_t])
+      call put_hollow('unwritten_text', text, [integer(hsize_t) ::])
+      call put_attribute('three', h5t_ieee_f64le, [3_hsize_t])
+      call put_attribute('word', text, [integer(hsize_t) ::])
+      call h5tclose_f(text, status)
+      call h5fclose_f(file, status)
+
+   contains
+
+      subroutine put_hollow(name, kind_in_file, extent)
+         character(len=*), intent(in) :: name
+         integer(hid_t), intent(in) :: kind_in_file
+         integer(hsize_t), intent(in) :: extent(:)
+         integer(hid_t) :: dataset, properties, space
+
+         call h5pcreate_f(h5p_dataset_create_f, properties, status)
+         if (size(extent) > 0) call h5pset_chunk_f(properties, 1, [8_hsize_t], status)
+         call h5screate_simple_f(size(extent), extent, space, status)
+         call h5dcreate_f(file, name, kind_in_file, space, dataset, status, dcpl_id=properties)
+         call h5dclose_f(dataset, status)
+         call h5sclose_f(space, status)
+         call h5pclose_f(properties, status)
+      end subroutine put_hollow
+
+      subroutine put_attribute(name, kind_in_file, extent)
+         character(len=*), intent(in) :: name
+         integer(hid_t), intent(in) :: kind_in_file
+         integer(hsize_t), intent(in) :: extent(:)
+         integer(hid_t) :: attribute, space
+
+         call h5screate_simple_f(size(extent), extent, space, status)
+         call h5acreate_f(file, name, kind_in_file, space, attribute, status)
+         call h5aclose_f(attribute, status)
+         call h5sclose_f(space, status)
+      end subroutine put_attribute
+
+   end subroutine write_hollow_file
+
+   !> Number of HDF5's objects that are open, in all files and apart from files
+   integer function count_open_objects()
+      integer(size_t) :: n
+      integer :: status
+
+      call h5fget_obj_count_f(int(h5f_obj_all_f, hid_t), h5f_obj_all_f, n, status)
+      count_open_objects = int(n)
+   end function count_open_objects
 
 end module foreign_file

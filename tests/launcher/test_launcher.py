@@ -21,6 +21,7 @@ CMAKE_LISTS = """\
 cmake_minimum_required(VERSION 3.25)
 project(toy LANGUAGES Fortran)
 add_subdirectory(src/app)
+add_subdirectory(tests/verification)
 enable_testing()
 add_test(NAME good COMMAND ${CMAKE_COMMAND} -E true)
 add_test(NAME bad COMMAND ${CMAKE_COMMAND} -E false)
@@ -33,6 +34,8 @@ set_tests_properties(odd PROPERTIES SKIP_RETURN_CODE 1)
 PRESETS = """\
 {"version": 6, "configurePresets": [
   {"name": "release", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"},
+  {"name": "single", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"},
+  {"name": "quadruple", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"},
   {"name": "debug", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"}]}
 """
 
@@ -73,6 +76,7 @@ class Toy(unittest.TestCase):
         self.write("CMakePresets.json", PRESETS)
         self.write("src/app/CMakeLists.txt", "add_executable(polydem main.f90)\n")
         self.write("src/app/main.f90", PROGRAM)
+        self.write("tests/verification/CMakeLists.txt", "add_executable(verify ../../src/app/main.f90)\n")
         self.write("postproc/pyproject.toml", "")
         self.write(".venv/.made", self.folder + "\n")
         self.environment = {name: value for name, value in os.environ.items()
@@ -112,8 +116,9 @@ class Words(Toy):
     def test_help_needs_no_build(self):
         code, output, _ = self.call("--help")
         self.assertEqual(code, 0)
-        for verb in ("run", "check", "info", "plot", "replay", "bench", "test", "--no-install"):
-            self.assertIn(f"\n  {verb} ", output)
+        verbs = "run check info plot replay bench workprecision costs sweep test verify"
+        for word in [*verbs.split(), "--no-install"]:
+            self.assertIn(f"\n  {word} ", output)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
 
     def test_wrong_verbs_and_options_give_2(self):
@@ -147,6 +152,23 @@ class Build(Toy):
             seconds.append(time.perf_counter() - start)
         self.assertLess(statistics.median(seconds), 0.2)
 
+    def test_verify_builds_and_becomes_the_benchmarks_alone(self):
+        code, output, messages = self.call("verify", "B8")
+        self.assertEqual((code, output, messages), (0, "<B8>\n", "polydem: building verify in build/release\n"))
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build", "release", "src", "app", "polydem")))
+        self.assertEqual(self.call("verify"), (0, "", ""))
+
+    def test_a_sweep_knows_the_program_and_its_help_needs_none(self):
+        self.write(".venv/bin/python", '#!/bin/bash\nprintf "<%s>\\n" "$@"\n')
+        os.chmod(os.path.join(self.folder, ".venv/bin/python"), 0o755)
+        program = os.path.join(self.folder, "build/release/src/app/polydem")
+        code, output, messages = self.call("sweep", "make", "--help")
+        self.assertEqual((code, messages, os.path.exists(program)), (0, "", False))
+        code, output, _ = self.call("sweep", "run", "my sweep", "--cores", "2")
+        self.assertEqual((code, os.path.exists(program)), (0, True))
+        words = ["-m", "polydem_post", "sweep", "--program", program, "run", "my sweep", "--cores", "2"]
+        self.assertEqual(output, "".join(f"<{word}>\n" for word in words))
+
     def test_a_changed_source_is_built_and_an_error_shown(self):
         self.call("--version")
         self.write("src/app/main.f90", PROGRAM.replace("'<'", "'['"))
@@ -168,6 +190,19 @@ class Build(Toy):
         code, output, messages = self.call("info", launcher=os.path.join(moved, "polydem"), POLYDEM_PRESET="debug")
         self.assertEqual((code, output), (0, "<info>\n"))
         self.assertIn("building", messages)
+
+    def test_workprecision_builds_three_precisions_and_hands_their_programs_on(self):
+        self.write(".venv/bin/python", '#!/bin/bash\nprintf "%s\\n" "$@"\n')
+        os.chmod(os.path.join(self.folder, ".venv", "bin", "python"), 0o755)
+        code, output, messages = self.call("workprecision", "stack", "--repeats", "2")
+        self.assertEqual(code, 0, messages)
+        expected = ["-m", "polydem_post", "workprecision"]
+        for precision, preset in (("double", "release"), ("single", "single"), ("quadruple", "quadruple")):
+            program = os.path.join(self.folder, "build", preset, "src", "app", "polydem")
+            self.assertTrue(os.access(program, os.X_OK))
+            expected += ["--program", f"{precision}={program}"]
+        self.assertEqual(output.splitlines(), [*expected, "stack", "--repeats", "2"])
+        self.assertEqual(self.call("workprecision", "--help")[1].splitlines(), [*expected[:3], "--help"])
 
     def test_simultaneous_first_calls_build_once(self):
         calls = [subprocess.Popen([self.launcher, "info"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

@@ -25,6 +25,7 @@ def main() -> int:
     environment["PYTHONDONTWRITEBYTECODE"] = "1"
     environment["POLYDEM_WRITE_SAMPLE"] = str(write_sample)
     environment["POLYDEM_PROGRAM"] = str(program)
+    environment["POLYDEM_SOURCE_DIR"] = str(root)
     command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests)]
     return subprocess.run(command, env=environment).returncode
 

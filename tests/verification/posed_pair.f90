@@ -49,6 +49,7 @@ contains
       settings%damping = 'none'
       settings%friction = 'none'
       call new_force_law(settings, pair%bodies, pair%law)
+      pair%contacts%area_is_effective = pair%law%needs_effective_area
    end subroutine new_pair
 
    !> Forces and torques of the poses.

@@ -1,4 +1,4 @@
-"""Command line: python -m polydem_post plot, table, tables or cache."""
+"""Command line: python -m polydem_post plot, table, tables, cache, costs, workprecision or sweep."""
 
 from __future__ import annotations
 
@@ -21,11 +21,10 @@ def main(arguments: list[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     warnings.showwarning = lambda message, *_: print(f"warning: {message}", file=sys.stderr)
     try:
-        options.action(options)
+        return options.action(options) or 0
     except ResultError as error:
         print(f"error: {error}", file=sys.stderr)
         return INPUT_ERROR
-    return 0
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -55,6 +54,9 @@ def _parser() -> argparse.ArgumentParser:
     tables.add_argument("--output", type=Path, metavar="DIR", help="where to; report in the first folder if absent")
     tables.add_argument("--no-figures", action="store_true", help="tables and verdicts only")
     _add_cache(verbs)
+    _add_costs(verbs)
+    _add_workprecision(verbs)
+    _add_sweep(verbs)
     return parser
 
 
@@ -76,6 +78,80 @@ def _add_cache(verbs) -> None:
     for level in ("D1", "LL"):
         cache.add_argument(f"--{level}", metavar="SIZE,WAYS,LINE", help=f"simulate this {level} [bytes, ways, bytes]")
     cache.add_argument("--branch-sim", action="store_true", help="count mispredicted branches too")
+
+
+def _add_costs(verbs) -> None:
+    costs = verbs.add_parser(
+        "costs", help="measure what each optional model costs",
+        description="Runs a packed drum with one optional model after the other, on and off in turns, and writes what "
+        "each costs of a step and in memory. An interrupted call goes on; samples of another build are refused.")
+    costs.set_defaults(action=_costs)
+    costs.add_argument("--program", type=Path, required=True, help="the built program (the launcher says which)")
+    costs.add_argument("--inputs", type=Path, default=Path("inputs"), help="folder of the scenes (default: inputs)")
+    costs.add_argument("--output", type=Path, default=Path("results/costs"), help="where to (default: results/costs)")
+    costs.add_argument("--repeats", type=int, default=9, help="timed runs of each model (default: 9)")
+    costs.add_argument("--threads", type=int, default=1, help="threads of each run (default: 1)")
+
+
+def _add_workprecision(verbs) -> None:
+    work = verbs.add_parser(
+        "workprecision", help="measure error against time over steps, integrators, laws and precisions",
+        description="Runs small scenes with all steps, integrators, force laws and precisions, and writes tables, "
+                    "figures and a recommendation to DIR/report. Goes on where an interrupted study was.")
+    work.set_defaults(action=_workprecision)
+    work.add_argument("scenes", nargs="*", metavar="SCENE", help="names in inputs/precision; all if absent")
+    work.add_argument("--output", type=Path, default=Path("results/workprecision"), metavar="DIR",
+                      help="folder of the study (default: results/workprecision)")
+    work.add_argument("--repeats", type=int, default=3, metavar="N", help="timed runs of every choice (default: 3)")
+    work.add_argument("--report-only", action="store_true", help="run nothing, write the report of what there is")
+    work.add_argument("--program", type=_program, action="append", default=[], metavar="PRECISION=PATH",
+                      help="a built program (the launcher says which)")
+
+
+def _program(text: str) -> tuple:
+    precision, equals, path = text.partition("=")
+    if not equals or precision not in ("single", "double", "quadruple"):
+        raise argparse.ArgumentTypeError(f"'{text}' is not like double=PATH")
+    return precision, Path(path)
+
+
+def _add_sweep(verbs) -> None:
+    sweep = verbs.add_parser("sweep", help="run a table of runs that differ in some entries of one namelist")
+    sweep.add_argument("--program", type=Path, help="the built program (the launcher says which)")
+    steps = sweep.add_subparsers(dest="step", required=True, metavar="make|run|collect")
+
+    make = steps.add_parser(
+        "make", help="check a table of runs, and lay out their folders",
+        usage="./polydem sweep make [TABLE.csv] BASE.nml [group.key=A,B,...]... --output FOLDER",
+        description="The table has a column name and one for each entry that differs, as scene.seed; an empty cell "
+                    "leaves the entry as BASE.nml has it. Listed values are combined with each other and with all "
+                    "rows; values with commas stand between semicolons: 'forces.gravity=0,-9.81;0,-1.62'.")
+    make.set_defaults(action=_sweep_make)
+    make.add_argument("words", nargs="+", metavar="WORD", help="table, namelist, lists of values")
+    make.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="folder of the sweep")
+    make.add_argument("--cores", type=_count, default=1, metavar="N", help="checks at once (default: 1)")
+
+    run = steps.add_parser(
+        "run", help="run what is not finished",
+        description="Ends with 0 if all runs are finished, 1 if some failed, 75 if it was asked to end (INT, TERM, "
+                    "HUP, USR1) before: the same command then goes on.")
+    run.set_defaults(action=_sweep_run)
+    run.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the sweep")
+    run.add_argument("--cores", type=_count, metavar="N", help="cores to use (default: all that there are)")
+    run.add_argument("--threads", type=_count, default=1, metavar="T", help="threads of each run (default: 1)")
+    run.add_argument("--rows", type=_numbers, metavar="A,B,C", help="only these rows of the table, counted from 1")
+    run.add_argument("--names", type=_words, metavar="A,B,C", help="only the runs of these names")
+    run.add_argument("--retry", action="store_true", help="run again what failed")
+
+    collect = steps.add_parser("collect", help="write results.csv and results.h5 of what there is")
+    collect.set_defaults(action=_sweep_collect)
+    collect.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the sweep")
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or not 0 < int(text) < 1000000:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 on")
+    return int(text)
 
 
 def _numbers(text: str) -> list[int]:
@@ -130,6 +206,69 @@ def _cache(options: argparse.Namespace) -> None:
     finders = options.finders or read_bench([options.folder]).named("finder")
     steps, branches = tuple(options.steps), options.branch_sim
     count_misses(options.folder, options.program, finders, model, steps, options.scenes, branches, say=_say)
+
+
+def _costs(options: argparse.Namespace) -> None:
+    from .costs import Study, measure_costs, write_costs
+
+    if options.repeats < 1 or options.threads < 1:
+        raise ResultError("--repeats and --threads take numbers from 1 on")
+    study = Study(options.program, options.inputs, options.output, options.threads)
+    samples = measure_costs(study, options.repeats, say=_say)
+    print(write_costs(samples, options.output).document("text"), end="")
+
+
+def _workprecision(options: argparse.Namespace) -> None:
+    from .precision_report import write_precision_report
+    from .precision_samples import Study
+    from .precision_scenes import SCENES
+
+    unknown = [name for name in options.scenes if name not in SCENES]
+    if unknown:
+        raise ResultError(f"there is no scene {', '.join(unknown)}; there are {', '.join(SCENES)}")
+    if options.repeats < 1:
+        raise ResultError("--repeats takes a number of at least 1")
+    if not options.report_only:
+        study = Study(options.output, dict(options.program), _say)
+        study.measure([SCENES[name] for name in options.scenes or SCENES], options.repeats)
+    print(write_precision_report(options.output)[-1])
+
+
+def _sweep_make(options: argparse.Namespace) -> None:
+    from .sweep import LISTED_ENTRY, make_sweep
+
+    lists = [word for word in options.words if LISTED_ENTRY.fullmatch(word)]
+    files = [word for word in options.words if word not in lists]
+    tables = [word for word in files if word.lower().endswith(".csv")]
+    bases = [word for word in files if word not in tables]
+    if len(bases) != 1 or len(tables) > 1:
+        raise ResultError("sweep make takes one namelist, and a table (.csv) or lists as scene.seed=1,2,3; see --help")
+    table = Path(tables[0]) if tables else None
+    sweep = make_sweep(Path(bases[0]), options.output, _sweep_program(options), table, lists, options.cores)
+    _say(f"{sweep.folder}: {len(sweep.runs)} runs; next: ./polydem sweep run {sweep.folder}")
+
+
+def _sweep_run(options: argparse.Namespace) -> int:
+    from .sweep import Sweep
+    from .sweep_run import Runner, available_cores
+
+    runs = Sweep(options.folder).choose(options.rows, options.names)
+    runner = Runner(_sweep_program(options), options.cores or len(available_cores()), options.threads, _say)
+    return runner.run(runs, options.retry)
+
+
+def _sweep_collect(options: argparse.Namespace) -> None:
+    from .sweep import Sweep
+    from .sweep_collect import CSV_FILE, HDF5_FILE, collect_sweep
+
+    collect_sweep(Sweep(options.folder), _say)
+    _say(f"{options.folder / CSV_FILE}\n{options.folder / HDF5_FILE}")
+
+
+def _sweep_program(options: argparse.Namespace) -> Path:
+    if options.program is None:
+        raise ResultError("--program is missing: call ./polydem sweep, which knows it")
+    return options.program
 
 
 def _say(line: str) -> None:

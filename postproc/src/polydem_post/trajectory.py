@@ -177,13 +177,25 @@ class Trajectory:
         return {name: np.concatenate(parts) for name, parts in columns.items()}
 
     @cached_property
+    def ledger_units(self) -> dict[str, str]:
+        """Unit of each entry of the ledger."""
+        units: dict[str, str] = {}
+        for segment in self._segments:
+            with open_file(segment.path) as file:
+                for name, values in file.get("ledger", {}).items():
+                    units[name] = str(values.attrs.get("unit", ""))
+        return units
+
+    @cached_property
     def profile(self) -> dict:
-        """Per stage: `stage` (list), `calls`, `total`, `least`, `most` [s]; `seconds` of the whole run."""
+        """Per stage: `stage` (list), `calls`, `total`, `least`, `most` [s]; of the run `seconds`, `memory` [KiB]."""
         with self._open_profile() as file:
             group = file["profile"]
             profile = {name: group[name][:] for name in ("calls", "total", "least", "most")}
             profile["stage"] = [str(name) for name in group["stage"].asstr()[:]]
             profile["seconds"] = float(group["seconds"][()])
+            if "memory" in group:
+                profile["memory"] = int(group["memory"][()])
             return profile
 
     @cached_property

@@ -1,22 +1,29 @@
-!> Work of the elastic force along closed paths of one body against another at rest.
+!> Benchmark B5: work of the elastic force along closed paths of one body against another at rest.
 !>
-!> The body goes round an ellipse in the space of its three coordinates. Where no corner enters or leaves the
-!> other body on the way, the trapezoidal rule of the periodic integrand is exact to rounding. The work is given as
-!> a share of the sum of the absolute works of all steps.
-module test_closed_loops
-   use funit
-   use polydem_kinds, only: wp
+!> The body goes round an ellipse in the space of its three coordinates. A force with a potential does no work on the
+!> way; where no corner enters or leaves the other body, the trapezoidal rule of the periodic integrand is exact to
+!> rounding, elsewhere it converges. The area law does work, whatever the step. The work is given as a share of the
+!> sum of the absolute works of all steps.
+module b05_closed_loops
+   use outlines, only: pi
+   use polydem_kinds, only: ip, wp
+   use polydem_strings, only: to_text
    use posed_pair, only: new_pair, pair_t, press
    use trial, only: block_at
+   use verification_table, only: table_t
    implicit none
-
-   real(wp), parameter :: pi = 3.14159265358979323846_wp
+   private
+   public :: run_closed_loops
 
    !> A path: the coordinates x, y and angle are middle + reach*cos(t + phase)
    type :: path_t
+      !> Side of the moving square; that of the other is 1 [m]
       real(wp) :: side
+      !> Middle of x, y [m] and the angle [rad]
       real(wp) :: middle(3)
+      !> Greatest distances from it
       real(wp) :: reach(3)
+      !> Phases [rad]
       real(wp) :: phase(3)
    end type path_t
 
@@ -34,39 +41,31 @@ module test_closed_loops
 
 contains
 
-   @test
-   subroutine the_conservative_law_does_no_work_on_closed_paths()
-      integer :: k
-
-      do k = 1, size(smooth)
-         @assertLessThan(abs(work('conservative', smooth(k), 400)), 1.0e-13_wp)
-      end do
-   end subroutine the_conservative_law_does_no_work_on_closed_paths
-
-   @test
-   subroutine its_work_vanishes_with_the_step_where_corners_come_and_go()
+   !> Five smooth paths and one on which corners come and go.
+   subroutine run_closed_loops(table)
+      !> Table to fill
+      type(table_t), intent(inout) :: table
       real(wp) :: coarse, fine
-
-      coarse = abs(work('conservative', tilting, 250))
-      fine = abs(work('conservative', tilting, 16000))
-      @assertLessThan(coarse, 1.0e-4_wp)
-      @assertLessThan(fine, 1.0e-3_wp*coarse)
-   end subroutine its_work_vanishes_with_the_step_where_corners_come_and_go
-
-   @test
-   subroutine the_area_law_does_work_on_closed_paths_whatever_the_step()
-      real(wp) :: share
       integer :: k
 
+      call table%begin('B5', 'work of the elastic force on closed paths, as a share of the absolute work')
       do k = 1, size(smooth)
-         share = work('area', smooth(k), 1600)
-         @assertGreaterThan(abs(share), 2.0e-3_wp)
-         @assertEqual(share, work('area', smooth(k), 400), tolerance=2.0e-4_wp*abs(share))
+         call table%expect_absolute('conservative law, path '//to_text(int(k, ip))//', 400 steps', 0.0_wp, &
+                                    work('conservative', smooth(k), 400), 1.0e-13_wp)
       end do
-      share = work('area', tilting, 16000)
-      @assertGreaterThan(abs(share), 1.0e-3_wp)
-      @assertEqual(share, work('area', tilting, 4000), tolerance=2.0e-4_wp*abs(share))
-   end subroutine the_area_law_does_work_on_closed_paths_whatever_the_step
+      coarse = work('conservative', tilting, 250)
+      fine = work('conservative', tilting, 16000)
+      call table%expect_absolute('conservative law, path 6 with events, 250 steps', 0.0_wp, coarse, 1.0e-4_wp)
+      call table%expect_absolute('conservative law, path 6 with events, 16000 steps', 0.0_wp, fine, 1.0e-7_wp)
+      do k = 1, size(smooth)
+         fine = work('area', smooth(k), 1600)
+         call table%expect_relative('area law, path '//to_text(int(k, ip))//': 400 steps as 1600 steps', fine, &
+                                    work('area', smooth(k), 400), 2.0e-4_wp)
+      end do
+      fine = work('area', tilting, 16000)
+      call table%expect_relative('area law, path 6: 4000 steps as 16000 steps', fine, work('area', tilting, 4000), &
+                                 2.0e-4_wp)
+   end subroutine run_closed_loops
 
    !> Work on a body along a path in n steps, as a share of the sum of absolute works
    function work(law, path, n) result(share)
@@ -96,4 +95,4 @@ contains
       share = share/total
    end function work
 
-end module test_closed_loops
+end module b05_closed_loops

@@ -1,0 +1,298 @@
+"""What each optional model costs: per cent of a time step, and bytes per body, on against off.
+
+A drum is packed from a settled bed and runs a few steps, once with a model and once without, all models in turns,
+again and again. Ratios are formed within each turn, so that a machine that slows down for a while spoils a turn and
+not a model.
+A step is all its stages, guards and output included; the start of a run does not count. Beside times stand the
+instructions that a step takes in a simulated processor: the same at every call and on a busy machine, where times are
+worth little. Memory is what the process holds after the last step of a larger drum, on less off.
+
+Times of forces differ also because the model changes what happens; in so few steps hardly.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import re
+import subprocess
+from dataclasses import asdict, astuple, dataclass, fields
+from pathlib import Path
+
+from .cachegrind import PLAIN_MODEL, simulate
+from .cachegrind import Model as Caches
+from .emit import FORMATS, SUFFIXES, Table
+from .statistics import Estimate, median, median_of_ratios, number
+from .trajectory import ResultError, Trajectory
+
+#: Name of the raw samples in the folder of the study
+FILE = "samples.csv"
+
+#: Steps and boxes of the runs for times, and of those for memory
+TIMED = (400, 2522)
+WEIGHED = (4, 100000)
+#: Instructions are those of the last hundred steps, in which everything happens that does not happen in every step
+COUNTED = ((20, 600), (120, 600))
+
+#: How often memory is measured
+WEIGHINGS = 3
+
+#: Every optional model off
+BARE = (
+    "forces.damping=none",
+    "forces.friction=none",
+    "scene.motion=none",
+    "guards.displacement=off",
+    "guards.step=off",
+    "output.ledger=.false.",
+    "output.trace_steps=0",
+    "output.trace_start=0",
+    "integrate.dt=2e-5",
+)
+
+
+@dataclass(frozen=True)
+class Model:
+    """Something that a scene can switch on."""
+
+    name: str
+    #: Overrides that switch it on
+    on: tuple
+    #: Name of the model that it is compared with
+    off: str = "nothing"
+
+
+#: The models, each behind the one that it is compared with
+MODELS = (
+    Model("nothing", ()),
+    Model("damping by the rate", ("forces.damping=rate",)),
+    Model("damping of the book", ("forces.damping=book",)),
+    Model("friction (Cundall-Strack)", ("forces.friction=cundall_strack",)),
+    Model("stop without direction", ("overlap.degenerate=stop",)),
+    Model("compensated sums", ("integrate.accumulation=compensated",)),
+    Model("Gear's integrator", ("integrate.scheme=gear",)),
+    Model("turning walls", ("scene.motion=rotation", "scene.motion_rate=0.25")),
+    Model("guard: displacement", ("guards.displacement=stop",)),
+    Model("guard: stable step", ("guards.step=stop",)),
+    Model("guard: overlap", ("guards.overlap=stop",)),
+    Model("ledger", ("output.ledger=.true.",)),
+    Model("guard: energy", ("output.ledger=.true.", "guards.energy=warn"), off="ledger"),
+    Model("a frame every 50 steps", ("output.frame_interval=1e-3",)),
+    Model("frames with contacts", ("output.frame_interval=1e-3", "output.contacts=.true."), "a frame every 50 steps"),
+    Model("times of every step", ("output.step_profile=.true.",)),
+)
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One run."""
+
+    model: str
+    #: 'time', 'memory' or 'count'
+    kind: str
+    repeat: int
+    bodies: int
+    steps: int
+    threads: int
+    #: Mean of a step, all stages [us]; of 'count' its instructions
+    step: float
+    #: Contacts per step
+    contacts: float
+    #: Resident after the last step [KiB]
+    memory: int
+    #: What ran where
+    program: str
+    machine: str
+
+
+@dataclass(frozen=True)
+class Study:
+    """Where and with what to measure."""
+
+    program: Path
+    inputs: Path
+    output: Path
+    threads: int = 1
+
+    def command(self, namelist: str, folder: Path, overrides, threads: int) -> list[str]:
+        """Command that runs a scene."""
+        words = [f"output.folder={folder}", *overrides]
+        command = [str(self.program), "run", str(self.inputs / namelist), "--force", "--threads", str(threads)]
+        return command + [part for word in words for part in ("--set", word)]
+
+    def run(self, namelist: str, folder: Path, overrides) -> Trajectory:
+        """Run a scene and open its result."""
+        command = self.command(namelist, folder, overrides, self.threads)
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise ResultError(f"{' '.join(command)}: {done.stderr.strip()}")
+        return Trajectory(folder)
+
+    def count(self, namelist: str, folder: Path, overrides) -> int:
+        """Instructions of a run on one thread, its start included."""
+        command = self.command(namelist, folder, overrides, 1)
+        return simulate(command, Caches(**PLAIN_MODEL), re.compile(""))["Ir"]
+
+    def bed(self) -> Path:
+        """The settled bed that drums are packed from; made if it is not there."""
+        folder = self.output / "bed"
+        if not (folder / "profile.h5").exists() or Trajectory(folder).status != "finished":
+            self.run("bed.nml", folder, ["output.frame_interval=0", "output.ledger=.false."])
+        return folder
+
+    def overrides(self, model: Model, steps: int, boxes: int) -> list[str]:
+        """What makes a drum of a size that has one model on."""
+        size = [f"scene.boxes={boxes}", f"scene.packing={self.bed()}", f"integrate.duration={2e-5 * steps:.6e}"]
+        return [*BARE, *size, *model.on]
+
+    def sample(self, model: Model, kind: str, repeat: int) -> Sample:
+        """One run with a model."""
+        scene, folder = "bench/drum.nml", self.output / "run"
+        if kind == "count":
+            few, more = (self.count(scene, folder, self.overrides(model, *size)) for size in COUNTED)
+            result = Trajectory(folder)
+            step = (more - few) / (COUNTED[1][0] - COUNTED[0][0])
+        else:
+            result = self.run(scene, folder, self.overrides(model, *(TIMED if kind == "time" else WEIGHED)))
+            step = 1e6 * float(sum(result.profile["total"])) / result.counters["steps"]
+        profile, counters, origin = result.profile, result.counters, result.provenance
+        return Sample(
+            model.name,
+            kind,
+            repeat,
+            counters["bodies"],
+            counters["steps"],
+            self.threads,
+            round(step, 4),
+            round(counters["contacts"] / counters["steps"], 1),
+            profile["memory"],
+            f"polydem {origin['version']} ({origin['revision']}), {origin['build_type']}, {origin['compiler']}",
+            origin["processor"],
+        )
+
+
+def measure_costs(study: Study, repeats: int, say=print) -> list[Sample]:
+    """All samples, those in the file and those that are missing there."""
+    samples = read_samples(study.output / FILE)
+    wanted = [("time", k) for k in range(repeats + 1)] + [("memory", k) for k in range(1, WEIGHINGS + 1)]
+    wanted.append(("count", 1))
+    for kind, repeat in wanted:
+        taken = {sample.model for sample in samples if (sample.kind, sample.repeat) == (kind, repeat)}
+        for model in MODELS:
+            if model.name in taken:
+                continue
+            sample = study.sample(model, kind, repeat)
+            _compare(study.output / FILE, samples, sample)
+            samples.append(sample)
+            _write(study.output / FILE, samples)
+        say(f"{kind} {repeat}: done")
+    return samples
+
+
+def _compare(path: Path, samples: list, sample: Sample) -> None:
+    for name in ("program", "machine", "threads"):
+        if samples and getattr(samples[0], name) != getattr(sample, name):
+            raise ResultError(
+                f"{path}: has samples of {getattr(samples[0], name)}, not of {getattr(sample, name)}; choose another "
+                "folder with --output, or remove the file"
+            )
+
+
+def read_samples(path: Path) -> list[Sample]:
+    """The samples of a file, none if there is no file."""
+    if not path.exists():
+        return []
+    kinds = {"str": str, "int": int, "float": float}
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+            columns = [(each.name, kinds[str(each.type)]) for each in fields(Sample)]
+            return [Sample(**{name: kind(row[name]) for name, kind in columns}) for row in rows]
+    except (KeyError, TypeError, ValueError) as error:
+        raise ResultError(f"{path}: is not a file of ./polydem costs ({error})") from error
+
+
+def _write(path: Path, samples: list) -> None:
+    """Write all samples, so that an interruption leaves the old file or the new one."""
+    new = path.with_suffix(".csv.unfinished")
+    with new.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(asdict(samples[0]))
+        writer.writerows(astuple(sample) for sample in samples)
+    os.replace(new, path)
+
+
+def share_of_step(samples: list, model: Model) -> Estimate:
+    """What a model adds to a step [%]: median over the turns, without the first one, which warms up."""
+    on, off = (
+        {sample.repeat: sample.step for sample in samples if (sample.kind, sample.model) == ("time", name)}
+        for name in (model.name, model.off)
+    )
+    ratio = median_of_ratios({key: on[key] for key in on if key > 0}, off)
+    scaled = (100.0 * (value - 1.0) for value in (ratio.value, ratio.low, ratio.high, ratio.least))
+    return Estimate(*scaled, ratio.repeats)
+
+
+def share_of_instructions(samples: list, model: Model) -> float:
+    """What a model adds to the instructions of a step [%]."""
+    return 100.0 * (_instructions(samples, model.name) / _instructions(samples, model.off) - 1.0)
+
+
+def _instructions(samples: list, name: str) -> float:
+    return median([sample.step for sample in samples if (sample.kind, sample.model) == ("count", name)]).value
+
+
+def bytes_per_body(samples: list, model: Model) -> float:
+    """Memory that a model adds, per body [bytes]."""
+    return _weight(samples, model.name) - _weight(samples, model.off)
+
+
+def _weight(samples: list, name: str) -> float:
+    weighed = [sample for sample in samples if (sample.kind, sample.model) == ("memory", name)]
+    return median([1024.0 * sample.memory / sample.bodies for sample in weighed]).value
+
+
+def costs_table(samples: list) -> Table:
+    """One row per model."""
+    timed = [sample for sample in samples if sample.kind == "time"]
+    first = timed[0]
+    table = Table(
+        "costs",
+        "What optional models cost",
+        ("model", "on by", "time of a step [%]", "instructions [%]", "bytes per body", "contacts per step"),
+        texts=2,
+    )
+    for model in MODELS:
+        mine = [sample for sample in timed if sample.model == model.name and sample.repeat > 0]
+        if not mine:
+            continue
+        contacts = number(mine[0].contacts, 4)
+        if model.name == model.off:
+            step = median([sample.step for sample in mine])
+            counted = f"{number(1e-6 * _instructions(samples, model.name))} million"
+            table.add(model.name, "", f"{step.text()} us", counted, f"{_weight(samples, model.name):.0f}", contacts)
+            continue
+        share = share_of_step(samples, model)
+        text = f"{share.value:+.1f} [{share.low:+.1f}, {share.high:+.1f}]"
+        shown = ", ".join(word for word in model.on if word not in _model(model.off).on)
+        counted = f"{share_of_instructions(samples, model):+.2f}"
+        table.add(model.name, shown, text, counted, f"{bytes_per_body(samples, model):+.0f}", contacts)
+    table.note = (
+        f"{first.program}; {first.machine}; {first.threads} thread(s). Times: {first.bodies} bodies, {first.steps} "
+        f"steps, median of {max(s.repeat for s in timed)} turns with its interval. Instructions: {COUNTED[1][1]} "
+        f"boxes, one thread, a hundred steps. Memory: {WEIGHED[1]} boxes, to about 7 bytes. "
+        "Against the same without it; frames with contacts against frames, the guard of energy against the ledger."
+    )
+    return table
+
+
+def _model(name: str) -> Model:
+    return next(model for model in MODELS if model.name == name)
+
+
+def write_costs(samples: list, folder: Path) -> Table:
+    """Write the table in every form; return it."""
+    table = costs_table(samples)
+    for form in FORMATS:
+        (folder / (table.name + SUFFIXES[form])).write_text(table.document(form), encoding="utf-8")
+    return table

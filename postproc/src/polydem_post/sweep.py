@@ -1,0 +1,274 @@
+"""Batches: a table of runs that differ in some entries of one namelist.
+
+A sweep is a folder, made once and then filled by runs:
+
+    table.csv                 one row per run: its name, and its value of each entry
+    runs/NAME/input.nml       the namelist, as it was when the sweep was made
+    runs/NAME/overrides.txt   the entries of this run, one group.key=value to a line
+    runs/NAME/attempts.csv    when it was run, for how long, with which exit code (see sweep_run)
+    runs/NAME/output.txt      what it printed
+    runs/NAME/result          its result
+    results.csv, results.h5   everything in one table (see sweep_collect)
+"""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import os
+import re
+import shutil
+import subprocess
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from .trajectory import ResultError
+
+TABLE, RUNS = "table.csv", "runs"
+INPUT, OVERRIDES, ATTEMPTS, OUTPUT, RESULT = "input.nml", "overrides.txt", "attempts.csv", "output.txt", "result"
+
+#: Column of the names
+NAME = "name"
+
+#: What names become part of paths
+SAFE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._+-]{0,99}")
+
+#: An entry of the namelist, and one with the list of its values
+ENTRY = re.compile(r"[A-Za-z]\w*\.[A-Za-z]\w*")
+LISTED_ENTRY = re.compile(r"([A-Za-z]\w*\.[A-Za-z]\w*)=(.*)", re.DOTALL)
+
+#: The sweep itself says where results go
+OWN_ENTRY = "output.folder"
+
+#: So many wrong rows are told
+MOST_TOLD = 10
+
+
+@dataclass(frozen=True)
+class Row:
+    """A run to be."""
+
+    name: str
+    #: Values of the columns as they were written; empty: as in the namelist
+    values: tuple[str, ...]
+    #: Where it was asked for, for messages
+    place: str
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run of a sweep, and its files."""
+
+    name: str
+    folder: Path
+    #: Values of the columns as they were written
+    values: tuple[str, ...]
+
+    @property
+    def result(self) -> Path:
+        """Folder of its result."""
+        return self.folder / RESULT
+
+    def overrides(self) -> list[str]:
+        """The entries that it changes, each group.key=value."""
+        return (self.folder / OVERRIDES).read_text(encoding="utf-8").splitlines()
+
+    def attempts(self) -> list[dict]:
+        """What was tried so far: `started` (UTC), `seconds`, `exit_code` and `threads` of each attempt."""
+        path = self.folder / ATTEMPTS
+        if not path.exists():
+            return []
+        try:
+            with path.open(newline="", encoding="utf-8") as file:
+                return [{"started": row["started"], "seconds": float(row["seconds"]),
+                         "exit_code": int(row["exit_code"]), "threads": int(row["threads"])}
+                        for row in csv.DictReader(file)]
+        except (KeyError, TypeError, ValueError) as error:
+            raise ResultError(f"{path}: is not a list of attempts ({error})") from error
+
+
+class Sweep:
+    """A sweep that was made: `columns` (entries that differ) and `runs`, in the order of its table."""
+
+    def __init__(self, folder):
+        self.folder = Path(folder)
+        if not (self.folder / TABLE).is_file():
+            raise ResultError(f"{folder}: is not a sweep (holds no {TABLE}); ./polydem sweep make makes one")
+        self.columns, rows = read_table(self.folder / TABLE)
+        self.runs = [Run(row.name, self.folder / RUNS / row.name, row.values) for row in rows]
+
+    def choose(self, numbers: list[int] | None = None, names: list[str] | None = None) -> list[Run]:
+        """The runs of some rows, counted from 1, and of some names; all if neither is given."""
+        if not numbers and not names:
+            return self.runs
+        known = {run.name: run for run in self.runs}
+        for number in numbers or []:
+            if not 1 <= number <= len(self.runs):
+                raise ResultError(f"{self.folder}: there is no row {number}, only 1 to {len(self.runs)}")
+        for name in names or []:
+            if name not in known:
+                raise ResultError(f"{self.folder}: there is no run {name}")
+        chosen = {self.runs[number - 1].name for number in numbers or []} | set(names or [])
+        return [run for run in self.runs if run.name in chosen]
+
+
+# --- tables ------------------------------------------------------------------------------------------------------
+
+
+def read_table(path: Path) -> tuple[list[str], list[Row]]:
+    """Columns, apart from the name, and rows of a CSV table; messages name file and line."""
+    lines = _read_lines(path)
+    if not lines:
+        raise ResultError(f"{path}: is empty; its first line must name the columns, as in name,scene.seed")
+    first, header = lines[0]
+    _check_header(f"{path}:{first}", header)
+    place_of_name = header.index(NAME)
+    columns = [word for word in header if word != NAME]
+    rows = []
+    for number, words in lines[1:]:
+        place = f"{path}:{number}"
+        if len(words) != len(header):
+            raise ResultError(f"{place}: has {len(words)} values, but the table has {len(header)} columns; a value "
+                              'with commas stands in double quotes: "0, -9.81"')
+        values = tuple(word for k, word in enumerate(words) if k != place_of_name)
+        rows.append(Row(words[place_of_name], values, place))
+    check_names(rows)
+    if not rows:
+        raise ResultError(f"{path}: has no rows below its heading")
+    return columns, rows
+
+
+def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
+    """Number and words of each line that is not blank."""
+    lines = []
+    try:
+        with Path(path).open(newline="", encoding="utf-8-sig") as file:
+            reader = csv.reader(file, strict=True)
+            number = 1
+            for words in reader:
+                if any(word.strip() for word in words):
+                    lines.append((number, [" ".join(word.split()) for word in words]))
+                number = reader.line_num + 1
+    except FileNotFoundError as error:
+        raise ResultError(f"{path}: there is no such file") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultError(f"{path}: cannot be read ({error})") from error
+    except csv.Error as error:
+        raise ResultError(f"{path}:{reader.line_num}: is not CSV ({error})") from error
+    return lines
+
+
+def _check_header(place: str, header: list[str]) -> None:
+    if NAME not in header:
+        raise ResultError(f"{place}: the table needs a column {NAME}, apart from those of entries like scene.seed")
+    for word in header:
+        if header.count(word) > 1:
+            raise ResultError(f"{place}: the column {word!r} is there twice")
+        if word != NAME:
+            _check_entry(place, word)
+
+
+def _check_entry(place: str, entry: str) -> None:
+    if not ENTRY.fullmatch(entry):
+        raise ResultError(f"{place}: {entry!r} is not an entry of the namelist, group.key as in scene.seed")
+    if entry.lower() == OWN_ENTRY:
+        raise ResultError(f"{place}: {OWN_ENTRY} cannot vary, since the sweep gives every run its own folder")
+
+
+def check_names(rows: list[Row]) -> None:
+    """Names must be fit for folders, and different also where letters have no size."""
+    seen = {}
+    for row in rows:
+        if not SAFE_NAME.fullmatch(row.name):
+            raise ResultError(f"{row.place}: {row.name!r} cannot be a name: letters, digits and . _ + - up to 100")
+        other = seen.setdefault(row.name.lower(), row)
+        if other is not row:
+            raise ResultError(f"{row.place}: the name {row.name} is given twice (first in {other.place})")
+
+
+def expand(columns: list[str], rows: list[Row], lists: list[str]) -> tuple[list[str], list[Row]]:
+    """Every row with every combination of the values listed as group.key=A,B,C: a full factorial table.
+
+    Between values that have commas stand semicolons: forces.gravity=0,-9.81;0,-1.62. The names of the runs tell the
+    values that differ; where they cannot, runs are numbered.
+    """
+    entries, choices = [], []
+    for text in lists:
+        match = LISTED_ENTRY.fullmatch(text)
+        entry, values = match.group(1), match.group(2)
+        _check_entry(text, entry)
+        if entry in columns + entries:
+            raise ResultError(f"{text}: {entry} is given twice")
+        entries.append(entry)
+        choices.append([value.strip() for value in values.split(";" if ";" in values else ",") if value.strip()])
+        if not choices[-1]:
+            raise ResultError(f"{text}: a value is missing, as in scene.seed=1,2,3")
+    product = []
+    for row in rows or [Row("", (), " ".join(lists))]:
+        for combination in itertools.product(*choices):
+            words = [f"{entry.split('.')[1]}_{value}" for entry, value, values in zip(entries, combination, choices)
+                     if len(values) > 1]
+            name = "-".join(filter(None, [row.name, *(re.sub(r"[^A-Za-z0-9._+-]+", "_", word) for word in words)]))
+            product.append(Row(name, row.values + combination, row.place))
+    names = {row.name.lower() for row in product}
+    if len(names) < len(product) or not all(SAFE_NAME.fullmatch(name) for name in names):
+        product = [Row(f"run_{k:04d}", row.values, row.place) for k, row in enumerate(product, 1)]
+    return columns + entries, product
+
+
+# --- making a sweep ----------------------------------------------------------------------------------------------
+
+
+def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = None, lists: list[str] | None = None,
+               cores: int = 1) -> Sweep:
+    """Check every row of the table, times the lists, and lay out the folders of the runs."""
+    columns, rows = read_table(table) if table else ([], [])
+    if lists:
+        columns, rows = expand(columns, rows, lists)
+    if not rows:
+        raise ResultError("a sweep needs a table, or lists of values like scene.seed=1,2,3")
+    if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+        raise ResultError(f"{folder}: is there already; choose another folder")
+    check_names(rows)
+    overrides = [[f"{column}={value}" for column, value in zip(columns, row.values) if value] for row in rows]
+    _check_rows(base, program, rows, overrides, cores)
+    new = folder.with_name(folder.name + ".unfinished")
+    try:
+        if new.exists():
+            shutil.rmtree(new)
+        for row, entries in zip(rows, overrides):
+            place = new / RUNS / row.name
+            place.mkdir(parents=True)
+            shutil.copyfile(base, place / INPUT)
+            (place / OVERRIDES).write_text("".join(f"{entry}\n" for entry in entries), encoding="utf-8")
+        with (new / TABLE).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow([NAME, *columns])
+            writer.writerows([row.name, *row.values] for row in rows)
+        os.replace(new, folder)
+    except OSError as error:
+        raise ResultError(f"{folder}: cannot be written ({error})") from error
+    return Sweep(folder)
+
+
+def _check_rows(base: Path, program: Path, rows: list[Row], overrides: list[list[str]], cores: int) -> None:
+    """Let the program check the namelist with the entries of every row."""
+
+    def problem(entries: list[str]) -> str:
+        command = [str(program), "check", str(base), "--threads", "1"]
+        for entry in entries:
+            command += ["--set", entry]
+        answer = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+                                text=True, errors="replace", check=False)
+        if answer.returncode == 0:
+            return ""
+        said = [line for line in answer.stderr.splitlines() if line.strip()]
+        return said[-1].replace("polydem: ", "", 1) if said else f"check ended with exit code {answer.returncode}"
+
+    with ThreadPoolExecutor(max(1, cores)) as pool:
+        problems = [f"{row.place}: {text}" for row, text in zip(rows, pool.map(problem, overrides)) if text]
+    problems = list(dict.fromkeys(problems))
+    if problems:
+        more = [f"and {len(problems) - MOST_TOLD} more"] if len(problems) > MOST_TOLD else []
+        raise ResultError("\n".join(problems[:MOST_TOLD] + more))

@@ -1,0 +1,231 @@
+"""Running a sweep: several runs at once within the cores given, what is finished never again."""
+
+from __future__ import annotations
+
+import csv
+import fcntl
+import os
+import signal
+import subprocess
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+from .sweep import ATTEMPTS, INPUT, OUTPUT, Run
+from .trajectory import ResultError
+
+#: Exit code of a run that was asked to end and can go on from a checkpoint
+STOPPED = 75
+
+#: Exit code of a sweep in which a run failed
+FAILED = 1
+
+#: States of a run
+NOT_RUN, FINISHED, FAILING, STOPPED_EARLY, INTERRUPTED = "not run", "finished", "failed", "stopped", "interrupted"
+
+#: Signals that end a sweep; a second one does not wait for checkpoints
+SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
+
+#: Time between two looks at the runs [s]
+INTERVAL = 0.05
+
+
+def state_of(run: Run) -> str:
+    """What became of a run so far."""
+    attempts = run.attempts()
+    if not attempts:
+        return NOT_RUN
+    code = attempts[-1]["exit_code"]
+    if code < 0:
+        return INTERRUPTED
+    return {0: FINISHED, STOPPED: STOPPED_EARLY}.get(code, FAILING)
+
+
+def last_words(run: Run) -> str:
+    """The last line that a run printed."""
+    path = run.folder / OUTPUT
+    if not path.exists():
+        return ""
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - 4096))
+        lines = file.read().decode("utf-8", errors="replace").replace("\r", "\n").splitlines()
+    said = [line.strip() for line in lines if line.strip()]
+    return said[-1].replace("polydem: ", "", 1) if said else ""
+
+
+def describe(run: Run) -> str:
+    """A run in a message: name, state, and why it failed."""
+    state, attempts = state_of(run), run.attempts()
+    if state == FAILING:
+        return f"{run.name}: failed with exit code {attempts[-1]['exit_code']}: {last_words(run)}"
+    return f"{run.name}: {state}" + (f" after {attempts[-1]['seconds']:.1f} s" if attempts else "")
+
+
+def available_cores() -> list[int]:
+    """Numbers of the cores that this process may use."""
+    return sorted(os.sched_getaffinity(0))
+
+
+def can_continue(program: Path) -> bool:
+    """Whether the program goes on from checkpoints."""
+    try:
+        answer = subprocess.run([str(program), "run", "--help"], capture_output=True, text=True, check=False)
+    except OSError as error:
+        raise ResultError(f"{program}: cannot be run ({error})") from error
+    return "--continue" in answer.stdout
+
+
+class Runner:
+    """Runs that take their turns on some cores."""
+
+    def __init__(self, program: Path, cores: int, threads: int, say=print):
+        if threads > cores:
+            raise ResultError(f"runs of {threads} threads do not fit on {cores} cores")
+        self.command = [str(program), "run"]
+        self.continues = can_continue(program)
+        self.threads = threads
+        self.slots = [_Slot(environment(cores, threads, slot)) for slot in range(cores // threads)]
+        self.say = say
+        self.stopping = False
+
+    def run(self, runs: list[Run], retry: bool = False) -> int:
+        """Do what is left of some runs; gives 0 if all are finished, STOPPED if some can go on, else FAILED."""
+        due = []
+        for run in runs:
+            state = state_of(run)
+            if state == FAILING and not retry:
+                self.say(f"{describe(run)} (--retry runs it again)")
+            elif state != FINISHED:
+                due.append(run)
+        self.say(f"{len(runs)} runs, {len(due)} to do, {len(self.slots)} at once, {self.threads} threads each")
+        with self._signals():
+            while due or any(slot.is_busy for slot in self.slots):
+                for slot in self.slots:
+                    if slot.is_busy and slot.has_ended():
+                        self.say(describe(slot.end()))
+                    while due and not slot.is_busy and not self.stopping:
+                        self._start(slot, due.pop(0))
+                if self.stopping and not any(slot.is_busy for slot in self.slots):
+                    break
+                time.sleep(INTERVAL)
+        return self._verdict(runs)
+
+    def _start(self, slot: _Slot, run: Run) -> None:
+        command = [*self.command, str(run.folder / INPUT), "--threads", str(self.threads)]
+        for entry in [*run.overrides(), f"output.folder={run.result}"]:
+            command += ["--set", entry]
+        if self.continues:
+            command.append("--continue")
+        elif run.result.exists():
+            command.append("--force")
+        hindrance = slot.start(run, command, self.threads)
+        if hindrance:
+            self.say(f"{run.name}: left out, since another sweep {hindrance}")
+
+    def _verdict(self, runs: list[Run]) -> int:
+        states = [state_of(run) for run in runs]
+        self.say(", ".join(f"{states.count(state)} {state}" for state in dict.fromkeys(states)))
+        if all(state == FINISHED for state in states):
+            return 0
+        if all(state in (FINISHED, FAILING) for state in states):
+            return FAILED
+        self.say("the same command goes on with what is left")
+        return STOPPED
+
+    @contextmanager
+    def _signals(self):
+        """Pass signals on to the runs, which then end with a checkpoint where they can."""
+
+        def stop(number, _):
+            if not self.stopping:
+                self.say(f"{signal.Signals(number).name}: waiting for the runs to end; once more ends them at once")
+            self.stopping = True
+            for slot in self.slots:
+                slot.signal(signal.SIGUSR1 if self.continues else signal.SIGTERM)
+
+        former = {number: signal.getsignal(number) for number in SIGNALS}
+        for number in SIGNALS:
+            if former[number] is not signal.SIG_IGN:
+                signal.signal(number, stop)
+        try:
+            yield
+        finally:
+            for number, handler in former.items():
+                signal.signal(number, handler)
+
+
+def environment(cores: int, threads: int, slot: int) -> dict[str, str]:
+    """Environment of the runs in a slot.
+
+    Runs that have all cores of the machine, or of a job, are bound, each to its own: threads that wander lose their
+    caches. On a part of the cores they are not, since another sweep would choose the same ones.
+    """
+    names = dict(os.environ, OMP_NUM_THREADS=str(threads))
+    names.pop("OMP_PLACES", None)
+    own = available_cores()
+    if cores == len(own):
+        names["OMP_PLACES"] = ",".join(f"{{{core}}}" for core in own[slot * threads : (slot + 1) * threads])
+        names["OMP_PROC_BIND"] = "close"
+    else:
+        names["OMP_PROC_BIND"] = "false"
+    if cores > len(own):
+        names["OMP_WAIT_POLICY"] = "passive"
+    return names
+
+
+@dataclass
+class _Slot:
+    """A place where one run at a time runs."""
+
+    environment: dict[str, str]
+    run: Run | None = None
+    process: subprocess.Popen | None = None
+    #: List of attempts of the run; locked, so that no other sweep runs it
+    record: TextIO | None = None
+    began: float = 0.0
+    started: str = ""
+    threads: int = 0
+
+    @property
+    def is_busy(self) -> bool:
+        return self.process is not None
+
+    def start(self, run: Run, command: list[str], threads: int) -> str:
+        """Start a run, unless another sweep has it or, since it was found due, had it; gives what hinders."""
+        self.record = (run.folder / ATTEMPTS).open("a", newline="", encoding="utf-8")
+        try:
+            fcntl.flock(self.record, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self.record.close()
+            return "runs it now"
+        if state_of(run) == FINISHED:
+            self.record.close()
+            return "has just finished it"
+        self.run, self.threads, self.began = run, threads, time.monotonic()
+        self.started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
+        with (run.folder / OUTPUT).open("ab") as output:
+            # A session of its own: the terminal's Ctrl-C goes to the sweep, which passes it on.
+            self.process = subprocess.Popen(command, env=self.environment, stdin=subprocess.DEVNULL, stdout=output,
+                                            stderr=subprocess.STDOUT, start_new_session=True)
+        return ""
+
+    def signal(self, number: int) -> None:
+        """Send a signal to the run, if there is one."""
+        if self.process:
+            self.process.send_signal(number)
+
+    def has_ended(self) -> bool:
+        """Whether the run is over."""
+        return self.process.poll() is not None
+
+    def end(self) -> Run:
+        """Book the attempt, and give the run back."""
+        writer = csv.writer(self.record, lineterminator="\n")
+        if self.record.tell() == 0:
+            writer.writerow(["started", "seconds", "exit_code", "threads"])
+        writer.writerow([self.started, f"{time.monotonic() - self.began:.3f}", self.process.returncode, self.threads])
+        self.record.close()
+        run, self.run, self.process = self.run, None, None
+        return run

@@ -1,0 +1,158 @@
+!> The guards of a run that look at whole steps: depth of contacts, energy, stable step; and what all have to tell.
+!>
+!> A guard that is off is not looked at and holds no array.
+module polydem_watch
+   use polydem_archive, only: archive_t
+   use polydem_body_sizes, only: thickness_of_bodies
+   use polydem_depths, only: any_deeper, deepest_contact, depth_text
+   use polydem_energy_guard, only: check_energy, energy_guard_t, open_energy_guard
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_log, only: log_t
+   use polydem_simulation, only: check_stability, simulation_t
+   use polydem_strings, only: to_text
+   use polydem_warnings, only: warning_t
+   implicit none
+   private
+   public :: watch_t, new_watch, look, sum_up, keep_watch
+
+   !> Guards with what they have seen
+   type :: watch_t
+      !> Thickness of each body, (slot) [m]; only for the depth of contacts
+      real(wp), allocatable :: thickness(:)
+      !> Warnings of deep contacts
+      type(warning_t) :: overlap
+      !> Energy that nobody gave
+      type(energy_guard_t) :: energy
+      !> Looks at which the step was a large share of the stable one
+      integer(lp) :: large_steps = 0_lp
+      !> Greatest share of the stable step that was warned of
+      real(wp), private :: warned = 0.0_wp
+      !> Greatest share of the stable step seen
+      real(wp) :: greatest_share = 0.0_wp
+   end type watch_t
+
+   !> Steps between two looks at what is not looked at in every step
+   integer(lp), parameter :: interval = 100_lp
+
+contains
+
+   !> Prepare the guards that the settings ask for.
+   subroutine new_watch(watch, simulation)
+      !> The guards
+      type(watch_t), intent(out) :: watch
+      !> A simulation at time 0
+      type(simulation_t), intent(in) :: simulation
+
+      associate (settings => simulation%settings%guards)
+         if (settings%overlap /= 'off') watch%thickness = thickness_of_bodies(simulation%bodies)
+         if (settings%energy /= 'off') call open_energy_guard(watch%energy, simulation%contacts)
+      end associate
+   end subroutine new_watch
+
+   !> Keep in an archive what the guards have seen.
+   subroutine keep_watch(watch, archive)
+      !> The guards
+      type(watch_t), intent(inout) :: watch
+      !> Archive
+      class(archive_t), intent(inout) :: archive
+
+      call archive%keep('/run/deep_steps', watch%overlap%count, '1', 'steps with a contact that was too deep')
+      call archive%keep('/run/energy_looks', watch%energy%warning%count, '1', 'looks that found too much energy')
+      call archive%keep('/run/large_steps', watch%large_steps, '1', 'looks that found less than twice the step')
+      call archive%keep('/run/warned_share', watch%warned, '1', 'greatest share of the stable step warned of')
+      call archive%keep('/run/greatest_share', watch%greatest_share, '1', 'greatest share of the stable step')
+   end subroutine keep_watch
+
+   !> Look at a step, and write warnings that are new.
+   subroutine look(watch, simulation, is_last, log, error)
+      !> The guards
+      type(watch_t), intent(inout) :: watch
+      !> The simulation at the end of a step
+      type(simulation_t), intent(inout) :: simulation
+      !> Whether everything is looked at, however long ago the last look was
+      logical, intent(in) :: is_last
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Allocated if the run must stop; names body, position and step
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (settings => simulation%settings%guards)
+         if (settings%overlap /= 'off') call look_at_depths(watch, simulation, error)
+         if (is_last .or. mod(simulation%step, interval) == 0_lp) then
+            if (settings%step /= 'off') call look_at_step(watch, simulation, log, error)
+            if (settings%energy /= 'off') then
+               call check_energy(watch%energy, settings%energy, settings%energy_limit, simulation%ledger, &
+                                 simulation%settings%forces%gravity, simulation%bodies, simulation%step, error)
+            end if
+         end if
+      end associate
+      call simulation%guard%warning%tell(log)
+      call watch%overlap%tell(log)
+      call watch%energy%warning%tell(log)
+   end subroutine look
+
+   !> Write how often there was reason to warn.
+   subroutine sum_up(watch, simulation, log)
+      !> The guards
+      type(watch_t), intent(in) :: watch
+      !> The simulation at its end
+      type(simulation_t), intent(in) :: simulation
+      !> Log
+      type(log_t), intent(inout) :: log
+
+      if (watch%greatest_share > 0.0_wp) call log%write_line( &
+         'greatest share of the stable step of the contacts: '//to_text(watch%greatest_share, 3))
+      call write_count(simulation%guard%warning%count, 'steps in which a body moved too far')
+      call write_count(watch%overlap%count, 'steps with a contact that was too deep')
+      call write_count(watch%energy%warning%count, 'looks at the energy that found too much of it')
+      call write_count(watch%large_steps, 'looks at the stable step that found less than twice the step')
+
+   contains
+
+      subroutine write_count(n, what)
+         integer(lp), intent(in) :: n
+         character(len=*), intent(in) :: what
+
+         if (n > 0_lp) call log%write_line('warnings: '//to_text(n)//' '//what)
+      end subroutine write_count
+
+   end subroutine sum_up
+
+   subroutine look_at_depths(watch, simulation, error)
+      type(watch_t), intent(inout) :: watch
+      type(simulation_t), intent(in) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: worst
+
+      associate (s => simulation, settings => simulation%settings%guards)
+         if (.not. any_deeper(s%contacts, watch%thickness, settings%overlap_limit)) return
+         worst = deepest_contact(s%contacts, watch%thickness)
+         call watch%overlap%respond(settings%overlap, 'step '//to_text(s%step)//': '// &
+                                    depth_text(s%bodies, s%contacts, watch%thickness, worst)// &
+                                    '. Take a smaller dt or a greater stiffness, or look for deep overlaps at the '// &
+                                    'start (relaxed_depth in &guards)', error)
+      end associate
+   end subroutine look_at_depths
+
+   !> Compare the step with the stable step of the contacts, and warn when the share has grown by a tenth.
+   subroutine look_at_step(watch, simulation, log, error)
+      type(watch_t), intent(inout) :: watch
+      type(simulation_t), intent(in) :: simulation
+      type(log_t), intent(inout) :: log
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: warning
+      real(wp) :: stable, share
+
+      call check_stability(simulation, stable, warning, error)
+      share = 0.0_wp
+      if (stable < huge(stable)) share = simulation%dt/stable
+      watch%greatest_share = max(watch%greatest_share, share)
+      if (.not. allocated(warning)) return
+      watch%large_steps = watch%large_steps + 1_lp
+      if (share <= 1.1_wp*watch%warned) return
+      watch%warned = share
+      call log%write_line('warning: '//warning)
+   end subroutine look_at_step
+
+end module polydem_watch

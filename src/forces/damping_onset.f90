@@ -1,0 +1,55 @@
+!> Damping that begins when bodies touch, not with the step in which they are first seen to overlap.
+!>
+!> A dashpot jumps from nothing to gamma v at first touch. A force that is computed once per step acts for a whole step,
+!> from half a step before to half a step after, however late the bodies met in it; so restitution is only of
+!> first order in the step. The contact is s = A/((dA/dt) dt) of a step old when it is first seen, and the dashpot has
+!> to act for s + 1/2 steps: with this weight of its first force restitution is of second order, at no cost but
+!> the memory of the area. (Exact to second order for faces, A ~ depth; at corners, where A ~ depth^2, damping
+!> begins without a jump and needs no weight; theirs, between 1/2 and 1, does not change the order.)
+module polydem_damping_onset
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_force_part, only: force_part_t
+   use polydem_kinds, only: ip, wp, worth_threads
+   implicit none
+   private
+   public :: damping_onset_t
+
+   !> Weighs the damping of the parts before it in the step of first touch
+   type, extends(force_part_t) :: damping_onset_t
+   contains
+      procedure :: add
+   end type damping_onset_t
+
+contains
+
+   !> Weigh the damping of new contacts, limit the sum to repulsion and remember the areas.
+   subroutine add(self, bodies, dt, contacts, memory)
+      class(damping_onset_t), intent(in) :: self
+      !> Bodies (not used)
+      type(bodies_t), intent(in) :: bodies
+      !> Time since the last evaluation [s]; 0: no contact is new
+      real(wp), intent(in) :: dt
+      !> Contacts; `normal_force` changes
+      type(contacts_t), intent(inout) :: contacts
+      !> Memory of the pairs; `area` is read and set
+      type(contact_memory_t), intent(inout) :: memory
+      real(wp) :: growth, damping
+      integer(ip) :: c
+
+      associate (unused_self => self, unused_bodies => bodies)
+      end associate
+      !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
+      !$omp    shared(dt, contacts, memory) private(c, growth, damping)
+      do c = 1_ip, contacts%n
+         growth = contacts%rate(c)*dt
+         if (memory%area(contacts%pair(c)) <= 0.0_wp .and. contacts%area(c) < growth) then
+            damping = contacts%normal_force(c) - contacts%elastic(c)
+            contacts%normal_force(c) = max(0.0_wp, contacts%elastic(c) + (contacts%area(c)/growth + 0.5_wp)*damping)
+         end if
+         memory%area(contacts%pair(c)) = contacts%area(c)
+      end do
+      !$omp end parallel do
+   end subroutine add
+
+end module polydem_damping_onset

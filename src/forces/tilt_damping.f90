@@ -1,0 +1,73 @@
+!> Damping of tilts: a torque T = -s sqrt(k I_eff) (w1 - w2) on the first body, the opposite on the second.
+!>
+!> A face is a bed of springs: besides E L/l against approach it has the stiffness k = E L/l L^2/12 against tilts
+!> (K.L. Johnson, Contact Mechanics, Cambridge 1985, Sec. 4.3). Normal damping follows the rate of the area, which tilts
+!> about the middle of the face do not change to first order, and friction feels them only where bodies slip; so stacks
+!> and walls bend to and fro for very long. A bed of dashpots damps tilts as well, and this torque is its second moment.
+!> I_eff = 1/(1/I1 + 1/I2); s = 2 damps the tilt of two bodies critically. Corners, of length 0, roll freely.
+!>
+!> The torque never moves the normal force beyond half of L from its line: the pressures it stands for do not pull.
+module polydem_tilt_damping
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_force_part, only: force_part_t
+   use polydem_kinds, only: ip, wp, worth_threads
+   implicit none
+   private
+   public :: tilt_damping_t, tilt_stiffness
+
+   !> Damping of tilts
+   type, extends(force_part_t) :: tilt_damping_t
+      !> Young's modulus in two dimensions E [N/m2]
+      real(wp) :: stiffness
+      !> Share s of sqrt(k I_eff)
+      real(wp) :: share
+   contains
+      procedure :: add
+   end type tilt_damping_t
+
+contains
+
+   !> Add the torque; the normal forces must be complete.
+   subroutine add(self, bodies, dt, contacts, memory)
+      class(tilt_damping_t), intent(in) :: self
+      !> Bodies, for their moments of inertia
+      type(bodies_t), intent(in) :: bodies
+      !> Time since the last evaluation [s] (not used)
+      real(wp), intent(in) :: dt
+      !> Contacts; `twist` changes
+      type(contacts_t), intent(inout) :: contacts
+      !> Memory of the pairs (not used)
+      type(contact_memory_t), intent(inout) :: memory
+      real(wp) :: mobility, limit, torque
+      integer(ip) :: c
+
+      associate (unused_dt => dt, unused_memory => memory)
+      end associate
+      !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
+      !$omp    shared(self, bodies, contacts) private(c, mobility, limit, torque)
+      do c = 1_ip, contacts%n
+         associate (i => contacts%first(c), j => contacts%second(c))
+            mobility = bodies%inverse_inertia(i) + bodies%inverse_inertia(j)
+            torque = -self%share*sqrt(tilt_stiffness(self%stiffness, contacts, c)/mobility) &
+               *(bodies%angular_velocity(i) - bodies%angular_velocity(j))
+         end associate
+         limit = 0.5_wp*contacts%length(c)*contacts%normal_force(c)
+         contacts%twist(c) = contacts%twist(c) + max(-limit, min(limit, torque))
+      end do
+      !$omp end parallel do
+   end subroutine add
+
+   !> Stiffness of a contact against tilts, as if it was a face [N]
+   pure real(wp) function tilt_stiffness(stiffness, contacts, c)
+      !> Young's modulus in two dimensions E [N/m2]
+      real(wp), intent(in) :: stiffness
+      !> Contacts with their lengths
+      type(contacts_t), intent(in) :: contacts
+      !> Place in the table
+      integer(ip), intent(in) :: c
+
+      tilt_stiffness = stiffness*contacts%length(c)**3*contacts%inverse_length(c)/12.0_wp
+   end function tilt_stiffness
+
+end module polydem_tilt_damping

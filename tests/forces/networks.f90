@@ -1,0 +1,245 @@
+!> Networks of contacts made by hand or by chance, and their dense matrices, for tests of exact friction.
+module networks
+   use polydem_assemble, only: incidence_t, index_contacts
+   use polydem_bodies, only: bodies_t
+   use polydem_body_list, only: body_list_t, new_bodies
+   use polydem_contacts, only: contact_memory_t, contacts_t, reserve_contacts
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: ip, wp
+   use polydem_random, only: random_t
+   implicit none
+   private
+   public :: scene_t, column_of, random_scene, dense_of, kkt_error
+
+   !> Bodies with forces and velocities, and their contacts
+   type :: scene_t
+      !> Bodies
+      type(bodies_t) :: bodies
+      !> Contacts
+      type(contacts_t) :: contacts
+      !> Index of the contacts
+      type(incidence_t) :: incidence
+      !> Memory of one pair per contact
+      type(contact_memory_t) :: memory
+   end type scene_t
+
+contains
+
+   !> Random squares, the first n_fixed of them fixed, with random forces, velocities and contacts.
+   subroutine random_scene(n_bodies, n_fixed, n_contacts, random, scene)
+      !> Number of bodies
+      integer(ip), intent(in) :: n_bodies
+      !> Number of fixed bodies
+      integer(ip), intent(in) :: n_fixed
+      !> Number of contacts, of different pairs; the pairs of fixed bodies and the first do not count
+      integer(ip), intent(in) :: n_contacts
+      !> Random numbers
+      type(random_t), intent(inout) :: random
+      !> The scene
+      type(scene_t), intent(out) :: scene
+      integer(ip) :: c, i, j, s
+      real(wp) :: angle, missing
+
+      call place_squares(n_bodies, n_fixed, scene)
+      do s = 1_ip, n_bodies
+         scene%bodies%velocity(:, s) = 1.0e-2_wp*[random%normal(), random%normal()]
+         scene%bodies%angular_velocity(s) = random%normal()
+         scene%bodies%force(:, s) = [random%normal(), random%normal()]
+         scene%bodies%torque(s) = 1.0e-2_wp*random%normal()
+      end do
+      missing = real(n_contacts, wp)
+      c = 0_ip
+      do i = 1_ip, n_bodies
+         do j = max(i, n_fixed) + 1_ip, n_bodies
+            if (c == n_contacts) exit
+            if (random%uniform()*real(pairs_left(i, j), wp) > missing) cycle
+            missing = missing - 1.0_wp
+            c = c + 1_ip
+            angle = 6.28_wp*random%uniform()
+            call set_contact(scene, c, i, j, [cos(angle), sin(angle)], abs(random%normal()), &
+                             1.0e-2_wp*[random%normal(), random%normal()], 1.0e-2_wp*[random%normal(), random%normal()])
+         end do
+      end do
+      call finish(scene, c)
+
+   contains
+
+      !> Pairs that are still to come, this one included
+      pure integer(ip) function pairs_left(i, j)
+         integer(ip), intent(in) :: i, j
+         integer(ip) :: k
+
+         pairs_left = n_bodies - j + 1_ip
+         do k = i + 1_ip, n_bodies
+            pairs_left = pairs_left + n_bodies - max(k, n_fixed)
+         end do
+      end function pairs_left
+
+   end subroutine random_scene
+
+   !> Thin plates on top of each other on a fixed one, each pushed sideways and twisted.
+   subroutine column_of(n_blocks, scene)
+      !> Number of free plates
+      integer(ip), intent(in) :: n_blocks
+      !> The scene
+      type(scene_t), intent(out) :: scene
+      integer(ip) :: c
+
+      call place_squares(n_blocks + 1_ip, 1_ip, scene)
+      do c = 1_ip, n_blocks
+         scene%bodies%force(1, c + 1_ip) = 0.01_wp
+         scene%bodies%torque(c + 1_ip) = 1.0e-4_wp*cos(real(c, wp))
+         call set_contact(scene, c, c, c + 1_ip, [0.0_wp, -1.0_wp], 10.0_wp*real(n_blocks - c + 1_ip, wp), &
+                          [0.0_wp, 1.0e-4_wp], [0.0_wp, -1.0e-4_wp])
+      end do
+      call finish(scene, n_blocks)
+   end subroutine column_of
+
+   !> Matrix h W and slip velocities without friction, by the definition: the motion of contact points.
+   subroutine dense_of(scene, dt, matrix, free_slip)
+      !> Scene
+      type(scene_t), intent(in) :: scene
+      !> Step [s]
+      real(wp), intent(in) :: dt
+      !> Matrix, (contact, contact) [m/s per N/m]
+      real(wp), allocatable, intent(out) :: matrix(:, :)
+      !> Slip velocities [m/s]
+      real(wp), allocatable, intent(out) :: free_slip(:)
+      real(wp), allocatable :: velocity(:, :)
+      integer(ip) :: c, k, s
+
+      associate (bodies => scene%bodies, contacts => scene%contacts)
+         allocate (matrix(contacts%n, contacts%n), free_slip(contacts%n), velocity(3, bodies%n))
+         do k = 0_ip, contacts%n
+            velocity = 0.0_wp
+            if (k == 0_ip) then
+               do s = 1_ip, bodies%n
+                  velocity(:, s) = [bodies%velocity(:, s), bodies%angular_velocity(s)]
+                  if (.not. bodies%fixed(s)) velocity(:, s) = velocity(:, s) &
+                     + dt*[bodies%force(:, s)*bodies%inverse_mass(s), bodies%torque(s)*bodies%inverse_inertia(s)]
+               end do
+            else
+               call add_force(contacts%first(k), 1.0_wp, contacts%arm_first(:, k))
+               call add_force(contacts%second(k), -1.0_wp, contacts%arm_second(:, k))
+            end if
+            do c = 1_ip, contacts%n
+               if (k == 0_ip) free_slip(c) = slip(c)
+               if (k > 0_ip) matrix(c, k) = slip(c)
+            end do
+         end do
+      end associate
+
+   contains
+
+      !> Velocity that a unit tangential force of contact k gives to a free body
+      subroutine add_force(body, sign_of_force, arm)
+         integer(ip), intent(in) :: body
+         real(wp), intent(in) :: sign_of_force, arm(2)
+         real(wp) :: force(2)
+
+         if (scene%bodies%fixed(body)) return
+         force = sign_of_force*[-scene%contacts%direction(2, k), scene%contacts%direction(1, k)]
+         velocity(1:2, body) = dt*scene%bodies%inverse_mass(body)*force
+         velocity(3, body) = dt*scene%bodies%inverse_inertia(body)*(arm(1)*force(2) - arm(2)*force(1))
+      end subroutine add_force
+
+      real(wp) function slip(c)
+         integer(ip), intent(in) :: c
+         real(wp) :: difference(2)
+
+         difference = at(scene%contacts%first(c), scene%contacts%arm_first(:, c)) &
+            - at(scene%contacts%second(c), scene%contacts%arm_second(:, c))
+         slip = scene%contacts%direction(1, c)*difference(2) - scene%contacts%direction(2, c)*difference(1)
+      end function slip
+
+      !> Velocity of a point of a body
+      function at(body, arm) result(v)
+         integer(ip), intent(in) :: body
+         real(wp), intent(in) :: arm(2)
+         real(wp) :: v(2)
+
+         v = velocity(1:2, body) + velocity(3, body)*[-arm(2), arm(1)]
+      end function at
+
+   end subroutine dense_of
+
+   !> Greatest violation of the conditions of a solution: of the bounds, of no slip below them, of slip against the
+   !> force at them; forces as shares of their limits, slip as a share of the greatest change of a slip velocity.
+   real(wp) function kkt_error(scene, dt, friction)
+      !> Scene with its friction
+      type(scene_t), intent(in) :: scene
+      !> Step [s]
+      real(wp), intent(in) :: dt
+      !> Friction coefficient
+      real(wp), intent(in) :: friction
+      real(wp), allocatable :: matrix(:, :), slip(:)
+      real(wp) :: scale
+      integer(ip) :: c
+
+      call dense_of(scene, dt, matrix, slip)
+      associate (n => scene%contacts%n, f => scene%contacts%tangential_force)
+         scale = 0.0_wp
+         do c = 1_ip, n
+            scale = max(scale, matrix(c, c)*abs(f(c)))
+            slip = slip + matrix(:, c)*f(c)
+         end do
+         kkt_error = 0.0_wp
+         do c = 1_ip, n
+            associate (limit => friction*scene%contacts%normal_force(c))
+               kkt_error = max(kkt_error, (abs(f(c)) - limit)/(limit + tiny(limit)))
+               if (abs(f(c)) < limit) then
+                  kkt_error = max(kkt_error, abs(slip(c))/scale)
+               else if (limit > 0.0_wp) then
+                  kkt_error = max(kkt_error, sign(slip(c), f(c)*slip(c))/scale)
+               end if
+            end associate
+         end do
+      end associate
+   end function kkt_error
+
+   subroutine place_squares(n_bodies, n_fixed, scene)
+      integer(ip), intent(in) :: n_bodies, n_fixed
+      type(scene_t), intent(inout) :: scene
+      real(wp), parameter :: square(2, 4) = 0.005_wp*reshape( &
+         [-1.0_wp, -1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp], [2, 4])
+      type(body_list_t) :: list
+      type(error_t), allocatable :: error
+      integer(ip) :: s
+
+      do s = 1_ip, n_bodies
+         call list%append(square, density=1000.0_wp*real(1_ip + mod(s, 7_ip), wp), fixed=s <= n_fixed)
+      end do
+      call new_bodies(list, scene%bodies, error)
+      call reserve_contacts(scene%contacts, n_bodies*(n_bodies - 1_ip)/2_ip)
+   end subroutine place_squares
+
+   subroutine set_contact(scene, c, i, j, direction, normal_force, arm_first, arm_second)
+      type(scene_t), intent(inout) :: scene
+      integer(ip), intent(in) :: c, i, j
+      real(wp), intent(in) :: direction(2), normal_force, arm_first(2), arm_second(2)
+
+      associate (contacts => scene%contacts)
+         contacts%pair(c) = c
+         contacts%first(c) = i
+         contacts%second(c) = j
+         contacts%direction(:, c) = direction
+         contacts%length(c) = 0.01_wp
+         contacts%normal(:, c) = -0.01_wp*direction
+         contacts%normal_force(c) = normal_force
+         contacts%arm_first(:, c) = arm_first
+         contacts%arm_second(:, c) = arm_second
+      end associate
+   end subroutine set_contact
+
+   subroutine finish(scene, n_contacts)
+      type(scene_t), intent(inout) :: scene
+      integer(ip), intent(in) :: n_contacts
+
+      scene%contacts%n = n_contacts
+      scene%contacts%tangential_force(1:n_contacts) = 0.0_wp
+      allocate (scene%memory%tangential(n_contacts))
+      scene%memory%tangential = 0.0_wp
+      call index_contacts(scene%bodies%n, scene%contacts, scene%incidence)
+   end subroutine finish
+
+end module networks

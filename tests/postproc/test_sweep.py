@@ -1,0 +1,379 @@
+"""Sweeps: tables, folders, several runs at once, what is done after failures and signals, and what is collected."""
+
+import csv
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import pytest
+from polydem_post import Trajectory
+from polydem_post.__main__ import main
+from polydem_post.sweep import Row, expand, make_sweep, read_table
+from polydem_post.sweep_run import Runner, available_cores, environment, state_of
+from polydem_post.trajectory import ResultError
+
+#: Stands for the program. The entry toy.does says what a run does; toy.seconds how long it takes.
+TOY = """\
+#!{python}
+import json, os, signal, sys, time
+words = sys.argv[1:]
+entries = dict(words[k + 1].split("=", 1) for k, word in enumerate(words) if word == "--set")
+if "--help" in words:
+    print("run FILE.nml {options}")
+elif words[0] == "check":
+    if "toy.wrong" in entries:
+        sys.exit("polydem: --set toy.wrong=" + entries["toy.wrong"] + ": unknown key 'wrong' in &toy")
+else:
+    result = entries["output.folder"]
+    again = os.path.isdir(result)
+    os.makedirs(result, exist_ok=True)
+    began = time.time()
+    def stop(number, _):
+        if entries["toy.does"] != "deafen":
+            print("stopped"); sys.exit(75)
+        signal.signal(number, signal.SIG_DFL)
+    signal.signal(signal.SIGUSR1, stop)
+    print("step", flush=True)
+    time.sleep(float(entries.get("toy.seconds", "0")))
+    while entries["toy.does"] in ("wait", "deafen") and not again:
+        time.sleep(0.02)
+    with open(os.path.join(result, "calls"), "a") as file:
+        file.write(json.dumps([words, began, time.time(), os.environ.get("OMP_PLACES")]) + "\\n")
+    does = entries["toy.does"]
+    if does == "fail" or (does == "fail_once" and not again):
+        print("polydem: body 7: lost", file=sys.stderr); sys.exit(1)
+    if does == "crash" and not again:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if does == "stop" and not again:
+        print("stopped"); sys.exit(75)
+"""
+
+
+@pytest.fixture
+def toy(tmp_path):
+    """Makes a program that knows --continue or not, and a namelist beside it."""
+
+    def make(options="--continue"):
+        program = tmp_path / "polydem"
+        program.write_text(TOY.format(python=sys.executable, options=options), encoding="utf-8")
+        program.chmod(0o755)
+        (tmp_path / "base.nml").write_text("&toy /\n", encoding="utf-8")
+        return program
+
+    return make
+
+
+@pytest.fixture
+def sweep_of(tmp_path, toy):
+    """Makes a sweep of rows (name, what it does, seconds)."""
+
+    def make(*rows, options="--continue"):
+        program = toy(options)
+        lines = ["name,toy.does,toy.seconds"] + [",".join(row) for row in rows]
+        table = tmp_path / "table.csv"
+        table.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        return program, make_sweep(tmp_path / "base.nml", tmp_path / "sweep", program, table)
+
+    return make
+
+
+def calls_of(run):
+    path = run.result / "calls"
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+def states(sweep):
+    return {run.name: state_of(run) for run in sweep.runs}
+
+
+# --- tables ------------------------------------------------------------------------------------------------------
+
+
+def test_reads_a_table_as_spreadsheets_write_it(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_bytes('\ufeffforces.gravity,name, scene.seed\r\n"0, -9.81",a,1\r\n\r\n,b-2.5,\r\n'.encode())
+    columns, rows = read_table(path)
+    assert columns == ["forces.gravity", "scene.seed"]
+    assert [(row.name, row.values) for row in rows] == [("a", ("0, -9.81", "1")), ("b-2.5", ("", ""))]
+    assert [row.place for row in rows] == [f"{path}:2", f"{path}:4"]
+
+
+@pytest.mark.parametrize(
+    "text, line, message",
+    [
+        ("", 0, "is empty"),
+        ("scene.seed\n1\n", 1, "needs a column name"),
+        ("name,scene.seed,scene.seed\n", 1, "'scene.seed' is there twice"),
+        ("name,seed\n", 1, "'seed' is not an entry"),
+        ("name,scene.seed x\n", 1, "is not an entry"),
+        ("name,output.folder\n", 1, "output.folder cannot vary"),
+        ("name,scene.seed\n", 0, "has no rows"),
+        ("name,scene.seed\na,1\nb\n", 3, "has 1 values, but the table has 2 columns"),
+        ("name,forces.gravity\na,0,-9.81\n", 2, "stands in double quotes"),
+        ("name,scene.seed\na,1\n\nA,2\n", 4, "the name A is given twice (first in"),
+        ("name,scene.seed\n../x,1\n", 2, "'../x' cannot be a name"),
+        ("name,scene.seed\n,1\n", 2, "'' cannot be a name"),
+        ('name,scene.seed\na,"1\n', 2, "is not CSV"),
+        ("name,scene.seed\n\x00,\x80", 0, ""),
+    ],
+)
+def test_names_file_and_line_of_a_wrong_table(tmp_path, text, line, message):
+    path = tmp_path / "table.csv"
+    path.write_bytes(text.encode("latin-1"))
+    with pytest.raises(ResultError) as caught:
+        read_table(path)
+    assert str(caught.value).startswith(f"{path}:{line}: " if line else f"{path}")
+    assert message in str(caught.value)
+
+
+def test_a_table_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(ResultError, match="no.csv: there is no such file"):
+        read_table(tmp_path / "no.csv")
+
+
+def test_lists_give_every_combination_with_every_row():
+    given = [Row("p", ("7",), "t:2"), Row("q", ("",), "t:3")]
+    columns, rows = expand(["a.x"], given, ["b.y=1,2", "c.z=u v,w", "d.e=5"])
+    assert columns == ["a.x", "b.y", "c.z", "d.e"]
+    assert [row.name for row in rows] == [f"{n}-y_{y}-z_{z}" for n in "pq" for y in "12" for z in ("u_v", "w")]
+    assert rows[5].values == ("", "1", "w", "5")
+    assert rows[5].place == "t:3"
+
+
+def test_values_with_commas_stand_between_semicolons():
+    _, rows = expand([], [], ["forces.gravity=0,-9.81;0,-1.62"])
+    assert [row.values for row in rows] == [("0,-9.81",), ("0,-1.62",)]
+    assert [row.name for row in rows] == ["gravity_0_-9.81", "gravity_0_-1.62"]
+
+
+def test_runs_are_numbered_where_values_make_no_names():
+    assert [row.name for row in expand([], [], ["a.x=1"])[1]] == ["run_0001"]
+    assert [row.name for row in expand([], [], ["a.x=1 2,1/2"])[1]] == ["run_0001", "run_0002"]
+
+
+@pytest.mark.parametrize("lists", [["a.x="], ["a.x=1", "a.x=2"], ["output.folder=a,b"]])
+def test_refuses_lists_that_are_none(lists):
+    with pytest.raises(ResultError):
+        expand([], [], lists)
+
+
+# --- making ------------------------------------------------------------------------------------------------------
+
+
+def test_makes_a_frozen_folder_for_every_run(sweep_of, tmp_path):
+    _, sweep = sweep_of(("a", "finish", ""), ("b", "fail", "0.5"))
+    (tmp_path / "base.nml").write_text("changed", encoding="utf-8")
+    folder = tmp_path / "sweep" / "runs"
+    assert (folder / "a" / "overrides.txt").read_text() == "toy.does=finish\n"
+    assert (folder / "b" / "overrides.txt").read_text() == "toy.does=fail\ntoy.seconds=0.5\n"
+    assert (folder / "b" / "input.nml").read_text() == "&toy /\n"
+    assert [run.name for run in sweep.choose([2])] == ["b"]
+    assert [run.name for run in sweep.choose([2], ["a"])] == ["a", "b"]
+    for numbers, names in (([3], None), ([0], None), (None, ["c"])):
+        with pytest.raises(ResultError, match="there is no"):
+            sweep.choose(numbers, names)
+
+
+def test_wrong_rows_are_told_with_their_lines_and_nothing_is_made(toy, tmp_path, capsys):
+    table = tmp_path / "table.csv"
+    table.write_text("name,toy.wrong\na,\nb,1\nc,2\n", encoding="utf-8")
+    words = ["make", str(table), str(tmp_path / "base.nml"), "--output", str(tmp_path / "sweep")]
+    assert main(["sweep", "--program", str(toy()), *words]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert said == [f"error: {table}:3: --set toy.wrong=1: unknown key 'wrong' in &toy",
+                    f"{table}:4: --set toy.wrong=2: unknown key 'wrong' in &toy"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["base.nml", "polydem", "table.csv"]
+
+
+def test_does_not_mix_with_what_is_there(sweep_of):
+    sweep_of(("a", "finish", ""))
+    with pytest.raises(ResultError, match="is there already"):
+        sweep_of(("b", "finish", ""))
+
+
+@pytest.mark.parametrize("words", [["make", "a.nml", "b.nml"], ["make", "a.csv", "b.csv", "c.nml"], ["make", "a.csv"]])
+def test_make_takes_one_namelist_and_one_table(words, capsys):
+    assert main(["sweep", "--program", "none", *words, "--output", "x"]) == 2
+    assert "takes one namelist" in capsys.readouterr().err
+
+
+# --- running -----------------------------------------------------------------------------------------------------
+
+
+def test_runs_several_at_once_and_never_more(sweep_of):
+    program, sweep = sweep_of(*((f"r{k}", "finish", "0.3") for k in range(6)))
+    assert Runner(program, 4, 2, say=lambda _: None).run(sweep.runs) == 0
+    assert set(states(sweep).values()) == {"finished"}
+    spans = [call[1:3] for run in sweep.runs for call in calls_of(run)]
+    at_once = [sum(begin <= moment < end for begin, end in spans) for moment, _ in spans]
+    assert max(at_once) == 2
+    assert [len(calls_of(run)) for run in sweep.runs] == [1] * 6
+    words = calls_of(sweep.runs[0])[0][0]
+    assert words[:4] == ["run", str(sweep.runs[0].folder / "input.nml"), "--threads", "2"]
+    assert words[-3:] == ["--set", f"output.folder={sweep.runs[0].result}", "--continue"]
+
+
+def test_goes_on_with_what_is_left(sweep_of):
+    said = []
+    program, sweep = sweep_of(("good", "finish", ""), ("early", "stop", ""), ("bad", "fail_once", ""),
+                              ("shot", "crash", ""))
+    assert Runner(program, 1, 1, said.append).run(sweep.runs) == 75
+    assert states(sweep) == {"good": "finished", "early": "stopped", "bad": "failed", "shot": "interrupted"}
+    assert "bad: failed with exit code 1: body 7: lost" in said
+    said.clear()
+    assert Runner(program, 1, 1, said.append).run(sweep.runs) == 1
+    assert states(sweep) == {"good": "finished", "early": "finished", "bad": "failed", "shot": "finished"}
+    assert said[0] == "bad: failed with exit code 1: body 7: lost (--retry runs it again)"
+    assert Runner(program, 1, 1, said.append).run(sweep.runs, retry=True) == 0
+    assert [len(calls_of(run)) for run in sweep.runs] == [1, 2, 2, 2]
+    assert [len(run.attempts()) for run in sweep.runs] == [1, 2, 2, 2]
+    assert sweep.runs[3].attempts()[0]["exit_code"] == -signal.SIGKILL
+
+
+def test_begins_anew_where_the_program_cannot_go_on(sweep_of):
+    program, sweep = sweep_of(("early", "stop", ""), options="--force")
+    assert Runner(program, 1, 1, say=lambda _: None).run(sweep.runs) == 75
+    assert Runner(program, 1, 1, say=lambda _: None).run(sweep.runs) == 0
+    assert [call[0][-1] for call in calls_of(sweep.runs[0])] == [f"output.folder={sweep.runs[0].result}", "--force"]
+
+
+def test_binds_runs_to_cores_of_their_own_if_all_are_theirs(monkeypatch):
+    monkeypatch.setenv("OMP_PLACES", "cores")
+    monkeypatch.setattr("polydem_post.sweep_run.available_cores", lambda: [2, 3, 6, 7])
+    places = [environment(4, 2, slot)["OMP_PLACES"] for slot in range(2)]
+    assert places == ["{2},{3}", "{6},{7}"]
+    part = environment(2, 1, 0)
+    assert ("OMP_PLACES" in part, part["OMP_PROC_BIND"], part["OMP_NUM_THREADS"]) == (False, "false", "1")
+    assert environment(8, 1, 0)["OMP_WAIT_POLICY"] == "passive"
+
+
+def test_threads_must_fit_on_the_cores(toy):
+    with pytest.raises(ResultError, match="runs of 3 threads do not fit on 2 cores"):
+        Runner(toy(), 2, 3)
+
+
+def start(program, sweep, *options):
+    """A sweep in a process of its own."""
+    command = [sys.executable, "-m", "polydem_post", "sweep", "--program", str(program), "run", str(sweep.folder)]
+    return subprocess.Popen([*command, *options], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+def await_steps(sweep, n):
+    """Wait until n runs are under way."""
+    for _ in range(1000):
+        if sum((run.folder / "output.txt").exists() and "step" in (run.folder / "output.txt").read_text()
+               for run in sweep.runs) == n:
+            return
+        time.sleep(0.02)
+    pytest.fail("the runs did not start")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGUSR1])
+def test_a_signal_ends_the_runs_early_and_the_next_call_goes_on(sweep_of, number):
+    program, sweep = sweep_of(("a", "wait", ""), ("b", "wait", ""), ("c", "finish", ""))
+    process = start(program, sweep, "--cores", "2")
+    await_steps(sweep, 2)
+    process.send_signal(number)
+    said = process.communicate(timeout=60)[0]
+    assert process.returncode == 75, said
+    assert states(sweep) == {"a": "stopped", "b": "stopped", "c": "not run"}
+    assert said.splitlines()[-1] == "the same command goes on with what is left"
+    assert "Traceback" not in said
+    process = start(program, sweep, "--cores", "2")
+    process.communicate(timeout=60)
+    assert process.returncode == 0
+    assert set(states(sweep).values()) == {"finished"}
+
+
+def test_a_second_signal_does_not_wait(sweep_of):
+    program, sweep = sweep_of(("a", "deafen", ""))
+    process = start(program, sweep)
+    await_steps(sweep, 1)
+    process.send_signal(signal.SIGINT)
+    time.sleep(0.5)
+    assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    said = process.communicate(timeout=60)[0]
+    assert process.returncode == 75, said
+    assert states(sweep) == {"a": "interrupted"}
+
+
+def test_two_calls_share_the_runs(sweep_of):
+    program, sweep = sweep_of(*((f"r{k}", "finish", "0.2") for k in range(4)))
+    processes = [start(program, sweep, "--cores", "1") for _ in range(2)]
+    said = [process.communicate(timeout=60)[0] for process in processes]
+    assert [len(calls_of(run)) for run in sweep.runs] == [1] * 4, said
+
+
+def test_what_is_no_sweep_is_told(tmp_path, capsys):
+    assert main(["sweep", "--program", "none", "run", str(tmp_path)]) == 2
+    assert "is not a sweep" in capsys.readouterr().err
+
+
+# --- with the program --------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def heights(tmp_path_factory):
+    """A sweep of the program itself: two heights of a stack, one that fails, one that is not run."""
+    program, root = Path(os.environ["POLYDEM_PROGRAM"]), Path(os.environ["POLYDEM_SOURCE_DIR"])
+    folder = tmp_path_factory.mktemp("heights")
+    table = folder / "table.csv"
+    table.write_text("name,scene.bodies\nlow,2\nhigh,4\nwild,3\nlater,3\n", encoding="utf-8")
+    made = make_sweep(root / "inputs" / "stack.nml", folder / "sweep", program, table)
+    for run in made.runs:
+        with (run.folder / "overrides.txt").open("a", encoding="utf-8") as file:
+            file.write("integrate.duration=2\nintegrate.dt=1\n" if run.name == "wild" else "integrate.duration=0.01\n")
+    code = Runner(program, 2, 1, say=lambda _: None).run(made.choose([1, 2, 3]))
+    return made, code
+
+
+def test_collects_what_the_program_left(heights, capsys):
+    sweep, code = heights
+    assert code == 1
+    assert main(["sweep", "collect", str(sweep.folder)]) == 0
+    said = capsys.readouterr().out.splitlines()
+    assert said[0].startswith("wild: failed with exit code 1: ")
+    assert said[1:3] == ["later: not run", "2 of 4 runs are finished"]
+    with (sweep.folder / "results.csv").open(newline="", encoding="utf-8") as file:
+        rows = {row["name"]: row for row in csv.DictReader(file)}
+    high = Trajectory(sweep.runs[1].result)
+    assert rows["high"]["state_hash"] == high.state_hash != rows["low"]["state_hash"]
+    assert float(rows["high"]["ledger.kinetic"]) == high.ledger["kinetic"][-1]
+    assert float(rows["high"]["stage.all"]) == high.profile["seconds"]
+    assert int(rows["high"]["counter.steps"]) == high.counters["steps"]
+    assert (rows["high"]["revision"], rows["high"]["threads"]) == (high.provenance["revision"], "1")
+    assert float(rows["high"]["wall"]) >= high.profile["seconds"]
+    assert (rows["later"]["state"], rows["later"]["exit_code"], rows["later"]["state_hash"]) == ("not run", "", "")
+    assert (rows["wild"]["state"], rows["wild"]["exit_code"]) == ("failed", "1")
+    with h5py.File(sweep.folder / "results.h5", "r") as file:
+        assert list(file["name"].asstr()) == ["low", "high", "wild", "later"]
+        assert list(file["parameter/scene.bodies"]) == [2, 4, 3, 3]
+        assert list(file["state_hash"].asstr())[1] == high.state_hash
+        assert file["ledger/kinetic"][1] == high.ledger["kinetic"][-1]
+        assert file["ledger/kinetic"].attrs["unit"] == high.ledger_units["kinetic"] == "J/m"
+        assert file["stage/all"].attrs["unit"] == "s"
+        assert str(file["exit_code"][3]) == "nan"
+
+
+def test_the_program_finds_the_wrong_entry(tmp_path, capsys):
+    program, root = os.environ["POLYDEM_PROGRAM"], Path(os.environ["POLYDEM_SOURCE_DIR"])
+    table = tmp_path / "table.csv"
+    table.write_text("name,forces.fricton_coefficient\na,0.1\n", encoding="utf-8")
+    words = ["make", str(table), str(root / "inputs" / "stack.nml"), "--output", str(tmp_path / "sweep")]
+    assert main(["sweep", "--program", program, *words]) == 2
+    message = capsys.readouterr().err
+    assert message.startswith(f"error: {table}:2: --set forces.fricton_coefficient=0.1")
+    assert "did you mean 'friction_coefficient'" in message
+
+
+def test_knows_the_cores_of_this_process():
+    only = str(available_cores()[0])
+    code = "from polydem_post.sweep_run import available_cores; print(available_cores())"
+    command = ["taskset", "-c", only, sys.executable, "-c", code]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == f"[{only}]"

@@ -1,0 +1,234 @@
+!> Benchmark B8: a block on an incline slides, rests or topples.
+!>
+!> Sliding it accelerates with g (sin a - mu cos a). Below tan a = mu it rests, and with a spring for friction it sags
+!> by m g sin a/k_t and then does not move.
+!>
+!> With enough friction it topples where its weight points beside its base, tan a = w/h, if it is rigid. A soft one
+!> stands on a triangle of area A = m g l/E. With the length 3 s of the triangle, s the distance of the weight from
+!> the edge, it is tilted by t = 2 A/(9 s^2), which moves the weight towards the edge: s = s_0 - h t/2, s_0 = (w - h
+!> tan a)/2. Both hold somewhere as long as s_0^3 > 3 h A/4: so it topples at tan a = (w - 2 (3 h A/4)^(1/3))/h, which
+!> tends to w/h with E^(-1/3) only.
+module b08_incline
+   use outlines, only: gravity, integrate_text
+   use polydem_body_list, only: body_list_t
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: wp
+   use polydem_simulation, only: simulation_t
+   use polydem_strings, only: to_text
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
+   implicit none
+   private
+   public :: run_incline, put_on_slope
+
+   real(wp), parameter :: young = 1.0e7_wp
+   real(wp), parameter :: density = 2500.0_wp
+   !> Friction coefficient and sides of the block, but for toppling [m]
+   real(wp), parameter :: mu = 0.3_wp, size_of_block(2) = [0.02_wp, 0.01_wp]
+   !> Thickness of the plank [m]
+   real(wp), parameter :: thickness = 0.05_wp
+
+contains
+
+   !> Slide, rest, topple.
+   subroutine run_incline(table, thorough)
+      !> Table to fill
+      type(table_t), intent(inout) :: table
+      !> A million steps of rest instead of 1e5
+      logical, intent(in) :: thorough
+
+      call table%begin('B8', 'block on an incline')
+      call slide(table, 0.5_wp, 'cundall_strack')
+      call slide(table, 0.32_wp, 'cundall_strack')
+      call slide(table, atan(1.01_wp*mu), 'exact')
+      call rest(table, merge(500000, 50000, thorough))
+      call rest_exactly(table, merge(500000, 50000, thorough))
+      call topple(table, 1.0e7_wp)
+      if (thorough) call topple(table, 1.0e9_wp)
+   end subroutine run_incline
+
+   subroutine slide(table, slope, friction)
+      type(table_t), intent(inout) :: table
+      real(wp), intent(in) :: slope
+      character(len=*), intent(in) :: friction
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+      real(wp) :: early, late
+
+      call put_on_slope(slope, 0.0_wp, size_of_block, mu, 'friction = '''//friction//'''', simulation, error)
+      if (.not. allocated(error)) call steps(simulation, 10000, error)
+      early = downhill(slope, simulation%bodies%velocity(:, 2))
+      if (.not. allocated(error)) call steps(simulation, 10000, error)
+      late = downhill(slope, simulation%bodies%velocity(:, 2))
+      call table%note_error(error)
+      if (allocated(error)) return
+      call table%expect_relative(friction//', tan a = '//to_text(tan(slope)/mu, 3)//' mu: acceleration [m/s2]', &
+                                 gravity*(sin(slope) - mu*cos(slope)), (late - early)/0.1_wp, 1.0e-3_wp)
+   end subroutine slide
+
+   !> The load comes at once, so the slope is less than half the critical one, or the spring would overshoot its limit.
+   subroutine rest(table, n)
+      type(table_t), intent(inout) :: table
+      integer, intent(in) :: n
+      real(wp), parameter :: slope = 0.1_wp, size(2) = size_of_block
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+      real(wp) :: start(2), middle(2), load
+
+      call put_on_slope(slope, 0.0_wp, size, mu, '', simulation, error)
+      if (allocated(error)) return
+      start = simulation%bodies%position(:, 2)
+      call steps(simulation, n, error)
+      middle = simulation%bodies%position(:, 2)
+      load = density*size(1)*size(2)*gravity*sin(slope)
+      call table%note_error(error)
+      if (allocated(error)) return
+      ! The block also tilts; what the spring feels is the displacement of the base.
+      call table%expect_relative('rests at 0.1 rad: sag of the spring [m]', load/(2.0_wp/7.0_wp*young), &
+                                 downhill(slope, middle - start) + 0.5_wp*size(2)*simulation%bodies%angle(2), 0.01_wp)
+      call table%expect_relative('rests: force of the spring [N/m]', load, abs(simulation%memory%tangential(1)), &
+                                 1.0e-6_wp)
+      call steps(simulation, n, error)
+      call table%note_error(error)
+      call table%expect_absolute('rests: move along the slope in the second half of '//to_text(2*n)//' steps [m]', &
+                                 0.0_wp, &
+                                 downhill(slope, simulation%bodies%position(:, 2) - middle), 1.0e-14_wp)
+   end subroutine rest
+
+   !> At 0.99 of the critical slope, after it has settled, exact friction lets nothing creep: 2 units in the last place
+   !> of 1 m are allowed.
+   subroutine rest_exactly(table, n)
+      type(table_t), intent(inout) :: table
+      integer, intent(in) :: n
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+      real(wp) :: middle(2), slope
+
+      slope = atan(0.99_wp*mu)
+      call put_on_slope(slope, 0.0_wp, size_of_block, mu, 'friction = ''exact''', simulation, error)
+      if (.not. allocated(error)) call steps(simulation, n, error)
+      if (.not. allocated(error)) middle = simulation%bodies%position(:, 2)
+      if (.not. allocated(error)) call steps(simulation, n, error)
+      call table%note_error(error)
+      if (allocated(error)) return
+      call table%expect_absolute('exact, tan a = 0.99 mu: move in the second half of '//to_text(2*n)//' steps [m]', &
+                                 0.0_wp, downhill(slope, simulation%bodies%position(:, 2) - middle), &
+                                 2.0_wp*epsilon(1.0_wp))
+   end subroutine rest_exactly
+
+   !> A block four times as high as wide, from its position of equilibrium just below the slope where it topples, and
+   !> from flat just above it.
+   subroutine topple(table, young)
+      type(table_t), intent(inout) :: table
+      real(wp), intent(in) :: young
+      real(wp), parameter :: size(2) = [0.01_wp, 0.04_wp]
+      real(wp) :: area, least, critical, turned
+      character(len=:), allocatable :: name
+
+      area = overlap_area(size, young)
+      least = (0.75_wp*size(2)*area)**(1.0_wp/3.0_wp)
+      critical = atan((size(1) - 2.0_wp*least)/size(2))
+      name = 'h/w = 4, mu = 1, E = '//to_text(young, 1)//': '
+      call table%show(name//'toppling tan a over w/h', tan(critical)*size(2)/size(1))
+      call turn_within(0.97_wp*critical, turned)
+      call table%expect_absolute(name//'at 0.97 of that: turns within 0.5 s by [rad]', 0.0_wp, turned, 1.0e-3_wp)
+      call turn_within(1.03_wp*critical, turned)
+      call table%expect_true(name//'at 1.03 of that: topples within 0.5 s', turned > 0.5_wp)
+
+   contains
+
+      subroutine turn_within(slope, turned)
+         real(wp), intent(in) :: slope
+         real(wp), intent(out) :: turned
+         type(simulation_t) :: simulation
+         type(error_t), allocatable :: error
+         integer :: k
+
+         call put_on_edge(slope, size, young, area, simulation, error)
+         turned = 0.0_wp
+         do k = 1, 500
+            if (.not. allocated(error)) call steps(simulation, nint(1.0e-3_wp/simulation%dt), error)
+            if (allocated(error)) exit
+            turned = abs(simulation%bodies%angle(2))
+            if (turned > 0.5_wp) exit
+         end do
+         call table%note_error(error)
+      end subroutine turn_within
+
+   end subroutine topple
+
+   !> Area of the overlap that carries the weight of a block that is about to topple, A = m g l/E [m2]
+   pure real(wp) function overlap_area(size, young)
+      real(wp), intent(in) :: size(2), young
+      real(wp) :: r1, r2
+
+      r1 = 0.5_wp*hypot(size(1), size(2))
+      r2 = 0.5_wp*hypot(size(1), thickness)
+      overlap_area = density*size(1)*size(2)*gravity/young*4.0_wp*r1*r2/(r1 + r2)
+   end function overlap_area
+
+   !> A block on its lower edge, tilted so that it is in equilibrium there: the overlap is a triangle of length 3 s
+   !> and angle t = 2 A/(3 s)^2, and the weight passes the corner at s = (w - h tan(a + t))/2. The smaller of the two
+   !> solutions is the stable one; where there is none, the tilt at which both would meet.
+   subroutine put_on_edge(slope, size, young, area, simulation, error)
+      real(wp), intent(in) :: slope, size(2), young, area
+      type(simulation_t), intent(out) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+      type(body_list_t) :: list
+      real(wp) :: tilt, margin, corner(2), centre(2)
+      integer :: k
+
+      tilt = 0.0_wp
+      margin = 0.5_wp*(size(1) - size(2)*tan(slope))
+      do k = 1, 200
+         tilt = min(2.0_wp*area/(9.0_wp*(margin - 0.5_wp*size(2)*tilt)**2), 2.0_wp*margin/(3.0_wp*size(2)))
+      end do
+      ! In the frame of the plank, whose face is y = 0 and whose x axis points downhill.
+      corner = [0.0_wp, -3.0_wp*(margin - 0.5_wp*size(2)*tilt)*tilt]
+      centre = corner + 0.5_wp*[-size(1)*cos(tilt) + size(2)*sin(tilt), size(1)*sin(tilt) + size(2)*cos(tilt)]
+      centre = centre + [0.0_wp, 0.5_wp*thickness]
+      call list%append(block_at(0.0_wp, 0.0_wp, 0.5_wp, thickness, -slope), fixed=.true.)
+      call list%append(block_at(cos(slope)*centre(1) + sin(slope)*centre(2), &
+                       cos(slope)*centre(2) - sin(slope)*centre(1), &
+                                size(1), size(2), -slope - tilt))
+      call begin('&forces friction_coefficient = 1 damping_coefficient = 1 stiffness = '//to_text(young)//' /'// &
+                 integrate_text(5.0e-6_wp*sqrt(1.0e7_wp/young)), list, simulation, error)
+   end subroutine put_on_edge
+
+   !> A long fixed plank and a block in its static depth on it, body 2, at steps of 1e-5 s.
+   subroutine put_on_slope(slope, speed, size, mu, forces, simulation, error)
+      !> Angle of the plank, downhill to the right [rad]
+      real(wp), intent(in) :: slope
+      !> Speed downhill at the start [m/s]
+      real(wp), intent(in) :: speed
+      !> Width and height of the block [m]
+      real(wp), intent(in) :: size(2)
+      !> Friction coefficient
+      real(wp), intent(in) :: mu
+      !> Further entries of &forces
+      character(len=*), intent(in) :: forces
+      !> Ready to advance
+      type(simulation_t), intent(out) :: simulation
+      !> What went wrong
+      type(error_t), allocatable, intent(inout) :: error
+      type(body_list_t) :: list
+      real(wp) :: distance, depth
+
+      ! E w d/l with l = 2 h T/(h + T), up to d/h.
+      depth = density*size(2)*gravity*cos(slope)/young*2.0_wp*size(2)*thickness/(size(2) + thickness)
+      distance = 0.5_wp*(size(2) + thickness) - depth
+      call list%append(block_at(0.0_wp, 0.0_wp, 2.0_wp, thickness, -slope), fixed=.true.)
+      call list%append(block_at(sin(slope)*distance, cos(slope)*distance, size(1), size(2), -slope), &
+                       velocity=[speed*cos(slope), -speed*sin(slope)])
+      call begin('&forces '//forces//' friction_coefficient = '//to_text(mu, &
+                 17)//' damping_coefficient = 1 /'// &
+                 integrate_text(1.0e-5_wp), list, simulation, error)
+   end subroutine put_on_slope
+
+   pure real(wp) function downhill(slope, vector)
+      real(wp), intent(in) :: slope, vector(2)
+
+      downhill = cos(slope)*vector(1) - sin(slope)*vector(2)
+   end function downhill
+
+end module b08_incline

@@ -1,0 +1,160 @@
+!> Benchmark B14: a stack of squares that starts in its static depths stays there, unless it is so high that it buckles.
+!>
+!> Interface i from the top carries i blocks: its depth is d_i = i m g l/(E w), where l = w - d_i since both force
+!> points lie half a depth inside the blocks. Everything is in balance from the start; rounding alone could move the
+!> stack. The damping must be strong, since the slowest mode of 50 blocks decays with 2 gamma 1/s only.
+!>
+!> A face that tilts by t shifts the centroid of its overlap by w^2 t/(12 d), so it bends back with the moment
+!> E w^2 t/12, whatever it carries. A stack is thus a column of bending stiffness B = E w^3/12 under its own weight
+!> q = rho g w per height, and buckles at the height (7.837 B/q)^(1/3) (A.G. Greenhill, Proc. Camb. Phil. Soc. 4 (1881)
+!> 65): n = (0.653 E/(rho g w))^(1/3) blocks, 29.9 at E = 1e7 and 64 at E = 1e8. Stacks of 24 and 36 blocks get a nudge.
+module b14_stack
+   use outlines, only: gravity
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: ip, wp
+   use polydem_read_settings, only: read_settings_text
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: new_simulation, simulation_t
+   use polydem_strings, only: to_text
+   use trial, only: steps
+   use verification_table, only: table_t
+   implicit none
+   private
+   public :: run_stack
+
+   real(wp), parameter :: width = 0.01_wp
+   real(wp), parameter :: weight = 2500.0_wp*width**2*gravity
+
+contains
+
+   !> Ten blocks for 2e4 steps, or fifty for a million.
+   subroutine run_stack(table, thorough)
+      !> Table to fill
+      type(table_t), intent(inout) :: table
+      !> The high stack
+      logical, intent(in) :: thorough
+      real(wp) :: leaning
+
+      if (thorough) then
+         call stand(table, 50, 1000000, 1.0e8_wp, 'cundall_strack')
+         call stand(table, 50, 1000000, 1.0e8_wp, 'exact')
+      else
+         call stand(table, 10, 20000, 1.0e7_wp, 'cundall_strack')
+         call stand(table, 10, 20000, 1.0e7_wp, 'exact')
+      end if
+      call table%show('blocks at which a stack buckles, E = 1e7', &
+                      (7.837_wp/12.0_wp*1.0e7_wp*width/weight)**(1.0_wp/3.0_wp))
+      call nudge(table, 24_ip, leaning)
+      call table%expect_absolute('24 blocks, E = 1e7, nudged: the top leans after 2 s by [m]', 0.0_wp, leaning, &
+                                 0.1_wp*width)
+      call nudge(table, 36_ip, leaning)
+      call table%expect_true('36 blocks, E = 1e7, nudged: the top leans by a width within 2 s', leaning > width)
+   end subroutine run_stack
+
+   !> Push a stack sideways so that its top has 1 mm/s; distance of the top from the middle after 2 s, or when that
+   !> exceeds a width.
+   subroutine nudge(table, n, leaning)
+      type(table_t), intent(inout) :: table
+      integer(ip), intent(in) :: n
+      real(wp), intent(out) :: leaning
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+      integer(ip) :: k
+
+      call build(n, 1.0e7_wp, 'cundall_strack', simulation, error)
+      leaning = 0.0_wp
+      do k = 1_ip, n
+         if (.not. allocated(error)) simulation%bodies%velocity(1, k) = 1.0e-3_wp*real(k, wp)/real(n, wp)
+      end do
+      do k = 1_ip, 20_ip
+         if (.not. allocated(error)) call steps(simulation, nint(0.1_wp/simulation%dt), error)
+         if (allocated(error)) exit
+         leaning = abs(simulation%bodies%position(1, n))
+         if (leaning > width) exit
+      end do
+      call table%note_error(error)
+   end subroutine nudge
+
+   subroutine build(n, young, friction, simulation, error)
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: young
+      character(len=*), intent(in) :: friction
+      type(simulation_t), intent(out) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=1) :: no_overrides(0)
+      type(settings_t) :: settings
+
+      call read_settings_text('stack.nml', '&scene name = ''stack'' width = 0.01 height = 0.01 bodies = '// &
+                              to_text(n)// &
+                              ' / &forces friction = '''//friction//''' damping_coefficient = 1 stiffness = '// &
+                                 to_text(young)// &
+                              ' / &integrate duration = 1000 / &output ledger = .false. /', no_overrides, settings, &
+                              error)
+      if (.not. allocated(error)) call new_simulation(settings, simulation, error)
+   end subroutine build
+
+   subroutine stand(table, n, n_steps, young, friction)
+      type(table_t), intent(inout) :: table
+      integer, intent(in) :: n, n_steps
+      real(wp), intent(in) :: young
+      character(len=*), intent(in) :: friction
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+      real(wp), allocatable :: start(:, :)
+      real(wp) :: worst, depth
+      integer :: c
+
+      call table%begin('B14', 'a stack of '//to_text(int(n, ip))//' squares from its static depths, '// &
+                       to_text(int(n_steps, ip))//' steps, friction '//friction)
+      call build(int(n, ip), young, friction, simulation, error)
+      if (.not. allocated(error)) start = simulation%bodies%position
+      if (.not. allocated(error)) call steps(simulation, n_steps, error)
+      call table%note_error(error)
+      if (allocated(error)) return
+      ! Contacts in the order of the lower block; the last one, of block 1 and the floor, comes behind that with block
+      ! 2.
+      worst = 0.0_wp
+      associate (contacts => simulation%contacts)
+         do c = 1, contacts%n
+            depth = contacts%area(c)/width
+            worst = max(worst, abs(depth/(weight*above(c)/(young*width)*(width - depth)) - 1.0_wp))
+         end do
+         call table%expect_absolute('number of contacts', real(n, wp), real(contacts%n, wp), 0.0_wp)
+         call table%expect_relative('depth of the lowest interface [m]', depth_below(n, young), &
+                                    contacts%area(2)/width, &
+                                    1.0e-6_wp)
+         call table%expect_absolute('worst relative error of a depth', 0.0_wp, worst, 1.0e-6_wp)
+      end associate
+      call table%expect_absolute('greatest speed [m/s]', 0.0_wp, maxval(abs(simulation%bodies%velocity)), 1.0e-10_wp)
+      call table%expect_absolute('greatest move of a block [m]', 0.0_wp, &
+                                 maxval(abs(simulation%bodies%position - start)), 1.0e-12_wp)
+      call table%expect_absolute('greatest turn of a block [rad]', 0.0_wp, maxval(abs(simulation%bodies%angle)), &
+                                 1.0e-12_wp)
+
+   contains
+
+      !> Number of blocks that a contact carries
+      real(wp) function above(c)
+         integer, intent(in) :: c
+
+         associate (contacts => simulation%contacts)
+            if (simulation%bodies%fixed(contacts%second(c))) then
+               above = real(n, wp)
+            else
+               above = real(n - contacts%first(c), wp)
+            end if
+         end associate
+      end function above
+
+   end subroutine stand
+
+   !> Depth d of an interface below n blocks, d = n weight (w - d)/(E w) [m]
+   pure real(wp) function depth_below(n, young)
+      integer, intent(in) :: n
+      real(wp), intent(in) :: young
+
+      depth_below = real(n, wp)*weight/(young*width)
+      depth_below = depth_below*width/(1.0_wp + depth_below)
+   end function depth_below
+
+end module b14_stack

@@ -1,0 +1,102 @@
+!> Benchmark B15: a stack of blocks that leans over as far as it can.
+!>
+!> Block i from the top, counted from 1, may stand out by w/(2 i) over the next lower one: then the centre of mass of
+!> what it carries, itself included, is above the edge. At 0.98 of all these overhangs the stack stands, at 1.02 it
+!> falls.
+!>
+!> That is for rigid blocks. At a share f of the overhangs every centre of mass is s = (1 - f) w/2 inside the edge. A
+!> soft edge gives way below s^3 = 3 H A/2, where A = m g l/E and H are the overlap and the height of the centre of
+!> mass of what it carries (`b08_incline`): for ten blocks and f = 0.98 that is E = 7e9, and all other edges tilt,
+!> too, so that ten blocks with E = 1e10 fall (shown).
+module b15_overhang
+   use outlines, only: integrate_text
+   use polydem_body_list, only: body_list_t
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: ip, wp
+   use polydem_simulation, only: simulation_t
+   use polydem_strings, only: to_text
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
+   implicit none
+   private
+   public :: run_overhang
+
+   real(wp), parameter :: width = 0.1_wp
+   real(wp), parameter :: height = 0.02_wp
+
+contains
+
+   !> Three blocks, and ten.
+   subroutine run_overhang(table, thorough)
+      !> Table to fill
+      type(table_t), intent(inout) :: table
+      !> The high stack as well
+      logical, intent(in) :: thorough
+      real(wp) :: fallen
+
+      call table%begin('B15', 'blocks of 10 cm x 2 cm, each as far out as it can be')
+      call lean(table, 3_ip, 1.0e10_wp)
+      if (.not. thorough) return
+      call fall_within(table, 10_ip, 0.98_wp, 1.0e10_wp, 0.5_wp, fallen)
+      call table%show('10 blocks, E = 1e10, at 0.98: the top block sinks in 0.5 s by [m]', fallen)
+      call lean(table, 10_ip, 1.0e12_wp)
+   end subroutine run_overhang
+
+   subroutine lean(table, n, young)
+      type(table_t), intent(inout) :: table
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: young
+      real(wp) :: fallen
+      character(len=:), allocatable :: name
+
+      name = to_text(n)//' blocks, E = '//to_text(young, 1)//', '
+      call fall_within(table, n, 0.98_wp, young, 0.5_wp, fallen)
+      call table%expect_absolute(name//'at 0.98: the top block sinks in 0.5 s by [m]', 0.0_wp, fallen, 1.0e-4_wp)
+      call fall_within(table, n, 1.02_wp, young, 2.0_wp, fallen)
+      call table%expect_true(name//'at 1.02: the top block falls by its height within 2 s', fallen > height)
+   end subroutine lean
+
+   !> How far the top block sinks within a time, or until it has fallen by its height [m].
+   subroutine fall_within(table, n, share, young, time, fallen)
+      type(table_t), intent(inout) :: table
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: share, young, time
+      real(wp), intent(out) :: fallen
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+      real(wp) :: start
+      integer :: k
+
+      call build(n, share, young, simulation, error)
+      fallen = 0.0_wp
+      if (.not. allocated(error)) start = simulation%bodies%position(2, n)
+      do k = 1, 100
+         if (.not. allocated(error)) call steps(simulation, nint(0.01_wp*time/simulation%dt), error)
+         if (allocated(error)) exit
+         fallen = start - simulation%bodies%position(2, n)
+         if (fallen > height) exit
+      end do
+      call table%note_error(error)
+   end subroutine fall_within
+
+   !> Blocks from the bottom up, face on face; the lowest one leans over the edge of a fixed body.
+   subroutine build(n, share, young, simulation, error)
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: share, young
+      type(simulation_t), intent(out) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+      type(body_list_t) :: list
+      real(wp) :: x
+      integer(ip) :: k
+
+      x = 0.0_wp
+      do k = 1_ip, n
+         x = x + share*width/(2.0_wp*real(n - k + 1_ip, wp))
+         call list%append(block_at(x, (real(k, wp) - 0.5_wp)*height, width, height, 0.0_wp))
+      end do
+      call list%append(block_at(0.0_wp, -0.5_wp*height, width, height, 0.0_wp), fixed=.true.)
+      call begin('&forces friction_coefficient = 1 damping_coefficient = 1 stiffness = '//to_text(young)//' /'// &
+                 integrate_text(2.0e-6_wp*sqrt(1.0e10_wp/young)), list, simulation, error)
+   end subroutine build
+
+end module b15_overhang
