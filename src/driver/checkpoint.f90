@@ -16,6 +16,7 @@ module polydem_checkpoint
    use polydem_signals, only: await_signals, caught_signal, release_signals
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
+   use polydem_watch, only: watch_t
    implicit none
    private
    public :: checkpoints_t
@@ -105,7 +106,7 @@ contains
    end subroutine look
 
    !> Write a checkpoint over the older one of the last two.
-   subroutine write_checkpoint(self, folder, provenance, simulation, history, error)
+   subroutine write_checkpoint(self, folder, provenance, simulation, history, watch, error)
       class(checkpoints_t), intent(inout) :: self
       !> Folder of the result
       character(len=*), intent(in) :: folder
@@ -115,6 +116,8 @@ contains
       type(simulation_t), intent(inout) :: simulation
       !> Former attempts and the present one
       type(history_t), intent(inout) :: history
+      !> Guards
+      type(watch_t), intent(inout) :: watch
       !> Why it could not be written; the last two are as they were
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
@@ -122,7 +125,7 @@ contains
 
       began = wall_seconds()
       call file%create(checkpoint_path(folder, self%next), provenance)
-      call keep_run(file, simulation, history)
+      call keep_run(file, simulation, history, watch)
       call file%complete(error)
       if (allocated(error)) return
       self%last_step = simulation%step

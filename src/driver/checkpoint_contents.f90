@@ -14,6 +14,7 @@ module polydem_checkpoint_contents
    use polydem_ledger, only: keep_ledger
    use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_simulation, only: simulation_t
+   use polydem_watch, only: keep_watch, watch_t
    implicit none
    private
    public :: history_t, keep_run, keep_progress, scene_hash
@@ -33,7 +34,7 @@ module polydem_checkpoint_contents
 contains
 
    !> Keep a run in an archive, or let one go on from there.
-   subroutine keep_run(archive, simulation, history)
+   subroutine keep_run(archive, simulation, history, watch)
       !> Archive; a failure is in its `error`
       class(archive_t), intent(inout) :: archive
       !> The simulation at the end of a step; if the archive gives back, any state of the same scene, which becomes the
@@ -41,14 +42,18 @@ contains
       type(simulation_t), intent(inout) :: simulation
       !> Former attempts
       type(history_t), intent(inout) :: history
+      !> Guards
+      type(watch_t), intent(inout) :: watch
 
       call keep_progress(archive, simulation%step, history)
+      call keep_watch(watch, archive)
       associate (s => simulation)
          call archive%match('/run/time_step', s%dt, 's', 'time step')
          call archive%match('/run/scene', [history%scene], '1', 'hash of the bodies at the start')
          call archive%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call archive%keep('/run/sums', s%sums, '1', 'sums of pairs, contacts, pairs that began and ended, '// &
                            'contacts without direction')
+         call archive%keep('/run/far_moves', s%guard%warning%count, '1', 'steps in which a body moved too far')
          call archive%keep('/run/stage_calls', s%timers%calls, '1', 'steps in which each stage ran')
          call archive%keep_seconds('/run/stage_total', s%timers%total, 'time spent in each stage')
          call archive%keep_seconds('/run/stage_least', s%timers%least, 'shortest time in a step')

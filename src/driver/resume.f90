@@ -13,6 +13,7 @@ module polydem_resume
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
+   use polydem_watch, only: watch_t
    implicit none
    private
    public :: past_t, is_finished, look_back, go_on
@@ -222,7 +223,7 @@ contains
    end subroutine read_steps
 
    !> Bring a simulation to the state of the checkpoint.
-   subroutine go_on(folder, past, revision, simulation, history, log, error)
+   subroutine go_on(folder, past, revision, simulation, history, watch, log, error)
       !> Folder of the result
       character(len=*), intent(in) :: folder
       !> What was found there, with a checkpoint
@@ -233,6 +234,8 @@ contains
       type(simulation_t), intent(inout) :: simulation
       !> The scene, to which the former attempts are added
       type(history_t), intent(inout) :: history
+      !> Guards as at the start
+      type(watch_t), intent(inout) :: watch
       !> Log
       type(log_t), intent(inout) :: log
       !> Why the checkpoint does not fit
@@ -241,7 +244,7 @@ contains
 
       call file%open(checkpoint_path(folder, past%checkpoint), error)
       if (allocated(error)) return
-      call keep_run(file, simulation, history)
+      call keep_run(file, simulation, history, watch)
       call file%close(error)
       if (allocated(error)) then
          error%message = checkpoint_path(folder, past%checkpoint)//' does not fit this run: '//error%message

@@ -203,7 +203,7 @@ contains
       if (allocated(run%past%remark)) call run%log%write_line(run%past%remark)
       if (run%past%checkpoint == 0_ip) return
       run%provenance%parent = checkpoint_path(run%folder, run%past%checkpoint)//', step '//to_text(run%past%step)
-      call go_on(run%folder, run%past, run%provenance%revision, run%simulation, run%history, run%log, error)
+      call go_on(run%folder, run%past, run%provenance%revision, run%simulation, run%history, run%watch, run%log, error)
       run%checkpoints%last_step = run%past%step
       run%checkpoints%next = modulo(run%past%checkpoint, n_checkpoints) + 1_ip
    end subroutine recall
@@ -226,7 +226,7 @@ contains
             history = run%history
             history%segments = int(run%trajectory%number, lp)
             history%seconds = history%seconds + (wall_seconds() - run%began)
-            call run%checkpoints%write(run%folder, run%provenance, s, history, error)
+            call run%checkpoints%write(run%folder, run%provenance, s, history, run%watch, error)
          end if
          if (allocated(reason)) call raise(error, stopped_early, 'stopped early by '//reason//' after step '// &
             to_text(s%step)//' of '//to_text(s%n_steps)//'; the same command with --continue goes on')

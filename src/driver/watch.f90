@@ -2,6 +2,7 @@
 !>
 !> A guard that is off is not looked at and holds no array.
 module polydem_watch
+   use polydem_archive, only: archive_t
    use polydem_body_sizes, only: thickness_of_bodies
    use polydem_depths, only: any_deeper, deepest_contact, depth_text
    use polydem_energy_guard, only: check_energy, energy_guard_t, open_energy_guard
@@ -13,7 +14,7 @@ module polydem_watch
    use polydem_warnings, only: warning_t
    implicit none
    private
-   public :: watch_t, new_watch, look, sum_up
+   public :: watch_t, new_watch, look, sum_up, keep_watch
 
    !> Guards with what they have seen
    type :: watch_t
@@ -48,6 +49,20 @@ contains
          if (settings%energy /= 'off') call open_energy_guard(watch%energy, simulation%contacts)
       end associate
    end subroutine new_watch
+
+   !> Keep in an archive what the guards have seen.
+   subroutine keep_watch(watch, archive)
+      !> The guards
+      type(watch_t), intent(inout) :: watch
+      !> Archive
+      class(archive_t), intent(inout) :: archive
+
+      call archive%keep('/run/deep_steps', watch%overlap%count, '1', 'steps with a contact that was too deep')
+      call archive%keep('/run/energy_looks', watch%energy%warning%count, '1', 'looks that found too much energy')
+      call archive%keep('/run/large_steps', watch%large_steps, '1', 'looks that found less than twice the step')
+      call archive%keep('/run/warned_share', watch%warned, '1', 'greatest share of the stable step warned of')
+      call archive%keep('/run/greatest_share', watch%greatest_share, '1', 'greatest share of the stable step')
+   end subroutine keep_watch
 
    !> Look at a step, and write warnings that are new.
    subroutine look(watch, simulation, is_last, log, error)

@@ -5,6 +5,7 @@ module hashing_archive
    use polydem_hash, only: mix_word
    use polydem_kinds, only: dp, lp
    use polydem_simulation, only: simulation_t
+   use polydem_watch, only: watch_t
    implicit none
    private
    public :: hash_of_everything
@@ -27,8 +28,9 @@ contains
       integer(lp) :: hash
       type(hashing_archive_t) :: archive
       type(history_t) :: history
+      type(watch_t) :: watch
 
-      call keep_run(archive, simulation, history)
+      call keep_run(archive, simulation, history, watch)
       hash = archive%hash
    end function hash_of_everything
 
