@@ -73,8 +73,7 @@ contains
       missing(:2) = end%momentum - start%momentum - simulation%ledger%impulse
       missing(3) = end%angular_momentum - start%angular_momentum - simulation%ledger%angular_impulse
       call table%expect_absolute(name//': momentum that is missing, over sum |m v|', 0.0_wp, &
-                                 norm2(missing(:2))/scale(1), &
-                                 1.0e-11_wp)
+                                 norm2(missing(:2))/scale(1), 1.0e-11_wp)
       call table%expect_absolute(name//': angular momentum that is missing, over its sum', 0.0_wp, &
                                  abs(missing(3))/scale(2), 1.0e-11_wp)
       call table%show(name//': impulse of the walls, over sum |m v|', norm2(simulation%ledger%impulse)/scale(1))

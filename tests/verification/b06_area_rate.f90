@@ -44,9 +44,10 @@ contains
          if (pair%contacts%area(1) < 1.0e-6_wp) cycle
          n = n + 1
          rate = pair%contacts%rate(1)
-         scale = norm2(pair%contacts%normal(:, 1))*(norm2(pair%bodies%velocity(:, 1)) + norm2(pair%bodies%velocity(:, &
-                       2))) &
-            + sum(abs(pair%contacts%moment(:, 1)*pair%bodies%angular_velocity))
+         associate (bodies => pair%bodies)
+            scale = norm2(pair%contacts%normal(:, 1))*(norm2(bodies%velocity(:, 1)) + norm2(bodies%velocity(:, 2))) &
+               + sum(abs(pair%contacts%moment(:, 1)*bodies%angular_velocity))
+         end associate
          call move(h, pair, after)
          call move(-2.0_wp*h, pair, before)
          worst = max(worst, abs((after - before)/(2.0_wp*h) - rate)/scale)

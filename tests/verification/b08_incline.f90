@@ -90,8 +90,7 @@ contains
                                  1.0e-6_wp)
       call steps(simulation, n, error)
       call table%note_error(error)
-      call table%expect_absolute('rests: move along the slope in the second half of '//to_text(2*n)//' steps [m]', &
-                                 0.0_wp, &
+      call table%expect_absolute('rests: move in the second half of '//to_text(2*n)//' steps [m]', 0.0_wp, &
                                  downhill(slope, simulation%bodies%position(:, 2) - middle), 1.0e-14_wp)
    end subroutine rest
 

@@ -121,8 +121,7 @@ contains
          end do
          call table%expect_absolute('number of contacts', real(n, wp), real(contacts%n, wp), 0.0_wp)
          call table%expect_relative('depth of the lowest interface [m]', depth_below(n, young), &
-                                    contacts%area(2)/width, &
-                                    1.0e-6_wp)
+                                    contacts%area(2)/width, 1.0e-6_wp)
          call table%expect_absolute('worst relative error of a depth', 0.0_wp, worst, 1.0e-6_wp)
       end associate
       call table%expect_absolute('greatest speed [m/s]', 0.0_wp, maxval(abs(simulation%bodies%velocity)), 1.0e-10_wp)

@@ -35,12 +35,9 @@ contains
       end do
       means = sum(angles, 1)/real(n_seeds, wp)
       call table%show('at g: angle of the centre of mass, mean over 3 seeds [degrees]', means(1))
-      call table%show('at g: greatest less least of the seeds [degrees]', maxval(angles(:, 1)) - minval(angles(:, 1)))
-      call table%show('at g/10: greatest less least of the seeds [degrees]', maxval(angles(:, 2)) - minval(angles(:, &
-                      2)))
-      call table%expect_absolute('at g/10: angle of the centre of mass, mean over 3 seeds [degrees]', means(1), &
-                                 means(2), &
-                                 1.0_wp)
+      call table%show('at g: range of the seeds [degrees]', maxval(angles(:, 1)) - minval(angles(:, 1)))
+      call table%show('at g/10: range of the seeds [degrees]', maxval(angles(:, 2)) - minval(angles(:, 2)))
+      call table%expect_absolute('at g/10: angle, mean over 3 seeds [degrees]', means(1), means(2), 1.0_wp)
    end subroutine run_drum_froude
 
    !> Mean angle from 1 s to 3 s, or as many times of free fall.
@@ -58,12 +55,13 @@ contains
       integer :: k
 
       stretch = 1.0_wp/sqrt(share)
-      call read_settings_text('drum.nml', '&scene name = ''drum'' bodies = 250 seed = '// &
-                              to_text(seed)//' motion = ''rotation'' motion_rate = '// &
-                              to_text(0.5_wp/stretch, 17)//' motion_start = '//to_text(0.3_wp*stretch, 17)// &
-                              ' motion_ramp = '//to_text(0.1_wp*stretch, 17)//' / &forces gravity = 0, '// &
-                              to_text(-share*gravity, 17)//' friction_coefficient = 0.4 damping_coefficient = 0.5 '// &
-                              'stiffness = 1e7 / &integrate duration = '//to_text(3.0_wp*stretch, 17)// &
+      call read_settings_text('drum.nml', '&scene name = ''drum'' bodies = 250 seed = '//to_text(seed)// &
+                              ' motion = ''rotation'' motion_rate = '//to_text(0.5_wp/stretch, 17)// &
+                              ' motion_start = '//to_text(0.3_wp*stretch, 17)// &
+                              ' motion_ramp = '//to_text(0.1_wp*stretch, 17)// &
+                              ' / &forces gravity = 0, '//to_text(-share*gravity, 17)// &
+                              ' friction_coefficient = 0.4 damping_coefficient = 0.5 stiffness = 1e7'// &
+                              ' / &integrate duration = '//to_text(3.0_wp*stretch, 17)// &
                               ' / &output ledger = .false. /', no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
       if (.not. allocated(error)) call steps(simulation, int(simulation%n_steps/3), error)
