@@ -65,7 +65,9 @@ def describe(run: Run) -> str:
 
 def available_cores() -> list[int]:
     """Numbers of the cores that this process may use."""
-    return sorted(os.sched_getaffinity(0))
+    if hasattr(os, "sched_getaffinity"):
+        return sorted(os.sched_getaffinity(0))
+    return list(range(os.cpu_count() or 1))
 
 
 def can_continue(program: Path) -> bool:
@@ -100,17 +102,25 @@ class Runner:
             elif state != FINISHED:
                 due.append(run)
         self.say(f"{len(runs)} runs, {len(due)} to do, {len(self.slots)} at once, {self.threads} threads each")
-        with self._signals():
-            while due or any(slot.is_busy for slot in self.slots):
-                for slot in self.slots:
-                    if slot.is_busy and slot.has_ended():
-                        self.say(describe(slot.end()))
-                    while due and not slot.is_busy and not self.stopping:
-                        self._start(slot, due.pop(0))
-                if self.stopping and not any(slot.is_busy for slot in self.slots):
-                    break
-                time.sleep(INTERVAL)
+        try:
+            with self._signals():
+                self._turns(due)
+        except OSError as error:
+            raise ResultError(f"the sweep cannot go on: {error}") from error
+        finally:
+            for slot in self.slots:
+                slot.give_up()
         return self._verdict(runs)
+
+    def _turns(self, due: list[Run]) -> None:
+        """Let the runs take their turns, until all are over or a signal comes."""
+        while (due and not self.stopping) or any(slot.is_busy for slot in self.slots):
+            for slot in self.slots:
+                if slot.is_busy and slot.has_ended():
+                    self.say(describe(slot.end()))
+                while due and not slot.is_busy and not self.stopping:
+                    self._start(slot, due.pop(0))
+            time.sleep(INTERVAL)
 
     def _start(self, slot: _Slot, run: Run) -> None:
         command = [*self.command, str(run.folder / INPUT), "--threads", str(self.threads)]
@@ -211,6 +221,13 @@ class _Slot:
         """Send a signal to the run, if there is one."""
         if self.process:
             self.process.send_signal(number)
+
+    def give_up(self) -> None:
+        """End the run, if there is one, since nobody will wait for it."""
+        if self.process:
+            self.process.terminate()
+            self.process.wait()
+            self.process = None
 
     def has_ended(self) -> bool:
         """Whether the run is over."""
