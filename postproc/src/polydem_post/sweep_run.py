@@ -96,11 +96,12 @@ class Runner:
         """Do what is left of some runs; gives 0 if all are finished, STOPPED if some can go on, else FAILED."""
         due = []
         for run in runs:
+            known = len(run.attempts())
             state = state_of(run)
             if state == FAILING and not retry:
                 self.say(f"{describe(run)} (--retry runs it again)")
             elif state != FINISHED:
-                due.append(run)
+                due.append((run, known))
         self.say(f"{len(runs)} runs, {len(due)} to do, {len(self.slots)} at once, {self.threads} threads each")
         try:
             with self._signals():
@@ -112,17 +113,17 @@ class Runner:
                 slot.give_up()
         return self._verdict(runs)
 
-    def _turns(self, due: list[Run]) -> None:
-        """Let the runs take their turns, until all are over or a signal comes."""
+    def _turns(self, due: list[tuple[Run, int]]) -> None:
+        """Let runs, of which so many attempts are known, take their turns, until all are over or a signal comes."""
         while (due and not self.stopping) or any(slot.is_busy for slot in self.slots):
             for slot in self.slots:
                 if slot.is_busy and slot.has_ended():
                     self.say(describe(slot.end()))
                 while due and not slot.is_busy and not self.stopping:
-                    self._start(slot, due.pop(0))
+                    self._start(slot, *due.pop(0))
             time.sleep(INTERVAL)
 
-    def _start(self, slot: _Slot, run: Run) -> None:
+    def _start(self, slot: _Slot, run: Run, known: int) -> None:
         command = [*self.command, str(run.folder / INPUT), "--threads", str(self.threads)]
         for entry in [*run.overrides(), f"output.folder={run.result}"]:
             command += ["--set", entry]
@@ -130,8 +131,8 @@ class Runner:
             command.append("--continue")
         elif run.result.exists():
             command.append("--force")
-        if not slot.start(run, command, self.threads):
-            self.say(f"{run.name}: left out, since another sweep runs it now")
+        if not slot.start(run, known, command, self.threads):
+            self.say(f"{run.name}: left out, since another call has it")
 
     def _verdict(self, runs: list[Run]) -> int:
         states = [state_of(run) for run in runs]
@@ -201,12 +202,15 @@ class _Slot:
     def is_busy(self) -> bool:
         return self.process is not None
 
-    def start(self, run: Run, command: list[str], threads: int) -> bool:
-        """Start a run, unless another sweep has it."""
+    def start(self, run: Run, known: int, command: list[str], threads: int) -> bool:
+        """Start a run, unless another sweep runs it now, or did so since `known` attempts were counted."""
         self.record = (run.folder / ATTEMPTS).open("a", newline="", encoding="utf-8")
         try:
             fcntl.flock(self.record, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            is_free = len(run.attempts()) == known
         except BlockingIOError:
+            is_free = False
+        if not is_free:
             self.record.close()
             return False
         self.run, self.threads, self.began = run, threads, time.monotonic()
