@@ -293,29 +293,51 @@ contains
       !> Its value
       type(value_t), intent(in) :: value
       character(len=:), allocatable :: text
+      type(text_t), allocatable :: words(:)
       integer :: k
 
-      text = ''
       select case (entry%type)
       case ('real')
-         do k = 1, size(value%reals)
-            text = text//', '//real_text(value%reals(k))
+         allocate (words(size(value%reals)))
+         do k = 1, size(words)
+            words(k)%text = real_text(value%reals(k))
          end do
-         text = text(3:)
       case ('integer')
-         do k = 1, size(value%integers)
-            text = text//', '//to_text(value%integers(k))
+         allocate (words(size(value%integers)))
+         do k = 1, size(words)
+            words(k)%text = to_text(value%integers(k))
          end do
-         text = text(min(3, len(text) + 1):)
       case ('logical')
-         text = trim(merge('.true. ', '.false.', value%flag))
+         allocate (words(1))
+         words(1)%text = trim(merge('.true. ', '.false.', value%flag))
       case default
-         do k = 1, size(value%texts)
-            text = text//', '//quoted(value%texts(k)%text)
+         allocate (words(size(value%texts)))
+         do k = 1, size(words)
+            words(k)%text = quoted(value%texts(k)%text)
          end do
-         text = text(min(3, len(text) + 1):)
       end select
+      text = listed(words)
    end function value_text
+
+   !> Words with commas between them, in a time that grows with their number
+   pure function listed(words) result(text)
+      type(text_t), intent(in) :: words(:)
+      character(len=:), allocatable :: text
+      integer :: k, n
+
+      n = max(0, 2*(size(words) - 1))
+      do k = 1, size(words)
+         n = n + len(words(k)%text)
+      end do
+      allocate (character(len=n) :: text)
+      n = 0
+      do k = 1, size(words)
+         if (k > 1) text(n + 1:n + 2) = ', '
+         if (k > 1) n = n + 2
+         text(n + 1:n + len(words(k)%text)) = words(k)%text
+         n = n + len(words(k)%text)
+      end do
+   end function listed
 
    !> Fewest digits that give a number back bit for bit
    pure function real_text(number) result(text)

@@ -19,6 +19,9 @@ module polydem_read_bench
    character(len=*), parameter :: safe_letters = &
       'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789._'
 
+   !> Longer lists, in which everything is compared with everything, are refused
+   integer, parameter :: longest_list = 9999
+
 contains
 
    !> Read the settings of a bench from a file.
@@ -75,6 +78,10 @@ contains
          call blame('names', 'has '//to_text(size(bench%names))//' values, but there are '// &
             to_text(size(bench%scenes))//' scenes', values, error)
       end if
+      if (max(size(bench%names), size(bench%finders), size(bench%threads)) > longest_list) then
+         call blame('names', 'and other lists cannot have more than '//to_text(longest_list)//' values', values, error)
+      end if
+      if (allocated(error)) return
       do k = 1, size(bench%names)
          if (verify(bench%names(k)%text, safe_letters) > 0 .or. bench%names(k)%text == '') call blame('names', &
             'holds '//quoted(bench%names(k)%text)//', but a name consists of letters, digits, . and _', values, error)
@@ -85,11 +92,13 @@ contains
       do k = 1, size(bench%prepare)
          if (bench%prepare(k)%text == '') call blame('prepare', 'holds an empty text', values, error)
       end do
+      if (allocated(error)) return
       call refuse_twice('names', bench%names, values, error)
       call refuse_twice('finders', bench%finders, values, error)
       do k = 2, size(bench%threads)
-         if (any(bench%threads(:k - 1) == bench%threads(k))) call blame('threads', 'holds '// &
-            to_text(bench%threads(k))//' twice', values, error)
+         if (all(bench%threads(:k - 1) /= bench%threads(k))) cycle
+         call blame('threads', 'holds '//to_text(bench%threads(k))//' twice', values, error)
+         return
       end do
    end subroutine check_bench
 
@@ -102,8 +111,9 @@ contains
 
       do k = 2, size(texts)
          do j = 1, k - 1
-            if (texts(j)%text == texts(k)%text) call blame(key, 'holds '//quoted(texts(k)%text)//' twice', values, &
-                                                           error)
+            if (texts(j)%text /= texts(k)%text) cycle
+            call blame(key, 'holds '//quoted(texts(k)%text)//' twice', values, error)
+            return
          end do
       end do
    end subroutine refuse_twice

@@ -3,12 +3,13 @@ module hostile_file
    use, intrinsic :: iso_c_binding, only: c_char, c_loc, c_null_char, c_ptr
    use hdf5, only: h5aclose_f, h5acreate_f, h5awrite_f, h5dclose_f, h5dcreate_f, h5dont_atexit_f, h5dwrite_f, &
       h5eset_auto_f, h5f_acc_trunc_f, h5fclose_f, h5fcreate_f, h5gclose_f, h5gcreate_f, h5gopen_f, &
-      h5lcreate_external_f, h5lcreate_hard_f, h5lcreate_soft_f, h5open_f, h5pclose_f, h5pcreate_f, h5pset_chunk_f, &
-      h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_fletcher32_f, h5pset_shuffle_f, h5sclose_f, h5screate_f, &
-      h5screate_simple_f
+      h5lcreate_external_f, h5lcreate_hard_f, h5lcreate_soft_f, h5open_f, h5pclose_f, h5pcreate_f, h5pset_buffer_f, &
+      h5pset_chunk_f, h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_fletcher32_f, h5pset_shuffle_f, &
+      h5sclose_f, h5screate_f, h5screate_simple_f
    use hdf5, only: h5fget_obj_count_f, h5tarray_create_f, h5tclose_f, h5tcopy_f, h5tcreate_f, h5tenum_create_f, &
       h5tenum_insert_f, h5tinsert_f, h5tset_size_f, h5tvlen_create_f
-   use hdf5, only: h5f_obj_all_f, h5p_dataset_create_f, h5p_link_create_f, h5s_null_f, h5t_compound_f, h5t_fortran_s1, &
+   use hdf5, only: h5f_obj_all_f, h5p_dataset_create_f, h5p_dataset_xfer_f, h5p_link_create_f, h5s_null_f, &
+      h5t_compound_f, h5t_fortran_s1, &
       h5t_ieee_f32le, h5t_ieee_f64be, h5t_ieee_f64le, h5t_native_double, h5t_opaque_f, h5t_std_b8le, h5t_std_i16be, &
       h5t_std_i32le, h5t_std_i64be, h5t_std_i64le, h5t_std_i8le, h5t_std_ref_obj, h5t_std_u64le, h5t_std_u8le, &
       h5t_string, hid_t, hsize_t, size_t
@@ -111,7 +112,7 @@ contains
       real(dp), allocatable, target :: buffer(:)
       character(len=:, kind=c_char), allocatable, target :: letters
       type(c_ptr), target :: address
-      integer(hid_t) :: dataset, kind_in_file, links, properties, space
+      integer(hid_t) :: dataset, kind_in_file, links, properties, space, transfer
       logical :: has_numbers
       integer :: status
 
@@ -134,7 +135,11 @@ contains
          else if (field%text /= '' .and. field%storage == as_it_is .and. size(field%extent) == 0) then
             letters = field%text//c_null_char
             address = c_loc(letters)
-            call h5dwrite_f(dataset, kind_in_file, c_loc(address), status)
+            ! HDF5 clears two buffers of a megabyte per text unless told otherwise.
+            call h5pcreate_f(h5p_dataset_xfer_f, transfer, status)
+            call h5pset_buffer_f(transfer, 1024_hsize_t, status)
+            call h5dwrite_f(dataset, kind_in_file, c_loc(address), status, xfer_prp=transfer)
+            call h5pclose_f(transfer, status)
          end if
          call h5dclose_f(dataset, status)
       end if

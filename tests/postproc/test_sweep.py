@@ -13,7 +13,7 @@ import h5py
 import pytest
 from polydem_post import Trajectory
 from polydem_post.__main__ import main
-from polydem_post.sweep import Row, expand, make_sweep, read_table
+from polydem_post.sweep import Row, Run, expand, make_sweep, read_table
 from polydem_post.sweep_run import Runner, available_cores, environment, state_of
 from polydem_post.trajectory import ResultError
 
@@ -255,6 +255,22 @@ def test_binds_runs_to_cores_of_their_own_if_all_are_theirs(monkeypatch):
 def test_threads_must_fit_on_the_cores(toy):
     with pytest.raises(ResultError, match="runs of 3 threads do not fit on 2 cores"):
         Runner(toy(), 2, 3)
+
+
+def test_a_sweep_that_cannot_go_on_leaves_no_run_behind(sweep_of):
+    program, sweep = sweep_of(("a", "wait", ""), ("b", "finish", ""))
+    (sweep.runs[1].folder / "attempts.csv").mkdir()
+    runner = Runner(program, 2, 1, say=lambda _: None)
+    with pytest.raises(ResultError, match="cannot go on: .*attempts.csv"):
+        runner.run([sweep.runs[0], BrokenRun(sweep.runs[1].name, sweep.runs[1].folder, ())])
+    assert not any(slot.is_busy for slot in runner.slots)
+
+
+class BrokenRun(Run):
+    """A run whose attempts are found to be unwritable only when it starts."""
+
+    def attempts(self):
+        return []
 
 
 def start(program, sweep, *options):

@@ -65,7 +65,9 @@ def describe(run: Run) -> str:
 
 def available_cores() -> list[int]:
     """Numbers of the cores that this process may use."""
-    return sorted(os.sched_getaffinity(0))
+    if hasattr(os, "sched_getaffinity"):
+        return sorted(os.sched_getaffinity(0))
+    return list(range(os.cpu_count() or 1))
 
 
 def can_continue(program: Path) -> bool:
@@ -94,25 +96,34 @@ class Runner:
         """Do what is left of some runs; gives 0 if all are finished, STOPPED if some can go on, else FAILED."""
         due = []
         for run in runs:
+            known = len(run.attempts())
             state = state_of(run)
             if state == FAILING and not retry:
                 self.say(f"{describe(run)} (--retry runs it again)")
             elif state != FINISHED:
-                due.append(run)
+                due.append((run, known))
         self.say(f"{len(runs)} runs, {len(due)} to do, {len(self.slots)} at once, {self.threads} threads each")
-        with self._signals():
-            while due or any(slot.is_busy for slot in self.slots):
-                for slot in self.slots:
-                    if slot.is_busy and slot.has_ended():
-                        self.say(describe(slot.end()))
-                    while due and not slot.is_busy and not self.stopping:
-                        self._start(slot, due.pop(0))
-                if self.stopping and not any(slot.is_busy for slot in self.slots):
-                    break
-                time.sleep(INTERVAL)
+        try:
+            with self._signals():
+                self._turns(due)
+        except OSError as error:
+            raise ResultError(f"the sweep cannot go on: {error}") from error
+        finally:
+            for slot in self.slots:
+                slot.give_up()
         return self._verdict(runs)
 
-    def _start(self, slot: _Slot, run: Run) -> None:
+    def _turns(self, due: list[tuple[Run, int]]) -> None:
+        """Let runs, of which so many attempts are known, take their turns, until all are over or a signal comes."""
+        while (due and not self.stopping) or any(slot.is_busy for slot in self.slots):
+            for slot in self.slots:
+                if slot.is_busy and slot.has_ended():
+                    self.say(describe(slot.end()))
+                while due and not slot.is_busy and not self.stopping:
+                    self._start(slot, *due.pop(0))
+            time.sleep(INTERVAL)
+
+    def _start(self, slot: _Slot, run: Run, known: int) -> None:
         command = [*self.command, str(run.folder / INPUT), "--threads", str(self.threads)]
         for entry in [*run.overrides(), f"output.folder={run.result}"]:
             command += ["--set", entry]
@@ -120,9 +131,8 @@ class Runner:
             command.append("--continue")
         elif run.result.exists():
             command.append("--force")
-        hindrance = slot.start(run, command, self.threads)
-        if hindrance:
-            self.say(f"{run.name}: left out, since another sweep {hindrance}")
+        if not slot.start(run, known, command, self.threads):
+            self.say(f"{run.name}: left out, since another call has it")
 
     def _verdict(self, runs: list[Run]) -> int:
         states = [state_of(run) for run in runs]
@@ -192,29 +202,36 @@ class _Slot:
     def is_busy(self) -> bool:
         return self.process is not None
 
-    def start(self, run: Run, command: list[str], threads: int) -> str:
-        """Start a run, unless another sweep has it or, since it was found due, had it; gives what hinders."""
+    def start(self, run: Run, known: int, command: list[str], threads: int) -> bool:
+        """Start a run, unless another sweep runs it now, or did so since `known` attempts were counted."""
         self.record = (run.folder / ATTEMPTS).open("a", newline="", encoding="utf-8")
         try:
             fcntl.flock(self.record, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            is_free = len(run.attempts()) == known
         except BlockingIOError:
+            is_free = False
+        if not is_free:
             self.record.close()
-            return "runs it now"
-        if state_of(run) == FINISHED:
-            self.record.close()
-            return "has just finished it"
+            return False
         self.run, self.threads, self.began = run, threads, time.monotonic()
         self.started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         with (run.folder / OUTPUT).open("ab") as output:
             # A session of its own: the terminal's Ctrl-C goes to the sweep, which passes it on.
             self.process = subprocess.Popen(command, env=self.environment, stdin=subprocess.DEVNULL, stdout=output,
                                             stderr=subprocess.STDOUT, start_new_session=True)
-        return ""
+        return True
 
     def signal(self, number: int) -> None:
         """Send a signal to the run, if there is one."""
         if self.process:
             self.process.send_signal(number)
+
+    def give_up(self) -> None:
+        """End the run, if there is one, since nobody will wait for it."""
+        if self.process:
+            self.process.terminate()
+            self.process.wait()
+            self.process = None
 
     def has_ended(self) -> bool:
         """Whether the run is over."""
