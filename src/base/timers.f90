@@ -7,19 +7,20 @@ module polydem_timers
    implicit none
    private
    public :: timers_t, n_stages, stage_names
-   public :: stage_boxes, stage_neighbours, stage_overlap, stage_forces, stage_integrate, stage_output
+   public :: stage_boxes, stage_neighbours, stage_overlap, stage_forces, stage_integrate, stage_exchange, stage_output
 
    integer, parameter :: stage_boxes = 1
    integer, parameter :: stage_neighbours = 2
    integer, parameter :: stage_overlap = 3
    integer, parameter :: stage_forces = 4
    integer, parameter :: stage_integrate = 5
-   integer, parameter :: stage_output = 6
+   integer, parameter :: stage_exchange = 6
+   integer, parameter :: stage_output = 7
    !> Number of timed stages
-   integer, parameter :: n_stages = 6
+   integer, parameter :: n_stages = 7
    !> Names of the stages, in the order of the constants above
    character(len=*), parameter :: stage_names(n_stages) = &
-      [character(len=10) :: 'boxes', 'neighbours', 'overlap', 'forces', 'integrate', 'output']
+      [character(len=10) :: 'boxes', 'neighbours', 'overlap', 'forces', 'integrate', 'exchange', 'output']
 
    !> Stop watches, one per stage; a stage that does not run costs nothing
    type :: timers_t

@@ -17,8 +17,10 @@ module polydem_boxes
       real(wp), allocatable :: bounds(:, :)
       !> Slot of the body that a box belongs to; ascending
       integer(ip), allocatable :: body(:)
-      !> Whether that body is fixed: two fixed bodies never make a pair
+      !> Whether that body is fixed
       logical, allocatable :: fixed(:)
+      !> Whether it is fixed, or moved by another process: two passive bodies never make a pair
+      logical, allocatable :: passive(:)
       !> Greatest half side that a box can have at any angle of its body [m]
       real(wp), allocatable :: reach(:)
    end type boxes_t

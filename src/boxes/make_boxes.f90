@@ -64,12 +64,14 @@ contains
       boxes%n = maker%first_box(bodies%n + 1_ip) - 1_ip
       boxes%n_bodies = bodies%n
       boxes%one_to_one = boxes%n == bodies%n
-      allocate (boxes%bounds(4, boxes%n), boxes%body(boxes%n), boxes%fixed(boxes%n), boxes%reach(boxes%n))
+      allocate (boxes%bounds(4, boxes%n), boxes%body(boxes%n), boxes%fixed(boxes%n), boxes%passive(boxes%n), &
+                boxes%reach(boxes%n))
       allocate (maker%padding(boxes%n))
       do s = 1_ip, bodies%n
          all_slots(s) = s
          boxes%body(maker%first_box(s):maker%first_box(s + 1_ip) - 1_ip) = s
          boxes%fixed(maker%first_box(s):maker%first_box(s + 1_ip) - 1_ip) = bodies%fixed(s)
+         boxes%passive(maker%first_box(s):maker%first_box(s + 1_ip) - 1_ip) = bodies%fixed(s) .or. bodies%ghost(s)
          call set_reach(maker, s, body_shape(bodies, s), margin, boxes%reach)
       end do
       call update_boxes(maker, bodies, all_slots, boxes)

@@ -7,7 +7,8 @@ module polydem_changed_entries
 
    !> Entries that do not touch the result; it was found where it is
    character(len=*), parameter :: harmless(*) = [character(len=19) :: 'output.folder', 'checkpoint.steps', &
-                                                 'checkpoint.interval', 'checkpoint.elapsed']
+                                                 'checkpoint.interval', 'checkpoint.elapsed', 'exchange.cut', &
+                                                 'exchange.margin', 'exchange.balance', 'exchange.imbalance']
 
 contains
 

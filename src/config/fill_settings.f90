@@ -61,6 +61,10 @@ contains
          call take(values, 'output.trace_start', output%trace_start)
          call take(values, 'output.step_profile', output%step_profile)
       end associate
+      call take(values, 'exchange.cut', settings%exchange%cut)
+      call take(values, 'exchange.margin', settings%exchange%margin)
+      call take(values, 'exchange.balance', settings%exchange%balance)
+      call take(values, 'exchange.imbalance', settings%exchange%imbalance)
       call take(values, 'checkpoint.steps', settings%checkpoint%steps)
       call take(values, 'checkpoint.interval', settings%checkpoint%interval)
       call take(values, 'checkpoint.elapsed', settings%checkpoint%elapsed)

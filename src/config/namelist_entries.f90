@@ -205,6 +205,14 @@ module polydem_namelist_entries
       'Share of the stable step that is taken if `dt` is 0'), &
       entry_t('integrate', 'duration', 'real', 1, required, 's', '> 0', '', &
       'Simulated time'), &
+      entry_t('exchange', 'cut', 'word', 1, 'bisection', '', 'bisection morton', '', &
+      'How space is divided among processes: by cuts across its longer side, or along Morton''s curve'), &
+      entry_t('exchange', 'margin', 'real', 1, '0', 'm', '>= 0, <= 1e12', '', &
+      'How far bodies may move until neighbouring processes are found anew; 0: from how often they are'), &
+      entry_t('exchange', 'balance', 'word', 1, 'measured', '', 'measured counted off', '', &
+      'Work that processes share evenly: as timed, as counted in pairs, or as it fell at the start'), &
+      entry_t('exchange', 'imbalance', 'real', 1, '1.1', '', '>= 1, <= 1e6', 'balance: measured counted', &
+      'Greatest work of a process over the mean at which space is divided anew'), &
       entry_t('output', 'folder', 'path', 1, '', '', '', '', &
       'Folder of the result; empty: results/ and the name of the namelist file'), &
       entry_t('output', 'frame_interval', 'real', 1, '0', 's', '>= 0', '', &

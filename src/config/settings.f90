@@ -6,6 +6,7 @@ module polydem_settings
    implicit none
    private
    public :: settings_t, scene_settings_t, boxes_settings_t, neighbours_settings_t, overlap_settings_t
+   public :: exchange_settings_t
    public :: forces_settings_t, integrate_settings_t, guards_settings_t, output_settings_t, checkpoint_settings_t
 
    !> Group &scene: what there is at the start
@@ -190,6 +191,18 @@ module polydem_settings
       logical :: step_profile
    end type output_settings_t
 
+   !> Group &exchange: how processes share the bodies; without effect on results
+   type :: exchange_settings_t
+      !> How space is divided: 'bisection' or 'morton'
+      character(len=:), allocatable :: cut
+      !> How far bodies may move until neighbours are found anew [m]; 0: automatic
+      real(wp) :: margin
+      !> What is shared evenly: 'measured' or 'counted' work, or nothing after the start: 'off'
+      character(len=:), allocatable :: balance
+      !> Greatest work over the mean at which space is divided anew
+      real(wp) :: imbalance
+   end type exchange_settings_t
+
    !> Group &checkpoint; whichever of the intervals has passed first makes the next checkpoint
    type :: checkpoint_settings_t
       !> Steps between two checkpoints; 0: not by steps
@@ -224,6 +237,8 @@ module polydem_settings
       type(guards_settings_t) :: guards
       !> Group &output
       type(output_settings_t) :: output
+      !> Group &exchange
+      type(exchange_settings_t) :: exchange
       !> Group &checkpoint
       type(checkpoint_settings_t) :: checkpoint
    end type settings_t

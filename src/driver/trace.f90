@@ -85,6 +85,7 @@ contains
       boxes%one_to_one = boxes%n_bodies == boxes%n
       boxes%body = trace%body
       boxes%fixed = trace%fixed
+      boxes%passive = trace%fixed
       boxes%reach = trace%reach
       boxes%bounds = trace%bounds(:, :, 1)
    end subroutine first_boxes

@@ -88,7 +88,7 @@ contains
             end do
          end do
       end do
-      call mine%keep_valid(boxes%body, boxes%fixed)
+      call mine%keep_valid(boxes%body, boxes%passive)
       call move_alloc(mine%box, found%box)
       found%n = mine%n
    end subroutine search_strips

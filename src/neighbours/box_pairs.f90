@@ -60,13 +60,13 @@ contains
       call move_alloc(longer, self%box)
    end subroutine reserve_found
 
-   !> Put the lower box of each pair first, and drop pairs of one body or of two fixed ones.
-   pure subroutine keep_valid(self, body, fixed)
+   !> Put the lower box of each pair first, and drop pairs of one body or of two passive ones.
+   pure subroutine keep_valid(self, body, passive)
       class(found_t), intent(inout) :: self
       !> Body of each box
       integer(ip), intent(in), contiguous :: body(:)
-      !> Whether that body is fixed
-      logical, intent(in), contiguous :: fixed(:)
+      !> Whether that body is passive
+      logical, intent(in), contiguous :: passive(:)
       integer(ip) :: k, kept, a, b
 
       kept = 0_ip
@@ -75,7 +75,7 @@ contains
          b = max(self%box(1, k), self%box(2, k))
          self%box(1, kept + 1_ip) = a
          self%box(2, kept + 1_ip) = b
-         kept = kept + merge(1_ip, 0_ip, body(a) /= body(b) .and. .not. (fixed(a) .and. fixed(b)))
+         kept = kept + merge(1_ip, 0_ip, body(a) /= body(b) .and. .not. (passive(a) .and. passive(b)))
       end do
       self%n = kept
    end subroutine keep_valid

@@ -199,10 +199,10 @@ contains
       end do
    end subroutine sort_by_cell
 
-   !> Find all pairs of boxes of different bodies, not both fixed, that overlap.
+   !> Find all pairs of boxes of different bodies, not both passive, that overlap.
    subroutine search(self, boxes)
       class(cell_grids_t), intent(inout) :: self
-      !> Boxes; read are their bodies and whether these are fixed
+      !> Boxes; read are their bodies and whether these are passive
       type(boxes_t), intent(in) :: boxes
       type(tally_t), allocatable :: tally(:)
       integer :: w
@@ -216,7 +216,7 @@ contains
       !$omp    shared(self, boxes, tally) private(w)
       do w = 1, size(self%found)
          call search_part(self, w, size(self%found), self%found(w), tally(w))
-         call self%found(w)%keep_valid(boxes%body, boxes%fixed)
+         call self%found(w)%keep_valid(boxes%body, boxes%passive)
       end do
       !$omp end parallel do
       self%total%tests = self%total%tests + sum(tally%tests)

@@ -1,13 +1,13 @@
 !> What every neighbour finder promises.
 !>
 !> Contract. Two boxes overlap if they share a point (touching counts). A finder looks at the boxes of a
-!> step and records every change since the step before: which boxes of different bodies, not both fixed,
+!> step and records every change since the step before: which boxes of different bodies, not both passive,
 !> began to overlap, and which ceased to. It may record a change and its reverse in one step (they
 !> cancel), and in any order; nothing may be missing and nothing be recorded twice. Before the first step
 !> nothing overlaps. `pair_list_t` turns the changes of boxes into the ascending list of pairs of bodies.
 !>
 !> What a finder remembers between steps is its own. Between steps boxes may move anywhere, but their
-!> number, bodies and fixedness stay.
+!> number, bodies and passiveness stay.
 !>
 !> A finder counts its work exactly and books its time under the phases of `polydem_work`.
 module polydem_finder

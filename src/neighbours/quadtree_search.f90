@@ -27,7 +27,7 @@ contains
       type(tree_t), intent(in) :: tree
       !> Grown cells now and before
       type(grown_cells_t), intent(in) :: grown
-      !> Boxes; only body and fixedness matter
+      !> Boxes; only bodies, and which are passive, matter
       type(boxes_t), intent(in) :: boxes
       !> Box whose grown cell is new
       integer(ip), intent(in) :: i
@@ -102,7 +102,7 @@ contains
       end if
       if (.not. meet(grown%now(:, i), grown%now(:, j))) return
       if (meet(grown%before(:, i), grown%before(:, j))) return
-      is_new = boxes%body(i) /= boxes%body(j) .and. .not. (boxes%fixed(i) .and. boxes%fixed(j))
+      is_new = boxes%body(i) /= boxes%body(j) .and. .not. (boxes%passive(i) .and. boxes%passive(j))
    end function is_new
 
 end module polydem_quadtree_search

@@ -26,8 +26,14 @@ module polydem_bodies
       integer(ip), allocatable :: id(:)
       !> Whether the body is moved by prescription or not at all
       logical, allocatable :: fixed(:)
-      !> Slots of the free bodies, ascending
+      !> Slots of the free bodies that this process moves, ascending
       integer(ip), allocatable :: free(:)
+      !> Whether another process moves the body, which is here because it is near one of `free`
+      logical, allocatable :: ghost(:)
+      !> Place of each body in the ascending order of all bodies of the run
+      integer(ip), allocatable :: row(:)
+      !> Number of all bodies of the run
+      integer(ip) :: n_all = 0_ip
       !> Mass [kg/m]; infinite mass of a fixed body is stored as 0
       real(wp), allocatable :: mass(:)
       !> Moment of inertia about the centre of mass [kg m]; infinite is stored as 0

@@ -227,6 +227,9 @@ contains
       bodies%inverse_inertia = 0.0_wp
       where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass
       where (bodies%inertia > 0.0_wp) bodies%inverse_inertia = 1.0_wp/bodies%inertia
+      bodies%n_all = bodies%n
+      bodies%row = [(s, s=1_ip, bodies%n)]
+      bodies%ghost = spread(.false., 1, bodies%n)
       bodies%free = pack([(s, s=1_ip, bodies%n)],.not. bodies%fixed)
       call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
    end subroutine finish

@@ -22,7 +22,7 @@ contains
       boxes%n_bodies = boxes%n
       boxes%bounds = bounds
       boxes%body = [(k, k=1_ip, boxes%n)]
-      allocate (boxes%fixed(boxes%n), source=.false.)
+      allocate (boxes%fixed(boxes%n), boxes%passive(boxes%n), source=.false.)
       boxes%reach = 0.5_wp*max(bounds(3, :) - bounds(1, :), bounds(4, :) - bounds(2, :))
    end subroutine new_boxes
 
@@ -68,7 +68,7 @@ contains
          do i = 1_ip, boxes%n
             a = boxes%body(i)
             b = boxes%body(j)
-            if (a >= b .or. (boxes%fixed(i) .and. boxes%fixed(j))) cycle
+            if (a >= b .or. (boxes%passive(i) .and. boxes%passive(j))) cycle
             if (boxes%bounds(1, i) > boxes%bounds(3, j) .or. boxes%bounds(1, j) > boxes%bounds(3, i)) cycle
             if (boxes%bounds(2, i) > boxes%bounds(4, j) .or. boxes%bounds(2, j) > boxes%bounds(4, i)) cycle
             touch(b, a) = .true.

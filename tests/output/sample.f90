@@ -31,6 +31,9 @@ contains
       bodies%id = [10_ip, 20_ip, 30_ip]
       bodies%fixed = [.true., .false., .false.]
       bodies%free = [2_ip, 3_ip]
+      bodies%ghost = [.false., .false., .false.]
+      bodies%row = [1_ip, 2_ip, 3_ip]
+      bodies%n_all = 3_ip
       bodies%mass = [0.0_wp, 2.0_wp, 4.0_wp]
       bodies%inertia = [0.0_wp, 0.5_wp, 0.25_wp]
       bodies%vertex_start = [1_ip, 5_ip, 8_ip, 12_ip]

@@ -22,7 +22,7 @@ COUNTS = (
     "depth",
     "bytes",
 )
-STAGES = ("boxes", "neighbours", "overlap", "forces", "integrate", "output")
+STAGES = ("boxes", "neighbours", "overlap", "forces", "integrate", "exchange", "output")
 SIZES = (2522, 5058, 7599, 10014, 12651, 100000)
 
 
