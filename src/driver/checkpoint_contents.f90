@@ -10,6 +10,7 @@ module polydem_checkpoint_contents
    use polydem_contacts, only: contact_memory_t
    use polydem_errors, only: error_t, raise, run_error
    use polydem_hash, only: mix_word
+   use polydem_kept_bodies, only: keep_bodies
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ledger, only: keep_ledger
    use polydem_neighbours, only: neighbours_t, new_neighbours
@@ -87,22 +88,6 @@ contains
       call archive%keep_seconds('/run/seconds', seconds, 'elapsed time of the run, without what was done twice')
       history%seconds = seconds(1)
    end subroutine keep_progress
-
-   !> Keep what changes about bodies.
-   subroutine keep_bodies(archive, bodies)
-      class(archive_t), intent(inout) :: archive
-      type(bodies_t), intent(inout) :: bodies
-
-      call archive%match('/bodies/id', int(bodies%id, lp), '1', 'identifiers of the bodies, ascending')
-      call archive%keep('/bodies/position', bodies%position, 'm', 'centres of mass')
-      call archive%keep('/bodies/angle', bodies%angle, 'rad', 'angles since the start')
-      call archive%keep('/bodies/velocity', bodies%velocity, 'm/s', 'velocities of the centres of mass')
-      call archive%keep('/bodies/angular_velocity', bodies%angular_velocity, 'rad/s', 'angular velocities')
-      call archive%keep('/bodies/acceleration', bodies%acceleration, 'm/s2', 'accelerations of the centres of mass')
-      call archive%keep('/bodies/angular_acceleration', bodies%angular_acceleration, 'rad/s2', 'angular accelerations')
-      call archive%keep('/bodies/force', bodies%force, 'N/m', 'sums of the forces')
-      call archive%keep('/bodies/torque', bodies%torque, 'N', 'sums of the torques about the centres of mass')
-   end subroutine keep_bodies
 
    !> Keep the pairs and what is remembered of them. Pairs that are given back are found again first.
    subroutine keep_pairs(archive, s)
