@@ -70,7 +70,7 @@ contains
             slot(n) = k
          end associate
       end do
-      call blocks%lay_out(team, bodies%n_all, key(:n), slot(:n))
+      call blocks%lay_out(team, bodies%n_all, size(body, kind=ip), key(:n), slot(:n))
    end subroutine lay_out_parts
 
    !> Lay out columns over pairs of bodies, like contacts. A pair of two fixed bodies must not be among them.
@@ -95,7 +95,7 @@ contains
          key(n) = row_key(bodies%row(first(k)), bodies%row(second(k)))
          slot(n) = k
       end do
-      call blocks%lay_out(team, bodies%n_all, key(:n), slot(:n))
+      call blocks%lay_out(team, bodies%n_all, size(first, kind=ip), key(:n), slot(:n))
    end subroutine lay_out_pairs
 
 end module polydem_own_rows

@@ -19,6 +19,8 @@ module polydem_row_blocks
       integer(lp) :: first = 0_lp
       !> Rows in all blocks
       integer(lp) :: total = 0_lp
+      !> Rows that this process knows, its own ones among them: places in the columns that will be brought
+      integer(ip) :: n_known = 0_ip
       !> Places of the rows that this process owns, in the order of the processes they go to
       integer(ip), allocatable, private :: slot(:)
       !> Rows that go to each process, (0:size - 1)
@@ -47,20 +49,23 @@ contains
    end function row_key
 
    !> Find out where rows go; collective.
-   subroutine lay_out(self, team, n_bodies, key, slot)
+   subroutine lay_out(self, team, n_bodies, n_known, key, slot)
       class(row_blocks_t), intent(inout) :: self
       !> Processes
       class(team_t), intent(inout) :: team
       !> Bodies of the run
       integer(ip), intent(in) :: n_bodies
+      !> Rows that this process knows: places in the columns that will be brought
+      integer(ip), intent(in) :: n_known
       !> Keys of the rows that this process owns, in any order; each has one owner
       integer(lp), intent(in) :: key(:)
-      !> Places of these rows in the columns that will be brought
+      !> Places of these rows among those it knows
       integer(ip), intent(in) :: slot(:)
       integer(lp), allocatable :: sent(:, :), received(:, :), sizes(:)
       integer(ip), allocatable :: home(:), counts(:)
       integer(ip) :: k
 
+      self%n_known = n_known
       home = home_of(key, n_bodies, team%size)
       call group_by_home(home, team%size, self%counts, self%slot)
       allocate (sent(1, size(key)))

@@ -60,8 +60,8 @@ contains
       if (present(part)) then
          slab%whole(dimension) = int(part%total, hsize_t)
          slab%start(dimension) = int(part%first, hsize_t)
-      else if (place%together) then
-         slab%is_empty = slab%is_empty .or. .not. writes_shared()
+      else if (place%together .and. .not. slab%is_empty) then
+         slab%is_empty = .not. writes_shared()
       end if
    end function slab_of
 
