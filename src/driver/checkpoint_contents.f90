@@ -62,7 +62,8 @@ contains
          if (s%settings%output%ledger) call keep_ledger(s%ledger, archive)
          call keep_bodies(archive, s%bodies)
          call s%integrator%keep(archive)
-         call archive%keep('/boxes/bounds', s%boxes%bounds, 'm', 'xmin, ymin, xmax, ymax when pairs were last searched')
+         call archive%keep('/boxes/bounds', s%boxes%bounds(:, :s%boxes%n), 'm', &
+                           'xmin, ymin, xmax, ymax when pairs were last searched')
          call keep_pairs(archive, s)
          if (.not. archive%gives_back .or. allocated(archive%error)) return
          call turn_bodies(s%bodies, s%moving)

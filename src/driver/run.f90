@@ -1,11 +1,11 @@
 !> A run from its settings to its result.
 module polydem_run
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use polydem_bodies, only: state_hash
    use polydem_books, only: fill_row, write_books
    use polydem_checkpoint, only: checkpoints_t
    use polydem_checkpoint_contents, only: history_t, scene_hash
    use polydem_clock, only: wall_seconds
+   use polydem_common_hash, only: hash_all_bodies
    use polydem_counters, only: counters_t
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t, input_error, raise, run_error, stopped_early
@@ -15,6 +15,7 @@ module polydem_run
    use polydem_ledger_row, only: ledger_row_t
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_counters, write_hash, write_header, write_timings
+   use polydem_lone_team, only: lone_team_t
    use polydem_machine, only: resident_memory
    use polydem_paths, only: make_folder
    use polydem_profile, only: write_profile
@@ -29,6 +30,7 @@ module polydem_run
    use polydem_strings, only: to_text
    use polydem_timers, only: stage_output
    use polydem_trajectory, only: trajectory_t
+   use polydem_wall_forces, only: complete_wall_forces
    use polydem_watch, only: look, new_watch, sum_up, watch_t
    implicit none
    private
@@ -81,6 +83,8 @@ module polydem_run
       integer(lp) :: log_steps = 0_lp
       !> Guards
       type(watch_t) :: watch
+      !> Processes of the run
+      type(lone_team_t) :: team
       !> Step of the last frame, negative if there is none
       integer(lp) :: last_frame = -1_lp
    end type run_t
@@ -190,7 +194,8 @@ contains
       call choose_intervals(run)
       if (.not. allocated(error)) call recall(run, error)
       if (allocated(error)) return
-      call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error, run%past%segments)
+      call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error, &
+                               run%past%segments, run%team)
       if (.not. allocated(error)) call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, error)
    end subroutine prepare
 
@@ -226,7 +231,7 @@ contains
             history = run%history
             history%segments = int(run%trajectory%number, lp)
             history%seconds = history%seconds + (wall_seconds() - run%began)
-            call run%checkpoints%write(run%folder, run%provenance, s, history, run%watch, error)
+            call run%checkpoints%write(run%folder, run%provenance, run%team, s, history, run%watch, error)
          end if
          if (allocated(reason)) call raise(error, stopped_early, 'stopped early by '//reason//' after step '// &
             to_text(s%step)//' of '//to_text(s%n_steps)//'; the same command with --continue goes on')
@@ -260,6 +265,7 @@ contains
 
       if (run%simulation%step <= run%past%last_frame) return
       associate (s => run%simulation, output => run%simulation%settings%output)
+         call complete_wall_forces(run%team, s%bodies, s%contacts)
          if (output%contacts .and. output%ledger) then
             call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, row=run%row)
          else if (output%contacts) then
@@ -304,7 +310,7 @@ contains
       status = 'finished'
       if (allocated(error)) status = error%message
       associate (s => run%simulation)
-         hash = state_hash(s%bodies)
+         call hash_all_bodies(run%team, s%bodies, hash)
          call report_counters(s, counters)
          if (allocated(error)) call write_last_frame(run, error%code, late_error)
          call run%trajectory%close(late_error)
