@@ -16,7 +16,7 @@ module polydem_checkpoint
    use polydem_row_blocks, only: row_blocks_t
    use polydem_settings, only: checkpoint_settings_t
    use polydem_signals, only: await_signals, caught_signal, release_signals
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: collect_counts, simulation_t
    use polydem_strings, only: to_text
    use polydem_team, only: team_t
    use polydem_wall_forces, only: complete_wall_forces
@@ -133,6 +133,7 @@ contains
       call file%create(checkpoint_path(folder, self%next), provenance, team)
       if (.not. allocated(file%error)) call lay_out_rows(team, simulation, file)
       call complete_wall_forces(team, simulation%bodies, simulation%contacts)
+      call collect_counts(simulation)
       call keep_run(file, simulation, history, watch)
       call file%complete(error)
       if (allocated(error)) return

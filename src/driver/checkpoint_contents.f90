@@ -18,7 +18,7 @@ module polydem_checkpoint_contents
    use polydem_watch, only: keep_watch, watch_t
    implicit none
    private
-   public :: history_t, keep_run, keep_progress, scene_hash
+   public :: history_t, keep_run, keep_whole, keep_progress, scene_hash
 
    !> The scene that a run began with, and its former attempts
    type :: history_t
@@ -46,6 +46,31 @@ contains
       !> Guards
       type(watch_t), intent(inout) :: watch
 
+      call keep_whole(archive, simulation, history, watch)
+      associate (s => simulation)
+         call keep_bodies(archive, s%bodies)
+         call s%integrator%keep(archive)
+         call archive%keep('/boxes/bounds', s%boxes%bounds(:, :s%boxes%n), 'm', &
+                           'xmin, ymin, xmax, ymax when pairs were last searched')
+         call keep_pairs(archive, s)
+         if (.not. archive%gives_back .or. allocated(archive%error)) return
+         call turn_bodies(s%bodies, s%moving)
+         s%contacts%n = 0_ip
+         s%contacts%n_degenerate = 0_ip
+      end associate
+   end subroutine keep_run
+
+   !> Keep what belongs to the whole run and not to bodies, boxes or pairs.
+   subroutine keep_whole(archive, simulation, history, watch)
+      !> Archive; a failure is in its `error`
+      class(archive_t), intent(inout) :: archive
+      !> The simulation
+      type(simulation_t), intent(inout) :: simulation
+      !> Former attempts
+      type(history_t), intent(inout) :: history
+      !> Guards
+      type(watch_t), intent(inout) :: watch
+
       call keep_progress(archive, simulation%step, history)
       call keep_watch(watch, archive)
       associate (s => simulation)
@@ -60,17 +85,8 @@ contains
          call archive%keep_seconds('/run/stage_least', s%timers%least, 'shortest time in a step')
          call archive%keep_seconds('/run/stage_most', s%timers%most, 'longest time in a step')
          if (s%settings%output%ledger) call keep_ledger(s%ledger, archive)
-         call keep_bodies(archive, s%bodies)
-         call s%integrator%keep(archive)
-         call archive%keep('/boxes/bounds', s%boxes%bounds(:, :s%boxes%n), 'm', &
-                           'xmin, ymin, xmax, ymax when pairs were last searched')
-         call keep_pairs(archive, s)
-         if (.not. archive%gives_back .or. allocated(archive%error)) return
-         call turn_bodies(s%bodies, s%moving)
-         s%contacts%n = 0_ip
-         s%contacts%n_degenerate = 0_ip
       end associate
-   end subroutine keep_run
+   end subroutine keep_whole
 
    !> Keep how far a run has got; the part of `keep_run` that needs no simulation.
    subroutine keep_progress(archive, step, history)

@@ -9,7 +9,6 @@ module polydem_share_scene
    use polydem_freight, only: freight_t, load, unload
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_ledger, only: ledger_t
    use polydem_motion, only: motion_names, motion_t
    use polydem_settings, only: settings_t
    use polydem_simulation_parts, only: fit_to_bodies, simulation_t

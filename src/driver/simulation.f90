@@ -24,7 +24,8 @@ module polydem_simulation
       timers_t
    implicit none
    private
-   public :: simulation_t, new_simulation, start_simulation, advance, time_of, report_counters, check_stability
+   public :: simulation_t, new_simulation, start_simulation, advance, time_of, collect_counts, &
+      report_counters, check_stability
 
    !> More steps than any run can do
    real(wp), parameter :: most_steps = 1.0e15_wp
@@ -125,7 +126,9 @@ contains
          call self%timers%lap(stage_boxes)
       end if
       call settle(self, error)
-      if (shared) call self%timers%lap(stage_exchange)
+      if (.not. shared) return
+      self%domain%ghost_steps = self%domain%ghost_steps + int(size(self%domain%ghosts%slots), lp)
+      call self%timers%lap(stage_exchange)
    end subroutine place_boxes
 
    !> Simulated time [s]: a product, so that it does not drift.
@@ -169,23 +172,53 @@ contains
       end if
    end subroutine check_stability
 
-   !> Exact counts of the work done so far.
+   !> Bring the counts of all processes to the leader, where they go on; collective.
+   subroutine collect_counts(self)
+      !> The simulation
+      type(simulation_t), intent(inout) :: self
+      integer(lp), allocatable :: counts(:)
+
+      if (self%team%size == 1_ip) return
+      associate (value => self%neighbours%finder%work%value, n => size(self%sums))
+         counts = [self%sums, value]
+         call self%team%add_up(counts)
+         if (.not. self%team%leads()) counts = 0_lp
+         self%sums = counts(:n)
+         value = counts(n + 1:)
+      end associate
+   end subroutine collect_counts
+
+   !> Exact counts of the work done so far, on all processes: pairs and contacts of two of them count twice. Collective.
    subroutine report_counters(self, counters)
       !> The simulation
       type(simulation_t), intent(inout) :: self
       !> List to set them in
       type(counters_t), intent(inout) :: counters
+      integer(lp) :: counts(6)
 
+      counts = [int(self%boxes%n, lp), self%team%messages, self%team%bytes, self%domain%ghost_steps, &
+                self%domain%arrivals, int(self%neighbours%pairs%n, lp)]
+      call self%team%add_up(counts)
+      call collect_counts(self)
       call counters%set('steps', self%step)
-      call counters%set('bodies', int(self%bodies%n, lp))
-      call counters%set('boxes', int(self%boxes%n, lp))
+      call counters%set('bodies', int(self%bodies%n_all, lp))
+      call counters%set('boxes', counts(1))
       call counters%set('pairs', self%sums(1))
       call counters%set('pairs began', self%sums(3))
       call counters%set('pairs ended', self%sums(4))
       call counters%set('contacts', self%sums(2))
       call counters%set('contacts without direction', self%sums(5))
       call self%neighbours%report(counters)
+      call counters%set('pairs', counts(6))
       if (allocated(self%law%constraint)) call self%law%constraint%report(counters)
+      if (self%team%size == 1_ip) return
+      call counters%set('processes', int(self%team%size, lp))
+      call counters%set('settlements', self%domain%settlements)
+      call counters%set('divisions of space', self%domain%divisions)
+      call counters%set('bodies that changed process', counts(5))
+      call counters%set('ghosts, summed over steps', counts(4))
+      call counters%set('messages', counts(2))
+      call counters%set('bytes in messages', counts(3))
    end subroutine report_counters
 
    !> From the boxes of the bodies to the forces on them: the middle of the step.
