@@ -1,7 +1,7 @@
 !> Counts what ranks would tell each other in a step: mpirun -n RANKS count_exchange FILE.csv GRAINS...
 !>
-!> The counts are those of the program itself, for grains packed in a box and in a drum, for both cuts and several margins
-!> (in long axes of a grain). They are exact on any machine, however many ranks share a processor.
+!> The counts are those of the program itself, for grains packed in a box and in a drum, for both cuts and several
+!> margins (in long axes of a grain). They are exact on any machine, however many ranks share a processor.
 program count_exchange
    use, intrinsic :: iso_fortran_env, only: error_unit
    use packed_grains, only: pack_share, shape_names
