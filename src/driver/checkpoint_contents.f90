@@ -10,6 +10,7 @@ module polydem_checkpoint_contents
    use polydem_contacts, only: contact_memory_t
    use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_hash, only: mix_word
+   use polydem_kept_bodies, only: keep_bodies
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ledger, only: keep_ledger
    use polydem_neighbours, only: neighbours_t, new_neighbours
@@ -18,7 +19,7 @@ module polydem_checkpoint_contents
    use polydem_watch, only: keep_watch, watch_t
    implicit none
    private
-   public :: history_t, keep_run, keep_progress, scene_hash
+   public :: history_t, keep_run, keep_whole, keep_progress, scene_hash
 
    !> The scene that a run began with, and its former attempts
    type :: history_t
@@ -46,6 +47,31 @@ contains
       !> Guards
       type(watch_t), intent(inout) :: watch
 
+      call keep_whole(archive, simulation, history, watch)
+      associate (s => simulation)
+         call keep_bodies(archive, s%bodies)
+         call s%integrator%keep(archive)
+         call archive%keep('/boxes/bounds', s%boxes%bounds(:, :s%boxes%n), 'm', &
+                           'xmin, ymin, xmax, ymax when pairs were last searched')
+         call keep_pairs(archive, s)
+         if (.not. archive%gives_back .or. allocated(archive%error)) return
+         call turn_bodies(s%bodies, s%moving)
+         s%contacts%n = 0_ip
+         s%contacts%n_degenerate = 0_ip
+      end associate
+   end subroutine keep_run
+
+   !> Keep what belongs to the whole run and not to bodies, boxes or pairs.
+   subroutine keep_whole(archive, simulation, history, watch)
+      !> Archive; a failure is in its `error`
+      class(archive_t), intent(inout) :: archive
+      !> The simulation
+      type(simulation_t), intent(inout) :: simulation
+      !> Former attempts
+      type(history_t), intent(inout) :: history
+      !> Guards
+      type(watch_t), intent(inout) :: watch
+
       call keep_progress(archive, simulation%step, history)
       call keep_watch(watch, archive)
       associate (s => simulation)
@@ -60,16 +86,8 @@ contains
          call archive%keep_seconds('/run/stage_least', s%timers%least, 'shortest time in a step')
          call archive%keep_seconds('/run/stage_most', s%timers%most, 'longest time in a step')
          if (s%settings%output%ledger) call keep_ledger(s%ledger, archive)
-         call keep_bodies(archive, s%bodies)
-         call s%integrator%keep(archive)
-         call archive%keep('/boxes/bounds', s%boxes%bounds, 'm', 'xmin, ymin, xmax, ymax when pairs were last searched')
-         call keep_pairs(archive, s)
-         if (.not. archive%gives_back .or. allocated(archive%error)) return
-         call turn_bodies(s%bodies, s%moving)
-         s%contacts%n = 0_ip
-         s%contacts%n_degenerate = 0_ip
       end associate
-   end subroutine keep_run
+   end subroutine keep_whole
 
    !> Keep how far a run has got; the part of `keep_run` that needs no simulation.
    subroutine keep_progress(archive, step, history)
@@ -88,22 +106,6 @@ contains
       call archive%keep_seconds('/run/seconds', seconds, 'elapsed time of the run, without what was done twice')
       history%seconds = seconds(1)
    end subroutine keep_progress
-
-   !> Keep what changes about bodies.
-   subroutine keep_bodies(archive, bodies)
-      class(archive_t), intent(inout) :: archive
-      type(bodies_t), intent(inout) :: bodies
-
-      call archive%match('/bodies/id', int(bodies%id, lp), '1', 'identifiers of the bodies, ascending')
-      call archive%keep('/bodies/position', bodies%position, 'm', 'centres of mass')
-      call archive%keep('/bodies/angle', bodies%angle, 'rad', 'angles since the start')
-      call archive%keep('/bodies/velocity', bodies%velocity, 'm/s', 'velocities of the centres of mass')
-      call archive%keep('/bodies/angular_velocity', bodies%angular_velocity, 'rad/s', 'angular velocities')
-      call archive%keep('/bodies/acceleration', bodies%acceleration, 'm/s2', 'accelerations of the centres of mass')
-      call archive%keep('/bodies/angular_acceleration', bodies%angular_acceleration, 'rad/s2', 'angular accelerations')
-      call archive%keep('/bodies/force', bodies%force, 'N/m', 'sums of the forces')
-      call archive%keep('/bodies/torque', bodies%torque, 'N', 'sums of the torques about the centres of mass')
-   end subroutine keep_bodies
 
    !> Keep the pairs and what is remembered of them. Pairs that are given back are found again first.
    subroutine keep_pairs(archive, s)

@@ -138,7 +138,7 @@ contains
    !> Compare the step with the stable step of the contacts, and warn when the share has grown by a tenth.
    subroutine look_at_step(watch, simulation, log, error)
       type(watch_t), intent(inout) :: watch
-      type(simulation_t), intent(in) :: simulation
+      type(simulation_t), intent(inout) :: simulation
       type(log_t), intent(inout) :: log
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: warning
