@@ -60,13 +60,19 @@ contains
          return
       end if
       if (command%threads > 0) call omp_set_num_threads(command%threads)
-      select case (command%verb)
-      case ('run', 'check')
+      if (command%verb == 'run') then
          call read_settings(command%file, command%overrides, settings, error)
-         if (allocated(error)) return
-         if (command%verb == 'check') call check_simulation(settings, error)
-         if (command%verb == 'run') call run_simulation(settings, command%force, error, attempt_t( &
-            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp)))
+         call team%agree(error)
+         if (.not. allocated(error)) call run_simulation(settings, command%force, error, attempt_t( &
+            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp)), team)
+         return
+      end if
+      ! The other verbs are those of one process.
+      if (.not. team%leads()) return
+      select case (command%verb)
+      case ('check')
+         call read_settings(command%file, command%overrides, settings, error)
+         if (.not. allocated(error)) call check_simulation(settings, error)
       case ('replay')
          call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error, &
                            int(command%steps, ip), command%samples, command%oracle)

@@ -205,7 +205,7 @@ contains
       call trade_freight(self%team, counts, freight, counts_received)
       self%domain%arrivals = self%domain%arrivals + &
          int(sum(counts_received) - counts_received(lbound(counts_received, 1) + self%team%rank), lp)
-      call unload(freight, self%bodies%n_all, self%bodies, mover%slots)
+      call unload(freight, (self%bodies%n_all), self%bodies, mover%slots)
       call self%integrator%start(self%bodies)
       call keep_columns(mover, self)
       call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)])
@@ -231,7 +231,7 @@ contains
       call keep_columns(mover, self)
       mover%gives_back = .true.
       call join_freights(freight, strangers)
-      call unload(freight, self%bodies%n_all, self%bodies, slots)
+      call unload(freight, (self%bodies%n_all), self%bodies, slots)
       self%bodies%ghost(slots(n + 1_ip:)) = .true.
       self%bodies%free = pack([(s, s=1_ip, self%bodies%n)],.not. (self%bodies%fixed .or. self%bodies%ghost))
       mover%slots = slots(:n)

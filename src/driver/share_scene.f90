@@ -2,6 +2,7 @@
 !> for all. Free bodies come with the first step.
 module polydem_share_scene
    use polydem_archive, only: archive_t
+   use polydem_assemble, only: index_contacts
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_contacts, only: reserve_contacts
    use polydem_domain, only: new_domain
@@ -184,6 +185,7 @@ contains
       call fit_to_bodies(self, error, grain)
       if (allocated(error)) return
       call reserve_contacts(self%contacts, 0_ip)
+      call index_contacts(self%bodies%n, self%contacts, self%incidence)
       call self%integrator%start(self%bodies)
    end subroutine begin_without_free_bodies
 

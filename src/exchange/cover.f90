@@ -2,9 +2,9 @@
 !>
 !> First, boxes much larger than the typical one are set apart, so that they do not stretch the rectangle of all
 !> others. Then the group for which that saves most area is split in two by the centres of its boxes, again and again,
-!> until there are as many as may be, or the best split does not save a hundredth of the area. Splits are looked for
-!> between few equal bins along both axes (as I. Wald, IEEE Symposium on Interactive Ray Tracing (2007) 33, does for
-!> other ends).
+!> until there are as many as may be, or the best split saves little in comparison with a strip around all boxes, which
+!> is where ghosts are in any case. Splits are looked for between few equal bins along both axes (as I. Wald, IEEE
+!> Symposium on Interactive Ray Tracing (2007) 33, does for other ends).
 module polydem_cover
    use polydem_kinds, only: ip, wp
    implicit none
@@ -17,8 +17,8 @@ module polydem_cover
    integer, parameter :: n_bins = 16
    !> Binary orders of magnitude above the mean one from which on a box counts as large
    integer, parameter :: large = 3
-   !> Area that a split must save, in areas of the rectangle on all boxes
-   real(wp), parameter :: least_gain = 0.01_wp
+   !> Area that a split must save, over that of a strip of boxes around the rectangle on all of them
+   real(wp), parameter :: least_gain = 0.1_wp
 
    !> What joins to any rectangle without changing it; its sides are numbers
    real(wp), parameter :: no_bounds(4) = 0.25_wp*huge(1.0_wp)*[1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]
@@ -60,7 +60,7 @@ contains
       list = [(k, k=1_ip, size(boxes, 2, kind=ip))]
       n = 0_ip
       if (size(list) > 0) then
-         wanted = least_gain*area(bounds_of(boxes))
+         wanted = least_gain*strip_area(boxes)
          call set_large_apart(boxes, list, groups, n)
          do k = 1_ip, n
             call measure(boxes, list, groups(k))
@@ -93,6 +93,20 @@ contains
          bounds = joined(bounds, boxes(:, k))
       end do
    end function bounds_of
+
+   !> Area of a strip around all boxes, as wide as a box is on average
+   pure real(wp) function strip_area(boxes)
+      real(wp), intent(in) :: boxes(:, :)
+      real(wp) :: bounds(4), sides
+      integer :: k
+
+      bounds = bounds_of(boxes)
+      sides = 0.0_wp
+      do k = 1, size(boxes, 2)
+         sides = sides + (boxes(3, k) - boxes(1, k)) + (boxes(4, k) - boxes(2, k))
+      end do
+      strip_area = sum(bounds(3:4) - bounds(1:2))*sides/real(size(boxes, 2), wp)
+   end function strip_area
 
    !> Make one group of the boxes of common size and, if there are any, one of the large ones.
    pure subroutine set_large_apart(boxes, list, groups, n)
