@@ -8,13 +8,14 @@ module polydem_checkpoint_contents
    use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t, state_hash, turn_bodies
    use polydem_contacts, only: contact_memory_t
-   use polydem_errors, only: error_t, raise, run_error
+   use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_hash, only: mix_word
    use polydem_kept_bodies, only: keep_bodies
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ledger, only: keep_ledger
    use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_simulation, only: simulation_t
+   use polydem_strings, only: to_text
    use polydem_watch, only: keep_watch, watch_t
    implicit none
    private
@@ -121,6 +122,7 @@ contains
          call archive%match('/pairs/first', int(s%bodies%id(pairs%first(:n)), lp), '1', 'lower identifier of each pair')
          call archive%match('/pairs/second', int(s%bodies%id(pairs%second(:n)), lp), '1', 'higher identifier')
          call keep_memory(archive, n, s%memory)
+         call expect_edges(archive, s)
          call archive%keep('/run/finder_counts', work%value, '1', 'work of the finder so far')
          call archive%keep_seconds('/run/finder_seconds', work%seconds, 'time of each phase of the finder')
       end associate
@@ -152,6 +154,26 @@ contains
       call keep_column(archive, '/pairs/tangential', n, memory%tangential, 'N/m', 'tangential force remembered')
       call keep_column(archive, '/pairs/area', n, memory%area, 'm2', 'area of the overlap at the last step')
    end subroutine keep_memory
+
+   !> Refuse edges that the bodies of a pair do not have.
+   subroutine expect_edges(archive, s)
+      class(archive_t), intent(inout) :: archive
+      type(simulation_t), intent(in) :: s
+      integer(ip) :: edge, k
+
+      if (.not. archive%gives_back .or. allocated(archive%error)) return
+      associate (pairs => s%neighbours%pairs, start => s%bodies%vertex_start)
+         do k = 1_ip, pairs%n
+            edge = s%memory%separating_edge(k)
+            if (edge <= start(pairs%first(k) + 1_ip) - start(pairs%first(k)) .and. &
+                -edge <= start(pairs%second(k) + 1_ip) - start(pairs%second(k))) cycle
+            call raise(archive%error, input_error, '/pairs/separating_edge of the bodies '// &
+                       to_text(int(s%bodies%id(pairs%first(k)), lp))//' and '// &
+                       to_text(int(s%bodies%id(pairs%second(k)), lp))//' is none that they have')
+            return
+         end do
+      end associate
+   end subroutine expect_edges
 
    !> Keep a column over pairs, if there is one.
    subroutine keep_column(archive, name, n, column, unit, meaning)
