@@ -13,6 +13,7 @@ module polydem_simulation
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, lp, wp
    use polydem_ledger, only: book_step, ledger_t, open_ledger
+   use polydem_lone_team, only: lone_team_t
    use polydem_make_boxes, only: box_maker_t, new_box_maker, update_boxes
    use polydem_motion, only: motion_t, move_bodies
    use polydem_neighbours, only: neighbours_t, new_neighbours
@@ -21,6 +22,7 @@ module polydem_simulation
    use polydem_settings, only: settings_t
    use polydem_stable_step, only: stable_step_of_contacts, stable_step_of_shapes
    use polydem_strings, only: to_text
+   use polydem_team, only: team_t
    use polydem_timers, only: stage_boxes, stage_forces, stage_integrate, stage_neighbours, stage_overlap, timers_t
    implicit none
    private
@@ -30,6 +32,8 @@ module polydem_simulation
    type :: simulation_t
       !> Settings of the run
       type(settings_t) :: settings
+      !> Processes that share the bodies
+      class(team_t), allocatable :: team
       !> Bodies
       type(bodies_t) :: bodies
       !> Prescribed motions of fixed bodies
@@ -78,13 +82,15 @@ module polydem_simulation
 contains
 
    !> Build the scene that the settings ask for and everything else.
-   subroutine new_simulation(settings, self, error)
+   subroutine new_simulation(settings, self, error, team)
       !> Checked settings
       type(settings_t), intent(in) :: settings
       !> The simulation, ready to advance
       type(simulation_t), intent(out) :: self
       !> Bad input
       type(error_t), allocatable, intent(inout) :: error
+      !> Processes of which this one leads; alone if absent
+      class(team_t), intent(in), optional :: team
       type(bodies_t) :: bodies
       type(motion_t), allocatable :: motions(:)
       type(relaxation_t) :: relaxation
@@ -93,12 +99,12 @@ contains
       if (allocated(error)) return
       if (settings%guards%relaxed_depth > 0.0_wp) call relax_bodies(settings, bodies, relaxation, error)
       if (allocated(error)) return
-      call start_simulation(settings, bodies, motions, self, error)
+      call start_simulation(settings, bodies, motions, self, error, team)
       self%relaxation = relaxation
    end subroutine new_simulation
 
    !> Start from given bodies, and compute the forces at time 0.
-   subroutine start_simulation(settings, bodies, motions, self, error)
+   subroutine start_simulation(settings, bodies, motions, self, error, team)
       !> Checked settings; the group &scene is not used
       type(settings_t), intent(in) :: settings
       !> Bodies at the start
@@ -109,7 +115,11 @@ contains
       type(simulation_t), intent(out) :: self
       !> Bad input
       type(error_t), allocatable, intent(inout) :: error
+      !> Processes of which this one leads; alone if absent
+      class(team_t), intent(in), optional :: team
 
+      if (present(team)) allocate (self%team, source=team)
+      if (.not. allocated(self%team)) allocate (lone_team_t :: self%team)
       self%settings = settings
       self%bodies = bodies
       self%motions = motions
