@@ -58,7 +58,7 @@ contains
          call archive%keep_seconds('/run/stage_total', s%timers%total, 'time spent in each stage')
          call archive%keep_seconds('/run/stage_least', s%timers%least, 'shortest time in a step')
          call archive%keep_seconds('/run/stage_most', s%timers%most, 'longest time in a step')
-         if (s%settings%output%ledger) call keep_ledger(s%ledger, archive)
+         if (s%settings%output%ledger) call keep_ledger(s%ledger, s%bodies%n, archive)
          call keep_bodies(archive, s%bodies)
          call s%integrator%keep(archive)
          call archive%keep('/boxes/bounds', s%boxes%bounds, 'm', 'xmin, ymin, xmax, ymax when pairs were last searched')

@@ -37,16 +37,16 @@ module polydem_watch
 
 contains
 
-   !> Prepare the guards that the settings ask for.
+   !> Prepare the guards that the settings ask for; collective.
    subroutine new_watch(watch, simulation)
       !> The guards
       type(watch_t), intent(out) :: watch
       !> A simulation at time 0
-      type(simulation_t), intent(in) :: simulation
+      type(simulation_t), intent(inout) :: simulation
 
       associate (settings => simulation%settings%guards)
          if (settings%overlap /= 'off') watch%thickness = thickness_of_bodies(simulation%bodies)
-         if (settings%energy /= 'off') call open_energy_guard(watch%energy, simulation%contacts)
+         if (settings%energy /= 'off') call open_energy_guard(watch%energy, simulation)
       end associate
    end subroutine new_watch
 
@@ -81,10 +81,7 @@ contains
          if (settings%overlap /= 'off') call look_at_depths(watch, simulation, error)
          if (is_last .or. mod(simulation%step, interval) == 0_lp) then
             if (settings%step /= 'off') call look_at_step(watch, simulation, log, error)
-            if (settings%energy /= 'off') then
-               call check_energy(watch%energy, settings%energy, settings%energy_limit, simulation%ledger, &
-                                 simulation%settings%forces%gravity, simulation%bodies, simulation%step, error)
-            end if
+            if (settings%energy /= 'off') call check_energy(watch%energy, simulation, error)
          end if
       end associate
       call simulation%guard%warning%tell(log)

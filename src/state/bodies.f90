@@ -16,7 +16,7 @@ module polydem_bodies
    use polydem_hash, only: mix_word
    implicit none
    private
-   public :: bodies_t, turn_bodies, state_hash
+   public :: bodies_t, turn_bodies, owns_contact, state_hash
 
    !> Structure of arrays over slots 1..n
    type :: bodies_t
@@ -96,6 +96,17 @@ contains
       end do
       !$omp end parallel do
    end subroutine turn_bodies
+
+   !> Whether this process counts a contact. That is up to the process that moves the first body, or the second one if
+   !> the first is fixed; others have the contact too if they move its other body.
+   pure logical function owns_contact(bodies, first, second)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the two bodies of the contact; one of them is free
+      integer(ip), intent(in) :: first, second
+
+      owns_contact = .not. bodies%ghost(merge(second, first, bodies%fixed(first)))
+   end function owns_contact
 
    !> Hash of the bits of every body's identifier, position, angle and velocities in identifier order.
    !>
