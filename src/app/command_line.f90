@@ -85,6 +85,8 @@ module polydem_command_line
       'override an entry of the namelist; may be repeated'), &
       option_t('--threads', 'T', 'run check replay', &
       'number of threads (default: all that the system offers; replay: one)'), &
+      option_t('--ranks', 'R', 'run check', &
+      'number of processes by MPI, which the launcher ./polydem starts'), &
       option_t('--force', '', 'run', 'overwrite results that are there already'), &
       option_t('--continue', '', 'run', &
       'go on from the last checkpoint, or begin if there is none; do nothing if all is done'), &
@@ -248,6 +250,9 @@ contains
       select case (options(which)%name)
       case ('--threads')
          call read_count('--threads', value, command%threads, error)
+      case ('--ranks')
+         call raise(error, input_error, '--ranks is for the launcher: ./polydem run FILE.nml --ranks '// &
+            value//'; else start the program of the preset mpi with mpirun -n '//value)
       case ('--force')
          command%force = .true.
       case ('--continue')

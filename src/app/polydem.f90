@@ -10,12 +10,14 @@ program polydem
    use polydem_command_line, only: command_t, read_command_line, usage
    use polydem_errors, only: error_t
    use polydem_info, only: describe_program, describe_result
+   use polydem_join_team, only: join_team
    use polydem_kinds, only: dp, ip
    use polydem_read_bench, only: read_bench
    use polydem_read_settings, only: read_settings
    use polydem_replay, only: replay_trace
    use polydem_run, only: attempt_t, run_simulation
    use polydem_settings, only: settings_t
+   use polydem_team, only: team_t
    implicit none
 
    interface
@@ -28,15 +30,18 @@ program polydem
 
    type(command_t) :: command
    type(error_t), allocatable :: error
+   class(team_t), allocatable :: team
 
-   call read_command_line(command, error)
+   call join_team(team, error)
+   if (.not. allocated(error)) call read_command_line(command, error)
    if (.not. allocated(error)) call obey(command, error)
    flush (output_unit)
    if (allocated(error)) then
-      write (error_unit, '(2a)') 'polydem: ', error%message
+      if (team%leads()) write (error_unit, '(2a)') 'polydem: ', error%message
       flush (error_unit)
-      call c_exit(int(error%code, c_int))
    end if
+   call team%leave()
+   if (allocated(error)) call c_exit(int(error%code, c_int))
 
 contains
 
@@ -48,20 +53,26 @@ contains
       type(bench_settings_t) :: bench
 
       if (command%help) then
-         write (output_unit, '(a)') usage(command%verb)
+         if (team%leads()) write (output_unit, '(a)') usage(command%verb)
          return
       else if (command%version) then
-         write (output_unit, '(5a)') 'polydem ', program_version, ' (git ', git_revision, ')'
+         if (team%leads()) write (output_unit, '(5a)') 'polydem ', program_version, ' (git ', git_revision, ')'
          return
       end if
       if (command%threads > 0) call omp_set_num_threads(command%threads)
-      select case (command%verb)
-      case ('run', 'check')
+      if (command%verb == 'run') then
          call read_settings(command%file, command%overrides, settings, error)
-         if (allocated(error)) return
-         if (command%verb == 'check') call check_simulation(settings, error)
-         if (command%verb == 'run') call run_simulation(settings, command%force, error, attempt_t( &
-            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp)))
+         call team%agree(error)
+         if (.not. allocated(error)) call run_simulation(settings, command%force, error, attempt_t( &
+            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp)), team)
+         return
+      end if
+      ! The other verbs are those of one process.
+      if (.not. team%leads()) return
+      select case (command%verb)
+      case ('check')
+         call read_settings(command%file, command%overrides, settings, error)
+         if (.not. allocated(error)) call check_simulation(settings, error)
       case ('replay')
          call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error, &
                            int(command%steps, ip), command%samples, command%oracle)

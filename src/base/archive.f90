@@ -8,7 +8,8 @@
 !> /bodies, /boxes and /pairs have one row for each of these, in ascending order of identifiers, never of slots. So an
 !> archive that is shared by several processes knows from the name how to gather rows and hand them out again.
 !>
-!> Every bit is kept, in any working precision. The first failure stays in `error`; after it nothing happens.
+!> Every bit is kept, in any working precision. What is given back may come from anywhere, so whole numbers that are kept
+!> must be small enough to be counted on. The first failure stays in `error`; after it nothing happens.
 module polydem_archive
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: dp, ip, lp, wp
@@ -16,6 +17,9 @@ module polydem_archive
    implicit none
    private
    public :: archive_t
+
+   !> Greatest whole number that is given back
+   integer(lp), parameter :: most_count = 2_lp**62
 
    !> A place for columns
    type, abstract :: archive_t
@@ -140,6 +144,9 @@ contains
 
       if (allocated(self%error)) return
       call self%exchange_longs(name, values, unit, meaning)
+      if (.not. self%gives_back .or. allocated(self%error)) return
+      if (any(values > most_count .or. values < -most_count)) call raise(self%error, input_error, name//' ('// &
+         meaning//') holds numbers that cannot be')
    end subroutine keep_longs
 
    subroutine keep_long(self, name, values, unit, meaning)
@@ -163,7 +170,12 @@ contains
 
       wide = int(values, lp)
       call self%keep_longs(name, wide, unit, meaning)
-      if (self%gives_back .and. .not. allocated(self%error)) values = int(wide, ip)
+      if (.not. self%gives_back .or. allocated(self%error)) return
+      if (any(wide > huge(1_ip) .or. wide < -huge(1_ip))) then
+         call raise(self%error, input_error, name//' ('//meaning//') holds numbers beyond 32 bits')
+      else
+         values = int(wide, ip)
+      end if
    end subroutine keep_integers
 
    !> Take times of clocks or give them back, which are double precision always.
@@ -191,8 +203,9 @@ contains
       character(len=*), intent(in) :: unit, meaning
       integer(lp), allocatable :: former(:)
 
+      if (allocated(self%error)) return
       allocate (former, source=values)
-      call self%keep_longs(name, former, unit, meaning)
+      call self%exchange_longs(name, former, unit, meaning)
       if (allocated(self%error)) return
       if (any(former /= values)) call raise(self%error, input_error, name//' ('//meaning// &
          ') is not what it was when the state was saved')

@@ -31,6 +31,8 @@ module polydem_make_boxes
    !> What it takes to make boxes
    type :: box_maker_t
       private
+      !> Median diameter of the free bodies; huge if there is none [m]
+      real(wp), public :: grain = huge(1.0_wp)
       !> First box of each body, (bodies + 1)
       integer(ip), allocatable :: first_box(:)
       !> First vertex of each box's piece, (boxes + 1); the box of a whole body has none
@@ -44,7 +46,7 @@ module polydem_make_boxes
 contains
 
    !> Decide which bodies are cut, make room for all boxes and fill them.
-   subroutine new_box_maker(maker, bodies, largest_ratio, margin, boxes, error)
+   subroutine new_box_maker(maker, bodies, largest_ratio, margin, boxes, error, grain)
       !> What `update_boxes` will need
       type(box_maker_t), intent(out) :: maker
       !> Bodies at their present place
@@ -57,8 +59,12 @@ contains
       type(boxes_t), intent(out) :: boxes
       !> Allocated if a body is so large that it had to be cut into too many pieces
       type(error_t), allocatable, intent(inout) :: error
+      !> Median diameter of the free bodies, if these are not all there are; otherwise it is taken from them [m]
+      real(wp), intent(in), optional :: grain
       integer(ip) :: s, all_slots(bodies%n)
 
+      if (present(grain)) maker%grain = grain
+      if (.not. present(grain)) maker%grain = median_diameter(bodies)
       call cut_bodies(maker, bodies, largest_ratio, error)
       if (allocated(error)) return
       boxes%n = maker%first_box(bodies%n + 1_ip) - 1_ip
@@ -84,18 +90,17 @@ contains
       real(wp), intent(in) :: largest_ratio
       type(error_t), allocatable, intent(inout) :: error
       type(pieces_t) :: pieces
-      real(wp) :: grain, none(2, 0)
+      real(wp) :: none(2, 0)
       integer(ip) :: s, room
       logical :: fits
 
-      grain = median_diameter(bodies)
       room = most_pieces
       allocate (maker%first_box(bodies%n + 1_ip))
       maker%first_box(1) = 1_ip
       do s = 1_ip, bodies%n
-         call cut_body(body_shape(bodies, s), grain, largest_ratio, room, pieces, fits)
+         call cut_body(body_shape(bodies, s), maker%grain, largest_ratio, room, pieces, fits)
          if (.not. fits) then
-            call refuse(bodies%id(s), diameter(body_shape(bodies, s))/grain, error)
+            call refuse(bodies%id(s), diameter(body_shape(bodies, s))/maker%grain, error)
             return
          end if
          room = room - (pieces%n + 1_ip - maker%first_box(s))

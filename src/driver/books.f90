@@ -1,10 +1,10 @@
 !> The ledger of a simulation as rows for the trajectory and lines for the log.
 module polydem_books
-   use polydem_bodies, only: owns_contact
    use polydem_kinds, only: ip, lp, wp
    use polydem_ledger, only: balance_t
    use polydem_ledger_row, only: ledger_row_t
    use polydem_log, only: log_t
+   use polydem_own_rows, only: owns_pair
    use polydem_simulation, only: simulation_t, take_stock
    use polydem_strings, only: to_text
    implicit none
@@ -68,7 +68,7 @@ contains
       counts = 0_lp
       associate (contacts => simulation%contacts)
          do c = 1_ip, contacts%n
-            if (owns_contact(simulation%bodies, contacts%first(c), contacts%second(c))) counts = counts + 1_lp
+            if (owns_pair(simulation%bodies, contacts%first(c), contacts%second(c))) counts = counts + 1_lp
          end do
       end associate
       call simulation%team%add_up(counts)

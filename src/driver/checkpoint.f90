@@ -10,12 +10,16 @@ module polydem_checkpoint
    use polydem_errors, only: error_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
+   use polydem_own_rows, only: lay_out_bodies, lay_out_pairs, lay_out_parts
    use polydem_provenance, only: provenance_t
    use polydem_result_folder, only: checkpoint_path, n_checkpoints
+   use polydem_row_blocks, only: row_blocks_t
    use polydem_settings, only: checkpoint_settings_t
    use polydem_signals, only: await_signals, caught_signal, release_signals
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: collect_counts, simulation_t
    use polydem_strings, only: to_text
+   use polydem_team, only: team_t
+   use polydem_wall_forces, only: complete_wall_forces
    use polydem_watch, only: watch_t
    implicit none
    private
@@ -106,12 +110,14 @@ contains
    end subroutine look
 
    !> Write a checkpoint over the older one of the last two.
-   subroutine write_checkpoint(self, folder, provenance, simulation, history, watch, error)
+   subroutine write_checkpoint(self, folder, provenance, team, simulation, history, watch, error)
       class(checkpoints_t), intent(inout) :: self
       !> Folder of the result
       character(len=*), intent(in) :: folder
       !> Where it comes from
       type(provenance_t), intent(in) :: provenance
+      !> Processes of the run, all of which must call
+      class(team_t), intent(inout) :: team
       !> The simulation at the end of a step
       type(simulation_t), intent(inout) :: simulation
       !> Former attempts and the present one
@@ -124,7 +130,10 @@ contains
       real(dp) :: began
 
       began = wall_seconds()
-      call file%create(checkpoint_path(folder, self%next), provenance)
+      call file%create(checkpoint_path(folder, self%next), provenance, team)
+      if (.not. allocated(file%error)) call lay_out_rows(team, simulation, file)
+      call complete_wall_forces(team, simulation%bodies, simulation%contacts)
+      call collect_counts(simulation)
       call keep_run(file, simulation, history, watch)
       call file%complete(error)
       if (allocated(error)) return
@@ -136,6 +145,23 @@ contains
       self%seconds = self%seconds + (self%last_moment - began)
       self%longest = max(self%longest, self%last_moment - began)
    end subroutine write_checkpoint
+
+   !> Say which rows of a checkpoint this process has.
+   subroutine lay_out_rows(team, simulation, file)
+      class(team_t), intent(inout) :: team
+      type(simulation_t), intent(in) :: simulation
+      type(checkpoint_file_t), intent(inout) :: file
+      type(row_blocks_t) :: rows
+
+      associate (bodies => simulation%bodies, boxes => simulation%boxes, pairs => simulation%neighbours%pairs)
+         call lay_out_bodies(team, bodies, rows)
+         call file%set_rows('/bodies/', rows)
+         call lay_out_parts(team, bodies, boxes%body(:boxes%n), rows)
+         call file%set_rows('/boxes/', rows)
+         call lay_out_pairs(team, bodies, pairs%first(:pairs%n), pairs%second(:pairs%n), rows)
+         call file%set_rows('/pairs/', rows)
+      end associate
+   end subroutine lay_out_rows
 
    !> End, and say how many there were.
    subroutine close_checkpoints(self, log)

@@ -8,16 +8,18 @@ module polydem_checkpoint_contents
    use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t, state_hash, turn_bodies
    use polydem_contacts, only: contact_memory_t
-   use polydem_errors, only: error_t, raise, run_error
+   use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_hash, only: mix_word
+   use polydem_kept_bodies, only: keep_bodies
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_ledger, only: keep_ledger
+   use polydem_ledger, only: keep_books, keep_ledger
    use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_simulation, only: simulation_t
+   use polydem_strings, only: to_text
    use polydem_watch, only: keep_watch, watch_t
    implicit none
    private
-   public :: history_t, keep_run, keep_progress, scene_hash
+   public :: history_t, keep_run, keep_whole, keep_progress, scene_hash
 
    !> The scene that a run began with, and its former attempts
    type :: history_t
@@ -45,6 +47,32 @@ contains
       !> Guards
       type(watch_t), intent(inout) :: watch
 
+      call keep_whole(archive, simulation, history, watch)
+      associate (s => simulation)
+         call keep_bodies(archive, s%bodies)
+         call s%integrator%keep(archive)
+         if (s%settings%output%ledger) call keep_books(s%ledger, s%bodies%n, archive)
+         call archive%keep('/boxes/bounds', s%boxes%bounds(:, :s%boxes%n), 'm', &
+                           'xmin, ymin, xmax, ymax when pairs were last searched')
+         call keep_pairs(archive, s)
+         if (.not. archive%gives_back .or. allocated(archive%error)) return
+         call turn_bodies(s%bodies, s%moving)
+         s%contacts%n = 0_ip
+         s%contacts%n_degenerate = 0_ip
+      end associate
+   end subroutine keep_run
+
+   !> Keep what belongs to the whole run and not to bodies, boxes or pairs.
+   subroutine keep_whole(archive, simulation, history, watch)
+      !> Archive; a failure is in its `error`
+      class(archive_t), intent(inout) :: archive
+      !> The simulation
+      type(simulation_t), intent(inout) :: simulation
+      !> Former attempts
+      type(history_t), intent(inout) :: history
+      !> Guards
+      type(watch_t), intent(inout) :: watch
+
       call keep_progress(archive, simulation%step, history)
       call keep_watch(watch, archive)
       associate (s => simulation)
@@ -58,17 +86,9 @@ contains
          call archive%keep_seconds('/run/stage_total', s%timers%total, 'time spent in each stage')
          call archive%keep_seconds('/run/stage_least', s%timers%least, 'shortest time in a step')
          call archive%keep_seconds('/run/stage_most', s%timers%most, 'longest time in a step')
-         if (s%settings%output%ledger) call keep_ledger(s%ledger, s%bodies%n, archive)
-         call keep_bodies(archive, s%bodies)
-         call s%integrator%keep(archive)
-         call archive%keep('/boxes/bounds', s%boxes%bounds, 'm', 'xmin, ymin, xmax, ymax when pairs were last searched')
-         call keep_pairs(archive, s)
-         if (.not. archive%gives_back .or. allocated(archive%error)) return
-         call turn_bodies(s%bodies, s%moving)
-         s%contacts%n = 0_ip
-         s%contacts%n_degenerate = 0_ip
+         if (s%settings%output%ledger) call keep_ledger(s%ledger, archive)
       end associate
-   end subroutine keep_run
+   end subroutine keep_whole
 
    !> Keep how far a run has got; the part of `keep_run` that needs no simulation.
    subroutine keep_progress(archive, step, history)
@@ -88,22 +108,6 @@ contains
       history%seconds = seconds(1)
    end subroutine keep_progress
 
-   !> Keep what changes about bodies.
-   subroutine keep_bodies(archive, bodies)
-      class(archive_t), intent(inout) :: archive
-      type(bodies_t), intent(inout) :: bodies
-
-      call archive%match('/bodies/id', int(bodies%id, lp), '1', 'identifiers of the bodies, ascending')
-      call archive%keep('/bodies/position', bodies%position, 'm', 'centres of mass')
-      call archive%keep('/bodies/angle', bodies%angle, 'rad', 'angles since the start')
-      call archive%keep('/bodies/velocity', bodies%velocity, 'm/s', 'velocities of the centres of mass')
-      call archive%keep('/bodies/angular_velocity', bodies%angular_velocity, 'rad/s', 'angular velocities')
-      call archive%keep('/bodies/acceleration', bodies%acceleration, 'm/s2', 'accelerations of the centres of mass')
-      call archive%keep('/bodies/angular_acceleration', bodies%angular_acceleration, 'rad/s2', 'angular accelerations')
-      call archive%keep('/bodies/force', bodies%force, 'N/m', 'sums of the forces')
-      call archive%keep('/bodies/torque', bodies%torque, 'N', 'sums of the torques about the centres of mass')
-   end subroutine keep_bodies
-
    !> Keep the pairs and what is remembered of them. Pairs that are given back are found again first.
    subroutine keep_pairs(archive, s)
       class(archive_t), intent(inout) :: archive
@@ -119,6 +123,7 @@ contains
          call archive%match('/pairs/first', int(s%bodies%id(pairs%first(:n)), lp), '1', 'lower identifier of each pair')
          call archive%match('/pairs/second', int(s%bodies%id(pairs%second(:n)), lp), '1', 'higher identifier')
          call keep_memory(archive, n, s%memory)
+         call expect_edges(archive, s)
          call archive%keep('/run/finder_counts', work%value, '1', 'work of the finder so far')
          call archive%keep_seconds('/run/finder_seconds', work%seconds, 'time of each phase of the finder')
       end associate
@@ -150,6 +155,26 @@ contains
       call keep_column(archive, '/pairs/tangential', n, memory%tangential, 'N/m', 'tangential force remembered')
       call keep_column(archive, '/pairs/area', n, memory%area, 'm2', 'area of the overlap at the last step')
    end subroutine keep_memory
+
+   !> Refuse edges that the bodies of a pair do not have.
+   subroutine expect_edges(archive, s)
+      class(archive_t), intent(inout) :: archive
+      type(simulation_t), intent(in) :: s
+      integer(ip) :: edge, k
+
+      if (.not. archive%gives_back .or. allocated(archive%error)) return
+      associate (pairs => s%neighbours%pairs, start => s%bodies%vertex_start)
+         do k = 1_ip, pairs%n
+            edge = s%memory%separating_edge(k)
+            if (edge <= start(pairs%first(k) + 1_ip) - start(pairs%first(k)) .and. &
+                -edge <= start(pairs%second(k) + 1_ip) - start(pairs%second(k))) cycle
+            call raise(archive%error, input_error, '/pairs/separating_edge of the bodies '// &
+                       to_text(int(s%bodies%id(pairs%first(k)), lp))//' and '// &
+                       to_text(int(s%bodies%id(pairs%second(k)), lp))//' is none that they have')
+            return
+         end do
+      end associate
+   end subroutine expect_edges
 
    !> Keep a column over pairs, if there is one.
    subroutine keep_column(archive, name, n, column, unit, meaning)

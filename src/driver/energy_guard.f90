@@ -5,15 +5,14 @@
 !> grow beyond is measured against the energy turned over. A force law that is not conservative, as the area law,
 !> adds to it, some per cent of the work of a contact in either direction.
 module polydem_energy_guard
-   use polydem_bodies, only: bodies_t, owns_contact
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
-   use polydem_exact_sum, only: exact_sum_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ledger, only: balance_t
    use polydem_simulation, only: simulation_t, take_stock
    use polydem_strings, only: to_text
    use polydem_team, only: team_t
-   use polydem_team_sums, only: add_up_sums
    use polydem_warnings, only: warning_t
    implicit none
    private
@@ -29,23 +28,17 @@ module polydem_energy_guard
 
 contains
 
-   !> Take down what the contacts hold; to be called when the ledger has been opened. Collective.
-   subroutine open_energy_guard(guard, simulation)
+   !> Take down what the contacts hold; to be called when the ledger has been opened, where all bodies are.
+   subroutine open_energy_guard(guard, contacts)
       !> The guard
       type(energy_guard_t), intent(out) :: guard
-      !> Simulation at the start
-      type(simulation_t), intent(inout) :: simulation
-      type(exact_sum_t) :: stored(1)
+      !> Contacts at the start with their forces
+      type(contacts_t), intent(in) :: contacts
       integer(ip) :: c
 
-      associate (contacts => simulation%contacts)
-         do c = 1_ip, contacts%n
-            if (owns_contact(simulation%bodies, contacts%first(c), contacts%second(c))) &
-               call stored(1)%add(0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c))
-         end do
-      end associate
-      call add_up_sums(simulation%team, stored)
-      guard%stored = stored(1)%value()
+      do c = 1_ip, contacts%n
+         guard%stored = guard%stored + 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)
+      end do
    end subroutine open_energy_guard
 
    !> Compare the energy with what was given; collective, and all processes come to the same result.

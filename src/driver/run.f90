@@ -1,11 +1,11 @@
 !> A run from its settings to its result.
 module polydem_run
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use polydem_bodies, only: state_hash
    use polydem_books, only: count_contacts, fill_row, write_books
    use polydem_checkpoint, only: checkpoints_t
-   use polydem_checkpoint_contents, only: history_t, scene_hash
+   use polydem_checkpoint_contents, only: history_t, keep_whole, scene_hash
    use polydem_clock, only: wall_seconds
+   use polydem_common_hash, only: hash_all_bodies
    use polydem_counters, only: counters_t
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t, input_error, raise, run_error, stopped_early
@@ -14,7 +14,8 @@ module polydem_run
    use polydem_ledger, only: balance_t
    use polydem_ledger_row, only: ledger_row_t
    use polydem_log, only: log_t
-   use polydem_log_tables, only: write_counters, write_hash, write_header, write_timings
+   use polydem_log_tables, only: write_counters, write_hash, write_header, write_ranks, write_timings
+   use polydem_lone_team, only: lone_team_t
    use polydem_machine, only: resident_memory
    use polydem_paths, only: make_folder
    use polydem_profile, only: write_profile
@@ -24,11 +25,14 @@ module polydem_run
       n_checkpoints
    use polydem_resume, only: go_on, is_finished, look_back, past_t
    use polydem_run_lock, only: lock_result, unlock_result
+   use polydem_share_scene, only: share_scene, sharer_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: advance, new_simulation, report_counters, simulation_t, time_of
    use polydem_strings, only: to_text
-   use polydem_timers, only: stage_output
+   use polydem_team, only: team_t
+   use polydem_timers, only: n_stages, stage_exchange, stage_output, timers_t
    use polydem_trajectory, only: trajectory_t
+   use polydem_wall_forces, only: complete_wall_forces
    use polydem_watch, only: look, new_watch, sum_up, watch_t
    implicit none
    private
@@ -49,6 +53,8 @@ module polydem_run
 
    !> A run under way
    type :: run_t
+      !> Processes that run it
+      class(team_t), allocatable :: team
       !> How it was asked for
       type(attempt_t) :: attempt
       !> When it began, by the clock [s]
@@ -83,12 +89,14 @@ module polydem_run
       type(watch_t) :: watch
       !> Step of the last frame, negative if there is none
       integer(lp) :: last_frame = -1_lp
+      !> Why the run must end early, known to the leader; unallocated as long as it need not
+      character(len=:), allocatable :: reason
    end type run_t
 
 contains
 
-   !> Run a simulation, and leave trajectory, profile and log in its folder.
-   subroutine run_simulation(settings, force, error, attempt)
+   !> Run a simulation, and leave trajectory, profile and log in its folder. Collective.
+   subroutine run_simulation(settings, force, error, attempt, team)
       !> Checked settings
       type(settings_t), intent(in) :: settings
       !> Whether an older result may be overwritten
@@ -97,44 +105,138 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> How to deal with former attempts; a new run without a limit if absent
       type(attempt_t), intent(in), optional :: attempt
+      !> Processes that run it, of which only the leader writes anything but shared files; this one alone if absent
+      class(team_t), intent(in), optional :: team
       type(run_t) :: run
-      character(len=:), allocatable :: note
+      logical :: is_locked
+      integer(lp) :: finished(1)
 
       run%began = wall_seconds()
       if (present(attempt)) run%attempt = attempt
+      if (present(team)) allocate (run%team, source=team)
+      if (.not. allocated(run%team)) allocate (lone_team_t :: run%team)
       run%folder = result_folder(settings)
-      if (run%attempt%continues) then
-         if (is_finished(run%folder, settings)) then
-            call tell_finished(run%folder)
-            return
-         end if
+      finished = 0_lp
+      if (run%team%leads() .and. run%attempt%continues) then
+         if (is_finished(run%folder, settings)) finished = 1_lp
       end if
+      call run%team%share(finished)
+      if (finished(1) == 1_lp) then
+         if (run%team%leads()) call tell_finished(run%folder)
+         return
+      end if
+      is_locked = .false.
+      if (run%team%leads()) call begin(settings, force, run, is_locked, error)
+      call run%team%agree(error)
+      if (.not. allocated(error)) call join(settings, run, error)
+      if (.not. allocated(error)) call go(run, error)
+      if (is_locked) call unlock_result(run%folder)
+   end subroutine run_simulation
+
+   !> What the leader does alone: the scene, the folder, and what former attempts left there.
+   subroutine begin(settings, force, run, is_locked, error)
+      type(settings_t), intent(in) :: settings
+      logical, intent(in) :: force
+      type(run_t), intent(inout) :: run
+      !> Whether the folder is locked
+      logical, intent(inout) :: is_locked
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: note
+
       call check_free(run, force, error)
       if (.not. allocated(error)) call new_simulation(settings, run%simulation, error)
       if (.not. allocated(error)) call make_folder(run%folder, error)
       if (.not. allocated(error)) call lock_result(run%folder, note, error)
       if (allocated(error)) return
+      is_locked = .true.
       call prepare(settings, force, note, run, error)
-      if (.not. allocated(error)) call go(run, error)
-      call unlock_result(run%folder)
-   end subroutine run_simulation
+   end subroutine begin
+
+   !> Let all processes know what the leader knows, and open what they write together.
+   subroutine join(settings, run, error)
+      type(settings_t), intent(in) :: settings
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+      type(sharer_t) :: sharer
+      integer(lp) :: longs(6)
+      real(dp) :: stored(1)
+
+      call share_scene(settings, run%team, run%simulation, error)
+      call run%team%agree(error)
+      if (allocated(error)) return
+      if (run%team%size > 1_ip) then
+         longs = [run%history%scene, int(run%past%checkpoint, lp), run%past%step, int(run%past%segments, lp), &
+                  run%past%last_frame, int(run%checkpoints%next, lp)]
+         stored = real(run%watch%energy%stored, dp)
+         call run%team%share(longs)
+         call run%team%share(stored)
+         if (.not. run%team%leads()) then
+            run%history%scene = longs(1)
+            run%past%checkpoint = int(longs(2), ip)
+            run%past%step = longs(3)
+            run%past%segments = int(longs(4), ip)
+            run%past%last_frame = longs(5)
+            call run%checkpoints%open(settings%checkpoint, run%simulation%dt, run%began, 0.0_dp)
+            if (run%past%checkpoint > 0_ip) run%checkpoints%last_step = run%past%step
+            run%checkpoints%next = int(longs(6), ip)
+            run%watch%energy%stored = real(stored(1), wp)
+            call choose_intervals(run)
+         end if
+         allocate (sharer%team, source=run%team)
+         sharer%gives_back = .not. run%team%leads()
+         call keep_whole(sharer, run%simulation, run%history, run%watch)
+         if (allocated(sharer%error)) call move_alloc(sharer%error, error)
+         call run%team%agree(error)
+         if (allocated(error)) return
+         if (.not. run%team%leads()) then
+            run%simulation%sums = 0_lp
+            run%simulation%timers = timers_t()
+         end if
+      end if
+      call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error, &
+                               run%past%segments, run%team)
+      if (run%team%size == 1_ip .and. .not. allocated(error)) &
+         call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, error)
+   end subroutine join
 
    !> The first frame, unless a former attempt wrote it, all steps, and the end.
    subroutine go(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
+      logical :: is_due, must_stop
 
       if (run%past%checkpoint == 0_ip) call end_step(run, error)
       do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
          call advance(run%simulation, error)
+         call agree_on_step(run, is_due, must_stop, error)
          if (.not. allocated(error)) call end_step(run, error)
          call run%simulation%timers%lap(stage_output)
          call run%simulation%timers%end_step()
          if (.not. allocated(error)) call run%recorder%record(run%simulation, error)
-         if (.not. allocated(error)) call save(run, error)
+         if (.not. allocated(error)) call save(run, is_due, must_stop, error)
       end do
       call finish(run, run%history%seconds + (wall_seconds() - run%began), error)
    end subroutine go
+
+   !> Let all processes know how the step went, and what the clock and the signals of the leader say.
+   subroutine agree_on_step(run, is_due, must_stop, error)
+      type(run_t), intent(inout) :: run
+      !> Whether a checkpoint is due, and whether the run must end after it
+      logical, intent(out) :: is_due, must_stop
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp) :: flags(3)
+
+      is_due = .false.
+      if (run%team%leads()) call run%checkpoints%look(run%simulation%step, is_due, run%reason)
+      must_stop = allocated(run%reason)
+      if (run%team%size == 1_ip) return
+      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), run%simulation%guard%warning%count]
+      call run%team%agree(error, flags)
+      is_due = flags(1) == 1_lp
+      must_stop = flags(2) == 1_lp
+      run%simulation%guard%warning%count = flags(3)
+      call run%simulation%timers%lap(stage_exchange)
+   end subroutine agree_on_step
 
    !> Refuse to overwrite a result unless that is wanted.
    subroutine check_free(run, force, error)
@@ -189,9 +291,6 @@ contains
       call new_watch(run%watch, run%simulation)
       call choose_intervals(run)
       if (.not. allocated(error)) call recall(run, error)
-      if (allocated(error)) return
-      call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error, run%past%segments)
-      if (.not. allocated(error)) call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, error)
    end subroutine prepare
 
    !> Look after checkpoints from now on, and go on from one if that is wanted.
@@ -209,16 +308,14 @@ contains
    end subroutine recall
 
    !> Write a checkpoint when it is time for one, and end the run early if that is wanted.
-   subroutine save(run, error)
+   subroutine save(run, is_due, must_stop, error)
       type(run_t), intent(inout) :: run
+      logical, intent(in) :: is_due, must_stop
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: reason
       type(history_t) :: history
-      logical :: is_due
 
       associate (s => run%simulation)
          if (s%step == s%n_steps) return
-         call run%checkpoints%look(s%step, is_due, reason)
          if (is_due) then
             ! The frames up to the checkpoint are safe before it is.
             call run%trajectory%close(error)
@@ -226,10 +323,12 @@ contains
             history = run%history
             history%segments = int(run%trajectory%number, lp)
             history%seconds = history%seconds + (wall_seconds() - run%began)
-            call run%checkpoints%write(run%folder, run%provenance, s, history, run%watch, error)
+            call run%checkpoints%write(run%folder, run%provenance, run%team, s, history, run%watch, error)
          end if
-         if (allocated(reason)) call raise(error, stopped_early, 'stopped early by '//reason//' after step '// &
-            to_text(s%step)//' of '//to_text(s%n_steps)//'; the same command with --continue goes on')
+         if (.not. must_stop) return
+         if (.not. allocated(run%reason)) run%reason = 'the leader'
+         call raise(error, stopped_early, 'stopped early by '//run%reason//' after step '// &
+                    to_text(s%step)//' of '//to_text(s%n_steps)//'; the same command with --continue goes on')
       end associate
    end subroutine save
 
@@ -262,6 +361,7 @@ contains
 
       if (run%simulation%step <= run%past%last_frame) return
       associate (s => run%simulation, output => run%simulation%settings%output)
+         call complete_wall_forces(run%team, s%bodies, s%contacts)
          if (output%contacts .and. output%ledger) then
             call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, row=run%row)
          else if (output%contacts) then
@@ -283,10 +383,14 @@ contains
       integer, intent(in) :: code
       type(error_t), allocatable, intent(inout) :: error
 
+      integer(lp) :: nowhere(1)
+
       associate (s => run%simulation, bodies => run%simulation%bodies)
          if (code /= run_error .or. run%last_frame == s%step) return
-         if (.not. all(ieee_is_finite(bodies%position)) .or. .not. all(ieee_is_finite(bodies%velocity))) return
-         if (.not. all(ieee_is_finite(bodies%angle)) .or. .not. all(ieee_is_finite(bodies%angular_velocity))) return
+         nowhere = merge(0_lp, 1_lp, all(ieee_is_finite(bodies%position)) .and. all(ieee_is_finite(bodies%velocity)) &
+                         .and. all(ieee_is_finite(bodies%angle)) .and. all(ieee_is_finite(bodies%angular_velocity)))
+         call run%team%maximise(nowhere)
+         if (nowhere(1) == 1_lp) return
          if (s%settings%output%ledger) call fill_row(s, run%balance, run%row)
       end associate
       call write_frame(run, error)
@@ -306,15 +410,16 @@ contains
       status = 'finished'
       if (allocated(error)) status = error%message
       associate (s => run%simulation)
-         hash = state_hash(s%bodies)
+         call hash_all_bodies(run%team, s%bodies, hash)
          call report_counters(s, counters)
          if (allocated(error)) call write_last_frame(run, error%code, late_error)
          call run%trajectory%close(late_error)
          call run%recorder%close(run%log, late_error)
          call run%checkpoints%close(run%log)
-         call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, status, late_error, &
-                            memory)
-         call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n)
+         if (run%team%leads()) call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, &
+                                                  status, late_error, memory)
+         call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n_all)
+         call write_spread(run, run%log)
          call write_counters(run%log, counters)
          if (s%settings%output%ledger) call write_books(s, run%log)
          call sum_up(run%watch, s, run%log)
@@ -323,7 +428,20 @@ contains
       call write_hash(run%log, hash)
       call run%log%close(late_error)
       if (.not. allocated(error) .and. allocated(late_error)) call move_alloc(late_error, error)
+      call run%team%agree(error)
    end subroutine finish
+
+   !> Write how the time of each stage is spread over processes; collective.
+   subroutine write_spread(run, log)
+      type(run_t), intent(inout) :: run
+      type(log_t), intent(inout) :: log
+      real(dp), allocatable :: total(:)
+      integer(ip), allocatable :: counts(:)
+
+      if (run%team%size == 1_ip) return
+      call run%team%gather(run%simulation%timers%total, total, counts)
+      call write_ranks(log, reshape(total, [n_stages, int(run%team%size)]))
+   end subroutine write_spread
 
    subroutine choose_intervals(run)
       type(run_t), intent(inout) :: run

@@ -1,81 +1,31 @@
 !> A simulation and its time step.
 module polydem_simulation
-   use polydem_assemble, only: assemble_forces, incidence_t, index_contacts
+   use polydem_assemble, only: assemble_forces, index_contacts
    use polydem_bodies, only: bodies_t, turn_bodies
-   use polydem_boxes, only: boxes_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_find_contacts, only: find_contacts
-   use polydem_force_law, only: evaluate_law, force_law_t, new_force_law
-   use polydem_guards, only: check_contacts, check_motion, check_places, check_step, motion_guard_t, new_motion_guard
-   use polydem_integrator, only: integrator_t
+   use polydem_force_law, only: evaluate_law
+   use polydem_guards, only: check_contacts, check_motion, check_places, check_step
    use polydem_integrator_factory, only: new_integrator
-   use polydem_kinds, only: ip, lp, wp
-   use polydem_ledger, only: balance_of, balance_t, book_step, ledger_t, open_ledger
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_ledger, only: balance_of, balance_t, book_step, open_ledger
    use polydem_lone_team, only: lone_team_t
-   use polydem_make_boxes, only: box_maker_t, new_box_maker, update_boxes
+   use polydem_make_boxes, only: update_boxes
    use polydem_motion, only: motion_t, move_bodies
-   use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_relax, only: relax_bodies, relaxation_t
    use polydem_scene, only: build_scene
    use polydem_settings, only: settings_t
-   use polydem_stable_step, only: stable_step_of_contacts, stable_step_of_shapes
+   use polydem_settle, only: recall_pairs, settle
+   use polydem_simulation_parts, only: fit_to_bodies, simulation_t
+   use polydem_stable_step, only: contact_numbers, stable_step_of_contacts, stable_step_of_shapes
    use polydem_strings, only: to_text
-   use polydem_team, only: team_t
-   use polydem_timers, only: stage_boxes, stage_forces, stage_integrate, stage_neighbours, stage_overlap, timers_t
+   use polydem_timers, only: stage_boxes, stage_exchange, stage_forces, stage_integrate, stage_neighbours, stage_overlap, &
+      timers_t
    implicit none
    private
-   public :: simulation_t, new_simulation, start_simulation, advance, time_of, take_stock, report_counters, &
-      check_stability
-
-   !> Everything that a run consists of
-   type :: simulation_t
-      !> Settings of the run
-      type(settings_t) :: settings
-      !> Processes that share the bodies
-      class(team_t), allocatable :: team
-      !> Bodies
-      type(bodies_t) :: bodies
-      !> Prescribed motions of fixed bodies
-      type(motion_t), allocatable :: motions(:)
-      !> How the boxes are made
-      type(box_maker_t) :: maker
-      !> Bounding boxes
-      type(boxes_t) :: boxes
-      !> Pairs of bodies whose boxes overlap
-      type(neighbours_t) :: neighbours
-      !> Contacts of the last step
-      type(contacts_t) :: contacts
-      !> What is remembered of the pairs
-      type(contact_memory_t) :: memory
-      !> Contacts of each body
-      type(incidence_t) :: incidence
-      !> Force law
-      type(force_law_t) :: law
-      !> Integrator
-      class(integrator_t), allocatable :: integrator
-      !> Books of energy and momentum
-      type(ledger_t) :: ledger
-      !> Seconds per stage
-      type(timers_t) :: timers
-      !> Steps done
-      integer(lp) :: step = 0_lp
-      !> Steps to do
-      integer(lp) :: n_steps = 0_lp
-      !> Time step [s]
-      real(wp) :: dt = 0.0_wp
-      !> Stable step expected from the shapes [s]
-      real(wp) :: expected_stable_step = 0.0_wp
-      !> Watches how far bodies move
-      type(motion_guard_t) :: guard
-      !> How bodies were pushed apart before time 0
-      type(relaxation_t) :: relaxation
-      !> Slots that may move: free bodies, then those of motions; the first n_free of them are the free ones
-      integer(ip), allocatable :: moving(:)
-      !> Sums over all steps: pairs, contacts, pairs that began, pairs that ended, degenerate contacts
-      integer(lp) :: sums(5) = 0_lp
-   end type simulation_t
+   public :: simulation_t, new_simulation, start_simulation, advance, time_of, take_stock, collect_counts, &
+      report_counters, check_stability
 
    !> More steps than any run can do
    real(wp), parameter :: most_steps = 1.0e15_wp
@@ -83,15 +33,13 @@ module polydem_simulation
 contains
 
    !> Build the scene that the settings ask for and everything else.
-   subroutine new_simulation(settings, self, error, team)
+   subroutine new_simulation(settings, self, error)
       !> Checked settings
       type(settings_t), intent(in) :: settings
       !> The simulation, ready to advance
       type(simulation_t), intent(out) :: self
       !> Bad input
       type(error_t), allocatable, intent(inout) :: error
-      !> Processes of which this one leads; alone if absent
-      class(team_t), intent(in), optional :: team
       type(bodies_t) :: bodies
       type(motion_t), allocatable :: motions(:)
       type(relaxation_t) :: relaxation
@@ -100,12 +48,12 @@ contains
       if (allocated(error)) return
       if (settings%guards%relaxed_depth > 0.0_wp) call relax_bodies(settings, bodies, relaxation, error)
       if (allocated(error)) return
-      call start_simulation(settings, bodies, motions, self, error, team)
+      call start_simulation(settings, bodies, motions, self, error)
       self%relaxation = relaxation
    end subroutine new_simulation
 
    !> Start from given bodies, and compute the forces at time 0.
-   subroutine start_simulation(settings, bodies, motions, self, error, team)
+   subroutine start_simulation(settings, bodies, motions, self, error)
       !> Checked settings; the group &scene is not used
       type(settings_t), intent(in) :: settings
       !> Bodies at the start
@@ -116,39 +64,27 @@ contains
       type(simulation_t), intent(out) :: self
       !> Bad input
       type(error_t), allocatable, intent(inout) :: error
-      !> Processes of which this one leads; alone if absent
-      class(team_t), intent(in), optional :: team
 
-      if (present(team)) allocate (self%team, source=team)
-      if (.not. allocated(self%team)) allocate (lone_team_t :: self%team)
+      allocate (lone_team_t :: self%team)
       self%settings = settings
       self%bodies = bodies
       self%motions = motions
-      call new_force_law(settings%forces, self%bodies, self%law)
-      self%contacts%area_is_effective = self%law%needs_effective_area
-      self%contacts%has_twist = self%law%needs_twist
       call new_integrator(settings%integrate, self%integrator)
       call choose_step(self, error)
+      if (.not. allocated(error)) call fit_to_bodies(self, error)
       if (allocated(error)) return
-      call list_moving(self)
-      call new_motion_guard(self%guard, settings%guards, self%bodies, self%moving)
-      associate (choice => settings%boxes)
-         call new_box_maker(self%maker, self%bodies, choice%largest_ratio, choice%margin, self%boxes, error)
-      end associate
-      if (allocated(error)) return
-      call new_neighbours(self%neighbours, settings%neighbours%finder, self%boxes, error, settings%neighbours%skin)
-      if (allocated(error)) return
-      call allocate_memory(self)
       call move_walls(self, 0.0_wp)
+      call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
       call find_and_push(self, 0.0_wp, error)
       if (allocated(error)) return
       call start_integration(self)
-      if (settings%output%ledger) call open_ledger(self%ledger, self%team, self%dt, settings%forces%gravity, &
-                                                   self%bodies, self%incidence, self%contacts)
+      if (settings%output%ledger) call open_ledger(self%ledger, self%team, settings%forces%gravity, self%bodies, &
+                                                   self%incidence, self%contacts)
       self%timers = timers_t()
    end subroutine start_simulation
 
-   !> One time step.
+   !> One time step. Of several processes all call this; a failure of one is known to all, at the latest when they agree
+   !> after the step.
    subroutine advance(self, error)
       !> The simulation
       type(simulation_t), intent(inout) :: self
@@ -161,9 +97,9 @@ contains
       call self%integrator%predict(self%dt, self%bodies)
       call move_walls(self, time_of(self))
       call check_places(self%guard, self%bodies, self%step, error)
-      if (allocated(error)) return
-      call turn_bodies(self%bodies, self%moving)
       call self%timers%lap(stage_integrate)
+      call place_boxes(self, error)
+      if (allocated(error)) return
       call find_and_push(self, self%dt, error)
       if (allocated(error)) return
       call self%integrator%correct(self%dt, self%bodies)
@@ -175,6 +111,27 @@ contains
       call check_motion(self%guard, self%bodies, self%step, self%dt, error)
       call self%timers%lap(stage_integrate)
    end subroutine advance
+
+   !> From predicted positions to boxes, with all bodies where they belong.
+   subroutine place_boxes(self, error)
+      type(simulation_t), intent(inout) :: self
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: shared
+
+      shared = self%team%size > 1_ip
+      if (shared) call self%domain%ghosts%follow(self%team, self%bodies)
+      if (shared) call self%timers%lap(stage_exchange)
+      if (.not. allocated(error)) then
+         call turn_bodies(self%bodies, self%moving)
+         call self%timers%lap(stage_integrate)
+         call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
+         call self%timers%lap(stage_boxes)
+      end if
+      call settle(self, error)
+      if (.not. shared) return
+      self%domain%ghost_steps = self%domain%ghost_steps + int(size(self%domain%ghosts%slots), lp)
+      call self%timers%lap(stage_exchange)
+   end subroutine place_boxes
 
    !> Simulated time [s]: a product, so that it does not drift.
    pure real(wp) function time_of(self)
@@ -191,14 +148,15 @@ contains
       !> Energy, momentum, and what is unexplained
       type(balance_t), intent(out) :: balance
 
-      call balance_of(self%ledger, self%team, self%settings%forces%gravity, self%bodies, self%incidence, &
+      call balance_of(self%ledger, self%team, self%dt, self%settings%forces%gravity, self%bodies, self%incidence, &
                       self%contacts, balance)
    end subroutine take_stock
 
-   !> Compare the step with the stable step of the present contacts.
+   !> Compare the step with the stable step of the present contacts. Of several processes, that which has the critical
+   !> contact warns or fails.
    subroutine check_stability(self, stable, warning, error)
       !> The simulation
-      type(simulation_t), intent(in) :: self
+      type(simulation_t), intent(inout) :: self
       !> Stable step of the present contacts [s], huge if there are none
       real(wp), intent(out) :: stable
       !> Set if the step is large, or unstable and that does not stop the run
@@ -206,10 +164,18 @@ contains
       !> Set if the step is unstable and that stops the run
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: failure
+      real(wp), allocatable :: numbers(:)
+      real(dp) :: least(1)
       integer(ip) :: critical
 
-      call stable_step_of_contacts(self%settings%forces, self%integrator%stability(), self%bodies, self%incidence, &
+      numbers = contact_numbers(self%bodies%n, self%incidence)
+      call self%domain%ghosts%follow_column(self%team, numbers)
+      call stable_step_of_contacts(self%settings%forces, self%integrator%stability(), self%bodies, numbers, &
                                    self%contacts, stable, critical)
+      least(1) = -real(stable, dp)
+      call self%team%maximise(least)
+      if (stable > real(-least(1), wp)) critical = 0_ip
+      if (self%team%size > 1_ip) stable = real(-least(1), wp)
       call check_step(self%bodies, self%contacts, self%step, self%dt, stable, critical, warning, failure)
       if (.not. allocated(failure)) return
       if (self%settings%guards%step /= 'stop') then
@@ -219,33 +185,61 @@ contains
       end if
    end subroutine check_stability
 
-   !> Exact counts of the work done so far.
+   !> Bring the counts of all processes to the leader, where they go on; collective.
+   subroutine collect_counts(self)
+      !> The simulation
+      type(simulation_t), intent(inout) :: self
+      integer(lp), allocatable :: counts(:)
+
+      if (self%team%size == 1_ip) return
+      associate (value => self%neighbours%finder%work%value, n => size(self%sums))
+         counts = [self%sums, value]
+         call self%team%add_up(counts)
+         if (.not. self%team%leads()) counts = 0_lp
+         self%sums = counts(:n)
+         value = counts(n + 1:)
+      end associate
+   end subroutine collect_counts
+
+   !> Exact counts of the work done so far, on all processes: pairs and contacts of two of them count twice. Collective.
    subroutine report_counters(self, counters)
       !> The simulation
       type(simulation_t), intent(inout) :: self
       !> List to set them in
       type(counters_t), intent(inout) :: counters
+      integer(lp) :: counts(6)
 
+      counts = [int(self%boxes%n, lp), self%team%messages, self%team%bytes, self%domain%ghost_steps, &
+                self%domain%arrivals, int(self%neighbours%pairs%n, lp)]
+      call self%team%add_up(counts)
+      call collect_counts(self)
       call counters%set('steps', self%step)
-      call counters%set('bodies', int(self%bodies%n, lp))
-      call counters%set('boxes', int(self%boxes%n, lp))
+      call counters%set('bodies', int(self%bodies%n_all, lp))
+      call counters%set('boxes', counts(1))
       call counters%set('pairs', self%sums(1))
       call counters%set('pairs began', self%sums(3))
       call counters%set('pairs ended', self%sums(4))
       call counters%set('contacts', self%sums(2))
       call counters%set('contacts without direction', self%sums(5))
       call self%neighbours%report(counters)
+      call counters%set('pairs', counts(6))
       if (allocated(self%law%constraint)) call self%law%constraint%report(counters)
+      if (self%team%size == 1_ip) return
+      call counters%set('processes', int(self%team%size, lp))
+      call counters%set('settlements', self%domain%settlements)
+      call counters%set('divisions of space', self%domain%divisions)
+      call counters%set('bodies that changed process', counts(5))
+      call counters%set('ghosts, summed over steps', counts(4))
+      call counters%set('messages', counts(2))
+      call counters%set('bytes in messages', counts(3))
    end subroutine report_counters
 
-   !> From the poses of the bodies to the forces on them: the middle of the step.
+   !> From the boxes of the bodies to the forces on them: the middle of the step.
    subroutine find_and_push(self, dt, error)
       type(simulation_t), intent(inout) :: self
       real(wp), intent(in) :: dt
       type(error_t), allocatable, intent(inout) :: error
 
-      call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
-      call self%timers%lap(stage_boxes)
       call self%neighbours%update(self%boxes)
       if (self%neighbours%pairs%contradictions > 0_lp) then
          call raise(error, run_error, 'step '//to_text(self%step)//': the finder '// &
@@ -254,6 +248,7 @@ contains
          return
       end if
       call carry_memory(self)
+      call recall_pairs(self)
       call self%timers%lap(stage_neighbours)
       associate (pairs => self%neighbours%pairs)
          call find_contacts(self%bodies, pairs%n, pairs%first, pairs%second, self%memory, self%contacts)
@@ -291,14 +286,6 @@ contains
       end associate
    end subroutine carry_memory
 
-   subroutine allocate_memory(self)
-      type(simulation_t), intent(inout) :: self
-
-      allocate (self%memory%separating_edge(0))
-      if (self%law%needs_tangential) allocate (self%memory%tangential(0))
-      if (self%law%needs_area) allocate (self%memory%area(0))
-   end subroutine allocate_memory
-
    subroutine move_walls(self, time)
       type(simulation_t), intent(inout) :: self
       real(wp), intent(in) :: time
@@ -308,16 +295,6 @@ contains
          if (time >= self%motions(k)%start) call move_bodies(self%motions(k), time, self%bodies)
       end do
    end subroutine move_walls
-
-   subroutine list_moving(self)
-      type(simulation_t), intent(inout) :: self
-      integer :: k
-
-      self%moving = self%bodies%free
-      do k = 1, size(self%motions)
-         self%moving = [self%moving, self%motions(k)%slots]
-      end do
-   end subroutine list_moving
 
    !> Accelerations at time 0: from the forces, or from gravity alone if the scheme wants it so.
    subroutine start_integration(self)

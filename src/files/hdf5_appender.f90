@@ -6,6 +6,8 @@ module polydem_hdf5_appender
    use hdf5, only: hid_t, hsize_t
    use polydem_errors, only: error_t
    use polydem_hdf5_dataset, only: append_rows_to, double_type, integer_type, long_type
+   use polydem_hdf5_place, only: place_t
+   use polydem_hdf5_slab, only: part_t, slab_of
    use polydem_hdf5_writer, only: hdf5_writer_t
    use polydem_kinds, only: dp, ip, lp
    implicit none
@@ -15,10 +17,11 @@ module polydem_hdf5_appender
    !> A file whose data sets can grow
    type, extends(hdf5_writer_t) :: hdf5_appender_t
    contains
-      !> Add one row along the slowest dimension: append(name, values, error, unit, meaning)
+      !> Add one row along the slowest dimension: append(name, values, error, unit, meaning), and `part` if it is a list
+      !> or table
       generic :: append => append_real, append_reals, append_real_table, append_integer, append_integers, &
          append_long
-      !> Add a row for each place of the last dimension: append_rows(name, values, error, unit, meaning)
+      !> Add a row for each place of the last dimension: append_rows(name, values, error, unit, meaning, part)
       generic :: append_rows => append_rows_reals, append_rows_table, append_rows_integers, append_rows_longs, &
          append_rows_long_table
       procedure, private :: append_real, append_reals, append_real_table, append_integer, append_integers
@@ -29,20 +32,26 @@ module polydem_hdf5_appender
 
 contains
 
-   !> Add contiguous rows to a growing data set, which gets its attributes when it is made.
-   subroutine add(self, name, type, row, n_rows, address, error, unit, meaning)
+   !> Add a contiguous slab to a growing data set, which gets its attributes when it is made.
+   subroutine add(self, name, type, extent, dimension, address, error, unit, meaning, part)
       class(hdf5_appender_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(hid_t), intent(in) :: type
-      integer, intent(in) :: row(:), n_rows
+      !> Shape of what is added, rows last
+      integer, intent(in) :: extent(:)
+      !> Which dimension may be spread over processes
+      integer, intent(in) :: dimension
       type(c_ptr), intent(in) :: address
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
+      type(place_t) :: place
       logical :: known
 
       if (allocated(error)) return
+      place = self%place_of(name)
       known = self%has(name)
-      call append_rows_to(self%place_of(name), type, int(row, hsize_t), int(n_rows, hsize_t), address, error)
+      call append_rows_to(place, type, slab_of(place, int(extent, hsize_t), address, dimension, part), error)
       if (.not. known) call self%describe(name, error, unit, meaning)
    end subroutine add
 
@@ -58,33 +67,35 @@ contains
       !> Attributes of the data set when it is made
       character(len=*), intent(in), optional :: unit, meaning
 
-      call self%add(name, double_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
+      call self%add(name, double_type(), [1], 1, c_loc(values), error, unit, meaning)
    end subroutine append_real
 
-   subroutine append_reals(self, name, values, error, unit, meaning)
+   subroutine append_reals(self, name, values, error, unit, meaning, part)
       class(hdf5_appender_t), intent(in) :: self
       character(len=*), intent(in) :: name
       real(dp), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%add(name, double_type(), [size(values)], 1, address, error, unit, meaning)
+      call self%add(name, double_type(), [size(values), 1], 1, address, error, unit, meaning, part)
    end subroutine append_reals
 
-   subroutine append_real_table(self, name, values, error, unit, meaning)
+   subroutine append_real_table(self, name, values, error, unit, meaning, part)
       class(hdf5_appender_t), intent(in) :: self
       character(len=*), intent(in) :: name
       real(dp), intent(in), target, contiguous :: values(:, :)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%add(name, double_type(), [size(values, 1), size(values, 2)], 1, address, error, unit, meaning)
+      call self%add(name, double_type(), [size(values, 1), size(values, 2), 1], 2, address, error, unit, meaning, part)
    end subroutine append_real_table
 
    subroutine append_integer(self, name, values, error, unit, meaning)
@@ -94,20 +105,21 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
 
-      call self%add(name, integer_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
+      call self%add(name, integer_type(), [1], 1, c_loc(values), error, unit, meaning)
    end subroutine append_integer
 
-   subroutine append_integers(self, name, values, error, unit, meaning)
+   subroutine append_integers(self, name, values, error, unit, meaning, part)
       class(hdf5_appender_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(ip), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%add(name, integer_type(), [size(values)], 1, address, error, unit, meaning)
+      call self%add(name, integer_type(), [size(values), 1], 1, address, error, unit, meaning, part)
    end subroutine append_integers
 
    subroutine append_long(self, name, values, error, unit, meaning)
@@ -117,11 +129,11 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
 
-      call self%add(name, long_type(), [integer ::], 1, c_loc(values), error, unit, meaning)
+      call self%add(name, long_type(), [1], 1, c_loc(values), error, unit, meaning)
    end subroutine append_long
 
    !> Add several rows to a growing data set; the other forms of `append_rows` differ in kind and shape only.
-   subroutine append_rows_reals(self, name, values, error, unit, meaning)
+   subroutine append_rows_reals(self, name, values, error, unit, meaning, part)
       class(hdf5_appender_t), intent(in) :: self
       !> Name of the data set, like /frames/position
       character(len=*), intent(in) :: name
@@ -131,64 +143,70 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Attributes of the data set when it is made
       character(len=*), intent(in), optional :: unit, meaning
+      !> Places of the last dimension that are this process'; if absent, values are the same on all
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%add(name, double_type(), [integer ::], size(values, 1), address, error, unit, meaning)
+      call self%add(name, double_type(), [size(values)], 1, address, error, unit, meaning, part)
    end subroutine append_rows_reals
 
-   subroutine append_rows_table(self, name, values, error, unit, meaning)
+   subroutine append_rows_table(self, name, values, error, unit, meaning, part)
       class(hdf5_appender_t), intent(in) :: self
       character(len=*), intent(in) :: name
       real(dp), intent(in), target, contiguous :: values(:, :)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%add(name, double_type(), [size(values, 1)], size(values, 2), address, error, &
-                    unit, meaning)
+      call self%add(name, double_type(), [size(values, 1), size(values, 2)], 2, address, error, unit, meaning, &
+                    part)
    end subroutine append_rows_table
 
-   subroutine append_rows_integers(self, name, values, error, unit, meaning)
+   subroutine append_rows_integers(self, name, values, error, unit, meaning, part)
       class(hdf5_appender_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(ip), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%add(name, integer_type(), [integer ::], size(values, 1), address, error, unit, meaning)
+      call self%add(name, integer_type(), [size(values)], 1, address, error, unit, meaning, part)
    end subroutine append_rows_integers
 
-   subroutine append_rows_longs(self, name, values, error, unit, meaning)
+   subroutine append_rows_longs(self, name, values, error, unit, meaning, part)
       class(hdf5_appender_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(lp), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%add(name, long_type(), [integer ::], size(values, 1), address, error, unit, meaning)
+      call self%add(name, long_type(), [size(values)], 1, address, error, unit, meaning, part)
    end subroutine append_rows_longs
 
-   subroutine append_rows_long_table(self, name, values, error, unit, meaning)
+   subroutine append_rows_long_table(self, name, values, error, unit, meaning, part)
       class(hdf5_appender_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(lp), intent(in), target, contiguous :: values(:, :)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%add(name, long_type(), [size(values, 1)], size(values, 2), address, error, unit, meaning)
+      call self%add(name, long_type(), [size(values, 1), size(values, 2)], 2, address, error, unit, meaning, part)
    end subroutine append_rows_long_table
 
 end module polydem_hdf5_appender

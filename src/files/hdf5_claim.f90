@@ -3,7 +3,8 @@ module polydem_hdf5_claim
    use hdf5, only: h5dclose_f, h5dget_storage_size_f, h5dget_type_f, h5dopen_f, h5tclose_f, h5tget_size_f, hid_t, &
       hsize_t, size_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_hdf5_dataset, only: dataset_shape, expect, place_t
+   use polydem_hdf5_dataset, only: dataset_shape
+   use polydem_hdf5_place, only: expect, place_t
    use polydem_kinds, only: dp, lp
    use polydem_strings, only: join, to_text
    implicit none

@@ -7,19 +7,21 @@
 module polydem_hdf5_dataset
    use, intrinsic :: iso_c_binding, only: c_ptr
    use hdf5, only: h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dont_atexit_f, h5dopen_f, &
-      h5dread_f, h5dset_extent_f, h5dwrite_f, h5eset_auto_f, h5get_libversion_f, h5iis_valid_f, h5kind_to_type, &
-      h5lexists_f, h5open_f, h5pclose_f, h5pcreate_f, h5pset_chunk_f, h5pset_create_inter_group_f, h5pset_deflate_f, &
-      h5pset_shuffle_f, h5sclose_f, h5screate_simple_f, h5sget_simple_extent_dims_f, &
-      h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, h5tclose_f, h5tget_class_f, h5tget_size_f, h5zfilter_avail_f
-   use hdf5, only: h5_integer_kind, h5_real_kind, h5p_dataset_create_f, h5p_link_create_f, h5s_select_set_f, &
+      h5dset_extent_f, h5eset_auto_f, h5get_libversion_f, h5iis_valid_f, h5kind_to_type, h5lexists_f, h5open_f, &
+      h5pclose_f, h5pcreate_f, h5pset_chunk_f, h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_fill_time_f, &
+      h5pset_shuffle_f, h5sclose_f, h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
+      h5tclose_f, h5tget_class_f, h5tget_size_f, h5zfilter_avail_f
+   use hdf5, only: h5_integer_kind, h5_real_kind, h5d_fill_time_never_f, h5p_dataset_create_f, h5p_link_create_f, &
       h5s_unlimited_f, h5t_enum_f, h5t_float_f, h5t_integer_f, h5t_native_double, h5z_filter_deflate_f, hid_t, &
       hsize_t, size_t
    use polydem_errors, only: error_t, input_error, io_error, raise
+   use polydem_hdf5_place, only: expect, place_t
+   use polydem_hdf5_slab, only: read_slab, slab_t, write_slab
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: place_t, start_library, library_version, expect
+   public :: start_library, library_version
    public :: write_dataset, create_dataset, append_rows_to, read_dataset, dataset_shape, has_link
    public :: holds_reals, holds_integers, double_type, integer_type, long_type, byte_type
 
@@ -30,18 +32,6 @@ module polydem_hdf5_dataset
 
    !> Chunks of growing data sets hold about this many bytes
    integer(hsize_t), parameter :: chunk_bytes = 32768_hsize_t
-
-   !> Where a data set is, for calls and for messages
-   type :: place_t
-      !> HDF5's number of the open file
-      integer(hid_t) :: file = -1_hid_t
-      !> Path of the file
-      character(len=:), allocatable :: path
-      !> Name of the data set, like /frames/position
-      character(len=:), allocatable :: name
-      !> Whether a new growing data set is compressed
-      logical :: compressed = .false.
-   end type place_t
 
 contains
 
@@ -93,21 +83,6 @@ contains
       byte_type = h5kind_to_type(bp, h5_integer_kind)
    end function byte_type
 
-   !> Turn a failed status of HDF5 into an error that names file and data set.
-   pure subroutine expect(status, action, place, error)
-      !> Status of an HDF5 call, negative on failure
-      integer, intent(in) :: status
-      !> What was tried, like 'write'
-      character(len=*), intent(in) :: action
-      !> File and data set
-      type(place_t), intent(in) :: place
-      !> Allocated if the call failed
-      type(error_t), allocatable, intent(inout) :: error
-
-      if (status >= 0) return
-      call raise(error, io_error, place%path//': cannot '//action//' '//place%name)
-   end subroutine expect
-
    !> Whether a name exists; every group on the way is looked up, as HDF5 demands.
    logical function has_link(place)
       !> File and name
@@ -126,29 +101,24 @@ contains
    end function has_link
 
    !> Write a new data set of fixed shape.
-   subroutine write_dataset(place, kind_in_file, extent, address, error)
+   subroutine write_dataset(place, kind_in_file, slab, error)
       !> File and name
       type(place_t), intent(in) :: place
       !> HDF5 type in memory and in the file
       integer(hid_t), intent(in) :: kind_in_file
-      !> Shape, fastest dimension first; empty for a scalar
-      integer(hsize_t), intent(in) :: extent(:)
-      !> Address of the first of the contiguous values
-      type(c_ptr), intent(in) :: address
+      !> What it holds
+      type(slab_t), intent(in) :: slab
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: space, dataset
       integer :: status
 
-      call h5screate_simple_f(size(extent), extent, space, status)
+      call h5screate_simple_f(size(slab%whole), slab%whole, space, status)
       call expect(status, 'make room for', place, error)
       if (allocated(error)) return
       call create_dataset(place, kind_in_file, space, dataset, error)
       if (.not. allocated(error)) then
-         if (product(extent) > 0_hsize_t) then
-            call h5dwrite_f(dataset, kind_in_file, address, status)
-            call expect(status, 'write', place, error)
-         end if
+         if (product(slab%whole) > 0_hsize_t) call write_slab(dataset, place, kind_in_file, slab, error)
          call h5dclose_f(dataset, status)
          call expect(status, 'finish writing', place, error)
       end if
@@ -188,28 +158,24 @@ contains
    end subroutine create_dataset
 
    !> Add rows along the slowest dimension, which is unlimited; the data set is created at the first call.
-   subroutine append_rows_to(place, kind_in_file, row, n_rows, address, error)
+   subroutine append_rows_to(place, kind_in_file, rows, error)
       !> File and name
       type(place_t), intent(in) :: place
       !> HDF5 type in memory and in the file
       integer(hid_t), intent(in) :: kind_in_file
-      !> Shape of one row, fastest dimension first; empty for a scalar
-      integer(hsize_t), intent(in) :: row(:)
-      !> Number of rows to add
-      integer(hsize_t), intent(in) :: n_rows
-      !> Address of the first of the contiguous values
-      type(c_ptr), intent(in) :: address
+      !> What to add; its last dimension counts rows
+      type(slab_t), intent(in) :: rows
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: dataset
       integer :: status
 
-      if (.not. has_link(place)) call create_growing(place, kind_in_file, row, error)
+      if (.not. has_link(place)) call create_growing(place, kind_in_file, rows%whole(:size(rows%whole) - 1), error)
       if (allocated(error)) return
       call h5dopen_f(place%file, place%name, dataset, status)
       call expect(status, 'open', place, error)
       if (allocated(error)) return
-      call grow(dataset, place, kind_in_file, row, n_rows, address, error)
+      call grow(dataset, place, kind_in_file, rows, error)
       call h5dclose_f(dataset, status)
       call expect(status, 'finish writing', place, error)
    end subroutine append_rows_to
@@ -234,6 +200,8 @@ contains
       if (status >= 0) call h5pcreate_f(h5p_dataset_create_f, properties, status)
       if (status >= 0) call h5pset_chunk_f(properties, n, chunk, status)
       if (status >= 0 .and. place%compressed) call compress(properties, status)
+      ! Several processes make room for rows long before they write them, and would fill it first.
+      if (status >= 0 .and. place%together) call h5pset_fill_time_f(properties, h5d_fill_time_never_f, status)
       call expect(status, 'make room for', place, error)
       if (allocated(error)) return
       call create_dataset(place, kind_in_file, space, dataset, error, properties)
@@ -254,56 +222,30 @@ contains
       if (status >= 0) call h5pset_deflate_f(properties, 1, status)
    end subroutine compress
 
-   subroutine grow(dataset, place, kind_in_file, row, n_rows, address, error)
+   subroutine grow(dataset, place, kind_in_file, rows, error)
       integer(hid_t), intent(in) :: dataset, kind_in_file
       type(place_t), intent(in) :: place
-      integer(hsize_t), intent(in) :: row(:), n_rows
-      type(c_ptr), intent(in) :: address
+      type(slab_t), intent(in) :: rows
       type(error_t), allocatable, intent(inout) :: error
+      type(slab_t) :: slab
       integer(hsize_t), allocatable :: extent(:)
       integer :: n, status
 
       call dataset_shape(place, extent, error)
       if (allocated(error)) return
       n = size(extent)
-      if (n /= size(row) + 1) status = -1
-      if (n == size(row) + 1) status = merge(0, -1, all(extent(:n - 1) == row))
+      if (n /= size(rows%whole)) status = -1
+      if (n == size(rows%whole)) status = merge(0, -1, all(extent(:n - 1) == rows%whole(:n - 1)))
       call expect(status, 'add rows of another shape to', place, error)
-      if (allocated(error) .or. n_rows == 0_hsize_t) return
-      extent(n) = extent(n) + n_rows
+      if (allocated(error) .or. rows%whole(n) == 0_hsize_t) return
+      slab = rows
+      slab%start(n) = slab%start(n) + extent(n)
+      extent(n) = extent(n) + rows%whole(n)
       call h5dset_extent_f(dataset, extent, status)
       call expect(status, 'extend', place, error)
-      if (allocated(error) .or. product(row) == 0_hsize_t) return
-      call transfer_slab(dataset, place, kind_in_file, [0_hsize_t*row, extent(n) - n_rows], [row, n_rows], &
-                         address, .true., error)
+      if (allocated(error) .or. product(rows%whole) == 0_hsize_t) return
+      call write_slab(dataset, place, kind_in_file, slab, error)
    end subroutine grow
-
-   !> Copy a slab between memory and a data set.
-   subroutine transfer_slab(dataset, place, kind_in_memory, start, extent, address, writing, error)
-      integer(hid_t), intent(in) :: dataset, kind_in_memory
-      type(place_t), intent(in) :: place
-      integer(hsize_t), intent(in) :: start(:), extent(:)
-      type(c_ptr), intent(in) :: address
-      logical, intent(in) :: writing
-      type(error_t), allocatable, intent(inout) :: error
-      integer(hid_t) :: file_space, memory_space
-      type(c_ptr) :: buffer
-      integer :: status, ignored
-
-      buffer = address
-      call h5screate_simple_f(size(extent), extent, memory_space, status)
-      if (status >= 0) call h5dget_space_f(dataset, file_space, status)
-      if (status >= 0) call h5sselect_hyperslab_f(file_space, h5s_select_set_f, start, extent, status)
-      if (status >= 0 .and. writing) then
-         call h5dwrite_f(dataset, kind_in_memory, buffer, status, memory_space, file_space)
-      else if (status >= 0) then
-         call h5dread_f(dataset, kind_in_memory, buffer, status, memory_space, file_space)
-      end if
-      if (writing) call expect(status, 'write', place, error)
-      if (.not. writing) call expect(status, 'read', place, error)
-      call h5sclose_f(file_space, ignored)
-      call h5sclose_f(memory_space, ignored)
-   end subroutine transfer_slab
 
    !> Shape of a data set, fastest dimension first.
    subroutine dataset_shape(place, extent, error)
@@ -360,7 +302,8 @@ contains
       if (allocated(error)) return
       call check_class(dataset, place, wanted, error)
       if (.not. allocated(error)) then
-         call transfer_slab(dataset, place, kind_in_memory, start, extent, address, .false., error)
+         call read_slab(dataset, place, kind_in_memory, &
+                        slab_t(whole=extent, start=start, extent=extent, address=address), error)
       end if
       call h5dclose_f(dataset, status)
    end subroutine read_dataset

@@ -10,17 +10,18 @@ module polydem_hdf5_file
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_appender, only: hdf5_appender_t
    use polydem_hdf5_claim, only: believable_shape, shape_text
-   use polydem_hdf5_dataset, only: double_type, holds_integers, holds_reals, library_version, &
-      long_type, place_t, read_dataset
+   use polydem_hdf5_dataset, only: double_type, holds_integers, holds_reals, library_version, long_type, read_dataset
+   use polydem_hdf5_place, only: place_t
+   use polydem_hdf5_slab, only: part_t
    use polydem_hdf5_text, only: read_attribute_value, read_text
    use polydem_kinds, only: dp, ip, lp
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: hdf5_file_t, library_version
+   public :: hdf5_file_t, part_t, library_version
 
-   !> An HDF5 file: create, open (to read), flush, close, has, shape_of, write, append, append_rows,
-   !> write_attribute, read
+   !> An HDF5 file: create, join (to write together), open (to read), flush, close, has, shape_of, write, append,
+   !> append_rows, write_attribute, read
    type, extends(hdf5_appender_t) :: hdf5_file_t
    contains
       !> Read a data set, allocating the values: read(name, values, error). Whole numbers may have any width,

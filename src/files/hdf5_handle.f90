@@ -1,10 +1,13 @@
 !> An HDF5 file that is opened, flushed, asked and closed; what is in it is read and written by extensions.
 module polydem_hdf5_handle
-   use hdf5, only: h5f_acc_rdonly_f, h5f_acc_trunc_f, h5f_scope_global_f, h5fclose_f, h5fcreate_f, &
-      h5fflush_f, h5fopen_f, h5p_file_create_f, h5pclose_f, h5pcreate_f, h5pset_userblock_f, hid_t, hsize_t
+   use hdf5, only: h5f_acc_rdonly_f, h5f_acc_rdwr_f, h5f_acc_trunc_f, h5f_scope_global_f, h5fclose_f, h5fcreate_f, &
+      h5fflush_f, h5fopen_f, h5p_file_access_f, h5p_file_create_f, h5pclose_f, h5pcreate_f, h5pset_userblock_f, hid_t, &
+      hsize_t
    use polydem_errors, only: error_t, input_error, io_error, raise
+   use polydem_hdf5_access, only: access_together, fails_anywhere
    use polydem_hdf5_claim, only: believable_shape
-   use polydem_hdf5_dataset, only: has_link, place_t, start_library
+   use polydem_hdf5_dataset, only: has_link, start_library
+   use polydem_hdf5_place, only: place_t
    use polydem_kinds, only: ip, lp
    use polydem_paths, only: exists, is_folder
    implicit none
@@ -20,8 +23,11 @@ module polydem_hdf5_handle
       character(len=:), allocatable :: path
       !> Whether growing data sets are compressed
       logical :: compressed = .false.
+      !> Whether all processes of the run write the file together
+      logical :: together = .false.
    contains
       procedure :: create
+      procedure :: join
       procedure :: open => open_file
       procedure :: flush => flush_file
       procedure :: close => close_file
@@ -29,6 +35,7 @@ module polydem_hdf5_handle
       procedure :: has
       procedure :: shape_of
       procedure :: place_of
+      procedure, private :: fails
    end type hdf5_handle_t
 
    !> What to try if a file cannot be opened although it is there
@@ -58,6 +65,7 @@ contains
       call start_library(error)
       if (allocated(error)) return
       self%path = path
+      self%together = .false.
       self%compressed = .false.
       if (present(compressed)) self%compressed = compressed
       call h5pcreate_f(h5p_file_create_f, properties, status)
@@ -69,6 +77,32 @@ contains
       call raise(error, io_error, path//': cannot be created; is there such a folder, room and '// &
                  'permission?'//locking_hint)
    end subroutine create
+
+   !> Open a file that one process created and closed, so that all processes of the run write to it. Until it is closed,
+   !> all must make the same calls in the same order; of a failure all know.
+   subroutine join(self, path, error)
+      class(hdf5_handle_t), intent(inout) :: self
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: properties
+      integer :: status, ignored
+
+      call start_library(error)
+      if (allocated(error)) return
+      self%path = path
+      self%together = .true.
+      call h5pcreate_f(h5p_file_access_f, properties, status)
+      if (status >= 0) call access_together(properties, status)
+      if (status >= 0) call h5fopen_f(path, h5f_acc_rdwr_f, self%id, status, access_prp=properties)
+      call h5pclose_f(properties, ignored)
+      if (fails_anywhere(status < 0)) then
+         self%id = -1_hid_t
+         call raise(error, io_error, path//': cannot be opened by all processes; do all see the same folder?'// &
+                    locking_hint)
+      end if
+   end subroutine join
 
    !> Open a file for reading.
    subroutine open_file(self, path, error)
@@ -90,6 +124,7 @@ contains
       call start_library(error)
       if (allocated(error)) return
       self%path = path
+      self%together = .false.
       call h5fopen_f(path, h5f_acc_rdonly_f, self%id, status)
       if (status >= 0) return
       self%id = -1_hid_t
@@ -104,7 +139,7 @@ contains
       integer :: status
 
       call h5fflush_f(self%id, h5f_scope_global_f, status)
-      if (status < 0) call raise(error, io_error, self%path//': cannot be flushed')
+      if (self%fails(status)) call raise(error, io_error, self%path//': cannot be flushed')
    end subroutine flush_file
 
    !> Close the file; nothing happens if it is closed. A file that cannot be closed is given up.
@@ -116,12 +151,22 @@ contains
 
       if (self%id < 0_hid_t) return
       call h5fclose_f(self%id, status)
-      if (status < 0) then
+      if (self%fails(status)) then
          call raise(error, io_error, self%path//': cannot be closed')
          call self%abandon(error)
       end if
       self%id = -1_hid_t
    end subroutine close_file
+
+   !> Whether a call of HDF5 failed; if the file is written together, on any process
+   logical function fails(self, status)
+      class(hdf5_handle_t), intent(in) :: self
+      !> Status of the call on this process
+      integer, intent(in) :: status
+
+      fails = status < 0
+      if (self%together) fails = fails_anywhere(fails)
+   end function fails
 
    !> Give up a file that could not be written, and say in the message what to do. The file is not closed, since HDF5
    !> would try to write it again, and might crash; the operating system closes it when the program ends.
@@ -171,6 +216,7 @@ contains
       place%path = self%path
       place%name = name
       place%compressed = self%compressed
+      place%together = self%together
    end function place_of
 
 end module polydem_hdf5_handle

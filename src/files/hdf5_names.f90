@@ -5,7 +5,7 @@ module polydem_hdf5_names
    use hdf5, only: h5_index_name_f, h5_iter_inc_f, h5gclose_f, h5gget_info_f, h5gopen_f, h5i_dataset_f, h5iget_type_f, &
       h5lget_name_by_idx_f, h5oclose_f, h5oopen_f, hid_t, hsize_t, size_t
    use polydem_errors, only: error_t
-   use polydem_hdf5_dataset, only: expect, place_t
+   use polydem_hdf5_place, only: expect, place_t
    implicit none
    private
    public :: count_names, read_name, is_dataset

@@ -1,6 +1,7 @@
 !> Texts in HDF5 files: data sets and attributes of variable length in UTF-8, which h5py shows as `str`.
 !>
-!> HDF5 handles them as addresses of texts that end with a null character.
+!> HDF5 handles them as addresses of texts that end with a null character. It cannot write data sets of them to files
+!> that several processes write together; attributes it can.
 module polydem_hdf5_text
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_loc, c_null_char, c_null_ptr, c_ptr, &
       c_size_t
@@ -11,7 +12,9 @@ module polydem_hdf5_text
    use hdf5, only: h5p_default_f, h5s_scalar_f, h5t_cset_utf8_f, h5t_float_f, h5t_integer_f, h5t_no_class_f, &
       h5t_string, hid_t, hsize_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_hdf5_dataset, only: dataset_shape, expect, place_t, write_dataset
+   use polydem_hdf5_dataset, only: dataset_shape, write_dataset
+   use polydem_hdf5_place, only: expect, place_t
+   use polydem_hdf5_slab, only: slab_of
    implicit none
    private
    public :: write_texts, read_text, write_attribute_value, read_attribute_value, write_text_attribute
@@ -44,7 +47,7 @@ contains
       call lay_out(texts, size(extent) > 0, letters, addresses)
       call text_type(place, kind_in_file, error)
       if (allocated(error)) return
-      call write_dataset(place, kind_in_file, extent, c_loc(addresses), error)
+      call write_dataset(place, kind_in_file, slab_of(place, extent, c_loc(addresses), 1), error)
       call h5tclose_f(kind_in_file, status)
    end subroutine write_texts
 

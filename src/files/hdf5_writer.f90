@@ -2,6 +2,9 @@
 !>
 !> Every procedure takes the name of the data set and the values, and allocates `error` on failure, with the
 !> file and the data set in its message. `unit` and `meaning` become attributes of the data set.
+!>
+!> To a file of several processes all write in the same order: values that are the same on all of them, or, with `part`,
+!> each its part of the last dimension. Texts are written before the others join.
 module polydem_hdf5_writer
    use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr, c_ptr
    use hdf5, only: hid_t, hsize_t
@@ -9,6 +12,7 @@ module polydem_hdf5_writer
    use polydem_hdf5_dataset, only: byte_type, double_type, integer_type, long_type, write_dataset
    use polydem_hdf5_handle, only: hdf5_handle_t
    use polydem_hdf5_text, only: write_attribute_value, write_text_attribute, write_texts
+   use polydem_hdf5_slab, only: part_t, slab_of
    use polydem_kinds, only: bp, dp, ip, lp
    implicit none
    private
@@ -17,7 +21,7 @@ module polydem_hdf5_writer
    !> A file that can be written to
    type, extends(hdf5_handle_t) :: hdf5_writer_t
    contains
-      !> Write a new data set: write(name, values, error, unit, meaning)
+      !> Write a new data set: write(name, values, error, unit, meaning), and for lists and tables of numbers `part`
       generic :: write => write_real, write_reals, write_real_table, write_integer, write_integers, &
          write_long, write_longs, write_long_table, write_bytes, write_text, write_text_list
       !> Attach a value to a group or data set: write_attribute(object, name, value, error)
@@ -32,7 +36,7 @@ module polydem_hdf5_writer
 contains
 
    !> Write contiguous values as a new data set with its attributes.
-   subroutine put(self, name, type, extent, address, error, unit, meaning)
+   subroutine put(self, name, type, extent, address, error, unit, meaning, part)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(hid_t), intent(in) :: type
@@ -40,9 +44,11 @@ contains
       type(c_ptr), intent(in) :: address
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
 
       if (allocated(error)) return
-      call write_dataset(self%place_of(name), type, int(extent, hsize_t), address, error)
+      call write_dataset(self%place_of(name), type, slab_of(self%place_of(name), int(extent, hsize_t), address, &
+                                                            size(extent), part), error)
       call self%describe(name, error, unit, meaning)
    end subroutine put
 
@@ -77,30 +83,32 @@ contains
       call self%put(name, double_type(), [integer ::], c_loc(values), error, unit, meaning)
    end subroutine write_real
 
-   subroutine write_reals(self, name, values, error, unit, meaning)
+   subroutine write_reals(self, name, values, error, unit, meaning, part)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       real(dp), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, double_type(), [size(values)], address, error, unit, meaning)
+      call self%put(name, double_type(), [size(values)], address, error, unit, meaning, part)
    end subroutine write_reals
 
-   subroutine write_real_table(self, name, values, error, unit, meaning)
+   subroutine write_real_table(self, name, values, error, unit, meaning, part)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       real(dp), intent(in), target, contiguous :: values(:, :)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, double_type(), [size(values, 1), size(values, 2)], address, error, unit, meaning)
+      call self%put(name, double_type(), [size(values, 1), size(values, 2)], address, error, unit, meaning, part)
    end subroutine write_real_table
 
    subroutine write_integer(self, name, values, error, unit, meaning)
@@ -113,17 +121,18 @@ contains
       call self%put(name, integer_type(), [integer ::], c_loc(values), error, unit, meaning)
    end subroutine write_integer
 
-   subroutine write_integers(self, name, values, error, unit, meaning)
+   subroutine write_integers(self, name, values, error, unit, meaning, part)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(ip), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, integer_type(), [size(values)], address, error, unit, meaning)
+      call self%put(name, integer_type(), [size(values)], address, error, unit, meaning, part)
    end subroutine write_integers
 
    subroutine write_long(self, name, values, error, unit, meaning)
@@ -136,43 +145,46 @@ contains
       call self%put(name, long_type(), [integer ::], c_loc(values), error, unit, meaning)
    end subroutine write_long
 
-   subroutine write_longs(self, name, values, error, unit, meaning)
+   subroutine write_longs(self, name, values, error, unit, meaning, part)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(lp), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, long_type(), [size(values)], address, error, unit, meaning)
+      call self%put(name, long_type(), [size(values)], address, error, unit, meaning, part)
    end subroutine write_longs
 
-   subroutine write_long_table(self, name, values, error, unit, meaning)
+   subroutine write_long_table(self, name, values, error, unit, meaning, part)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(lp), intent(in), target, contiguous :: values(:, :)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, long_type(), [size(values, 1), size(values, 2)], address, error, unit, meaning)
+      call self%put(name, long_type(), [size(values, 1), size(values, 2)], address, error, unit, meaning, part)
    end subroutine write_long_table
 
-   subroutine write_bytes(self, name, values, error, unit, meaning)
+   subroutine write_bytes(self, name, values, error, unit, meaning, part)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(bp), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      type(part_t), intent(in), optional :: part
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, byte_type(), [size(values)], address, error, unit, meaning)
+      call self%put(name, byte_type(), [size(values)], address, error, unit, meaning, part)
    end subroutine write_bytes
 
    subroutine write_text(self, name, values, error, unit, meaning)

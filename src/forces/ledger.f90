@@ -17,6 +17,9 @@
 !> rates over steps, in which the first counts half; the other half of the last is taken off when a balance is drawn.
 !> Totals over bodies are exact sums, rounded once, then multiplied by the step: they have the same bits for any number
 !> of threads and processes.
+!>
+!> The scale of impulses, on which the residuals are measured, is the sum over contacts with fixed bodies, and over
+!> bodies for gravity: forces that cancel within a fixed body count.
 module polydem_ledger
    use polydem_archive, only: archive_t
    use polydem_assemble, only: incidence_t
@@ -29,7 +32,7 @@ module polydem_ledger
    use polydem_team_sums, only: add_up_sums
    implicit none
    private
-   public :: ledger_t, balance_t, open_ledger, book_step, balance_of, keep_ledger
+   public :: ledger_t, balance_t, open_ledger, book_step, balance_of, keep_ledger, keep_books
 
    !> Books that are open
    type :: ledger_t
@@ -44,12 +47,8 @@ module polydem_ledger
       real(wp), allocatable :: torque(:)
       !> Sums of rates of what fixed bodies do to each body, (n_wall_books, slot)
       real(wp), allocatable :: wall_book(:, :)
-      !> Step [s]
-      real(wp), private :: dt = 0.0_wp
       !> Steps booked
       integer(lp), private :: steps = 0_lp
-      !> Mass of all free bodies [kg/m]
-      real(wp), private :: mass = 0.0_wp
       !> Energy, momentum and angular momentum at the start
       real(wp), private :: start(4) = 0.0_wp
       !> Elastic energy of the contacts at the start, if they have one [J/m]
@@ -93,24 +92,22 @@ module polydem_ledger
 
    !> Least energy turned over, as a share of the potential
    real(wp), parameter :: least_share = 1.0e-9_wp
-   !> Bodies that one thread adds up at a time
-   integer(ip), parameter :: block = 2048_ip
+   !> Bodies that are worth a sum of their own, and the greatest number of such sums
+   integer(ip), parameter :: block = 1024_ip, most_blocks = 32_ip
 
-   !> Places among the totals: kinetic energy, potential, momenta and mass; torque of gravity and its absolute value;
-   !> elastic energy; behind these places books, and books of fixed bodies
-   integer, parameter :: at_mass = 6, at_torque = 7, at_energy = 9, at_books = at_energy, at_walls = at_books + n_books, &
-      n_totals = at_walls + n_wall_books
+   !> Places among the totals: kinetic energy, potential and momenta; mass times steps; torque of gravity and its absolute
+   !> value; elastic energy; bodies whose last rates are unknown; behind them books, and books of fixed bodies
+   integer, parameter :: at_motion = 5, at_mass = 6, at_torque = 7, at_energy = 9, at_unknown = 10, &
+      at_books = at_unknown, at_walls = at_books + n_books, n_totals = at_walls + n_wall_books
 
 contains
 
    !> Start the books with the bodies and forces of step 0; collective.
-   subroutine open_ledger(ledger, team, dt, gravity, bodies, incidence, contacts)
+   subroutine open_ledger(ledger, team, gravity, bodies, incidence, contacts)
       !> Books
       type(ledger_t), intent(out) :: ledger
       !> Processes that share the bodies
       class(team_t), intent(inout) :: team
-      !> Step [s]
-      real(wp), intent(in) :: dt
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
       !> Bodies with their forces
@@ -121,14 +118,12 @@ contains
       type(contacts_t), intent(in) :: contacts
       real(wp) :: total(n_totals)
 
-      ledger%dt = dt
       call allocate_books(ledger, bodies%n)
       call add_to_books(ledger, 0.5_wp, gravity, bodies, incidence, contacts)
       ledger%is_current = .true.
       total = totals(ledger, team, gravity, bodies, incidence, contacts)
       ledger%energy_scale = total(1)
       ledger%start = [total(1) + total(2), total(3:5)]
-      ledger%mass = total(at_mass)
       ledger%elastic_start = total(at_energy)
    end subroutine open_ledger
 
@@ -151,11 +146,13 @@ contains
    end subroutine book_step
 
    !> Compare the bodies with the books; collective.
-   subroutine balance_of(ledger, team, gravity, bodies, incidence, contacts, balance)
+   subroutine balance_of(ledger, team, dt, gravity, bodies, incidence, contacts, balance)
       !> Books
       type(ledger_t), intent(inout) :: ledger
       !> Processes that share the bodies
       class(team_t), intent(inout) :: team
+      !> Step, the same in all steps [s]
+      real(wp), intent(in) :: dt
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
       !> Bodies at the end of a step
@@ -166,36 +163,32 @@ contains
       type(contacts_t), intent(in) :: contacts
       !> Energy, momentum, and what is unexplained
       type(balance_t), intent(out) :: balance
-      real(wp) :: total(n_totals), time
+      real(wp) :: total(n_totals)
 
       total = totals(ledger, team, gravity, bodies, incidence, contacts)
       balance%kinetic = total(1)
       balance%potential = total(2)
       balance%momentum = total(3:4)
       balance%angular_momentum = total(5)
-      time = real(ledger%steps, wp)*ledger%dt
-      if (.not. ledger%is_current) time = time + 0.5_wp*ledger%dt
-      associate (books => ledger%dt*total(at_books + 1:at_books + n_books), &
-                 walls => ledger%dt*total(at_walls + 1:at_walls + n_wall_books))
+      associate (books => dt*total(at_books + 1:at_walls), walls => dt*total(at_walls + 1:), &
+                 mass_time => dt*total(at_mass), torques => dt*total(at_torque:at_torque + 1))
          balance%elastic_work = books(1)
-         if (ledger%is_current .and. contacts%energy_is_quadratic) &
+         if (contacts%energy_is_quadratic .and. .not. total(at_unknown) > 0.0_wp) &
             balance%elastic_work = ledger%elastic_start - total(at_energy)
          balance%damping_work = books(2)
          balance%friction_work = books(3)
          balance%wall_work = walls(1)
-         balance%impulse = walls(2:3) + ledger%mass*gravity*time
-         balance%angular_impulse = walls(4) + ledger%dt*total(at_torque)
-         call find_residuals(ledger, walls(5) + ledger%mass*(abs(gravity(1)) + abs(gravity(2)))*time, &
-                             walls(6) + ledger%dt*total(at_torque + 1), balance)
+         balance%impulse = walls(2:3) + mass_time*gravity
+         balance%angular_impulse = walls(4) + torques(1)
+         call find_residuals(ledger, walls(5) + mass_time*(abs(gravity(1)) + abs(gravity(2))), walls(6) + torques(2), &
+                             balance)
       end associate
    end subroutine balance_of
 
-   !> Keep the books in an archive.
-   subroutine keep_ledger(ledger, n_bodies, archive)
+   !> Keep in an archive what belongs to the whole run.
+   subroutine keep_ledger(ledger, archive)
       !> Books
       type(ledger_t), intent(inout) :: ledger
-      !> Number of bodies, if the archive gives back
-      integer(ip), intent(in) :: n_bodies
       !> Archive
       class(archive_t), intent(inout) :: archive
 
@@ -204,23 +197,33 @@ contains
       call archive%keep('/run/ledger_steps', ledger%steps, '1', 'steps booked')
       call archive%keep('/run/elastic_start', ledger%elastic_start, 'J/m', 'elastic energy at the start')
       call archive%keep('/run/energy_scale', ledger%energy_scale, 'J/m', 'greatest energy turned over')
-      if (archive%gives_back) then
-         ledger%is_current = .false.
-         deallocate (ledger%book, ledger%torque, ledger%wall_book)
-         call allocate_books(ledger, n_bodies)
-      end if
+   end subroutine keep_ledger
+
+   !> Keep the books of bodies in an archive; if it gives back, those of others than before.
+   subroutine keep_books(ledger, n_bodies, archive)
+      !> Books
+      type(ledger_t), intent(inout) :: ledger
+      !> Number of bodies
+      integer(ip), intent(in) :: n_bodies
+      !> Archive
+      class(archive_t), intent(inout) :: archive
+
+      if (archive%gives_back) ledger%is_current = .false.
+      if (archive%gives_back .or. .not. allocated(ledger%book)) call allocate_books(ledger, n_bodies)
       call archive%keep('/bodies/book', ledger%book, 'W/m', 'sums over steps of the powers of elastic, damping and '// &
                         'tangential forces')
       call archive%keep('/bodies/torque_book', ledger%torque, 'N', 'sum over steps of the torque of gravity')
       call archive%keep('/bodies/wall_book', ledger%wall_book, 'W/m, N/m, N/m, N, N/m, N', 'sums over steps of what '// &
                         'fixed bodies do: power, force, torque, absolute forces and torques')
-   end subroutine keep_ledger
+   end subroutine keep_books
 
+   !> Make room for the books of bodies, which are empty.
    subroutine allocate_books(ledger, n)
       type(ledger_t), intent(inout) :: ledger
       !> Number of bodies
       integer(ip), intent(in) :: n
 
+      if (allocated(ledger%book)) deallocate (ledger%book, ledger%torque, ledger%wall_book)
       allocate (ledger%book(n_books, n), ledger%torque(n), ledger%wall_book(n_wall_books, n))
       ledger%book = 0.0_wp
       ledger%torque = 0.0_wp
@@ -294,21 +297,39 @@ contains
       type(incidence_t), intent(in) :: incidence
       type(contacts_t), intent(in) :: contacts
       real(wp) :: total(n_totals)
-      type(exact_sum_t) :: sums(n_totals)
-      integer(ip) :: b, n
+      type(exact_sum_t), allocatable :: sums(:, :)
+      integer(ip) :: b, n, n_blocks
+      integer :: i
 
       n = size(bodies%free, kind=ip)
-      !$omp parallel do if (n > block) schedule(static) default(none) &
-      !$omp    shared(n, sums, ledger, gravity, bodies, incidence, contacts) private(b)
-      do b = 1_ip, n, block
-         call add_block(ledger, gravity, bodies, incidence, contacts, b, min(n, b + block - 1_ip), sums)
+      n_blocks = max(1_ip, min(n/block, most_blocks))
+      allocate (sums(n_totals, n_blocks))
+      !$omp parallel do if (n_blocks > 1_ip) schedule(static) default(none) &
+      !$omp    shared(n, n_blocks, sums, ledger, gravity, bodies, incidence, contacts) private(b)
+      do b = 1_ip, n_blocks
+         call add_block(ledger, gravity, bodies, incidence, contacts, 1_ip + part_of(b - 1_ip), part_of(b), sums(:, b))
       end do
       !$omp end parallel do
-      call add_up_sums(team, sums)
-      total = sums%value()
+      do b = 2_ip, n_blocks
+         do i = 1, n_totals
+            call sums(i, 1)%add(sums(i, b))
+         end do
+      end do
+      call add_up_sums(team, sums(:, 1))
+      total = sums(:, 1)%value()
+
+   contains
+
+      !> Last place of a block among the free bodies
+      pure integer(ip) function part_of(block)
+         integer(ip), intent(in) :: block
+
+         part_of = int((int(n, lp)*int(block, lp))/int(n_blocks, lp), ip)
+      end function part_of
+
    end function totals
 
-   !> Add some of the free bodies to sums that threads share.
+   !> Add some of the free bodies to sums.
    subroutine add_block(ledger, gravity, bodies, incidence, contacts, low, high, sums)
       type(ledger_t), intent(in) :: ledger
       real(wp), intent(in) :: gravity(2)
@@ -318,33 +339,31 @@ contains
       !> First and last place in `bodies%free`
       integer(ip), intent(in) :: low, high
       type(exact_sum_t), intent(inout) :: sums(n_totals)
-      type(exact_sum_t) :: part(n_totals)
       real(wp) :: row(n_totals)
       integer(ip) :: k, s
       integer :: i
 
       do k = low, high
          s = bodies%free(k)
-         row(:at_mass) = motion_of(gravity, bodies, s)
+         row = 0.0_wp
+         row(:at_motion) = motion_of(gravity, bodies, s)
+         row(at_mass) = bodies%mass(s)*real(ledger%steps, wp)
          row(at_torque) = ledger%torque(s)
-         row(at_energy) = 0.0_wp
          row(at_books + 1:at_walls) = ledger%book(:, s)
          row(at_walls + 1:) = ledger%wall_book(:, s)
          if (ledger%is_current) then
             row(at_torque) = row(at_torque) - 0.5_wp*torque_of(gravity, bodies, s)
             call add_rates(bodies, incidence, contacts, s, -0.5_wp, row(at_books + 1:at_walls), row(at_walls + 1:))
             if (contacts%energy_is_quadratic) row(at_energy) = elastic_energy_of(bodies, incidence, contacts, s)
+         else
+            row(at_mass) = row(at_mass) + 0.5_wp*bodies%mass(s)
+            row(at_unknown) = 1.0_wp
          end if
          row(at_torque + 1) = abs(row(at_torque))
          do i = 1, n_totals
-            call part(i)%add(row(i))
+            call sums(i)%add(row(i))
          end do
       end do
-      !$omp critical
-      do i = 1, n_totals
-         call sums(i)%add(part(i))
-      end do
-      !$omp end critical
    end subroutine add_block
 
    !> Torque of gravity on a free body about the origin [N]
@@ -356,13 +375,13 @@ contains
       torque_of = bodies%mass(s)*(bodies%position(1, s)*gravity(2) - bodies%position(2, s)*gravity(1))
    end function torque_of
 
-   !> Kinetic energy [J/m], potential [J/m], momentum along x and y [N s/m], angular momentum about the origin [N s]
-   !> and mass [kg/m] of a free body
+   !> Kinetic energy [J/m], potential [J/m], momentum along x and y [N s/m] and angular momentum about the origin [N s]
+   !> of a free body
    pure function motion_of(gravity, bodies, s) result(values)
       real(wp), intent(in) :: gravity(2)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
-      real(wp) :: values(6)
+      real(wp) :: values(at_motion)
 
       associate (m => bodies%mass(s), v => bodies%velocity(:, s), x => bodies%position(:, s), &
                  spin => bodies%inertia(s)*bodies%angular_velocity(s))
@@ -370,7 +389,6 @@ contains
          values(2) = -m*(gravity(1)*x(1) + gravity(2)*x(2))
          values(3:4) = m*v
          values(5) = m*(x(1)*v(2) - x(2)*v(1)) + spin
-         values(6) = m
       end associate
    end function motion_of
 

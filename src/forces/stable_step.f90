@@ -22,7 +22,7 @@ module polydem_stable_step
    use polydem_tilt_damping, only: tilt_stiffness
    implicit none
    private
-   public :: stability_table_t, stable_step_of_contacts, stable_step_of_shapes
+   public :: stability_table_t, contact_numbers, stable_step_of_contacts, stable_step_of_shapes
 
    !> Greatest stable product of frequency and step against the damping ratio, piecewise linear
    type :: stability_table_t
@@ -40,15 +40,15 @@ module polydem_stable_step
 contains
 
    !> Stable step of the contacts as they are [s], huge if there are none, and the contact that sets it.
-   subroutine stable_step_of_contacts(settings, table, bodies, incidence, contacts, step, critical)
+   subroutine stable_step_of_contacts(settings, table, bodies, numbers, contacts, step, critical)
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
       !> What the integrator stands
       type(stability_table_t), intent(in) :: table
       !> Bodies
       type(bodies_t), intent(in) :: bodies
-      !> Index of the contacts
-      type(incidence_t), intent(in) :: incidence
+      !> Contacts that each body carries, (slot)
+      real(wp), intent(in) :: numbers(:)
       !> Contacts with their forces
       type(contacts_t), intent(in) :: contacts
       !> Stable step [s]
@@ -62,7 +62,7 @@ contains
       critical = 0_ip
       damping_ratio = damping_ratio_asked_for(settings)
       do c = 1_ip, contacts%n
-         this = step_of_contact(settings, damping_ratio, table, bodies, incidence, contacts, c)
+         this = step_of_contact(settings, damping_ratio, table, bodies, numbers, contacts, c)
          if (this < step) then
             step = this
             critical = c
@@ -108,13 +108,13 @@ contains
       end do
    end subroutine stable_step_of_shapes
 
-   real(wp) function step_of_contact(settings, damping_ratio, table, bodies, incidence, contacts, c)
+   real(wp) function step_of_contact(settings, damping_ratio, table, bodies, numbers, contacts, c)
       type(forces_settings_t), intent(in) :: settings
       !> Damping ratio of all contacts, if a restitution is given
       real(wp), intent(in) :: damping_ratio
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
-      type(incidence_t), intent(in) :: incidence
+      real(wp), intent(in) :: numbers(:)
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: c
       real(wp) :: g(4), alone(4), mobility, ratio, k_n, c_n, tilt(2)
@@ -157,18 +157,25 @@ contains
          mine(3) = along*across*bodies%inverse_inertia(s)
          mine(4) = bodies%inverse_inertia(s)
          alone = alone + mine
-         g = g + mine*real(contacts_of(incidence, s), wp)
+         g = g + mine*numbers(s)
       end subroutine add_body
 
    end function step_of_contact
 
-   pure integer(ip) function contacts_of(incidence, s)
+   !> Contacts that each body carries, (slot)
+   pure function contact_numbers(n_bodies, incidence) result(numbers)
+      !> Number of bodies
+      integer(ip), intent(in) :: n_bodies
+      !> Index of the contacts
       type(incidence_t), intent(in) :: incidence
-      integer(ip), intent(in) :: s
+      real(wp) :: numbers(n_bodies)
+      integer(ip) :: s
 
-      contacts_of = incidence%start_first(s + 1_ip) - incidence%start_first(s) &
-         + incidence%start_second(s + 1_ip) - incidence%start_second(s)
-   end function contacts_of
+      do s = 1_ip, n_bodies
+         numbers(s) = real(incidence%start_first(s + 1_ip) - incidence%start_first(s) &
+                           + incidence%start_second(s + 1_ip) - incidence%start_second(s), wp)
+      end do
+   end function contact_numbers
 
    !> Stable step of one element [s].
    pure real(wp) function step_of_element(settings, table, k_n, c_n, g, mass_tangential, tilt)

@@ -27,6 +27,7 @@ module polydem_integrator
       !> Products of frequency and step that the scheme stands
       procedure(stability), deferred :: stability
       procedure :: keep
+      procedure :: carry
    end type integrator_t
 
    abstract interface
@@ -67,5 +68,15 @@ contains
       associate (no_memory => self, unused => archive)
       end associate
    end subroutine keep
+
+   !> Let an archive take along, in the middle of a step, what `keep` keeps and what lasts from predict to correct; to be
+   !> replaced by schemes that have such a thing.
+   subroutine carry(self, archive)
+      class(integrator_t), intent(inout) :: self
+      !> Archive, which takes or gives back columns over /bodies
+      class(archive_t), intent(inout) :: archive
+
+      call self%keep(archive)
+   end subroutine carry
 
 end module polydem_integrator

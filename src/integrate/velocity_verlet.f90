@@ -3,6 +3,7 @@
 !> x' = x + dt v + dt^2/2 a, forces at x' with the velocity v + dt a, v' = v + dt/2 (a + a')
 !> (W.C. Swope, H.C. Andersen, P.H. Berens & K.R. Wilson, J. Chem. Phys. 76 (1982) 637).
 module polydem_velocity_verlet
+   use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t
    use polydem_integrator, only: integrator_t
    use polydem_kinds, only: ip, wp, worth_threads
@@ -20,6 +21,7 @@ module polydem_velocity_verlet
       procedure :: predict
       procedure :: correct
       procedure :: stability
+      procedure :: carry
    end type velocity_verlet_t
 
 contains
@@ -87,6 +89,16 @@ contains
       end do
       !$omp end parallel do
    end subroutine correct
+
+   !> Let an archive take along the velocities in the middle of the step.
+   subroutine carry(self, archive)
+      class(velocity_verlet_t), intent(inout) :: self
+      !> Archive
+      class(archive_t), intent(inout) :: archive
+
+      call self%keep(archive)
+      call archive%keep('/bodies/half_velocity', self%half, 'm/s, rad/s', 'velocities in the middle of the step')
+   end subroutine carry
 
    !> Limits for x'' + 2 z w x' + w^2 x = 0 with the force taken at the predicted velocity: where the spectral
    !> radius of the step leaves 1.

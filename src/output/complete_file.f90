@@ -1,4 +1,7 @@
 !> Files that are there whole or not at all: written under another name, brought to disk, renamed. They may be sealed.
+!>
+!> A file that several processes write is begun by the leader, who writes its texts; then the others join. All close it,
+!> and the leader does the rest.
 module polydem_complete_file
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t
@@ -6,9 +9,10 @@ module polydem_complete_file
    use polydem_paths, only: exists, remove_file, rename_file, sync_file
    use polydem_result_folder, only: unfinished
    use polydem_sealed_file, only: seal_file, seal_length
+   use polydem_team, only: team_t
    implicit none
    private
-   public :: begin_file, complete_file, discard_file
+   public :: begin_file, share_file, complete_file, discard_file
 
 contains
 
@@ -31,8 +35,25 @@ contains
       call file%create(path//unfinished, error, compressed, room)
    end subroutine begin_file
 
+   !> Let all processes write to a file that the leader has created; collective.
+   subroutine share_file(team, file, path, error)
+      !> Processes; if there is one only, nothing happens
+      class(team_t), intent(inout) :: team
+      !> The file, open at the leader
+      type(hdf5_file_t), intent(inout) :: file
+      !> Its present name
+      character(len=*), intent(in) :: path
+      !> Why it cannot be written; afterwards the same on all processes
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (team%size == 1_ip) return
+      if (team%leads() .and. .not. allocated(error)) call file%close(error)
+      call team%agree(error)
+      if (.not. allocated(error)) call file%join(path, error)
+   end subroutine share_file
+
    !> Close the file and give it its name; after a failure it is removed instead.
-   subroutine complete_file(file, path, error, sealed)
+   subroutine complete_file(file, path, error, sealed, team)
       !> File of `begin_file`
       type(hdf5_file_t), intent(inout) :: file
       !> Its name once it is complete
@@ -41,10 +62,25 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Whether it gets a seal, as told to `begin_file`; no if absent
       logical, intent(in), optional :: sealed
-      type(error_t), allocatable :: ignored
+      !> Processes that wrote it together, all of which must call; if absent, this one did alone
+      class(team_t), intent(inout), optional :: team
+      logical :: leads
 
+      leads = .true.
+      if (present(team)) leads = team%leads()
       if (allocated(error)) call file%abandon(error)
       call file%close(error)
+      if (leads) call name_file(path, error, sealed)
+      if (present(team)) call team%agree(error)
+   end subroutine complete_file
+
+   !> Give a closed file its name, or remove it after a failure.
+   subroutine name_file(path, error, sealed)
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(inout) :: error
+      logical, intent(in), optional :: sealed
+      type(error_t), allocatable :: ignored
+
       if (present(sealed) .and. .not. allocated(error)) then
          if (sealed) call seal_file(path//unfinished, error)
       end if
@@ -52,7 +88,7 @@ contains
       if (.not. allocated(error)) call rename_file(path//unfinished, path, error)
       if (.not. allocated(error)) call sync_file(folder_of(path), error)
       if (exists(path//unfinished)) call remove_file(path//unfinished, ignored)
-   end subroutine complete_file
+   end subroutine name_file
 
    !> Close the file and remove it.
    subroutine discard_file(file, path, error)

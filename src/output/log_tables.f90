@@ -9,7 +9,7 @@ module polydem_log_tables
    use polydem_timers, only: n_stages, stage_names, timers_t
    implicit none
    private
-   public :: write_header, write_timings, write_counters, write_hash
+   public :: write_header, write_timings, write_ranks, write_counters, write_hash
 
 contains
 
@@ -76,6 +76,29 @@ contains
                           decimal(1.0e6_dp*seconds/(real(steps, dp)*real(bodies, dp)), 4)// &
                           ' us per step and body')
    end subroutine write_timings
+
+   !> Write how the seconds of each stage are spread over processes. The time of exchange includes waiting for others.
+   subroutine write_ranks(log, total)
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Seconds, (stage, process)
+      real(dp), intent(in) :: total(:, :)
+      character(len=line_width) :: line
+      character(len=12) :: name
+      real(dp) :: mean
+      integer :: k
+
+      call log%write_line('')
+      write (line, '(a12,4a14)') 'of processes', 'least [s]', 'mean [s]', 'most [s]', 'most/mean'
+      call log%write_line(trim(line))
+      do k = 1, size(total, 1)
+         mean = sum(total(k, :))/real(size(total, 2), dp)
+         if (.not. mean > 0.0_dp) cycle
+         name = stage_names(k)
+         write (line, '(a12,3f14.3,f14.2)') name, minval(total(k, :)), mean, maxval(total(k, :)), maxval(total(k, :))/mean
+         call log%write_line(trim(line))
+      end do
+   end subroutine write_ranks
 
    !> Write the counters, one per line.
    subroutine write_counters(log, counters)

@@ -3,17 +3,23 @@
 !> The segment being written is trajectory_NNNN.h5.open and is flushed after each frame. When it is full it
 !> is closed, brought to disk and renamed to trajectory_NNNN.h5, and never written again. A program that is
 !> killed spoils at most the open segment, and that only if it dies during a flush.
+!>
+!> All processes of a run write each segment together, and all procedures are collective. Of errors that were there
+!> before, all must know.
 module polydem_trajectory
    use polydem_bodies, only: bodies_t
+   use polydem_complete_file, only: share_file
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ledger_row, only: ledger_row_t
+   use polydem_lone_team, only: lone_team_t
    use polydem_paths, only: make_folder, rename_file, sync_file
    use polydem_provenance, only: provenance_t
    use polydem_result_folder, only: open_suffix, segment_path
-   use polydem_segment, only: add_contacts, add_frame, add_ledger, add_walls, start_segment
+   use polydem_segment, only: add_contacts, add_frame, add_ledger, add_walls, start_segment, write_bodies
+   use polydem_team, only: team_t
    implicit none
    private
    public :: trajectory_t
@@ -23,6 +29,8 @@ module polydem_trajectory
       private
       !> Folder of the result
       character(len=:), allocatable :: folder
+      !> Processes that write it
+      class(team_t), allocatable :: team
       !> Where the result comes from, for each segment
       type(provenance_t) :: provenance
       !> The open segment
@@ -46,7 +54,7 @@ module polydem_trajectory
 contains
 
    !> Prepare to write; the folder is made if it is not there and should hold no result but the segments to go on from.
-   subroutine open_trajectory(self, folder, frames_per_segment, provenance, error, last_number)
+   subroutine open_trajectory(self, folder, frames_per_segment, provenance, error, last_number, team)
       class(trajectory_t), intent(inout) :: self
       !> Folder of the result
       character(len=*), intent(in) :: folder
@@ -58,14 +66,23 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Number of the last segment that is there; 0 if absent
       integer(ip), intent(in), optional :: last_number
+      !> Processes of the run; this one alone if absent
+      class(team_t), intent(in), optional :: team
 
+      if (allocated(self%team)) deallocate (self%team)
+      if (present(team)) then
+         allocate (self%team, source=team)
+      else
+         allocate (lone_team_t :: self%team)
+      end if
       self%folder = folder
       self%capacity = max(1_ip, frames_per_segment)
       self%provenance = provenance
       self%number = 0_ip
       if (present(last_number)) self%number = last_number
       self%is_open = .false.
-      call make_folder(folder, error)
+      if (self%team%leads()) call make_folder(folder, error)
+      call self%team%agree(error)
    end subroutine open_trajectory
 
    !> Write a frame and flush it; after a failure its segment stays open as it is. Give `contacts` in all frames or
@@ -76,7 +93,7 @@ contains
       integer(lp), intent(in) :: step
       !> Simulated time [s]
       real(wp), intent(in) :: time
-      !> Bodies with their forces
+      !> Bodies with their forces; at the leader with the whole forces on the fixed ones
       type(bodies_t), intent(in) :: bodies
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
@@ -86,15 +103,7 @@ contains
       type(ledger_row_t), intent(in), optional :: row
 
       if (.not. self%is_open) call open_segment(self, bodies, error)
-      if (allocated(error) .and. .not. self%is_open) return
-      call add_frame(self%file, step, real(time, dp), bodies, error)
-      call add_walls(self%file, bodies, error)
-      if (present(contacts)) then
-         call add_contacts(self%file, self%n_contacts, bodies, contacts, error)
-         self%n_contacts = self%n_contacts + int(contacts%n, lp)
-      end if
-      if (present(row)) call add_ledger(self%file, row, error)
-      if (.not. allocated(error)) call self%file%flush(error)
+      if (.not. allocated(error)) call fill_frame(self, step, time, bodies, error, contacts, row)
       if (allocated(error)) then
          call self%file%abandon(error)
          self%is_open = .false.
@@ -103,6 +112,22 @@ contains
       self%n_frames = self%n_frames + 1_ip
       if (self%n_frames == self%capacity) call close_segment(self, error)
    end subroutine write_frame
+
+   subroutine fill_frame(self, step, time, bodies, error, contacts, row)
+      type(trajectory_t), intent(inout) :: self
+      integer(lp), intent(in) :: step
+      real(wp), intent(in) :: time
+      type(bodies_t), intent(in) :: bodies
+      type(error_t), allocatable, intent(inout) :: error
+      type(contacts_t), intent(in), optional :: contacts
+      type(ledger_row_t), intent(in), optional :: row
+
+      call add_frame(self%file, self%team, step, real(time, dp), bodies, error)
+      call add_walls(self%file, bodies, error)
+      if (present(contacts)) call add_contacts(self%file, self%team, self%n_contacts, bodies, contacts, error)
+      if (present(row)) call add_ledger(self%file, row, error)
+      if (.not. allocated(error)) call self%file%flush(error)
+   end subroutine fill_frame
 
    !> Close the open segment, if there is one, however few frames it has.
    subroutine close_trajectory(self, error)
@@ -118,13 +143,20 @@ contains
       type(bodies_t), intent(in) :: bodies
       type(error_t), allocatable, intent(inout) :: error
 
+      character(len=:), allocatable :: path
+
       self%number = self%number + 1_ip
-      call self%file%create(segment_path(self%folder, self%number)//open_suffix, error)
-      if (allocated(error)) return
-      self%is_open = .true.
+      path = segment_path(self%folder, self%number)//open_suffix
       self%n_frames = 0_ip
       self%n_contacts = 0_lp
-      call start_segment(self%file, bodies, self%provenance, error)
+      if (self%team%leads()) then
+         call self%file%create(path, error)
+         if (.not. allocated(error)) call start_segment(self%file, self%provenance, error)
+      end if
+      call share_file(self%team, self%file, path, error)
+      if (allocated(error)) return
+      self%is_open = .true.
+      call write_bodies(self%file, self%team, bodies, error)
    end subroutine open_segment
 
    subroutine close_segment(self, error)
@@ -135,9 +167,12 @@ contains
       path = segment_path(self%folder, self%number)
       self%is_open = .false.
       call self%file%close(error)
-      if (.not. allocated(error)) call sync_file(path//open_suffix, error)
-      if (.not. allocated(error)) call rename_file(path//open_suffix, path, error)
-      if (.not. allocated(error)) call sync_file(self%folder, error)
+      if (self%team%leads()) then
+         if (.not. allocated(error)) call sync_file(path//open_suffix, error)
+         if (.not. allocated(error)) call rename_file(path//open_suffix, path, error)
+         if (.not. allocated(error)) call sync_file(self%folder, error)
+      end if
+      call self%team%agree(error)
    end subroutine close_segment
 
 end module polydem_trajectory

@@ -16,7 +16,7 @@ module polydem_bodies
    use polydem_hash, only: mix_word
    implicit none
    private
-   public :: bodies_t, turn_bodies, owns_contact, state_hash
+   public :: bodies_t, turn_bodies, state_hash, state_words
 
    !> Structure of arrays over slots 1..n
    type :: bodies_t
@@ -97,36 +97,37 @@ contains
       !$omp end parallel do
    end subroutine turn_bodies
 
-   !> Whether this process counts a contact. That is up to the process that moves the first body, or the second one if
-   !> the first is fixed; others have the contact too if they move its other body.
-   pure logical function owns_contact(bodies, first, second)
-      !> Bodies
-      type(bodies_t), intent(in) :: bodies
-      !> Slots of the two bodies of the contact; one of them is free
-      integer(ip), intent(in) :: first, second
-
-      owns_contact = .not. bodies%ghost(merge(second, first, bodies%fixed(first)))
-   end function owns_contact
-
    !> Hash of the bits of every body's identifier, position, angle and velocities in identifier order.
    !>
    !> Real numbers enter as double precision. Two runs agree in every bit if their hashes agree.
    pure integer(lp) function state_hash(bodies)
       !> Bodies to hash
       type(bodies_t), intent(in) :: bodies
+      integer(lp) :: words(7)
       integer(ip) :: s
+      integer :: k
 
       state_hash = int(bodies%n, lp)
       do s = 1_ip, bodies%n
-         state_hash = mix_word(state_hash, int(bodies%id(s), lp))
-         state_hash = mix_word(state_hash, bits(bodies%position(1, s)))
-         state_hash = mix_word(state_hash, bits(bodies%position(2, s)))
-         state_hash = mix_word(state_hash, bits(bodies%angle(s)))
-         state_hash = mix_word(state_hash, bits(bodies%velocity(1, s)))
-         state_hash = mix_word(state_hash, bits(bodies%velocity(2, s)))
-         state_hash = mix_word(state_hash, bits(bodies%angular_velocity(s)))
+         words = state_words(bodies, s)
+         do k = 1, size(words)
+            state_hash = mix_word(state_hash, words(k))
+         end do
       end do
    end function state_hash
+
+   !> What a body adds to the hash of the state
+   pure function state_words(bodies, s) result(words)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      !> Bits of its identifier, position, angle and velocities
+      integer(lp) :: words(7)
+
+      words = [int(bodies%id(s), lp), bits(bodies%position(1, s)), bits(bodies%position(2, s)), bits(bodies%angle(s)), &
+               bits(bodies%velocity(1, s)), bits(bodies%velocity(2, s)), bits(bodies%angular_velocity(s))]
+   end function state_words
 
    pure integer(lp) function bits(number)
       real(wp), intent(in) :: number

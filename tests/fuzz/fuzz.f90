@@ -6,8 +6,8 @@
 !> promise; a crash is a broken promise, too.
 program fuzz
    use, intrinsic :: iso_fortran_env, only: error_unit
-   use fuzz_cases, only: spoilt_file, try_bodies, try_bytes, try_namelist, try_override, try_scene, &
-      try_segment, try_trace, write_sound_file
+   use fuzz_cases, only: spoilt_file, try_bodies, try_bytes, try_checkpoint, try_namelist, try_override, &
+      try_scene, try_segment, try_trace, write_sound_file
    use hostile_file, only: count_open_objects, start_hdf5
    use polydem_clock, only: wall_seconds
    use polydem_errors, only: error_t, input_error, io_error, run_error
@@ -107,9 +107,11 @@ contains
          call try_bodies(random, error)
       case ('trace')
          call try_trace(random, error)
+      case ('checkpoint')
+         call try_checkpoint(random, error)
       case ('packing', 'result')
          call try_segment(kind_of_case, random, error)
-      case ('bodies_bytes', 'trace_bytes', 'packing_bytes', 'result_bytes')
+      case ('bodies_bytes', 'trace_bytes', 'checkpoint_bytes', 'packing_bytes', 'result_bytes')
          call try_bytes(kind_of_case(:index(kind_of_case, '_') - 1), random, bytes, error)
       case default
          error stop 'fuzz: there is no such kind of cases'

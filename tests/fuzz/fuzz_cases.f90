@@ -16,9 +16,11 @@ module fuzz_cases
    use polydem_replay, only: replay_trace
    use polydem_settings, only: settings_t
    use polydem_simulation, only: advance, new_simulation, simulation_t
+   use spoilt_checkpoint, only: go_on_from, put_behind_seal, sound_checkpoint
    implicit none
    private
-   public :: try_namelist, try_override, try_scene, try_bodies, try_trace, try_segment, try_bytes, write_sound_file
+   public :: try_namelist, try_override, try_scene, try_bodies, try_trace, try_checkpoint, try_segment, try_bytes, &
+      write_sound_file
 
    !> Spoilt input, and input that was read
    character(len=*), parameter, public :: spoilt_file = 'spoilt.h5'
@@ -125,6 +127,21 @@ contains
       call replay(random, error)
    end subroutine try_trace
 
+   !> A checkpoint whose seal is right, and the run that goes on from it
+   subroutine try_checkpoint(random, error)
+      !> Random numbers
+      type(random_t), intent(inout) :: random
+      !> Why it was refused
+      type(error_t), allocatable, intent(inout) :: error
+      type(field_t), allocatable :: fields(:)
+
+      fields = sound_checkpoint()
+      call spoil_fields(random, fields)
+      call write_hostile_file(spoilt_file, fields, random, .false.)
+      call put_behind_seal(spoilt_file)
+      call go_on_from(spoilt_file, error)
+   end subroutine try_checkpoint
+
    !> A segment of a trajectory with the texts of a profile, as a packing or as a result to describe
    subroutine try_segment(kind_of_use, random, error)
       !> packing or result
@@ -143,7 +160,7 @@ contains
 
    !> A file with spoilt bytes
    subroutine try_bytes(kind_of_file, random, sound, error)
-      !> bodies, trace, packing or result
+      !> bodies, trace, checkpoint, packing or result
       character(len=*), intent(in) :: kind_of_file
       !> Random numbers
       type(random_t), intent(inout) :: random
@@ -164,6 +181,9 @@ contains
          call read_bodies(error)
       case ('trace')
          call replay(random, error)
+      case ('checkpoint')
+         call go_on_from(spoilt_file, error)
+         if (.not. allocated(error) .and. bytes /= sound) error stop 'a spoilt checkpoint is taken for a sound one'
       case default
          call read_segment(kind_of_file, error)
       end select
@@ -171,7 +191,7 @@ contains
 
    !> Write a sound file.
    subroutine write_sound_file(kind_of_file, path, random)
-      !> bodies, trace, packing or result
+      !> bodies, trace, checkpoint, packing or result
       character(len=*), intent(in) :: kind_of_file
       !> Where to
       character(len=*), intent(in) :: path
@@ -183,6 +203,9 @@ contains
          call write_hostile_file(path, sound_bodies(), random, .false.)
       case ('trace')
          call write_hostile_file(path, sound_trace(), random, .false.)
+      case ('checkpoint')
+         call write_hostile_file(path, sound_checkpoint(), random, .false.)
+         call put_behind_seal(path)
       case default
          call write_hostile_file(path, sound_segment(), random, .false.)
       end select

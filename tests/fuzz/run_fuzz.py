@@ -16,8 +16,8 @@ import tempfile
 import time
 from pathlib import Path
 
-KINDS = ("namelist", "override", "scene", "bodies", "trace", "packing", "result",
-         "bodies_bytes", "trace_bytes", "packing_bytes", "result_bytes")
+KINDS = ("namelist", "override", "scene", "bodies", "trace", "checkpoint", "packing", "result",
+         "bodies_bytes", "trace_bytes", "checkpoint_bytes", "packing_bytes", "result_bytes")
 
 #: What a process may take, in a build without sanitizers as address space [bytes]
 MEMORY = 4 << 30

@@ -8,6 +8,7 @@ commands and a made-up apt-get, which links the real commands, stand for a machi
 
 import os
 import shutil
+import signal
 import statistics
 import subprocess
 import sys
@@ -25,6 +26,7 @@ add_subdirectory(tests/verification)
 enable_testing()
 add_test(NAME good COMMAND ${CMAKE_COMMAND} -E true)
 add_test(NAME bad COMMAND ${CMAKE_COMMAND} -E false)
+add_test(NAME ranks COMMAND sh -c [[test -x "$POLYDEM_MPI_PROGRAM"]])
 add_test(NAME odd COMMAND ${CMAKE_COMMAND} -E false)
 set_tests_properties(good odd PROPERTIES LABELS "fine;c.d")
 set_tests_properties(bad PROPERTIES LABELS broken)
@@ -34,6 +36,7 @@ set_tests_properties(odd PROPERTIES SKIP_RETURN_CODE 1)
 PRESETS = """\
 {"version": 6, "configurePresets": [
   {"name": "release", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"},
+  {"name": "mpi", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"},
   {"name": "single", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"},
   {"name": "quadruple", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"},
   {"name": "debug", "generator": "Ninja", "binaryDir": "${sourceDir}/build/${presetName}"}]}
@@ -51,6 +54,20 @@ program polydem
 end program polydem
 """
 
+# Notes its environment and becomes the program, unless it shall wait for signals.
+MPIRUN = """\
+#!/bin/bash
+env >"$NOTES/environment"
+[ "$1" = -n ] || exit 9
+echo "$2 ranks"
+shift 2
+[ -n "$MPIRUN_WAITS" ] || exec "$@"
+trap 'echo USR1 >>"$NOTES/heard"; [ "$MPIRUN_WAITS" = long ] || { sleep 0.3; exit 75; }' USR1
+trap 'echo TERM >>"$NOTES/heard"; exit 1' TERM
+touch "$NOTES/started"
+for k in {1..600}; do sleep 0.05; done
+"""
+
 APT_GET = """\
 #!/bin/bash
 echo "apt-get $*" >>"$APT_LOG"
@@ -61,7 +78,7 @@ for name in gfortran cmake ninja git h5fc; do ln -sf "$(PATH=$REAL_PATH command 
 
 # What the launcher and the tools may call on a bare machine.
 COMMANDS = ("ar as bash cat cp dirname env find flock grep head id ld ln mkdir mv nproc ranlib readlink rm sed "
-            "sh tail").split()
+            "setsid sh tail").split()
 
 
 class Toy(unittest.TestCase):
@@ -79,8 +96,13 @@ class Toy(unittest.TestCase):
         self.write("tests/verification/CMakeLists.txt", "add_executable(verify ../../src/app/main.f90)\n")
         self.write("postproc/pyproject.toml", "")
         self.write(".venv/.made", self.folder + "\n")
+        for name in ("mpirun", "mpifort", "h5pfc"):
+            self.write(f"mpi/{name}", MPIRUN)
+            os.chmod(os.path.join(self.folder, "mpi", name), 0o755)
         self.environment = {name: value for name, value in os.environ.items()
-                            if not name.startswith(("OMPI_", "POLYDEM_", "HDF5_", "CTEST_"))}
+                            if not name.startswith(("OMPI_", "OMP_", "POLYDEM_", "HDF5_", "CTEST_", "SLURM_"))}
+        self.environment["PATH"] = os.path.join(self.folder, "mpi") + ":" + self.environment["PATH"]
+        self.environment["NOTES"] = self.folder
 
     def write(self, path, text):
         path = os.path.join(self.folder, path)
@@ -93,6 +115,10 @@ class Toy(unittest.TestCase):
         result = subprocess.run([launcher or self.launcher, *arguments], capture_output=True, text=True, check=False,
                                 env={**self.environment, **environment}, cwd="/")
         return result.returncode, result.stdout, result.stderr
+
+    def read(self, name):
+        with open(os.path.join(self.folder, name), encoding="utf-8") as file:
+            return file.read().splitlines()
 
     def bare_machine(self):
         """Environment in which only the shell's own tools and the made-up apt-get are found."""
@@ -127,11 +153,100 @@ class Words(Toy):
         self.assertEqual(self.call("test", "a", "b")[0], 2)
         self.assertEqual(self.call("test", "--quick")[0], 2)
 
-    def test_inside_mpirun_nothing_is_prepared(self):
+
+class Ranks(Toy):
+    """Runs of several processes; what mpirun does, the made-up one only notes."""
+
+    def run_ranks(self, *arguments, **environment):
+        """Output, messages and the noted environment of a call that ends with 0."""
+        code, output, messages = self.call(*arguments, **environment)
+        self.assertEqual(code, 0, messages)
+        noted = dict(line.split("=", 1) for line in self.read("environment") if "=" in line)
+        return output.splitlines(), messages.splitlines(), noted
+
+    def test_ranks_are_taken_out_and_the_rest_goes_to_the_program_with_mpi(self):
+        cores = len(os.sched_getaffinity(0))
+        output, messages, noted = self.run_ranks("run", "my drum.nml", "--ranks", str(cores), "--set", "a.b=--ranks")
+        words = ["run", "--threads", "1", "my drum.nml", "--set", "a.b=--ranks"]
+        self.assertEqual(output, [f"{cores} ranks", *(f"<{word}>" for word in words)])
+        self.assertEqual(messages, ["polydem: building program in build/mpi"])
+        self.assertEqual((noted["OMPI_MCA_hwloc_base_binding_policy"], noted["OMP_PROC_BIND"]), ("none", "false"))
+        self.assertNotIn("OMPI_MCA_mpi_yield_when_idle", noted)
+        self.assertEqual(noted.get("OMPI_ALLOW_RUN_AS_ROOT"), "1" if os.getuid() == 0 else None)
+        output, _, _ = self.run_ranks("check", "--ranks=1", "--threads=1", "--", "--ranks")
+        self.assertEqual(output, ["1 ranks", "<check>", "<--threads=1>", "<-->", "<--ranks>"])
+        self.assertEqual(self.call("run", "--ranks", "2", "--help")[1], "<run>\n<--help>\n")
+        self.assertEqual(self.call("info", "--ranks", "2")[1], "<info>\n<--ranks>\n<2>\n")
+
+    def test_cores_are_shared_and_too_many_ranks_take_turns(self):
+        cores = len(os.sched_getaffinity(0))
+        output, messages, _ = self.run_ranks("run", "x", "--ranks", "1")
+        self.assertEqual(output[3], f"<{cores}>")
+        output, messages, noted = self.run_ranks("run", "x", "--ranks", str(2*cores), OMP_NUM_THREADS="3,1")
+        self.assertEqual(output[3], "<3>")
+        self.assertEqual(messages, [f"polydem: warning: {2*cores} ranks of 3 threads take turns on {cores} cores"])
+        self.assertEqual((noted["OMPI_MCA_rmaps_base_oversubscribe"], noted["OMPI_MCA_mpi_yield_when_idle"],
+                          noted["OMP_WAIT_POLICY"]), ("1", "1", "passive"))
+
+    def test_a_binding_of_the_user_stays(self):
+        _, _, noted = self.run_ranks("run", "x", "--ranks", "1", "--threads", "1", OMP_PROC_BIND="close",
+                                     OMPI_MCA_rmaps_base_mapping_policy="slot:PE=1")
+        self.assertEqual(noted["OMP_PROC_BIND"], "close")
+        self.assertNotIn("OMPI_MCA_hwloc_base_binding_policy", noted)
+
+    def test_a_number_of_ranks_is_a_number(self):
+        for words in (["0"], ["-1"], ["two"], ["1000000"], ["2.5"], [""], []):
+            code, _, messages = self.call("run", "x.nml", "--ranks", *words)
+            self.assertEqual(code, 2)
+            self.assertIn("a whole number from 1 to 999999 was expected", messages)
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
+
+    def test_under_mpirun_every_rank_becomes_the_program_with_mpi(self):
         code, _, messages = self.call("run", "x.nml", OMPI_COMM_WORLD_SIZE="2")
         self.assertEqual(code, 1)
-        self.assertIn("not built", messages)
+        self.assertIn("not built; call POLYDEM_PRESET=mpi ./polydem --version once outside mpirun", messages)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
+        self.assertEqual(self.call("--version", POLYDEM_PRESET="mpi")[:2], (0, "<--version>\n"))
+        self.assertEqual(self.call("run", "x.nml", OMPI_COMM_WORLD_SIZE="2"), (0, "<run>\n<x.nml>\n", ""))
+        code, _, messages = self.call("run", "x.nml", "--ranks", "2", OMPI_COMM_WORLD_SIZE="2")
+        self.assertEqual(code, 2)
+        self.assertIn("--ranks does not go with mpirun", messages)
+
+    def begin(self, waits):
+        """A call whose mpirun waits for signals."""
+        for name in ("started", "heard"):
+            if os.path.exists(os.path.join(self.folder, name)):
+                os.remove(os.path.join(self.folder, name))
+        run = subprocess.Popen([self.launcher, "run", "x.nml", "--ranks", "1"], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True, env={**self.environment, "MPIRUN_WAITS": waits})
+        self.addCleanup(run.communicate)
+        self.addCleanup(run.kill)
+        self.await_file("started")
+        return run
+
+    def await_file(self, name):
+        end = time.monotonic() + 60
+        while not os.path.exists(os.path.join(self.folder, name)):
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.02)
+
+    def test_the_first_signal_becomes_usr1_and_the_end_is_awaited(self):
+        self.call("--version", POLYDEM_PRESET="mpi")
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1):
+            run = self.begin("short")
+            run.send_signal(number)
+            self.assertEqual((run.wait(60), run.stderr.read()), (75, ""))
+            self.assertEqual(self.read("heard"), ["USR1"])
+
+    def test_the_second_signal_ends_all(self):
+        self.call("--version", POLYDEM_PRESET="mpi")
+        run = self.begin("long")
+        run.send_signal(signal.SIGTERM)
+        self.await_file("heard")
+        run.send_signal(signal.SIGINT)
+        self.assertEqual(run.wait(60), 128 + signal.SIGINT)
+        self.assertEqual(self.read("heard"), ["USR1", "TERM"])
+        self.assertIn("--continue goes on from the last checkpoint", run.stderr.read())
 
 
 class Build(Toy):
@@ -214,7 +329,8 @@ class Build(Toy):
     def test_tests_are_chosen_by_label_and_counted_in_the_last_line(self):
         code, output, _ = self.call("test")
         self.assertNotEqual(code, 0)
-        self.assertEqual(output.splitlines()[-1], "1 passed, 1 failed, 1 skipped")
+        self.assertEqual(output.splitlines()[-1], "2 passed, 1 failed, 1 skipped")
+        self.assertTrue(os.path.exists(os.path.join(self.folder, "build", "mpi", "src", "app", "polydem")))
         code, output, _ = self.call("test", "c.d")
         self.assertEqual((code, output.splitlines()[-1]), (0, "1 passed, 0 failed, 1 skipped"))
         code, output, _ = self.call("test", "broken")
@@ -237,6 +353,10 @@ class BareMachine(Toy):
             self.assertIn(package, output.split())
         self.assertNotIn("valgrind", output.split())
         self.assertIn("valgrind", self.call("cache", "results/bench", "--no-install", **machine)[1].split())
+        parallel = self.call("run", "x.nml", "--ranks", "2", "--no-install", **machine)[1].split()
+        for package in ("gfortran", "openmpi-bin", "libopenmpi-dev", "libhdf5-openmpi-dev"):
+            self.assertIn(package, parallel)
+        self.assertNotIn("libhdf5-dev", parallel)
         self.assertFalse(os.path.exists(machine["APT_LOG"]))
 
     def test_says_what_is_missing_installs_it_and_runs(self):

@@ -2,8 +2,8 @@
 
 usage: test_slurm.py FOLDER
 
-FOLDER holds job.sh and array.sh. They run in a folder with a made-up polydem, which notes its arguments and waits for
-a signal, and a made-up scontrol; the test stands for the queue.
+FOLDER holds job.sh, array.sh and ranks.sh. They run in a folder with a made-up polydem, which notes its arguments and
+waits for a signal, and made-up scontrol and mpirun; the test stands for the queue.
 """
 
 import os
@@ -34,7 +34,15 @@ SCONTROL = """\
 echo "$*" >>requeued
 """
 
+# Notes its own words and becomes the program that stands behind them.
+MPIRUN = """\
+#!/bin/bash
+while [ "$1" != ./polydem ]; do printf "%s\\n" "$1" >>ranks; shift; done
+exec "$@"
+"""
+
 JOB = {"SLURM_JOB_ID": "4711", "SLURM_CPUS_PER_TASK": "3"}
+RANKS = {**JOB, "SLURM_NTASKS": "5"}
 ARRAY = {**JOB, "SLURM_ARRAY_JOB_ID": "4700", "SLURM_ARRAY_TASK_ID": "12"}
 
 
@@ -45,7 +53,7 @@ class Queue(unittest.TestCase):
         top = tempfile.TemporaryDirectory(prefix="a job ")
         self.addCleanup(top.cleanup)
         self.folder = Path(top.name)
-        for name, text in (("polydem", POLYDEM), ("scontrol", SCONTROL)):
+        for name, text in (("polydem", POLYDEM), ("scontrol", SCONTROL), ("mpirun", MPIRUN)):
             (self.folder / name).write_text(text, encoding="utf-8")
             (self.folder / name).chmod(0o755)
 
@@ -72,7 +80,7 @@ class Queue(unittest.TestCase):
         self.fail("the run did not start")
 
     def test_the_end_of_a_run_is_the_end_of_the_job(self):
-        for script, environment in (("job.sh", JOB), ("array.sh", ARRAY)):
+        for script, environment in (("job.sh", JOB), ("ranks.sh", RANKS), ("array.sh", ARRAY)):
             for code in (0, 1, 2, 3, 137):
                 (self.folder / "code").write_text(str(code), encoding="utf-8")
                 self.assertEqual(self.submit(script, environment, "x").wait(60), code)
@@ -85,6 +93,13 @@ class Queue(unittest.TestCase):
         self.assertEqual(self.read("calls"), ["run inputs/my drum.nml --set scene.seed=2 --threads 3 --continue"])
         self.assertEqual(self.read("environment"), ["3 close"])
 
+    def test_a_job_of_several_ranks_gives_each_the_cores_of_a_task(self):
+        (self.folder / "code").write_text("0", encoding="utf-8")
+        job = self.submit("ranks.sh", RANKS, "inputs/my drum.nml")
+        self.assertEqual((job.wait(60), job.stderr.read()), (0, ""))
+        self.assertEqual(self.read("ranks")[:4], ["-n", "5", "--map-by", "slot:PE=3"])
+        self.assertEqual(self.read("calls"), ["run inputs/my drum.nml --threads 3 --continue"])
+
     def test_a_job_of_an_array_runs_its_row(self):
         (self.folder / "code").write_text("0", encoding="utf-8")
         self.assertEqual(self.submit("array.sh", ARRAY, "results/sweep").wait(60), 0)
@@ -93,11 +108,13 @@ class Queue(unittest.TestCase):
     def test_a_run_that_stopped_early_goes_back_into_the_queue(self):
         (self.folder / "code").write_text("75", encoding="utf-8")
         self.assertEqual(self.submit("job.sh", JOB, "x").wait(60), 75)
+        self.assertEqual(self.submit("ranks.sh", RANKS, "x").wait(60), 75)
         self.assertEqual(self.submit("array.sh", ARRAY, "x").wait(60), 75)
-        self.assertEqual(self.read("requeued"), ["requeue 4711", "requeue 4700_12"])
+        self.assertEqual(self.read("requeued"), ["requeue 4711", "requeue 4711", "requeue 4700_12"])
 
     def test_signals_of_the_queue_reach_the_run_as_usr1_and_its_end_is_awaited(self):
-        for script, environment, queued in (("job.sh", JOB, "4711"), ("array.sh", ARRAY, "4700_12")):
+        for script, environment, queued in (("job.sh", JOB, "4711"), ("ranks.sh", RANKS, "4711"),
+                                            ("array.sh", ARRAY, "4700_12")):
             for number in (signal.SIGUSR1, signal.SIGTERM):
                 for name in ("started", "heard", "requeued"):
                     (self.folder / name).unlink(missing_ok=True)

@@ -1,11 +1,12 @@
-"""Command line: python -m polydem_post plot, table, tables, cache, costs, workprecision or sweep."""
+"""Command line: python -m polydem_post plot, table, tables, cache, costs, workprecision, sweep or scale."""
 
 from __future__ import annotations
 
 import argparse
+import math
 import sys
 import warnings
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 from . import __version__
@@ -57,6 +58,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_costs(verbs)
     _add_workprecision(verbs)
     _add_sweep(verbs)
+    _add_scale(verbs)
     return parser
 
 
@@ -146,6 +148,41 @@ def _add_sweep(verbs) -> None:
     collect = steps.add_parser("collect", help="write results.csv and results.h5 of what there is")
     collect.set_defaults(action=_sweep_collect)
     collect.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the sweep")
+
+
+def _add_scale(verbs) -> None:
+    scale = verbs.add_parser(
+        "scale", help="reckon the time of a step on many ranks from counts",
+        description="Prints Markdown: how wide the strips of ghosts are that were counted, and the time of a step on 1 "
+                    "to 4096 ranks with all that is assumed.")
+    scale.set_defaults(action=_scale)
+    scale.add_argument("counts", type=Path, nargs="+", metavar="COUNTS.csv", help="files of count_exchange")
+    scale.add_argument("--bodies", type=_positive, default=1e6, metavar="N", help="bodies of all ranks (default: 1e6)")
+    scale.add_argument("--body", type=_positive, required=True, metavar="S", help="time of a step per body [s]")
+    for name, default, meaning in (
+        ("latency", 2e-6, "time of a message of no length [s]"),
+        ("bandwidth", 1e9, "of a rank [B/s]"),
+        ("ghost", 0.5, "what a ghost costs, in bodies"),
+        ("imbalance", 1.1, "work of the busiest rank over the mean"),
+        ("interval", 20.0, "steps between two publications of regions"),
+        ("publication", 0.5, "what one costs, in steps of the own bodies"),
+    ):
+        scale.add_argument(f"--{name}", type=_positive, default=default, metavar="X",
+                           help=f"{meaning} (default: {default:g})")
+    scale.add_argument("--sums", type=_count, default=1, metavar="K", help="sums over all ranks in a step (default: 1)")
+    scale.add_argument("--shape", default="drum", help="packing that was counted: box or drum (default: drum)")
+    scale.add_argument("--cut", default="bisection", help="bisection or morton (default: bisection)")
+    scale.add_argument("--margin", type=_positive, default=0.2, help="in long axes of a grain (default: 0.2)")
+
+
+def _positive(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above 0")
+    return value
 
 
 def _count(text: str) -> int:
@@ -269,6 +306,16 @@ def _sweep_program(options: argparse.Namespace) -> Path:
     if options.program is None:
         raise ResultError("--program is missing: call ./polydem sweep, which knows it")
     return options.program
+
+
+def _scale(options: argparse.Namespace) -> None:
+    from .exchange_model import Machine, fit_law, read_counts, scale_table, strip_table
+
+    counts = read_counts(options.counts)
+    machine = Machine(**{field.name: getattr(options, field.name) for field in fields(Machine)})
+    law = fit_law(counts, options.shape, options.cut, options.margin)
+    print(strip_table(counts).document("markdown"))
+    print(scale_table(law, machine, options.bodies).document("markdown"), end="")
 
 
 def _say(line: str) -> None:

@@ -1,0 +1,243 @@
+"""Time of a step on many ranks, reckoned from counts.
+
+What ranks tell each other is counted exactly by `count_exchange` (tests/exchange), on any machine. A rank has ghosts
+in a strip around its region. If n grains fill a square of side sqrt(n), in mean distances of grains, and the strip
+is w wide, then n + ghosts = (sqrt(n) + 2 w)^2, so
+
+    ghosts per grain = 4 w sqrt(P/N) + 4 w^2 P/N
+
+for N grains on P ranks. Every count gives a w; how well these agree tells how well the law holds. Time then follows
+from the cost of a body, latency and bandwidth, which are measured elsewhere and given.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from .emit import Table
+from .statistics import number
+from .trajectory import ResultError
+
+#: From so many ranks on one of them has neighbours on all sides
+SURROUNDED = 9
+
+#: Numbers of ranks of the table
+RANKS = tuple(2**k for k in range(13))
+
+#: Bytes of a rectangle that is told to all ranks
+RECTANGLE = 32
+
+
+@dataclass(frozen=True)
+class Count:
+    """What ranks would tell each other in a step; the columns of a file of count_exchange that are used here."""
+
+    #: Packing: box or drum
+    shape: str
+    #: Grains of all ranks
+    grains: int
+    #: Number of ranks
+    ranks: int
+    #: How space is cut: bisection or morton
+    cut: str
+    #: How far grains may move until regions are found anew, in long axes
+    margin: float
+    #: Grains of the rank that has most
+    grains_most: int
+    #: Ghosts of all ranks
+    ghosts: int
+    #: Ghosts of the rank that has most
+    ghosts_most: int
+    #: Messages of all ranks
+    messages: int
+    #: Messages of the rank that sends most
+    messages_most: int
+    #: Bytes of all messages
+    bytes: int
+    #: Bytes that the busiest rank sends or receives
+    bytes_most: int
+    #: Rectangles of all ranks
+    rectangles: int
+
+    @property
+    def strip(self) -> float:
+        """Width of the strip of ghosts around the rank that has most, in mean distances of grains."""
+        own = self.grains / self.ranks
+        return 0.5 * (math.sqrt(own + self.ghosts_most) - math.sqrt(own))
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What is measured elsewhere, and what is assumed."""
+
+    #: Time of a step per body that a rank owns [s]
+    body: float
+    #: Time until a message of no length arrives [s]
+    latency: float = 2e-6
+    #: Bytes that a rank can send and receive in a second [B/s]
+    bandwidth: float = 1e9
+    #: What a ghost costs, in bodies: its box, its pairs, its contacts, but no motion
+    ghost: float = 0.5
+    #: Greatest work of a rank over the mean
+    imbalance: float = 1.1
+    #: Sums over all ranks in a step
+    sums: int = 1
+    #: Steps between two publications of the regions
+    interval: float = 20.0
+    #: What a publication costs per body, in steps
+    publication: float = 0.5
+
+
+@dataclass(frozen=True)
+class Law:
+    """What grows with the number of ranks, for one packing, cut and margin."""
+
+    #: Width of the strip of ghosts, in mean distances of grains
+    strip: float
+    #: Least and greatest width that a single count gives
+    spread: tuple
+    #: Messages of the busiest rank in a step
+    messages: int
+    #: Bytes per ghost
+    ghost_bytes: float
+    #: Rectangles per rank
+    rectangles: float
+    #: Number of counts that this stands on
+    counts: int
+
+    def ghosts(self, grains: float) -> float:
+        """Ghosts of a rank with so many grains."""
+        return 4.0 * self.strip * math.sqrt(grains) + 4.0 * self.strip**2
+
+
+@dataclass(frozen=True)
+class Step:
+    """Times of the busiest rank in a step [s]."""
+
+    #: Own bodies
+    bodies: float
+    #: Ghosts
+    ghosts: float
+    #: Messages to neighbours
+    neighbours: float
+    #: Sums over all ranks, and the share of a step in the publication of regions
+    everyone: float
+
+    @property
+    def total(self) -> float:
+        """Time of the step [s]."""
+        return self.bodies + self.ghosts + self.neighbours + self.everyone
+
+
+def read_counts(paths) -> list[Count]:
+    """Counts of all files, which count_exchange wrote for different numbers of ranks."""
+    counts = []
+    for path in map(Path, paths):
+        try:
+            with path.open(newline="", encoding="utf-8") as file:
+                counts += [_count(row) for row in csv.DictReader(file)]
+        except OSError as error:
+            raise ResultError(f"{path}: {error.strerror}") from error
+        except (KeyError, TypeError, ValueError, UnicodeDecodeError) as error:
+            raise ResultError(f"{path} is not a file of count_exchange") from error
+    if not counts:
+        raise ResultError("there are no counts: give files of count_exchange")
+    return counts
+
+
+def _count(row: dict) -> Count:
+    kinds = {"str": str, "int": int, "float": float}
+    count = Count(**{field.name: kinds[field.type](row[field.name]) for field in fields(Count)})
+    if count.grains < 1 or count.ranks < 1:
+        raise ValueError("no grains or ranks")
+    return count
+
+
+def fit_law(counts: list[Count], shape: str, cut: str, margin: float) -> Law:
+    """The law of one packing, cut and margin, from counts of at least SURROUNDED ranks."""
+    mine = [count for count in counts if (count.shape, count.cut, count.margin) == (shape, cut, margin)]
+    if not mine:
+        known = sorted({f"{count.shape} {count.cut} {count.margin:g}" for count in counts})
+        raise ResultError(f"nothing was counted for {shape} {cut} {margin:g}; there are {', '.join(known)}")
+    mine = [count for count in mine if count.ranks >= SURROUNDED and count.ghosts > 0]
+    if not mine:
+        raise ResultError(f"{shape} {cut} {margin:g}: counts of at least {SURROUNDED} ranks are needed")
+    strips = [count.strip for count in mine]
+    return Law(
+        strip=math.exp(sum(map(math.log, strips)) / len(strips)),
+        spread=(min(strips), max(strips)),
+        messages=max(count.messages_most for count in mine),
+        ghost_bytes=sum(count.bytes for count in mine) / sum(count.ghosts for count in mine),
+        rectangles=sum(count.rectangles for count in mine) / sum(count.ranks for count in mine),
+        counts=len(mine),
+    )
+
+
+def predict(law: Law, machine: Machine, bodies: float, ranks: int) -> Step:
+    """Times of a step of so many bodies on so many ranks; one rank alone talks to nobody."""
+    own = bodies / ranks
+    if ranks == 1:
+        return Step(own * machine.body, 0.0, 0.0, 0.0)
+    ghosts = law.ghosts(own)
+    stages = math.ceil(math.log2(ranks))
+    told = ranks * law.rectangles * RECTANGLE / machine.bandwidth
+    publication = stages * machine.latency + told + machine.publication * machine.body * own
+    return Step(
+        bodies=machine.imbalance * own * machine.body,
+        ghosts=ghosts * machine.ghost * machine.body,
+        neighbours=min(law.messages, ranks - 1) * machine.latency + ghosts * law.ghost_bytes / machine.bandwidth,
+        everyone=machine.sums * stages * machine.latency + publication / machine.interval,
+    )
+
+
+def strip_table(counts: list[Count]) -> Table:
+    """How wide the strip of ghosts is, for everything that was counted."""
+    heading = ("packing", "cut", "margin", "counts", "strip", "least", "most", "messages", "rectangles per rank")
+    table = Table("strips", "Width of the strip of ghosts, in mean distances of grains", heading, texts=2)
+    for shape, cut, margin in sorted({(count.shape, count.cut, count.margin) for count in counts}):
+        law = fit_law(counts, shape, cut, margin)
+        widths = [f"{width:.2f}" for width in (law.strip, *law.spread)]
+        table.add(shape, cut, f"{margin:g}", law.counts, *widths, law.messages, f"{law.rectangles:.1f}")
+    table.note = (
+        "Ghosts per body are 4 w sqrt(P/N) + 4 w^2 P/N for N bodies on P ranks and a strip of width w; the rank with "
+        "most ghosts counts. Messages: those of the busiest rank in a step."
+    )
+    return table
+
+
+def scale_table(law: Law, machine: Machine, bodies: float, ranks=RANKS) -> Table:
+    """Time of a step against the number of ranks, with all that is assumed."""
+    heading = ("ranks", "bodies per rank", "ghosts per body", "bodies [us]", "ghosts [us]", "neighbours [us]",
+               "everyone [us]", "step [us]", "speed-up", "efficiency [%]")
+    table = Table("scale", f"Time of a step of {bodies:g} bodies, reckoned", heading, texts=0)
+    alone = predict(law, machine, bodies, 1).total
+    for size in ranks:
+        step = predict(law, machine, bodies, size)
+        own = bodies / size
+        gain = alone / step.total
+        times = (step.bodies, step.ghosts, step.neighbours, step.everyone, step.total)
+        table.add(size, number(own, 4), number(law.ghosts(own) / own if size > 1 else 0.0),
+                  *(number(1e6 * time) for time in times), number(gain), f"{100.0 * gain / size:.0f}")
+    table.note = _assumptions(law, machine)
+    return table
+
+
+def _assumptions(law: Law, machine: Machine) -> str:
+    """What the table stands on, in words."""
+    return "\n".join((
+        "Reckoned, not measured. Counted: "
+        f"a strip of ghosts {law.strip:.2f} mean distances wide ({law.spread[0]:.2f} to {law.spread[1]:.2f} in "
+        f"{law.counts} counts), {law.messages} messages in a step, {law.ghost_bytes:g} bytes per ghost, "
+        f"{law.rectangles:.1f} rectangles per rank.",
+        f"Given: {1e6 * machine.body:g} us per body and step, latency {1e6 * machine.latency:g} us, bandwidth "
+        f"{1e-9 * machine.bandwidth:g} GB/s per rank. Assumed: a ghost costs {machine.ghost:g} of a body; the busiest "
+        f"rank works {machine.imbalance:g} times the mean; {machine.sums} sum(s) over all ranks in a step, and a "
+        f"publication of regions every {machine.interval:g} steps that costs {machine.publication:g} steps of the own "
+        "bodies; both take a latency for each doubling of the ranks.",
+        "Messages follow one another and hide behind no work; every rank has neighbours on all sides, which is too "
+        f"much below {SURROUNDED} ranks. Left out: contention in the network, that ranks of one machine share memory "
+        "and caches, output, and that space is divided anew.",
+    ))

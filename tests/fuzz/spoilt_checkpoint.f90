@@ -1,0 +1,142 @@
+!> Checkpoints for fuzzing: one of a small run as fields that can be spoilt, and a run that goes on from what came of it.
+module spoilt_checkpoint
+   use hostile_fields, only: field_t, new_field
+   use polydem_archive, only: archive_t
+   use polydem_checkpoint_contents, only: history_t, keep_run
+   use polydem_checkpoint_file, only: checkpoint_file_t
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: dp, lp
+   use polydem_read_settings, only: read_settings_text
+   use polydem_sealed_file, only: seal_file, seal_length
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: advance, new_simulation, simulation_t
+   use polydem_text_file, only: read_text_file
+   use polydem_watch, only: new_watch, watch_t
+   implicit none
+   private
+   public :: sound_checkpoint, put_behind_seal, go_on_from
+
+   !> Four blocks on each other, with friction, the energy guard and an integrator that has columns of its own
+   character(len=*), parameter :: scene = "&scene name = 'stack' bodies = 4 width = 1e-2 height = 1e-2 / "// &
+      "&integrate scheme = 'gear' duration = 1 / &guards energy = 'stop' /"
+   !> Steps before the checkpoint, and after it
+   integer, parameter :: steps_before = 20, steps_after = 3
+   !> Hash of the bodies at the start, as far as fields that hold real numbers know
+   integer(lp), parameter :: any_hash = 4711_lp
+   character(len=*), parameter :: none(*) = [character(len=1) ::]
+
+   !> An archive whose columns become fields
+   type, extends(archive_t) :: field_archive_t
+      !> The columns so far
+      type(field_t), allocatable :: fields(:)
+   contains
+      procedure :: exchange_reals
+      procedure :: exchange_longs
+   end type field_archive_t
+
+contains
+
+   !> The columns of a sound checkpoint
+   function sound_checkpoint() result(fields)
+      type(field_t), allocatable :: fields(:)
+      type(field_archive_t) :: archive
+      type(simulation_t) :: simulation
+      type(history_t) :: history
+      type(watch_t) :: watch
+      type(error_t), allocatable :: error
+
+      call begin(simulation, watch, error)
+      call do_steps(simulation, steps_before, error)
+      if (allocated(error)) error stop 'fuzz: the run of the checkpoint fails'
+      allocate (archive%fields(0))
+      history%scene = any_hash
+      call keep_run(archive, simulation, history, watch)
+      call move_alloc(archive%fields, fields)
+   end function sound_checkpoint
+
+   !> Turn an HDF5 file into a sealed one: HDF5 finds its data behind the seal.
+   subroutine put_behind_seal(path)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: bytes
+      type(error_t), allocatable :: error
+      integer :: unit
+
+      call read_text_file(path, bytes, error)
+      if (allocated(error)) error stop 'fuzz: a file that was just written cannot be read'
+      open (newunit=unit, file=path, access='stream', form='unformatted', action='write', status='replace')
+      write (unit) repeat(' ', seal_length), bytes
+      close (unit)
+      call seal_file(path, error)
+   end subroutine put_behind_seal
+
+   !> Let the small run go on from a checkpoint.
+   subroutine go_on_from(path, error)
+      !> Path of the checkpoint
+      character(len=*), intent(in) :: path
+      !> Why it was refused, or why the run stopped
+      type(error_t), allocatable, intent(inout) :: error
+      type(checkpoint_file_t) :: file
+      type(simulation_t) :: simulation
+      type(history_t) :: history
+      type(watch_t) :: watch
+
+      call begin(simulation, watch, error)
+      history%scene = any_hash
+      call file%open(path, error)
+      if (allocated(error)) return
+      call keep_run(file, simulation, history, watch)
+      call file%close(error)
+      if (allocated(error)) error%message = path//' does not fit this run: '//error%message
+      call do_steps(simulation, steps_after, error)
+   end subroutine go_on_from
+
+   subroutine begin(simulation, watch, error)
+      type(simulation_t), intent(out) :: simulation
+      type(watch_t), intent(out) :: watch
+      type(error_t), allocatable, intent(inout) :: error
+      type(settings_t) :: settings
+
+      call read_settings_text('small.nml', scene, none, settings, error)
+      if (.not. allocated(error)) call new_simulation(settings, simulation, error)
+      if (.not. allocated(error)) call new_watch(watch, simulation)
+   end subroutine begin
+
+   subroutine do_steps(simulation, n, error)
+      type(simulation_t), intent(inout) :: simulation
+      integer, intent(in) :: n
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      do k = 1, n
+         if (.not. allocated(error)) call advance(simulation, error)
+      end do
+   end subroutine do_steps
+
+   !> Take a column of real numbers as a field.
+   subroutine exchange_reals(self, name, width, values, unit, meaning)
+      class(field_archive_t), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: width
+      real(dp), intent(inout), contiguous :: values(:)
+      character(len=*), intent(in) :: unit, meaning
+
+      associate (unused => unit//meaning)
+      end associate
+      if (width == 1) self%fields = [self%fields, new_field(name, [size(values)], values, .false.)]
+      if (width > 1) self%fields = [self%fields, new_field(name, [width, size(values)/width], values, .false.)]
+   end subroutine exchange_reals
+
+   !> Take a column of whole numbers as a field.
+   subroutine exchange_longs(self, name, values, unit, meaning)
+      class(field_archive_t), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      integer(lp), intent(inout), contiguous :: values(:)
+      character(len=*), intent(in) :: unit, meaning
+
+      associate (unused => unit//meaning)
+      end associate
+      self%fields = [self%fields, new_field(name, [size(values)], real(values, dp), .true.)]
+   end subroutine exchange_longs
+
+end module spoilt_checkpoint

@@ -1,0 +1,40 @@
+"""Run the tests of several processes: run_ranks.py ROOT PROGRAM [OPTION ...].
+
+ROOT is the repository, PROGRAM the one without MPI, POLYDEM_MPI_PROGRAM in the environment the one with it; without that
+the tests are skipped (code 77). Options are those of pytest, and --full for all combinations, which writes equality.md.
+"""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+#: Exit code of a test that was skipped
+SKIPPED = 77
+NEEDED = "import h5py, numpy, pytest"
+
+
+def main() -> int:
+    root, program = (Path(word).resolve() for word in sys.argv[1:3])
+    if not os.environ.get("POLYDEM_MPI_PROGRAM"):
+        print("skipped: POLYDEM_MPI_PROGRAM does not name a program with MPI")
+        return SKIPPED
+    python = root / ".venv" / "bin" / "python"
+    if not python.exists():
+        python = Path(sys.executable)
+    if subprocess.run([str(python), "-c", NEEDED], stderr=subprocess.DEVNULL).returncode != 0:
+        print(f"{python} lacks one of h5py, numpy and pytest; ./polydem test makes an environment that has them")
+        return 1
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("OMPI_COMM_WORLD")}
+    environment["POLYDEM_MPI_PROGRAM"] = str(Path(environment["POLYDEM_MPI_PROGRAM"]).resolve())
+    environment["POLYDEM_PROGRAM"] = str(program)
+    environment["POLYDEM_SOURCE_DIR"] = str(root)
+    environment["PYTHONPATH"] = str(root / "postproc" / "src")
+    environment["PYTHONDONTWRITEBYTECODE"] = "1"
+    tests = Path(__file__).resolve().parent
+    command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", "--rootdir", str(tests), str(tests)]
+    return subprocess.run([*command, *sys.argv[3:]], env=environment).returncode
+
+
+if __name__ == "__main__":
+    sys.exit(main())

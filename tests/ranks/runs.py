@@ -1,0 +1,70 @@
+"""Runs of the two programs, and what they leave."""
+
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import h5py
+
+#: Programs without and with MPI
+SERIAL = os.environ["POLYDEM_PROGRAM"]
+PARALLEL = os.environ["POLYDEM_MPI_PROGRAM"]
+
+#: How ranks are started where there may be fewer cores: they take turns, and nobody is bound
+ENVIRONMENT = {
+    **os.environ,
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "OMPI_MCA_mpi_yield_when_idle": "1",
+    "OMPI_MCA_hwloc_base_binding_policy": "none",
+    "OMP_WAIT_POLICY": "passive",
+}
+if os.getuid() == 0:
+    ENVIRONMENT.update(OMPI_ALLOW_RUN_AS_ROOT="1", OMPI_ALLOW_RUN_AS_ROOT_CONFIRM="1")
+
+
+def start(namelist, folder, ranks=None, threads=1, options=()):
+    """Start a run: of the program without MPI if no number of ranks is given."""
+    command = [SERIAL] if ranks is None else ["mpirun", "-n", str(ranks), PARALLEL]
+    command += ["run", str(namelist), "--threads", str(threads), "--set", f"output.folder={folder}", *options]
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                            text=True, env=ENVIRONMENT)
+
+
+def run(namelist, folder, ranks=None, threads=1, options=(), code=0):
+    """Run to the end, which must have the given exit code; give standard output and standard error."""
+    process = start(namelist, folder, ranks, threads, options)
+    output, message = process.communicate(timeout=300)
+    assert process.returncode == code, f"ended with {process.returncode}, not {code}:\n{message}\n{output[-2000:]}"
+    return output, message
+
+
+def contents(folder):
+    """All that the segments of a result hold, but not where it comes from: type, shape and bytes by name."""
+    found = {}
+
+    def take(name, entry):
+        if isinstance(entry, h5py.Dataset) and not name.startswith("provenance/"):
+            value = entry[()]
+            found[f"{path.name}:{name}"] = (entry.dtype.str, entry.shape, getattr(value, "tobytes", lambda: value)())
+
+    for path in sorted(Path(folder).glob("trajectory_*.h5")):
+        with h5py.File(path, "r") as file:
+            file.visititems(take)
+    assert found, f"{folder} holds no trajectory"
+    return found
+
+
+def state_hash(output):
+    """The hash that a run prints at its end."""
+    return re.search(r"^state hash: (\S+)", output, re.MULTILINE).group(1)
+
+
+def count(output, name):
+    """A count that a run prints at its end."""
+    return int(re.search(rf"^{name} +(\d+)$", output, re.MULTILINE).group(1))
+
+
+def differences(one, other):
+    """Names of what differs between two results, as `contents` gives them."""
+    return [name for name in sorted(one.keys() | other.keys()) if one.get(name) != other.get(name)]

@@ -1,0 +1,62 @@
+"""Small scenes that leave nothing out: every law, integrator and kind of wall, contacts from the start to the end."""
+
+#: Namelists by name, without the groups that `write_scene` adds
+SCENES = {
+    # Grains fall in a drum that already turns; friction with memory.
+    "drum": """\
+&scene
+   name = 'drum' bodies = 300 speed = 1.0
+   motion = 'rotation' motion_rate = 2.0
+/
+&forces gravity = 0, -80 stiffness = 2e5 /
+&integrate duration = 0.045 /
+""",
+    # Grains that fly about between walls that shake; most change their region several times.
+    "gas": """\
+&scene
+   name = 'gas' bodies = 120 fraction = 0.35 speed = 1.0 spin = 50
+   motion = 'oscillation' motion_amplitude = 1e-3, 2e-3 motion_frequency = 100
+/
+&forces
+   gravity = 0, 0 stiffness = 2e5
+   law = 'conservative' damping = 'hunt_crossley' damping_coefficient = 300
+/
+&integrate fraction = 0.1 duration = 0.02 /
+""",
+    # Long oblique walls, and an integrator that remembers and moves bodies twice a step.
+    "hopper": """\
+&scene name = 'hopper' bodies = 150 opening = 0.04 slope = 60 speed = 1.0 /
+&forces gravity = 0, -80 stiffness = 1e5 midstep_slip = .true. /
+&integrate scheme = 'gear' duration = 0.03 /
+""",
+    # Grains of sizes 1 to 10, of which the large ones reach over several regions; sums with their remainders.
+    "bed": """\
+&scene name = 'bed' bodies = 200 size_ratio = 10 speed = 2.0 /
+&forces gravity = 0, -80 stiffness = 2e5 damping_from_touch = .true. /
+&integrate accumulation = 'compensated' duration = 0.04 /
+""",
+    # At rest: nothing goes over a border unless the border moves.
+    "stack": """\
+&scene name = 'stack' bodies = 9 width = 0.01 height = 0.01 /
+&forces stiffness = 1e5 midstep_slip = .true. tilt_damping = 0.5 /
+&integrate duration = 0.03 /
+""",
+}
+
+#: Frames with everything in them, some to a segment; regions that change as often as possible
+OTHER_GROUPS = """\
+&output frame_interval = {interval} frames_per_segment = 7 contacts = .true. /
+&exchange margin = 1e-4 imbalance = 1 /
+&neighbours finder = '{finder}' /
+"""
+
+#: Frames in the duration of a scene, without the first
+N_FRAMES = 20
+
+
+def write_scene(path, scene, finder="quadtree", longer=1):
+    """Write the namelist of a scene, of so many times its duration, with as many frames in each."""
+    head, tail = SCENES[scene].rsplit("duration = ", 1)
+    duration, rest = tail.split(" ", 1)
+    groups = OTHER_GROUPS.format(interval=float(duration) / N_FRAMES, finder=finder)
+    path.write_text(f"{head}duration = {longer * float(duration)} {rest}{groups}", encoding="utf-8")

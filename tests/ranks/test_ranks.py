@@ -1,0 +1,80 @@
+"""Runs of several processes give what one process gives, in every bit."""
+
+import re
+import signal
+import time
+from itertools import product
+from pathlib import Path
+
+import pytest
+from conftest import Outcome
+from runs import contents, count, differences, run, start, state_hash
+from scenes import SCENES, write_scene
+
+RANKS = (1, 2, 3, 4, 7)
+THREADS = (1, 2)
+#: All finders, from the table in the manual of inputs
+FINDERS = re.search(r"^\| &neighbours \| `finder` .*?\| (\w+(?:, \w+)+) \|",
+                    (Path(__file__).parents[2] / "inputs" / "README.md").read_text(encoding="utf-8"),
+                    re.MULTILINE).group(1).split(", ")
+#: What is tried unless all is: every scene on several numbers of ranks, every finder and number of threads somewhere
+QUICK = [(scene, ranks, 1 + (ranks + k) % 2, FINDERS[(3 * k + n) % len(FINDERS)])
+         for k, scene in enumerate(SCENES)
+         for n, ranks in enumerate(((2, 4, 7), (1, 3, 7), (2, 3, 4), (1, 4, 7), (2, 3, 7))[k])]
+
+
+def pytest_generate_tests(metafunc):
+    if "combination" in metafunc.fixturenames:
+        full = metafunc.config.getoption("full")
+        combinations = list(product(SCENES, RANKS, THREADS, FINDERS)) if full else QUICK
+        metafunc.parametrize("combination", combinations, ids=lambda words: "-".join(str(word) for word in words))
+
+
+def test_the_result_has_the_same_bits(combination, expected, outcomes, tmp_path):
+    scene, ranks, threads, finder = combination
+    outcome = outcomes.setdefault((scene, ranks), Outcome())
+    outcome.tried += 1
+    write_scene(tmp_path / "scene.nml", scene, finder)
+    output, message = run(tmp_path / "scene.nml", tmp_path / "result", ranks, threads)
+    assert message == ""
+    assert differences(expected(scene).contents, contents(tmp_path / "result")) == []
+    assert state_hash(output) == expected(scene).hash
+    for name in ("steps", "contacts"):
+        assert count(output, name) == getattr(expected(scene), name), name
+    outcome.equal += 1
+    outcome.migrations.append(count(output, "migrations") if ranks > 1 else 0)
+
+
+def interrupt(folder, namelist, ranks, options):
+    """Begin or continue a run, and end it by a signal soon after its next checkpoint."""
+    before = newest(folder)
+    process = start(namelist, folder, ranks, 1, ("--continue", *options))
+    end = time.monotonic() + 120
+    while newest(folder) == before and process.poll() is None:
+        assert time.monotonic() < end, "waited in vain for a checkpoint"
+        time.sleep(0.002)
+    process.send_signal(signal.SIGUSR1)
+    output, message = process.communicate(timeout=120)
+    assert process.returncode == 75, (process.returncode, message)
+    return int(re.search(r"stopped early by the signal USR1 after step (\d+) of", message).group(1)), output
+
+
+def newest(folder):
+    """When the newest checkpoint was written; 0 if there is none."""
+    return max((path.stat().st_mtime_ns for path in folder.glob("checkpoint_?.h5")), default=0)
+
+
+@pytest.mark.parametrize("scene, ranks", [("drum", (3, 2, None)), ("gas", (None, 4, 3)), ("bed", (2, 7, 1))],
+                         ids=("drum-3-2-serial", "gas-serial-4-3", "bed-2-7-1"))
+def test_a_run_goes_on_with_another_number_of_ranks(scene, ranks, restarts, tmp_path):
+    write_scene(tmp_path / "scene.nml", scene, longer=8)
+    options = ("--set", "checkpoint.steps=150")
+    whole, _ = run(tmp_path / "scene.nml", tmp_path / "whole", None, 1, options)
+    folder = tmp_path / "result"
+    steps = [interrupt(folder, tmp_path / "scene.nml", number, options)[0] for number in ranks[:2]]
+    assert 0 < steps[0] < steps[1] < count(whole, "steps"), steps
+    output, _ = run(tmp_path / "scene.nml", folder, ranks[2], 1, ("--continue", *options))
+    assert f"step {steps[1]}\n" in output
+    assert state_hash(output) == state_hash(whole)
+    assert differences(contents(tmp_path / "whole"), contents(folder)) == []
+    restarts.append((scene, ranks, steps))
