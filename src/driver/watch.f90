@@ -20,6 +20,8 @@ module polydem_watch
    type :: watch_t
       !> Thickness of each body, (slot) [m]; only for the depth of contacts
       real(wp), allocatable :: thickness(:)
+      !> Generation of these bodies
+      integer(ip), private :: generation = 0_ip
       !> Warnings of deep contacts
       type(warning_t) :: overlap
       !> Energy that nobody gave
@@ -64,7 +66,7 @@ contains
       call archive%keep('/run/greatest_share', watch%greatest_share, '1', 'greatest share of the stable step')
    end subroutine keep_watch
 
-   !> Look at a step, and write warnings that are new.
+   !> Look at a step, and write warnings that are new. Collective; all processes know of a failure.
    subroutine look(watch, simulation, is_last, log, error)
       !> The guards
       type(watch_t), intent(inout) :: watch
@@ -77,16 +79,19 @@ contains
       !> Allocated if the run must stop; names body, position and step
       type(error_t), allocatable, intent(inout) :: error
 
+      logical :: looks
+
+      looks = is_last .or. mod(simulation%step, interval) == 0_lp
       associate (settings => simulation%settings%guards)
          if (settings%overlap /= 'off') call look_at_depths(watch, simulation, error)
-         if (is_last .or. mod(simulation%step, interval) == 0_lp) then
-            if (settings%step /= 'off') call look_at_step(watch, simulation, log, error)
-            if (settings%energy /= 'off') then
-               call check_energy(watch%energy, settings%energy, settings%energy_limit, simulation%ledger, &
-                                 simulation%settings%forces%gravity, simulation%bodies, simulation%step, error)
-            end if
+         if (looks .and. settings%step /= 'off') call look_at_step(watch, simulation, log, error)
+         if (looks .and. settings%energy /= 'off') then
+            call check_energy(watch%energy, settings%energy, settings%energy_limit, simulation%ledger, &
+                              simulation%settings%forces%gravity, simulation%bodies, simulation%step, error)
          end if
       end associate
+      if (looks) call simulation%team%agree(error)
+      if (looks) call simulation%team%spread_text(simulation%guard%warning%text)
       call simulation%guard%warning%tell(log)
       call watch%overlap%tell(log)
       call watch%energy%warning%tell(log)
@@ -119,17 +124,24 @@ contains
 
    end subroutine sum_up
 
+   !> Look for deep contacts. Of several processes, the first one that has any speaks.
    subroutine look_at_depths(watch, simulation, error)
       type(watch_t), intent(inout) :: watch
-      type(simulation_t), intent(in) :: simulation
+      type(simulation_t), intent(inout) :: simulation
       type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: text
       integer(ip) :: worst
 
       associate (s => simulation, settings => simulation%settings%guards)
-         if (.not. any_deeper(s%contacts, watch%thickness, settings%overlap_limit)) return
-         worst = deepest_contact(s%contacts, watch%thickness)
-         call watch%overlap%respond(settings%overlap, 'step '//to_text(s%step)//': '// &
-                                    depth_text(s%bodies, s%contacts, watch%thickness, worst)// &
+         if (watch%generation /= s%generation) watch%thickness = thickness_of_bodies(s%bodies)
+         watch%generation = s%generation
+         if (any_deeper(s%contacts, watch%thickness, settings%overlap_limit)) then
+            worst = deepest_contact(s%contacts, watch%thickness)
+            text = depth_text(s%bodies, s%contacts, watch%thickness, worst)
+         end if
+         call s%team%spread_text(text)
+         if (.not. allocated(text)) return
+         call watch%overlap%respond(settings%overlap, 'step '//to_text(s%step)//': '//text// &
                                     '. Take a smaller dt or a greater stiffness, or look for deep overlaps at the '// &
                                     'start (relaxed_depth in &guards)', error)
       end associate
@@ -145,6 +157,7 @@ contains
       real(wp) :: stable, share
 
       call check_stability(simulation, stable, warning, error)
+      call simulation%team%spread_text(warning)
       share = 0.0_wp
       if (stable < huge(stable)) share = simulation%dt/stable
       watch%greatest_share = max(watch%greatest_share, share)

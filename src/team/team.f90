@@ -58,6 +58,7 @@ module polydem_team
       procedure(leave), deferred :: leave
       procedure :: leads
       procedure :: agree
+      procedure :: spread_text
    end type team_t
 
    abstract interface
@@ -149,7 +150,6 @@ contains
       integer(lp), intent(inout), optional :: flags(:)
       integer(lp), allocatable :: values(:)
       character(len=:), allocatable :: text
-      integer(lp) :: rank
 
       if (self%size == 1_ip) return
       allocate (values(1))
@@ -160,30 +160,39 @@ contains
       call self%maximise(values)
       if (present(flags)) flags = values(2:)
       if (values(1) == 0_lp) return
-      rank = int(self%size, lp) - values(1)
-      text = ''
       values = [0_lp]
-      if (int(self%rank, lp) == rank) then
+      if (allocated(error)) then
          values(1) = int(error%code, lp)
          text = error%message
       end if
+      call self%spread_text(text)
+      if (allocated(error)) then
+         if (error%message /= text) values(1) = 0_lp
+      else
+         allocate (error)
+      end if
       call self%maximise(values)
-      call spread_text(self, text)
-      if (.not. allocated(error)) allocate (error)
       error%code = int(values(1))
       error%message = text
    end subroutine agree
 
-   !> Give all processes the only text that is not empty.
+   !> Give all processes the text of the lowest rank that has one, if any has; collective.
    subroutine spread_text(self, text)
       class(team_t), intent(inout) :: self
+      !> The text; unallocated: none
       character(len=:), allocatable, intent(inout) :: text
-      integer(lp) :: length(1)
+      integer(lp) :: first(2)
       integer(lp), allocatable :: codes(:)
 
-      length = len(text, lp)
-      call self%maximise(length)
-      allocate (codes(length(1)))
+      if (self%size == 1_ip) return
+      first = 0_lp
+      if (allocated(text)) first(1) = int(self%size - self%rank, lp)
+      call self%maximise(first(:1))
+      if (first(1) == 0_lp) return
+      if (int(self%size - self%rank, lp) == first(1)) first(2) = len(text, lp)
+      if (int(self%size - self%rank, lp) /= first(1)) text = ''
+      call self%maximise(first(2:))
+      allocate (codes(first(2)))
       codes = 0_lp
       if (len(text) > 0) codes = codes_of(text)
       call self%maximise(codes)

@@ -1,8 +1,8 @@
 !> How files are written by several processes: by HDF5 upon MPI-IO.
 !>
-!> `access_alone.f90` is the same module for builds without MPI. Both procedures without a result only note a wish in
-!> properties; what follows from it is collective. The file gets a duplicate of MPI_COMM_WORLD from HDF5, so that its
-!> messages do not mix with others.
+!> `alone/hdf5_access.f90` is the same module for builds without MPI. The first two procedures only note a wish in
+!> properties; what follows from it is collective. HDF5 duplicates MPI_COMM_WORLD, so that its messages do not mix with
+!> others.
 module polydem_hdf5_access
    use hdf5, only: h5fd_mpio_collective_f, h5pset_dxpl_mpio_f, h5pset_fapl_mpio_f, hid_t
    use mpi_f08, only: mpi_allreduce, mpi_comm_rank, mpi_comm_world, mpi_in_place, mpi_info_null, mpi_logical, mpi_lor

@@ -1,6 +1,6 @@
 !> How files are written by several processes: in a build without MPI there is only one.
 !>
-!> `access_together.f90` is the same module for builds with MPI.
+!> `together/hdf5_access.f90` is the same module for builds with MPI.
 module polydem_hdf5_access
    use hdf5, only: hid_t
    implicit none
@@ -13,7 +13,7 @@ contains
    subroutine access_together(properties, status)
       !> HDF5's properties of access to the file
       integer(hid_t), intent(in) :: properties
-      !> 0
+      !> Always 0
       integer, intent(out) :: status
 
       associate (same => properties)
@@ -25,7 +25,7 @@ contains
    subroutine transfer_together(properties, status)
       !> HDF5's properties of the transfer
       integer(hid_t), intent(in) :: properties
-      !> 0
+      !> Always 0
       integer, intent(out) :: status
 
       associate (same => properties)
