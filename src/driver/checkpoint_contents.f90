@@ -12,7 +12,7 @@ module polydem_checkpoint_contents
    use polydem_hash, only: mix_word
    use polydem_kept_bodies, only: keep_bodies
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_ledger, only: keep_ledger
+   use polydem_ledger, only: keep_books, keep_ledger
    use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
@@ -51,6 +51,7 @@ contains
       associate (s => simulation)
          call keep_bodies(archive, s%bodies)
          call s%integrator%keep(archive)
+         if (s%settings%output%ledger) call keep_books(s%ledger, s%bodies%n, archive)
          call archive%keep('/boxes/bounds', s%boxes%bounds(:, :s%boxes%n), 'm', &
                            'xmin, ymin, xmax, ymax when pairs were last searched')
          call keep_pairs(archive, s)

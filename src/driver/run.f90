@@ -1,7 +1,7 @@
 !> A run from its settings to its result.
 module polydem_run
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use polydem_books, only: fill_row, write_books
+   use polydem_books, only: count_contacts, fill_row, write_books
    use polydem_checkpoint, only: checkpoints_t
    use polydem_checkpoint_contents, only: history_t, keep_whole, scene_hash
    use polydem_clock, only: wall_seconds
@@ -337,6 +337,7 @@ contains
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
       logical :: frame_due, line_due
+      integer(ip) :: n_contacts
 
       associate (s => run%simulation)
          frame_due = s%step == s%n_steps .or. is_due(s%step, run%frame_steps)
@@ -345,8 +346,9 @@ contains
          if (allocated(error)) return
          if ((frame_due .or. line_due) .and. s%settings%output%ledger) call fill_row(s, run%balance, run%row)
          if (line_due) then
+            call count_contacts(s, n_contacts)
             call run%log%write_interval(s%step, s%n_steps, time_of(s), s%dt, run%balance%kinetic, &
-                                        run%balance%potential, s%contacts%n)
+                                        run%balance%potential, n_contacts)
          end if
          if (frame_due) call write_frame(run, error)
          call run%log%show_progress(s%step, s%n_steps)

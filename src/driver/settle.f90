@@ -12,7 +12,7 @@ module polydem_settle
    use polydem_ghosts, only: new_ghosts
    use polydem_kept_bodies, only: keep_bodies
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_ledger, only: keep_ledger
+   use polydem_ledger, only: keep_books
    use polydem_mover, only: mover_t
    use polydem_pair_freight, only: receive_pairs, send_pairs
    use polydem_simulation_parts, only: fit_to_bodies, simulation_t
@@ -248,7 +248,7 @@ contains
 
       call keep_bodies(archive, self%bodies)
       call self%integrator%carry(archive)
-      if (self%settings%output%ledger) call keep_ledger(self%ledger, archive)
+      if (self%settings%output%ledger) call keep_books(self%ledger, self%bodies%n, archive)
    end subroutine keep_columns
 
    !> Boxes of the free bodies, grown by as far as they may go, (4, body) [m]

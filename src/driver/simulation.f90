@@ -9,7 +9,7 @@ module polydem_simulation
    use polydem_guards, only: check_contacts, check_motion, check_places, check_step
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_ledger, only: book_step, open_ledger
+   use polydem_ledger, only: balance_of, balance_t, book_step, open_ledger
    use polydem_lone_team, only: lone_team_t
    use polydem_make_boxes, only: update_boxes
    use polydem_motion, only: motion_t, move_bodies
@@ -24,7 +24,7 @@ module polydem_simulation
       timers_t
    implicit none
    private
-   public :: simulation_t, new_simulation, start_simulation, advance, time_of, collect_counts, &
+   public :: simulation_t, new_simulation, start_simulation, advance, time_of, take_stock, collect_counts, &
       report_counters, check_stability
 
    !> More steps than any run can do
@@ -78,7 +78,8 @@ contains
       call find_and_push(self, 0.0_wp, error)
       if (allocated(error)) return
       call start_integration(self)
-      if (settings%output%ledger) call open_ledger(self%ledger, settings%forces%gravity, self%bodies, self%contacts)
+      if (settings%output%ledger) call open_ledger(self%ledger, self%team, settings%forces%gravity, self%bodies, &
+                                                   self%incidence, self%contacts)
       self%timers = timers_t()
    end subroutine start_simulation
 
@@ -91,6 +92,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       self%step = self%step + 1_lp
+      self%ledger%is_current = .false.
       call self%timers%start()
       call self%integrator%predict(self%dt, self%bodies)
       call move_walls(self, time_of(self))
@@ -103,7 +105,7 @@ contains
       call self%integrator%correct(self%dt, self%bodies)
       call self%timers%lap(stage_integrate)
       if (self%settings%output%ledger) then
-         call book_step(self%ledger, self%dt, self%settings%forces%gravity, self%bodies, self%contacts)
+         call book_step(self%ledger, self%settings%forces%gravity, self%bodies, self%incidence, self%contacts)
          call self%timers%lap(stage_forces)
       end if
       call check_motion(self%guard, self%bodies, self%step, self%dt, error)
@@ -138,6 +140,17 @@ contains
 
       time_of = real(self%step, wp)*self%dt
    end function time_of
+
+   !> Compare the bodies with the books; collective.
+   subroutine take_stock(self, balance)
+      !> The simulation, which has a ledger, at the end of a step
+      type(simulation_t), intent(inout) :: self
+      !> Energy, momentum, and what is unexplained
+      type(balance_t), intent(out) :: balance
+
+      call balance_of(self%ledger, self%team, self%dt, self%settings%forces%gravity, self%bodies, self%incidence, &
+                      self%contacts, balance)
+   end subroutine take_stock
 
    !> Compare the step with the stable step of the present contacts. Of several processes, that which has the critical
    !> contact warns or fails.

@@ -85,10 +85,7 @@ contains
       associate (settings => simulation%settings%guards)
          if (settings%overlap /= 'off') call look_at_depths(watch, simulation, error)
          if (looks .and. settings%step /= 'off') call look_at_step(watch, simulation, log, error)
-         if (looks .and. settings%energy /= 'off') then
-            call check_energy(watch%energy, settings%energy, settings%energy_limit, simulation%ledger, &
-                              simulation%settings%forces%gravity, simulation%bodies, simulation%step, error)
-         end if
+         if (looks .and. settings%energy /= 'off') call check_energy(watch%energy, simulation, error)
       end associate
       if (looks) call simulation%team%agree(error)
       if (looks) call simulation%team%spread_text(simulation%guard%warning%text)

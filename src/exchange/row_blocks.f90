@@ -9,7 +9,7 @@ module polydem_row_blocks
    use polydem_team, only: team_t
    implicit none
    private
-   public :: row_blocks_t, row_key
+   public :: row_blocks_t, row_key, component, vector
 
    !> How some rows get into blocks; columns follow by `bring`
    type :: row_blocks_t
@@ -139,6 +139,28 @@ contains
          block(:, k) = transfer(words_of_block(:, k), 0.0_dp, size(block, 1))
       end do
    end subroutine bring_doubles
+
+   !> One number of each row of a block
+   pure function component(block, k)
+      !> The block, (width, row)
+      real(dp), intent(in) :: block(:, :)
+      !> Which of the numbers of a row
+      integer, intent(in) :: k
+      real(dp) :: component(size(block, 2))
+
+      component = block(k, :)
+   end function component
+
+   !> Two numbers of each row of a block
+   pure function vector(block, k)
+      !> The block, (width, row)
+      real(dp), intent(in) :: block(:, :)
+      !> The first of the two
+      integer, intent(in) :: k
+      real(dp) :: vector(2, size(block, 2))
+
+      vector = block(k:k + 1, :)
+   end function vector
 
    !> The process whose block the row of a key is in, from 0
    elemental integer(ip) function home_of(key, n_bodies, n_processes)

@@ -40,6 +40,7 @@ contains
    !> HDF5 1.10 makes its 55 types anew whenever h5open_f is called, and keeps the former ones: so it is called once.
    !> HDF5 does nothing when the program exits: it would try again to write files that could not be written, and crash.
    !> All others are closed by then. It has to be told before its first work; told again, it only returns a status.
+   !> If MPI has begun before, HDF5 lets the end of MPI call it in spite of that; so a program starts HDF5 first.
    subroutine start_library(error)
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error

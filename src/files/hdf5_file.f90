@@ -10,7 +10,8 @@ module polydem_hdf5_file
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_appender, only: hdf5_appender_t
    use polydem_hdf5_claim, only: believable_shape, shape_text
-   use polydem_hdf5_dataset, only: double_type, holds_integers, holds_reals, library_version, long_type, read_dataset
+   use polydem_hdf5_dataset, only: double_type, holds_integers, holds_reals, library_version, long_type, &
+      read_dataset, start_library
    use polydem_hdf5_place, only: place_t
    use polydem_hdf5_slab, only: part_t
    use polydem_hdf5_text, only: read_attribute_value, read_text
@@ -18,7 +19,7 @@ module polydem_hdf5_file
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: hdf5_file_t, part_t, library_version
+   public :: hdf5_file_t, part_t, library_version, start_library
 
    !> An HDF5 file: create, join (to write together), open (to read), flush, close, has, shape_of, write, append,
    !> append_rows, write_attribute, read

@@ -20,7 +20,7 @@ module polydem_checkpoint_file
    use polydem_lone_team, only: lone_team_t
    use polydem_provenance, only: provenance_t, write_provenance
    use polydem_result_folder, only: unfinished
-   use polydem_row_blocks, only: row_blocks_t
+   use polydem_row_blocks, only: component, row_blocks_t
    use polydem_sealed_file, only: check_seal
    use polydem_segment, only: schema_version
    use polydem_team, only: team_t
@@ -194,13 +194,13 @@ contains
 
       k = group_of(self, name)
       if (k == 0 .and. size(values, 1) == 1) then
-         call self%file%write(name, values(1, :), self%error, unit, meaning)
+         call self%file%write(name, component(values, 1), self%error, unit, meaning)
       else if (k == 0) then
          call self%file%write(name, values, self%error, unit, meaning)
       else
          call self%rows(k)%bring(self%team, values, block)
          part = part_t(self%rows(k)%first, self%rows(k)%total)
-         if (size(values, 1) == 1) call self%file%write(name, block(1, :), self%error, unit, meaning, part)
+         if (size(values, 1) == 1) call self%file%write(name, component(block, 1), self%error, unit, meaning, part)
          if (size(values, 1) > 1) call self%file%write(name, block, self%error, unit, meaning, part)
       end if
    end subroutine write_reals
@@ -210,7 +210,7 @@ contains
    subroutine write_longs(self, name, values, unit, meaning)
       class(checkpoint_file_t), intent(inout) :: self
       character(len=*), intent(in) :: name, unit, meaning
-      integer(lp), intent(in) :: values(:)
+      integer(lp), intent(in), contiguous :: values(:)
       integer(lp), allocatable :: block(:, :)
       integer(lp) :: width(1)
       integer :: k

@@ -22,7 +22,7 @@ module polydem_segment
    use polydem_ledger_row, only: ledger_row_t
    use polydem_own_rows, only: lay_out_bodies, lay_out_pairs, lay_out_parts
    use polydem_provenance, only: provenance_t, write_provenance
-   use polydem_row_blocks, only: row_blocks_t
+   use polydem_row_blocks, only: component, row_blocks_t, vector
    use polydem_team, only: team_t
    implicit none
    private
@@ -74,8 +74,8 @@ contains
       call file%write('/bodies/id', int(numbers(1, :), ip), error, '1', 'identifier of each body, ascending', part)
       call file%write('/bodies/fixed', int(numbers(2, :), bp), error, '1', &
                       '1: moves by prescription or not at all, 0: free', part)
-      call file%write('/bodies/mass', masses(1, :), error, 'kg/m', 'mass; 0 stands for infinite', part)
-      call file%write('/bodies/inertia', masses(2, :), error, 'kg m', &
+      call file%write('/bodies/mass', component(masses, 1), error, 'kg/m', 'mass; 0 stands for infinite', part)
+      call file%write('/bodies/inertia', component(masses, 2), error, 'kg m', &
                       'moment of inertia about the centre of mass; 0 stands for infinite', part)
       call write_vertices(file, team, bodies, numbers(3, :), part, error)
       if (.not. any(bodies%fixed(:bodies%n))) return
@@ -150,11 +150,12 @@ contains
       part = part_t(blocks%first, blocks%total)
       call file%append('/frames/step', step, error, '1', 'number of the time step')
       call file%append('/frames/time', time, error, 's', 'simulated time')
-      call file%append('/frames/position', block(1:2, :), error, 'm', 'centres of mass', part)
-      call file%append('/frames/angle', block(3, :), error, 'rad', 'angles since the start, anticlockwise', part)
-      call file%append('/frames/velocity', block(4:5, :), error, 'm/s', 'velocities of the centres of mass', part)
-      call file%append('/frames/angular_velocity', block(6, :), error, 'rad/s', 'angular velocities, anticlockwise', &
+      call file%append('/frames/position', vector(block, 1), error, 'm', 'centres of mass', part)
+      call file%append('/frames/angle', component(block, 3), error, 'rad', 'angles since the start, anticlockwise', &
                        part)
+      call file%append('/frames/velocity', vector(block, 4), error, 'm/s', 'velocities of the centres of mass', part)
+      call file%append('/frames/angular_velocity', component(block, 6), error, 'rad/s', &
+                       'angular velocities, anticlockwise', part)
    end subroutine add_frame
 
    !> Add the forces and torques on the fixed bodies, if there are any.
@@ -225,13 +226,14 @@ contains
       call file%append_rows('/contacts/first', int(pairs(1, :), ip), error, '1', &
                             'identifier of the first body, the lower one', part)
       call file%append_rows('/contacts/second', int(pairs(2, :), ip), error, '1', 'identifier of the second body', part)
-      call file%append_rows('/contacts/area', block(1, :), error, 'm2', &
+      call file%append_rows('/contacts/area', component(block, 1), error, 'm2', &
                             'area of the overlap; with the conservative law its effective area', part)
-      call file%append_rows('/contacts/point', block(2:3, :), error, 'm', 'centroid of the overlap in the world', part)
-      call file%append_rows('/contacts/normal', block(4:5, :), error, 'm', &
+      call file%append_rows('/contacts/point', vector(block, 2), error, 'm', 'centroid of the overlap in the world', &
+                            part)
+      call file%append_rows('/contacts/normal', vector(block, 4), error, 'm', &
                             'integral of the outward normal over the outline of first inside second, '// &
                             'the gradient of that area', part)
-      call file%append_rows('/contacts/force', block(6:7, :), error, 'N/m', &
+      call file%append_rows('/contacts/force', vector(block, 6), error, 'N/m', &
                             'force on the first body; the second feels the opposite', part)
    end subroutine add_contacts
 

@@ -12,6 +12,7 @@ program write_together
    use polydem_checkpoint_file, only: checkpoint_file_t
    use polydem_common_hash, only: hash_all_bodies
    use polydem_errors, only: error_t, io_error, raise, run_error
+   use polydem_hdf5_file, only: start_library
    use polydem_join_team, only: join_team
    use polydem_kinds, only: ip, lp, wp
    use polydem_ledger_row, only: ledger_row_t
@@ -53,6 +54,7 @@ program write_together
    type(error_t), allocatable :: error
    character(len=:), allocatable :: folder
 
+   call start_library(error)
    call join_team(team, error)
    folder = 'together_'//to_text(team%size)
    call write_both(error)

@@ -9,10 +9,10 @@
 module b03_momentum
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
-   use polydem_ledger, only: balance_of, balance_t
+   use polydem_ledger, only: balance_t
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
-   use polydem_simulation, only: new_simulation, simulation_t
+   use polydem_simulation, only: new_simulation, simulation_t, take_stock
    use trial, only: steps
    use verification_table, only: table_t
    implicit none
@@ -54,7 +54,7 @@ contains
                                  error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
       if (.not. allocated(error)) then
-         call balance_of(simulation%ledger, settings%forces%gravity, simulation%bodies, start)
+         call take_stock(simulation, start)
          scale = 0.0_wp
          associate (bodies => simulation%bodies)
             do k = 1_ip, size(bodies%free, kind=ip)
@@ -69,14 +69,14 @@ contains
       end if
       call table%note_error(error)
       if (allocated(error)) return
-      call balance_of(simulation%ledger, settings%forces%gravity, simulation%bodies, end)
-      missing(:2) = end%momentum - start%momentum - simulation%ledger%impulse
-      missing(3) = end%angular_momentum - start%angular_momentum - simulation%ledger%angular_impulse
+      call take_stock(simulation, end)
+      missing(:2) = end%momentum - start%momentum - end%impulse
+      missing(3) = end%angular_momentum - start%angular_momentum - end%angular_impulse
       call table%expect_absolute(name//': momentum that is missing, over sum |m v|', 0.0_wp, &
                                  norm2(missing(:2))/scale(1), 1.0e-11_wp)
       call table%expect_absolute(name//': angular momentum that is missing, over its sum', 0.0_wp, &
                                  abs(missing(3))/scale(2), 1.0e-11_wp)
-      call table%show(name//': impulse of the walls, over sum |m v|', norm2(simulation%ledger%impulse)/scale(1))
+      call table%show(name//': impulse of the walls, over sum |m v|', norm2(end%impulse)/scale(1))
       call table%show(name//': kinetic energy at the end over that at the start', end%kinetic/start%kinetic)
    end subroutine fly
 
