@@ -9,6 +9,7 @@ program polydem
    use polydem_check, only: check_simulation
    use polydem_command_line, only: command_t, read_command_line, usage
    use polydem_errors, only: error_t
+   use polydem_hdf5_file, only: start_library
    use polydem_info, only: describe_program, describe_result
    use polydem_join_team, only: join_team
    use polydem_kinds, only: dp, ip
@@ -32,6 +33,8 @@ program polydem
    type(error_t), allocatable :: error
    class(team_t), allocatable :: team
 
+   ! HDF5 must outlive MPI, so it comes first.
+   call start_library(error)
    call join_team(team, error)
    if (.not. allocated(error)) call read_command_line(command, error)
    if (.not. allocated(error)) call obey(command, error)

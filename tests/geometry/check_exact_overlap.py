@@ -1,9 +1,10 @@
 """Compare overlaps computed by the program overlap_stream with exact rational arithmetic.
 
-    check_exact_overlap.py PROGRAM [--full] [--seed SEED]
+    check_exact_overlap.py PROGRAM [--full] [--seed SEED] [--table FOLDER] [--behind]
 
 Ten thousand pairs, more than a thousand of them degenerate on purpose; `--full`: a hundred thousand random and ten
-thousand degenerate ones.
+thousand degenerate ones. `--table` prints rows of the table of `./polydem verify` and writes them into a folder, with
+`--behind` at the end of the table that is there.
 
 The exact side knows nothing of clipping loops: every edge of one polygon is cut to the interval that lies in
 the other (Cyrus & Beck), in integers, and the area follows from Green's theorem. Only the standard library
@@ -25,7 +26,10 @@ import struct
 import subprocess
 import sys
 import tempfile
+from dataclasses import dataclass
 from fractions import Fraction
+
+from verification_rows import expect_zero, print_row, write_rows
 
 UNIT_ROUNDOFF = 2.0**-53
 
@@ -285,51 +289,89 @@ def integral_error(a, b, offset, exact, integrals, result):
     return max(abs(x - y) / scale for x, y, scale in zip(integrals, result[3:7], scales)) / allowed
 
 
+@dataclass
+class Findings:
+    """What came out of comparing pairs of one kind."""
+
+    pairs: int = 0
+    contacts: int = 0
+    #: Worst error of the area over the allowed
+    worst: float = 0.0
+    #: The same of N and M
+    worst_integral: float = 0.0
+    #: Processor time, that of the program included [s]
+    seconds: float = 0.0
+    #: What is wrong, a line for each pair
+    misses: tuple = ()
+
+    def __add__(self, other):
+        return Findings(self.pairs + other.pairs, self.contacts + other.contacts, max(self.worst, other.worst),
+                        max(self.worst_integral, other.worst_integral), self.seconds + other.seconds,
+                        self.misses + other.misses)
+
+
 def check(program, kind, count, seed):
-    """Compare some pairs of one kind; return contacts, the worst errors over the allowed, and what is wrong."""
+    """Compare some pairs of one kind."""
+    start = sum(os.times()[:4])
     rng = random.Random(f"{kind.__name__} {seed}")
     pairs = [kind(rng) for _ in range(count)]
     results = computed(program, [(a, b, o, 0) for a, b, o in pairs])
     again = computed(program, [(a, b, o, rng.choice([r[7], rng.randint(1, len(a)), -rng.randint(1, len(b))]))
                                for (a, b, o), r in zip(pairs, results)])
-    misses, worst, worst_integral, contacts = [], 0.0, 0.0, 0
-    for (a, b, offset), result, other in zip(pairs, results, again):
-        exact, integrals = exact_overlap(a, b, offset)
-        error = float(abs(Fraction(result[0]) - exact)) / allowed_error(a, b, exact)
-        worst = max(worst, error)
-        contacts += result[0] > 0.0
-        miss = []
-        if not error <= 1.0:
-            miss.append(f"error {error:.2f} of what is allowed")
-        if exact > 0 and kind not in WITHOUT_NORMAL:
-            integral = integral_error(a, b, offset, exact, integrals, result)
-            worst_integral = max(worst_integral, integral)
-            if not integral <= 1.0:
-                miss.append(f"integrals {result[3:7]} instead of {integrals}")
-        if exact == 0 and result[0] != 0.0:
-            miss.append("false contact")
-        if result[:7] != other[:7]:
-            miss.append("depends on the remembered edge")
-        if not all(map(math.isfinite, result)):
-            miss.append("not finite")
-        if miss:
-            misses.append(f"{', '.join(miss)}: A* = {float(exact):.6e}, A = {result[0]:.6e}, a = {a}, b = {b}, "
-                          f"offset = {offset}")
-    return contacts, worst, worst_integral, misses
+    found = Findings(pairs=count, contacts=sum(result[0] > 0.0 for result in results))
+    for pair, result, other in zip(pairs, results, again):
+        found += compare(kind, pair, result, other)
+    found.seconds = sum(os.times()[:4]) - start
+    return found
+
+
+def compare(kind, pair, result, other):
+    """Compare one pair; `other` is the result with a remembered edge."""
+    a, b, offset = pair
+    exact, integrals = exact_overlap(a, b, offset)
+    found, miss = Findings(), []
+    found.worst = float(abs(Fraction(result[0]) - exact)) / allowed_error(a, b, exact)
+    if not found.worst <= 1.0:
+        miss.append(f"error {found.worst:.2f} of what is allowed")
+    if exact > 0 and kind not in WITHOUT_NORMAL:
+        found.worst_integral = integral_error(a, b, offset, exact, integrals, result)
+        if not found.worst_integral <= 1.0:
+            miss.append(f"integrals {result[3:7]} instead of {integrals}")
+    if exact == 0 and result[0] != 0.0:
+        miss.append("false contact")
+    if result[:7] != other[:7]:
+        miss.append("depends on the remembered edge")
+    if not all(map(math.isfinite, result)):
+        miss.append("not finite")
+    if miss:
+        found.misses = (f"{', '.join(miss)}: A* = {float(exact):.6e}, A = {result[0]:.6e}, a = {a}, b = {b}, "
+                        f"offset = {offset}",)
+    return found
 
 
 def check_kind(pool, program, kind, count, seed):
-    """Compare one kind of pairs in lots; print one line; return the number of misses."""
+    """Compare one kind of pairs in lots; print the first misses."""
     sizes = [min(LOT, count - first) for first in range(0, count, LOT)]
     lots = [pool.submit(check, program, kind, size, f"{seed} {lot}") for lot, size in enumerate(sizes)]
-    found = [lot.result() for lot in lots]
-    contacts, worst, worst_integral, missed = zip(*found)
-    misses = [miss for some in missed for miss in some]
-    for miss in misses[:3]:
+    found = sum((lot.result() for lot in lots), Findings())
+    for miss in found.misses[:3]:
         print(f"  {kind.__name__}: {miss}")
-    print(f"{kind.__name__:24s} {count:6d} pairs {sum(contacts):6d} contacts, worst errors over the allowed: "
-          f"A {max(worst):8.2e}, N and M {max(worst_integral):8.2e}; {len(misses)} misses", flush=True)
-    return len(misses)
+    return found
+
+
+def rows_of(kind, found):
+    """Rows of one kind for the table of verification."""
+    name = f"{found.pairs} pairs, {kind.__name__.replace('_', ' ')}, {found.contacts} contacts: "
+    rows = [expect_zero("exact", name + "A, error/allowed", found.worst, 1.0, found.seconds)]
+    if kind not in WITHOUT_NORMAL:
+        rows.append(expect_zero("exact", name + "N and M", found.worst_integral, 1.0, 0.0))
+    return rows
+
+
+def print_findings(kind, found):
+    """Print one line about one kind."""
+    print(f"{kind.__name__:24s} {found.pairs:6d} pairs {found.contacts:6d} contacts, worst errors over the allowed: "
+          f"A {found.worst:8.2e}, N and M {found.worst_integral:8.2e}; {len(found.misses)} misses", flush=True)
 
 
 def main():
@@ -337,11 +379,31 @@ def main():
     parser.add_argument("program")
     parser.add_argument("--full", action="store_true")
     parser.add_argument("--seed", default="1")
+    parser.add_argument("--table")
+    parser.add_argument("--behind", action="store_true")
     given = parser.parse_args()
-    plan = FULL if given.full else USUAL
+    plan, rows, misses = FULL if given.full else USUAL, [], 0
+    title = f"{sum(plan.values())} pairs, {sum(plan[kind] for kind in DEGENERATE)} of them degenerate"
+    if given.table:
+        print(f"exact  overlaps against exact rational arithmetic, {title}", flush=True)
     with concurrent.futures.ProcessPoolExecutor(None if given.full else 2) as pool:
-        misses = sum(check_kind(pool, given.program, kind, count, given.seed) for kind, count in plan.items())
-    print(f"{sum(plan.values())} pairs, {sum(plan[kind] for kind in DEGENERATE)} of them degenerate: {misses} misses")
+        for kind, count in plan.items():
+            found = check_kind(pool, given.program, kind, count, given.seed)
+            misses += len(found.misses)
+            if not given.table:
+                print_findings(kind, found)
+                continue
+            of_kind = rows_of(kind, found)
+            for row in of_kind:
+                print_row(row)
+            rows += of_kind
+    if given.table:
+        rows.append(expect_zero("exact", f"{title}: misses, false contacts included", misses, 0.0, 0.0))
+        print_row(rows[-1])
+        write_rows(rows, given.table, given.behind)
+        print(f"{sum(row.verdict == 'MISSED' for row in rows)} rows missed their tolerance")
+    else:
+        print(f"{title}: {misses} misses")
     sys.exit(1 if misses else 0)
 
 

@@ -267,11 +267,31 @@ class Build(Toy):
             seconds.append(time.perf_counter() - start)
         self.assertLess(statistics.median(seconds), 0.2)
 
-    def test_verify_builds_and_becomes_the_benchmarks_alone(self):
+    def test_verify_builds_and_runs_the_benchmarks_alone(self):
         code, output, messages = self.call("verify", "B8")
         self.assertEqual((code, output, messages), (0, "<B8>\n", "polydem: building verify in build/release\n"))
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build", "release", "src", "app", "polydem")))
-        self.assertEqual(self.call("verify"), (0, "", ""))
+
+    def test_verify_runs_the_exact_comparison_behind_all_or_by_name(self):
+        self.write("tests/verification/CMakeLists.txt", "add_executable(verify verify.f90)\n")
+        self.write("tests/verification/verify.f90", PROGRAM.replace("   end do\n", "   end do\n   if (word == 'B9') stop 1\n"
+                                                                    "   if (word == 'B0') stop 2\n"))
+        self.write("tests/geometry/check_exact_overlap.py", "import os, sys\nprint(*sys.argv[1:], sep=' ')\n"
+                   "sys.exit(int(os.environ.get('EXACT_CODE', 0)))\n")
+        streamed = os.path.join(self.folder, "build/release/tests/geometry/overlap_stream")
+        exact = f"{streamed} --full --table results/verify"
+        for words, expected in ((("verify",), exact + " --behind\n"),
+                                (("verify", "exact"), exact + "\n"),
+                                (("verify", "exact", "B8"), f"<B8>\n{exact} --behind\n"),
+                                (("verify", "--quick"), "<--quick>\n")):
+            self.assertEqual(self.call(*words)[:2], (0, expected))
+        self.assertEqual(self.call("verify", "exact", EXACT_CODE="1")[0], 1)
+        code, output, _ = self.call("verify", "B9", "exact")
+        self.assertEqual((code, output), (1, f"<B9>\n{exact} --behind\n"))
+        self.assertEqual(self.call("verify", "B0", "exact")[:2], (2, "<B0>\n"))
+        code, output, _ = self.call("verify", "--help")
+        self.assertEqual(code, 0)
+        self.assertIn("\n exact: ", output)
 
     def test_a_sweep_knows_the_program_and_its_help_needs_none(self):
         self.write(".venv/bin/python", '#!/bin/bash\nprintf "<%s>\\n" "$@"\n')

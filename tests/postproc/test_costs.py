@@ -86,7 +86,8 @@ def test_models_run_in_turns_and_an_interrupted_study_goes_on(study):
     path.write_text("\n".join(kept) + "\n", encoding="utf-8")
     study.calls.clear()
     assert costs.measure_costs(study, 2, say=lambda _: None) == samples
-    assert study.calls == ["bench/drum.nml"] * (len(samples) - 4 + len(MODELS))
+    # The four samples that were kept are of instructions, each the difference of two runs.
+    assert study.calls == ["bench/drum.nml"] * (len(samples) + len(MODELS) - 8)
 
 
 def test_the_table_tells_what_was_measured(study):
@@ -99,6 +100,16 @@ def test_the_table_tells_what_was_measured(study):
     assert "polydem 1 (revision)" in table.note and "processor" in table.note
     assert costs_table(read_samples(study.output / costs.FILE)).rows == table.rows
     assert {path.suffix for path in study.output.glob("costs.*")} == {".txt", ".md", ".tex", ".csv"}
+
+
+def test_a_busy_machine_measures_no_times_but_all_the_rest(study):
+    samples = costs.measure_costs(study, 0, say=lambda _: None)
+    assert {sample.kind for sample in samples} == {"count", "memory"}
+    table = costs_table(samples)
+    rows = {row[0]: row for row in table.rows}
+    assert rows["friction (Cundall-Strack)"][2:5] == ("-", "+50.00", "+10240")
+    assert rows["slip in mid-step"][1:5] == ("forces.midstep_slip=.true.", "-", "+0.00", "+0")
+    assert "Times: not measured" in table.note
 
 
 def test_samples_of_another_build_and_damaged_ones_are_errors(study, monkeypatch):

@@ -53,7 +53,6 @@ contains
       character(len=*), intent(in) :: law
       real(wp), intent(in) :: dt
       real(wp), intent(out) :: worst, change
-      real(wp), parameter :: none(2) = 0.0_wp
       type(body_list_t) :: list
       type(simulation_t) :: simulation
       type(error_t), allocatable :: error

@@ -119,16 +119,17 @@ contains
             depth = contacts%area(c)/width
             worst = max(worst, abs(depth/(weight*above(c)/(young*width)*(width - depth)) - 1.0_wp))
          end do
-         call table%expect_absolute('number of contacts', real(n, wp), real(contacts%n, wp), 0.0_wp)
-         call table%expect_relative('depth of the lowest interface [m]', depth_below(n, young), &
+         call table%expect_absolute(friction//': number of contacts', real(n, wp), real(contacts%n, wp), 0.0_wp)
+         call table%expect_relative(friction//': depth of the lowest interface [m]', depth_below(n, young), &
                                     contacts%area(2)/width, 1.0e-6_wp)
-         call table%expect_absolute('worst relative error of a depth', 0.0_wp, worst, 1.0e-6_wp)
+         call table%expect_absolute(friction//': worst relative error of a depth', 0.0_wp, worst, 1.0e-6_wp)
       end associate
-      call table%expect_absolute('greatest speed [m/s]', 0.0_wp, maxval(abs(simulation%bodies%velocity)), 1.0e-10_wp)
-      call table%expect_absolute('greatest move of a block [m]', 0.0_wp, &
+      call table%expect_absolute(friction//': greatest speed [m/s]', 0.0_wp, &
+                                 maxval(abs(simulation%bodies%velocity)), 1.0e-10_wp)
+      call table%expect_absolute(friction//': greatest move of a block [m]', 0.0_wp, &
                                  maxval(abs(simulation%bodies%position - start)), 1.0e-12_wp)
-      call table%expect_absolute('greatest turn of a block [rad]', 0.0_wp, maxval(abs(simulation%bodies%angle)), &
-                                 1.0e-12_wp)
+      call table%expect_absolute(friction//': greatest turn of a block [rad]', 0.0_wp, &
+                                 maxval(abs(simulation%bodies%angle)), 1.0e-12_wp)
 
    contains
 

@@ -246,7 +246,7 @@ contains
 
       right = seconds
       right = adjustr(right)
-      write (output_unit, '(a4, 1x, a72, 1x, a12, 1x, a12, 1x, a8, 1x, a9, 1x, a7, 1x, a)') row%benchmark, &
+      write (output_unit, '(a5, 1x, a72, 1x, a12, 1x, a12, 1x, a8, 1x, a9, 1x, a7, 1x, a)') row%benchmark, &
          row%quantity, row%expected, row%got, row%error, row%tolerance, right, trim(row%verdict)
       flush (output_unit)
    end subroutine print_columns

@@ -79,18 +79,18 @@ def finder_functions(sources: Path) -> re.Pattern:
     return re.compile(rf"__polydem_(?:{names})(?:_inlined|_called|_o2)?_MOD_(?!(?:{REPORTS})(?:\W|$))")
 
 
-def simulate(command: list[str], model: Model, functions: re.Pattern, branches: bool = False) -> dict:
-    """Event -> number in some functions, while a command runs on one thread."""
+def simulate(command: list[str], model: Model | None, functions: re.Pattern, branches: bool = False) -> dict:
+    """Event -> number in some functions, while a command runs on one thread; without caches instructions alone."""
     if shutil.which("valgrind") is None:
         raise ResultError("valgrind is not installed; the launcher installs it: ./polydem cache FOLDER")
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "cachegrind.out"
         options = [
             "--tool=cachegrind",
-            "--cache-sim=yes",
+            f"--cache-sim={'yes' if model else 'no'}",
             f"--branch-sim={'yes' if branches else 'no'}",
             f"--cachegrind-out-file={out}",
-            *model.options,
+            *(model.options if model else ()),
         ]
         _run(["valgrind", *options, *command])
         return count_events(out.read_text(encoding="utf-8", errors="replace"), functions)

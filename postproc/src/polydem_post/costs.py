@@ -5,7 +5,8 @@ again and again. Ratios are formed within each turn, so that a machine that slow
 not a model.
 A step is all its stages, guards and output included; the start of a run does not count. Beside times stand the
 instructions that a step takes in a simulated processor: the same at every call and on a busy machine, where times are
-worth little. Memory is what the process holds after the last step of a larger drum, on less off.
+worth little and may be left out. They do not know of waiting: neither for memory nor for a disk, which frames and
+checkpoints do. Memory is what the process holds after the last step of a larger drum, on less off.
 
 Times of forces differ also because the model changes what happens; in so few steps hardly.
 """
@@ -19,8 +20,7 @@ import subprocess
 from dataclasses import asdict, astuple, dataclass, fields
 from pathlib import Path
 
-from .cachegrind import PLAIN_MODEL, simulate
-from .cachegrind import Model as Caches
+from .cachegrind import simulate
 from .emit import FORMATS, SUFFIXES, Table
 from .statistics import Estimate, median, median_of_ratios, number
 from .trajectory import ResultError, Trajectory
@@ -47,6 +47,7 @@ BARE = (
     "output.ledger=.false.",
     "output.trace_steps=0",
     "output.trace_start=0",
+    "checkpoint.elapsed=0",
     "integrate.dt=2e-5",
 )
 
@@ -65,9 +66,17 @@ class Model:
 #: The models, each behind the one that it is compared with
 MODELS = (
     Model("nothing", ()),
+    Model("conservative law", ("forces.law=conservative",)),
     Model("damping by the rate", ("forces.damping=rate",)),
+    Model("damping from touch", ("forces.damping=rate", "forces.damping_from_touch=.true."), "damping by the rate"),
     Model("damping of the book", ("forces.damping=book",)),
+    Model("damping (Hunt-Crossley)", ("forces.damping=hunt_crossley", "forces.damping_coefficient=300")),
+    Model("damping of tilts", ("forces.tilt_damping=0.5",)),
     Model("friction (Cundall-Strack)", ("forces.friction=cundall_strack",)),
+    Model("slip in mid-step", ("forces.friction=cundall_strack", "forces.midstep_slip=.true."),
+          "friction (Cundall-Strack)"),
+    Model("friction (exact)", ("forces.friction=exact",)),
+    Model("friction (exact to 1e-6)", ("forces.friction=exact", "forces.friction_tolerance=1e-6")),
     Model("stop without direction", ("overlap.degenerate=stop",)),
     Model("compensated sums", ("integrate.accumulation=compensated",)),
     Model("Gear's integrator", ("integrate.scheme=gear",)),
@@ -80,6 +89,7 @@ MODELS = (
     Model("a frame every 50 steps", ("output.frame_interval=1e-3",)),
     Model("frames with contacts", ("output.frame_interval=1e-3", "output.contacts=.true."), "a frame every 50 steps"),
     Model("times of every step", ("output.step_profile=.true.",)),
+    Model("a checkpoint every 50 steps", ("checkpoint.steps=50",)),
 )
 
 
@@ -131,7 +141,7 @@ class Study:
     def count(self, namelist: str, folder: Path, overrides) -> int:
         """Instructions of a run on one thread, its start included."""
         command = self.command(namelist, folder, overrides, 1)
-        return simulate(command, Caches(**PLAIN_MODEL), re.compile(""))["Ir"]
+        return simulate(command, None, re.compile(""))["Ir"]
 
     def bed(self) -> Path:
         """The settled bed that drums are packed from; made if it is not there."""
@@ -172,10 +182,11 @@ class Study:
 
 
 def measure_costs(study: Study, repeats: int, say=print) -> list[Sample]:
-    """All samples, those in the file and those that are missing there."""
+    """All samples, those in the file and those that are missing there; without repeats no times."""
     samples = read_samples(study.output / FILE)
-    wanted = [("time", k) for k in range(repeats + 1)] + [("memory", k) for k in range(1, WEIGHINGS + 1)]
-    wanted.append(("count", 1))
+    wanted = [("count", 1)] + [("memory", k) for k in range(1, WEIGHINGS + 1)]
+    if repeats > 0:
+        wanted += [("time", k) for k in range(repeats + 1)]
     for kind, repeat in wanted:
         taken = {sample.model for sample in samples if (sample.kind, sample.repeat) == (kind, repeat)}
         for model in MODELS:
@@ -254,8 +265,6 @@ def _weight(samples: list, name: str) -> float:
 
 def costs_table(samples: list) -> Table:
     """One row per model."""
-    timed = [sample for sample in samples if sample.kind == "time"]
-    first = timed[0]
     table = Table(
         "costs",
         "What optional models cost",
@@ -263,27 +272,52 @@ def costs_table(samples: list) -> Table:
         texts=2,
     )
     for model in MODELS:
-        mine = [sample for sample in timed if sample.model == model.name and sample.repeat > 0]
-        if not mine:
-            continue
-        contacts = number(mine[0].contacts, 4)
-        if model.name == model.off:
-            step = median([sample.step for sample in mine])
-            counted = f"{number(1e-6 * _instructions(samples, model.name))} million"
-            table.add(model.name, "", f"{step.text()} us", counted, f"{_weight(samples, model.name):.0f}", contacts)
-            continue
-        share = share_of_step(samples, model)
-        text = f"{share.value:+.1f} [{share.low:+.1f}, {share.high:+.1f}]"
-        shown = ", ".join(word for word in model.on if word not in _model(model.off).on)
-        counted = f"{share_of_instructions(samples, model):+.2f}"
-        table.add(model.name, shown, text, counted, f"{bytes_per_body(samples, model):+.0f}", contacts)
-    table.note = (
-        f"{first.program}; {first.machine}; {first.threads} thread(s). Times: {first.bodies} bodies, {first.steps} "
-        f"steps, median of {max(s.repeat for s in timed)} turns with its interval. Instructions: {COUNTED[1][1]} "
-        f"boxes, one thread, a hundred steps. Memory: {WEIGHED[1]} boxes, to about 7 bytes. "
-        "Against the same without it; frames with contacts against frames, the guard of energy against the ledger."
-    )
+        mine = [sample for sample in samples if sample.model == model.name]
+        if mine:
+            table.add(*_row(samples, mine, model))
+    table.note = _note(samples)
     return table
+
+
+def _row(samples: list, mine: list, model: Model) -> tuple:
+    """Cells of a model, of which there are some samples."""
+    timed = [sample for sample in mine if sample.kind == "time" and sample.repeat > 0]
+    counted = [sample for sample in mine if sample.kind == "count"]
+    weighed = [sample for sample in mine if sample.kind == "memory"]
+    step = instructions = memory = "-"
+    shown = ", ".join(word for word in model.on if word not in _model(model.off).on)
+    if model.name == model.off:
+        if timed:
+            step = f"{median([sample.step for sample in timed]).text()} us"
+        if counted:
+            instructions = f"{number(1e-6 * _instructions(samples, model.name))} million"
+        if weighed:
+            memory = f"{_weight(samples, model.name):.0f}"
+    else:
+        if timed:
+            share = share_of_step(samples, model)
+            step = f"{share.value:+.1f} [{share.low:+.1f}, {share.high:+.1f}]"
+        if counted:
+            instructions = f"{share_of_instructions(samples, model):+.2f}"
+        if weighed:
+            memory = f"{bytes_per_body(samples, model):+.0f}"
+    return model.name, shown, step, instructions, memory, number((timed or counted or mine)[0].contacts, 4)
+
+
+def _note(samples: list) -> str:
+    """What was measured, and on what."""
+    first = samples[0]
+    timed = [sample for sample in samples if sample.kind == "time"]
+    times = "Times: not measured. "
+    if timed:
+        times = (f"Times: {timed[0].bodies} bodies, {timed[0].steps} steps, median of "
+                 f"{max(s.repeat for s in timed)} turns with its interval, elapsed. ")
+    return (
+        f"{first.program}; {first.machine}; {first.threads} thread(s). {times}Instructions: {COUNTED[1][1]} "
+        f"boxes, one thread, a hundred steps; the same on a busy machine. Memory: {WEIGHED[1]} boxes, to about 7 bytes. "
+        "Against nothing, but each refinement against what it refines: damping from touch against damping by the rate, "
+        "slip in mid-step against friction, contacts against frames, the guard of energy against the ledger."
+    )
 
 
 def _model(name: str) -> Model:

@@ -113,7 +113,7 @@ def energy_drift(study: WorkPrecision) -> Drawing | None:
         left.plot(ends, lowest.rms * (ends / lowest.dt) ** 2, color="0.6", linewidth=0.8, label="second order")
     left.set(xscale="log", yscale="log", xlabel="dt [s]", ylabel="relative change of the kinetic energy")
     left.xaxis.set_minor_formatter(NullFormatter())
-    left.legend(fontsize=6.5)
+    left.legend(fontsize=6.5, handlelength=3.5)
     _draw_drifts(right, curves)
     return Drawing(
         "workprecision_energy_drift", figure,
