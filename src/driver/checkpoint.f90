@@ -130,7 +130,7 @@ contains
       real(dp) :: began
 
       began = wall_seconds()
-      call file%create(checkpoint_path(folder, self%next), provenance, team)
+      call file%create(checkpoint_path(folder, self%next), provenance, team, room_for(simulation))
       if (.not. allocated(file%error)) call lay_out_rows(team, simulation, file)
       call complete_wall_forces(team, simulation%bodies, simulation%contacts)
       call collect_counts(simulation)
@@ -145,6 +145,14 @@ contains
       self%seconds = self%seconds + (self%last_moment - began)
       self%longest = max(self%longest, self%last_moment - began)
    end subroutine write_checkpoint
+
+   !> Room that a checkpoint needs at most [B]: a body takes 200 bytes and its three or four pairs 40 each; Gear's
+   !> scheme and walls in many boxes come on top.
+   pure integer(lp) function room_for(simulation)
+      type(simulation_t), intent(in) :: simulation
+
+      room_for = 1000000_lp + 1000_lp*int(simulation%bodies%n_all, lp)
+   end function room_for
 
    !> Say which rows of a checkpoint this process has.
    subroutine lay_out_rows(team, simulation, file)

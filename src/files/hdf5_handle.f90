@@ -9,7 +9,7 @@ module polydem_hdf5_handle
    use polydem_hdf5_dataset, only: has_link, start_library
    use polydem_hdf5_place, only: place_t
    use polydem_kinds, only: ip, lp
-   use polydem_paths, only: exists, is_folder
+   use polydem_paths, only: disk_hint, exists, is_folder
    implicit none
    private
    public :: hdf5_handle_t
@@ -41,10 +41,6 @@ module polydem_hdf5_handle
    !> What to try if a file cannot be opened although it is there
    character(len=*), parameter :: locking_hint = &
       '; another program may be writing it; on a network file system try HDF5_USE_FILE_LOCKING=FALSE'
-
-   !> What to do if a file cannot be written
-   character(len=*), parameter :: disk_hint = &
-      '. Is the disk full? Make room, or choose another folder, and run again; files that were closed before are whole'
 
 contains
 
@@ -177,7 +173,7 @@ contains
 
       if (self%id < 0_hid_t) return
       self%id = -1_hid_t
-      error%message = error%message//disk_hint
+      if (index(error%message, disk_hint) == 0) error%message = error%message//disk_hint
    end subroutine abandon
 
    !> Whether the file has a group or data set of this name

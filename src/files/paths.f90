@@ -1,15 +1,28 @@
-!> Folders and files of the operating system (POSIX): make, rename, remove, bring to disk.
+!> Folders and files of the operating system (POSIX): make, rename, remove, reserve room, bring to disk.
 module polydem_paths
-   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_null_char, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_int64_t, c_null_char, c_ptr, c_size_t
    use polydem_errors, only: error_t, io_error, raise
+   use polydem_kinds, only: lp
    implicit none
    private
-   public :: make_folder, exists, is_folder, rename_file, remove_file, sync_file, last_failure
+   public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_room, sync_file, last_failure, disk_hint
+
+   !> What to do if a file cannot be written
+   character(len=*), parameter :: disk_hint = &
+      '. Is the disk full? Make room, or choose another folder, and run again; files that were closed before are whole'
 
    !> F_OK of access(2)
    integer(c_int), parameter :: existence = 0_c_int
    !> O_RDONLY of open(2)
    integer(c_int), parameter :: read_only = 0_c_int
+   !> O_WRONLY of open(2)
+   integer(c_int), parameter :: write_only = 1_c_int
+   !> FALLOC_FL_KEEP_SIZE of fallocate(2): the file does not get longer
+   integer(c_int), parameter :: keep_size = 1_c_int
+   !> SEEK_END of lseek(2)
+   integer(c_int), parameter :: to_end = 2_c_int
+   !> ENOSPC and EDQUOT of errno on Linux: no room on the disk, or none of the share of the user
+   integer(c_int), parameter :: no_room(2) = [28_c_int, 122_c_int]
    !> Permissions of a new folder before umask: rwxrwxrwx
    integer(c_int), parameter :: all_permissions = int(o'777', c_int)
 
@@ -52,6 +65,21 @@ module polydem_paths
          import :: c_int
          integer(c_int), value :: descriptor
       end function c_fsync
+
+      !> POSIX lseek(2) of the GNU C library, with 64 bits
+      integer(c_int64_t) function c_lseek(descriptor, offset, from) bind(C, name='lseek64')
+         import :: c_int, c_int64_t
+         integer(c_int), value :: descriptor
+         integer(c_int64_t), value :: offset
+         integer(c_int), value :: from
+      end function c_lseek
+
+      !> Linux fallocate(2) with 64 bits
+      integer(c_int) function c_fallocate(descriptor, mode, offset, length) bind(C, name='fallocate64')
+         import :: c_int, c_int64_t
+         integer(c_int), value :: descriptor, mode
+         integer(c_int64_t), value :: offset, length
+      end function c_fallocate
 
       !> POSIX close(2)
       integer(c_int) function c_close(descriptor) bind(C, name='close')
@@ -140,6 +168,31 @@ contains
       if (c_unlink(path//c_null_char) == 0_c_int) return
       call raise(error, io_error, "cannot remove '"//path//"': "//last_failure())
    end subroutine remove_file
+
+   !> Make the disk keep room for a file, so that nobody who then writes to it finds the disk full. File systems that
+   !> cannot do so are believed to have room.
+   subroutine reserve_room(path, bytes, error)
+      !> Path of the file, which must be there
+      character(len=*), intent(in) :: path
+      !> By how much it may get longer [B]; holes in it get room, too
+      integer(lp), intent(in) :: bytes
+      !> Allocated if there is no room
+      type(error_t), allocatable, intent(inout) :: error
+      integer(c_int) :: descriptor, ignored
+      integer(c_int), pointer :: number
+
+      descriptor = c_open(path//c_null_char, write_only)
+      if (descriptor < 0_c_int) then
+         call raise(error, io_error, "cannot open '"//path//"' to write to it: "//last_failure())
+         return
+      end if
+      call c_f_pointer(errno_location(), number)
+      if (c_fallocate(descriptor, keep_size, 0_c_int64_t, &
+                      c_lseek(descriptor, 0_c_int64_t, to_end) + int(bytes, c_int64_t)) /= 0_c_int) then
+         if (any(no_room == number)) call raise(error, io_error, path//': '//last_failure()//disk_hint)
+      end if
+      ignored = c_close(descriptor)
+   end subroutine reserve_room
 
    !> Wait until a closed file, or the list of names in a folder, is on the disk.
    subroutine sync_file(path, error)

@@ -58,7 +58,7 @@ module polydem_checkpoint_file
 contains
 
    !> Begin a checkpoint; a failure goes to `error` of the archive.
-   subroutine create(self, path, provenance, team)
+   subroutine create(self, path, provenance, team, room)
       class(checkpoint_file_t), intent(inout) :: self
       !> Its path when it is complete; a former file of this name is kept until then
       character(len=*), intent(in) :: path
@@ -66,7 +66,12 @@ contains
       type(provenance_t), intent(in) :: provenance
       !> Processes that write it; this one alone if absent
       class(team_t), intent(in), optional :: team
+      !> What they are going to write at most [B]; 0 if absent
+      integer(lp), intent(in), optional :: room
+      integer(lp) :: bytes
 
+      bytes = 0_lp
+      if (present(room)) bytes = room
       self%path = path
       self%gives_back = .false.
       self%is_spread = .false.
@@ -77,7 +82,7 @@ contains
          allocate (lone_team_t :: self%team)
       end if
       if (self%team%leads()) call write_origin(self, provenance)
-      call share_file(self%team, self%file, path//unfinished, self%error)
+      call share_file(self%team, self%file, path//unfinished, bytes, self%error)
    end subroutine create
 
    !> Create the file, and write what it is and where it comes from.

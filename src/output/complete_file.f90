@@ -5,14 +5,14 @@
 module polydem_complete_file
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t
-   use polydem_kinds, only: ip
-   use polydem_paths, only: exists, remove_file, rename_file, sync_file
+   use polydem_kinds, only: ip, lp
+   use polydem_paths, only: exists, remove_file, rename_file, reserve_room, sync_file
    use polydem_result_folder, only: unfinished
    use polydem_sealed_file, only: seal_file, seal_length
    use polydem_team, only: team_t
    implicit none
    private
-   public :: begin_file, share_file, complete_file, discard_file
+   public :: begin_file, share_file, keep_room, complete_file, discard_file
 
 contains
 
@@ -36,21 +36,40 @@ contains
    end subroutine begin_file
 
    !> Let all processes write to a file that the leader has created; collective.
-   subroutine share_file(team, file, path, error)
+   subroutine share_file(team, file, path, room, error)
       !> Processes; if there is one only, nothing happens
       class(team_t), intent(inout) :: team
       !> The file, open at the leader
       type(hdf5_file_t), intent(inout) :: file
       !> Its present name
       character(len=*), intent(in) :: path
+      !> Room to reserve for what they are going to write, as `keep_room` does [B]
+      integer(lp), intent(in) :: room
       !> Why it cannot be written; afterwards the same on all processes
       type(error_t), allocatable, intent(inout) :: error
 
       if (team%size == 1_ip) return
       if (team%leads() .and. .not. allocated(error)) call file%close(error)
-      call team%agree(error)
+      call keep_room(team, path, room, error)
       if (.not. allocated(error)) call file%join(path, error)
    end subroutine share_file
+
+   !> Reserve room for what processes are going to write together; collective. A process that finds the disk full would
+   !> return from HDF5 with an error, while the others wait for it there for ever.
+   subroutine keep_room(team, path, bytes, error)
+      !> Processes; if there is one only, nothing happens
+      class(team_t), intent(inout) :: team
+      !> Present name of the file
+      character(len=*), intent(in) :: path
+      !> By how much it may get longer [B]
+      integer(lp), intent(in) :: bytes
+      !> Why it cannot be written; afterwards the same on all processes
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (team%size == 1_ip) return
+      if (team%leads() .and. .not. allocated(error)) call reserve_room(path, bytes, error)
+      call team%agree(error)
+   end subroutine keep_room
 
    !> Close the file and give it its name; after a failure it is removed instead.
    subroutine complete_file(file, path, error, sealed, team)

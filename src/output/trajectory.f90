@@ -8,7 +8,7 @@
 !> before, all must know.
 module polydem_trajectory
    use polydem_bodies, only: bodies_t
-   use polydem_complete_file, only: share_file
+   use polydem_complete_file, only: keep_room, share_file
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t
@@ -102,7 +102,11 @@ contains
       !> Entries of the ledger
       type(ledger_row_t), intent(in), optional :: row
 
-      if (.not. self%is_open) call open_segment(self, bodies, error)
+      if (self%is_open) then
+         call keep_room(self%team, segment_path(self%folder, self%number)//open_suffix, room_for(bodies), error)
+      else
+         call open_segment(self, bodies, error)
+      end if
       if (.not. allocated(error)) call fill_frame(self, step, time, bodies, error, contacts, row)
       if (allocated(error)) then
          call self%file%abandon(error)
@@ -153,11 +157,19 @@ contains
          call self%file%create(path, error)
          if (.not. allocated(error)) call start_segment(self%file, self%provenance, error)
       end if
-      call share_file(self%team, self%file, path, error)
+      call share_file(self%team, self%file, path, room_for(bodies), error)
       if (allocated(error)) return
       self%is_open = .true.
       call write_bodies(self%file, self%team, bodies, error)
    end subroutine open_segment
+
+   !> Room that a frame needs at most, and shapes before the first one [B]. A grain has some ten corners of 16 bytes, 80
+   !> bytes in a frame, and two or three contacts of 72; a new chunk of each of the data sets comes on top.
+   pure integer(lp) function room_for(bodies)
+      type(bodies_t), intent(in) :: bodies
+
+      room_for = 2000000_lp + 1000_lp*int(bodies%n_all, lp)
+   end function room_for
 
    subroutine close_segment(self, error)
       type(trajectory_t), intent(inout) :: self
