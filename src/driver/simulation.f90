@@ -22,8 +22,8 @@ module polydem_simulation
    use polydem_simulation_parts, only: fit_to_bodies, simulation_t
    use polydem_stable_step, only: contact_numbers, stable_step_of_contacts, stable_step_of_shapes
    use polydem_strings, only: to_text
-   use polydem_timers, only: stage_boxes, stage_exchange, stage_forces, stage_integrate, stage_neighbours, stage_overlap, &
-      timers_t
+   use polydem_timers, only: stage_boxes, stage_exchange, stage_forces, stage_integrate, stage_neighbours, &
+      stage_overlap, timers_t
    implicit none
    private
    public :: simulation_t, new_simulation, start_simulation, advance, time_of, take_stock, collect_counts, &
