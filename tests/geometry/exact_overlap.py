@@ -1,7 +1,7 @@
 """The overlap of two convex polygons in exact rational arithmetic, with the standard library alone.
 
-It knows nothing of clipping loops: every edge of one polygon is cut to the interval that lies in the other (Cyrus & Beck), in
-integers, and the area follows from Green's theorem.
+It knows nothing of clipping loops: every edge of one polygon is cut to the interval that lies in the other (Cyrus &
+Beck), in integers, and the area follows from Green's theorem.
 """
 
 import math
