@@ -32,8 +32,8 @@ SCENES = {
     # Grains of sizes 1 to 10, of which the large ones reach over several regions; sums with their remainders.
     "bed": """\
 &scene name = 'bed' bodies = 200 size_ratio = 10 speed = 2.0 /
-&forces gravity = 0, -80 stiffness = 2e5 damping_from_touch = .true. /
-&integrate accumulation = 'compensated' duration = 0.04 /
+&forces gravity = 0, -80 stiffness = 2e5 damping_from_touch = .true. damping_coefficient = 0.2 /
+&integrate accumulation = 'compensated' fraction = 0.2 duration = 0.03 /
 """,
     # At rest: nothing goes over a border unless the border moves.
     "stack": """\

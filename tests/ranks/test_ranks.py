@@ -67,8 +67,8 @@ def newest(folder):
 @pytest.mark.parametrize("scene, ranks", [("drum", (3, 2, None)), ("gas", (None, 4, 3)), ("bed", (2, 7, 1))],
                          ids=("drum-3-2-serial", "gas-serial-4-3", "bed-2-7-1"))
 def test_a_run_goes_on_with_another_number_of_ranks(scene, ranks, restarts, tmp_path):
-    write_scene(tmp_path / "scene.nml", scene, longer=8)
-    options = ("--set", "checkpoint.steps=150")
+    write_scene(tmp_path / "scene.nml", scene, longer=3)
+    options = ("--set", "checkpoint.steps=100")
     whole, _ = run(tmp_path / "scene.nml", tmp_path / "whole", None, 1, options)
     folder = tmp_path / "result"
     steps = [interrupt(folder, tmp_path / "scene.nml", number, options)[0] for number in ranks[:2]]
