@@ -8,8 +8,8 @@
 !> /bodies, /boxes and /pairs have one row for each of these, in ascending order of identifiers, never of slots. So an
 !> archive that is shared by several processes knows from the name how to gather rows and hand them out again.
 !>
-!> Every bit is kept, in any working precision. What is given back may come from anywhere, so whole numbers that are kept
-!> must be small enough to be counted on. The first failure stays in `error`; after it nothing happens.
+!> Every bit is kept, in any working precision. What is given back may come from anywhere, so whole numbers that are
+!> kept must be small enough to be counted on. The first failure stays in `error`; after it nothing happens.
 module polydem_archive
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: dp, ip, lp, wp

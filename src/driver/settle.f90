@@ -43,7 +43,9 @@ contains
       if (self%team%size == 1_ip) return
       wish = 0_lp
       if (.not. allocated(error)) then
-         if (self%domain%must_settle(self%boxes%bounds(:, :self%boxes%n), self%boxes%passive(:self%boxes%n))) wish = 1_lp
+         associate (n => self%boxes%n)
+            if (self%domain%must_settle(self%boxes%bounds(:, :n), self%boxes%passive(:n))) wish = 1_lp
+         end associate
       end if
       call self%team%agree(error, wish)
       if (allocated(error) .or. wish(1) == 0_lp) return

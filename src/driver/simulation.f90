@@ -2,6 +2,7 @@
 module polydem_simulation
    use polydem_assemble, only: assemble_forces, index_contacts
    use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_contacts, only: is_degenerate
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_find_contacts, only: find_contacts
@@ -13,6 +14,7 @@ module polydem_simulation
    use polydem_lone_team, only: lone_team_t
    use polydem_make_boxes, only: update_boxes
    use polydem_motion, only: motion_t, move_bodies
+   use polydem_own_rows, only: owns_pair
    use polydem_relax, only: relax_bodies, relaxation_t
    use polydem_scene, only: build_scene
    use polydem_settings, only: settings_t
@@ -20,8 +22,8 @@ module polydem_simulation
    use polydem_simulation_parts, only: fit_to_bodies, simulation_t
    use polydem_stable_step, only: contact_numbers, stable_step_of_contacts, stable_step_of_shapes
    use polydem_strings, only: to_text
-   use polydem_timers, only: stage_boxes, stage_exchange, stage_forces, stage_integrate, stage_neighbours, stage_overlap, &
-      timers_t
+   use polydem_timers, only: stage_boxes, stage_exchange, stage_forces, stage_integrate, stage_neighbours, &
+      stage_overlap, timers_t
    implicit none
    private
    public :: simulation_t, new_simulation, start_simulation, advance, time_of, take_stock, collect_counts, &
@@ -201,7 +203,8 @@ contains
       end associate
    end subroutine collect_counts
 
-   !> Exact counts of the work done so far, on all processes: pairs and contacts of two of them count twice. Collective.
+   !> Exact counts of the work done so far on all processes: pairs that began and ended and the work of finders count
+   !> for each process that has them, everything else once. Collective.
    subroutine report_counters(self, counters)
       !> The simulation
       type(simulation_t), intent(inout) :: self
@@ -228,7 +231,7 @@ contains
       call counters%set('processes', int(self%team%size, lp))
       call counters%set('settlements', self%domain%settlements)
       call counters%set('divisions of space', self%domain%divisions)
-      call counters%set('bodies that changed process', counts(5))
+      call counters%set('migrations', counts(5))
       call counters%set('ghosts, summed over steps', counts(4))
       call counters%set('messages', counts(2))
       call counters%set('bytes in messages', counts(3))
@@ -252,9 +255,9 @@ contains
       call self%timers%lap(stage_neighbours)
       associate (pairs => self%neighbours%pairs)
          call find_contacts(self%bodies, pairs%n, pairs%first, pairs%second, self%memory, self%contacts)
-         self%sums = self%sums + int([pairs%n, self%contacts%n, pairs%n_began, pairs%n_ended, &
-                                      self%contacts%n_degenerate], lp)
+         self%sums(3:4) = self%sums(3:4) + int([pairs%n_began, pairs%n_ended], lp)
       end associate
+      call count_own(self)
       call check_contacts(self%settings%overlap%degenerate, self%bodies, self%contacts, self%step, error)
       call self%timers%lap(stage_overlap)
       call evaluate_law(self%law, self%bodies, dt, self%contacts, self%memory)
@@ -263,6 +266,28 @@ contains
       if (allocated(self%law%constraint)) call constrain(self, error)
       call self%timers%lap(stage_forces)
    end subroutine find_and_push
+
+   !> Count the pairs, the contacts and those of them without direction whose lead body this process moves.
+   subroutine count_own(self)
+      type(simulation_t), intent(inout) :: self
+      integer(lp) :: n(3)
+      integer(ip) :: c, p
+
+      associate (pairs => self%neighbours%pairs, contacts => self%contacts, bodies => self%bodies)
+         n = int([pairs%n, contacts%n, contacts%n_degenerate], lp)
+         if (self%team%size > 1_ip) then
+            do p = 1_ip, pairs%n
+               if (.not. owns_pair(bodies, pairs%first(p), pairs%second(p))) n(1) = n(1) - 1_lp
+            end do
+            do c = 1_ip, contacts%n
+               if (owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
+               n(2) = n(2) - 1_lp
+               if (contacts%n_degenerate > 0_ip) n(3) = n(3) - merge(1_lp, 0_lp, is_degenerate(contacts, c))
+            end do
+         end if
+      end associate
+      self%sums([1, 2, 5]) = self%sums([1, 2, 5]) + n
+   end subroutine count_own
 
    !> Add the forces that keep velocities to a constraint.
    subroutine constrain(self, error)

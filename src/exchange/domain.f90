@@ -1,8 +1,8 @@
 !> The part of space that a process looks after, and when it has to be found anew.
 !>
 !> Bodies are handed out by a division of space. Every process also has the bodies whose boxes, grown by a margin,
-!> meet its own ones; so all is well until a box of its own bodies leaves its grown box of then. All this is settled anew
-!> in the middle of a step, between predicting and finding pairs, so that nothing can happen unseen.
+!> meet its own ones; so all is well until a box of its own bodies leaves its grown box of then. All this is settled
+!> anew in the middle of a step, between predicting and finding pairs, so that nothing can happen unseen.
 module polydem_domain
    use polydem_errors, only: error_t
    use polydem_ghosts, only: ghosts_t
@@ -34,8 +34,9 @@ module polydem_domain
       real(wp), allocatable :: reference(:, :)
       !> Step in which that was
       integer(lp) :: last_step = -1_lp
-      !> Step in which space was divided last, and seconds of work up to then
+      !> Step in which space was divided last
       integer(lp) :: division_step = -1_lp
+      !> Time of work up to then [s]
       real(dp) :: division_seconds = 0.0_dp
       !> How often all was settled, space divided; bodies that came from other processes; ghosts, summed over steps
       integer(lp) :: settlements = 0_lp, divisions = 0_lp, arrivals = 0_lp, ghost_steps = 0_lp

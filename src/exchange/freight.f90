@@ -87,7 +87,7 @@ contains
       freight%shape = reshape([freight%shape, other%shape], [2, size(freight%shape, 2) + size(other%shape, 2)])
    end subroutine join_freights
 
-   !> Make bodies, in ascending order. What changes about them is zero, and they are free bodies of this process or fixed.
+   !> Make bodies, in ascending order. What changes about them is zero, and they are fixed or move with this process.
    subroutine unload(freight, n_all, bodies, slots)
       !> Bodies in any order
       type(freight_t), intent(in) :: freight

@@ -43,7 +43,8 @@ contains
       integer(ip) :: k, r, width
 
       associate (route => ghosts%route)
-         route%rank = pack([(r, r=0_ip, size(counts_sent, kind=ip) - 1_ip)], counts_sent > 0_ip .or. counts_received > 0_ip)
+         route%rank = pack([(r, r=0_ip, size(counts_sent, kind=ip) - 1_ip)], &
+                           counts_sent > 0_ip .or. counts_received > 0_ip)
          allocate (route%sent(size(route%rank) + 1), route%received(size(route%rank) + 1))
          route%sent(1) = 1_ip
          route%received(1) = 1_ip

@@ -69,8 +69,8 @@ contains
       end associate
    end subroutine keep
 
-   !> Let an archive take along, in the middle of a step, what `keep` keeps and what lasts from predict to correct; to be
-   !> replaced by schemes that have such a thing.
+   !> Let an archive take along, in the middle of a step, what `keep` keeps and what lasts from predict to correct; to
+   !> be replaced by schemes that have such a thing.
    subroutine carry(self, archive)
       class(integrator_t), intent(inout) :: self
       !> Archive, which takes or gives back columns over /bodies

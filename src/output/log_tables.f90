@@ -95,7 +95,8 @@ contains
          mean = sum(total(k, :))/real(size(total, 2), dp)
          if (.not. mean > 0.0_dp) cycle
          name = stage_names(k)
-         write (line, '(a12,3f14.3,f14.2)') name, minval(total(k, :)), mean, maxval(total(k, :)), maxval(total(k, :))/mean
+         write (line, '(a12,3f14.3,f14.2)') name, minval(total(k, :)), mean, maxval(total(k, :)), &
+            maxval(total(k, :))/mean
          call log%write_line(trim(line))
       end do
    end subroutine write_ranks

@@ -1,7 +1,8 @@
 !> The ranks of an MPI run: the only module, besides that which joins them, that uses MPI.
 !>
 !> Buffers are contiguous and bytes are sent, so that one code serves every working precision. Open MPI neither copies
-!> array sections nor knows the asynchronous attribute; every non-blocking call is completed in the procedure that began it.
+!> array sections nor knows the asynchronous attribute; so every non-blocking call is completed in the procedure that
+!> began it.
 module polydem_mpi_team
    use mpi_f08, only: mpi_allgather, mpi_allgatherv, mpi_allreduce, mpi_alltoall, mpi_bcast, mpi_byte, mpi_comm_world, &
       mpi_double_precision, mpi_finalize, mpi_in_place, mpi_integer, mpi_integer8, mpi_irecv, mpi_isend, mpi_max, &

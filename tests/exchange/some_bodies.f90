@@ -25,7 +25,8 @@ contains
          corners(1, :) = corners(1, :) + 2.0_wp*side*side
          last = 3_ip + modulo(k, 2_ip)
          if (k == 4_ip) call list%append(corners(:, :last), fixed=.true., id=10_ip*k)
-         if (k /= 4_ip) call list%append(corners(:, :last), velocity=[side, -side], angular_velocity=0.5_wp*side, id=10_ip*k)
+         if (k /= 4_ip) call list%append(corners(:, :last), velocity=[side, -side], angular_velocity=0.5_wp*side, &
+                                         id=10_ip*k)
       end do
       call new_bodies(list, bodies, error)
    end subroutine make_bodies

@@ -21,7 +21,7 @@ class FakeStudy(Study):
         steps = int(round(float(next(word for word in overrides if "duration" in word).split("=")[1]) / 2e-5))
         return 1000 + steps * (300 if "forces.friction=cundall_strack" in overrides else 200)
 
-    def run(self, namelist, folder, overrides):
+    def run(self, namelist, folder, overrides, **environment):
         self.calls.append(namelist)
         cost = 2.0 if "forces.friction=cundall_strack" in overrides else 1.0
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-!> What several processes tell each other, run by mpirun: ends with code 1 and a word about the first thing that is wrong.
+!> What several processes tell each other, run by mpirun: ends with code 1 and a word about all that is wrong.
 program team_checks
    use, intrinsic :: iso_fortran_env, only: error_unit
    use polydem_errors, only: error_t, io_error, raise
@@ -86,7 +86,8 @@ contains
       do r = 0, int(team%size) - 1
          do k = 1, int(counts(r))
             n = n + 1
-            call expect(all(abs(received(:, n) - [real(r, wp), real(team%rank, wp), real(k, wp)/3.0_wp]) <= 0.0_wp), 'rows')
+            call expect(all(abs(received(:, n) - [real(r, wp), real(team%rank, wp), real(k, wp)/3.0_wp]) <= 0.0_wp), &
+                        'rows')
          end do
       end do
    end subroutine check_rows

@@ -20,7 +20,7 @@ import subprocess
 from dataclasses import asdict, astuple, dataclass, fields
 from pathlib import Path
 
-from .cachegrind import simulate
+from .cachegrind import SAME_PLACES, simulate
 from .emit import FORMATS, SUFFIXES, Table
 from .statistics import Estimate, median, median_of_ratios, number
 from .trajectory import ResultError, Trajectory
@@ -130,10 +130,10 @@ class Study:
         command = [str(self.program), "run", str(self.inputs / namelist), "--force", "--threads", str(threads)]
         return command + [part for word in words for part in ("--set", word)]
 
-    def run(self, namelist: str, folder: Path, overrides) -> Trajectory:
+    def run(self, namelist: str, folder: Path, overrides, **environment: str) -> Trajectory:
         """Run a scene and open its result."""
         command = self.command(namelist, folder, overrides, self.threads)
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        done = subprocess.run(command, capture_output=True, text=True, check=False, env={**os.environ, **environment})
         if done.returncode != 0:
             raise ResultError(f"{' '.join(command)}: {done.stderr.strip()}")
         return Trajectory(folder)
@@ -163,7 +163,11 @@ class Study:
             result = Trajectory(folder)
             step = (more - few) / (COUNTED[1][0] - COUNTED[0][0])
         else:
-            result = self.run(scene, folder, self.overrides(model, *(TIMED if kind == "time" else WEIGHED)))
+            if kind == "time":
+                result = self.run(scene, folder, self.overrides(model, *TIMED))
+            else:
+                # Freed arrays go back to the system at once, and not now and then.
+                result = self.run(scene, folder, self.overrides(model, *WEIGHED), **SAME_PLACES)
             step = 1e6 * float(sum(result.profile["total"])) / result.counters["steps"]
         profile, counters, origin = result.profile, result.counters, result.provenance
         return Sample(
