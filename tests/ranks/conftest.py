@@ -33,6 +33,7 @@ class Outcome:
 
 def pytest_addoption(parser):
     parser.addoption("--full", action="store_true", help="try all combinations and write equality.md")
+    parser.addoption("--kills", type=int, default=3, help="how often a rank is killed")
 
 
 def pytest_configure(config):
