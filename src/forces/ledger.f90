@@ -95,8 +95,8 @@ module polydem_ledger
    !> Bodies that are worth a sum of their own, and the greatest number of such sums
    integer(ip), parameter :: block = 1024_ip, most_blocks = 32_ip
 
-   !> Places among the totals: kinetic energy, potential and momenta; mass times steps; torque of gravity and its absolute
-   !> value; elastic energy; bodies whose last rates are unknown; behind them books, and books of fixed bodies
+   !> Places among the totals: kinetic energy, potential and momenta; mass times steps; torque of gravity and its
+   !> absolute value; elastic energy; bodies whose last rates are unknown; behind them books, and books of fixed bodies
    integer, parameter :: at_motion = 5, at_mass = 6, at_torque = 7, at_energy = 9, at_unknown = 10, &
       at_books = at_unknown, at_walls = at_books + n_books, n_totals = at_walls + n_wall_books
 
@@ -213,8 +213,8 @@ contains
       call archive%keep('/bodies/book', ledger%book, 'W/m', 'sums over steps of the powers of elastic, damping and '// &
                         'tangential forces')
       call archive%keep('/bodies/torque_book', ledger%torque, 'N', 'sum over steps of the torque of gravity')
-      call archive%keep('/bodies/wall_book', ledger%wall_book, 'W/m, N/m, N/m, N, N/m, N', 'sums over steps of what '// &
-                        'fixed bodies do: power, force, torque, absolute forces and torques')
+      call archive%keep('/bodies/wall_book', ledger%wall_book, 'W/m, N/m, N/m, N, N/m, N', &
+                        'sums over steps of what fixed bodies do: power, force, torque, absolute forces and torques')
    end subroutine keep_books
 
    !> Make room for the books of bodies, which are empty.

@@ -318,7 +318,8 @@ def _note(samples: list) -> str:
                  f"{max(s.repeat for s in timed)} turns with its interval, elapsed. ")
     return (
         f"{first.program}; {first.machine}; {first.threads} thread(s). {times}Instructions: {COUNTED[1][1]} "
-        f"boxes, one thread, a hundred steps; the same on a busy machine. Memory: {WEIGHED[1]} boxes, to about 7 bytes. "
+        f"boxes, one thread, a hundred steps; the same on a busy machine. Memory: {WEIGHED[1]} boxes, to about 6 "
+        "bytes. "
         "Against nothing, but each refinement against what it refines: damping from touch against damping by the rate, "
         "slip in mid-step against friction, contacts against frames, the guard of energy against the ledger."
     )
