@@ -98,7 +98,8 @@ module polydem_ledger
    !> Places among the totals: kinetic energy, potential and momenta; mass times steps; torque of gravity and its
    !> absolute value; elastic energy; bodies whose last rates are unknown; behind them books, and books of fixed bodies
    integer, parameter :: at_mass = n_motions + 1, at_torque = at_mass + 1, at_energy = at_torque + 2, &
-      at_unknown = at_energy + 1, at_books = at_unknown, at_walls = at_books + n_books, n_totals = at_walls + n_wall_books
+      at_unknown = at_energy + 1, at_books = at_unknown, at_walls = at_books + n_books, &
+      n_totals = at_walls + n_wall_books
 
 contains
 
@@ -279,7 +280,8 @@ contains
       !$omp end parallel do
    end subroutine add_to_books
 
-   !> Add to the books of some bodies; a procedure of its own, so that the loop is compiled knowing that nothing overlaps.
+   !> Add to the books of some bodies; a procedure of its own, so that its loops are compiled knowing that nothing
+   !> overlaps.
    pure subroutine add_to_some(ledger, weight, gravity, bodies, incidence, contacts, slots)
       type(ledger_t), intent(inout) :: ledger
       real(wp), intent(in) :: weight, gravity(2)
