@@ -1,4 +1,4 @@
-!> Checkpoints for fuzzing: one of a small run as fields that can be spoilt, and a run that goes on from what came of it.
+!> Checkpoints for fuzzing: one of a small run as fields to be spoilt, and a run that goes on from what came of them.
 module spoilt_checkpoint
    use hostile_fields, only: field_t, new_field
    use polydem_archive, only: archive_t

@@ -274,8 +274,8 @@ class Build(Toy):
 
     def test_verify_runs_the_exact_comparison_behind_all_or_by_name(self):
         self.write("tests/verification/CMakeLists.txt", "add_executable(verify verify.f90)\n")
-        self.write("tests/verification/verify.f90", PROGRAM.replace("   end do\n", "   end do\n   if (word == 'B9') stop 1\n"
-                                                                    "   if (word == 'B0') stop 2\n"))
+        ends = "   end do\n   if (word == 'B9') stop 1\n   if (word == 'B0') stop 2\n"
+        self.write("tests/verification/verify.f90", PROGRAM.replace("   end do\n", ends))
         self.write("tests/geometry/check_exact_overlap.py", "import os, sys\nprint(*sys.argv[1:], sep=' ')\n"
                    "sys.exit(int(os.environ.get('EXACT_CODE', 0)))\n")
         streamed = os.path.join(self.folder, "build/release/tests/geometry/overlap_stream")

@@ -33,6 +33,7 @@ class Outcome:
 
 def pytest_addoption(parser):
     parser.addoption("--full", action="store_true", help="try all combinations and write equality.md")
+    parser.addoption("--kills", type=int, default=3, help="how often a rank is killed")
 
 
 def pytest_configure(config):
@@ -82,9 +83,10 @@ def table(config):
     combinations = max(outcome.tried for outcome in config.outcomes.values())
     lines = [
         "# The same bits for any number of processes", "",
-        f"Written by `run_ranks.py --full` on {datetime.date.today()}. Each cell: runs whose state hash, trajectory (all frames, "
-        f"contacts, walls and rows of the ledger) and counts were those of the program without MPI, of {combinations} runs with "
-        "every finder on 1 and 2 threads; in brackets how many bodies changed their process in a run.", "",
+        f"Written by `run_ranks.py --full` on {datetime.date.today()}. Each cell: runs whose state hash, trajectory "
+        "(all frames, contacts, walls and rows of the ledger) and counts of steps and contacts were those of the "
+        f"program without MPI, of {combinations} runs with every finder on 1 and 2 threads; in brackets how often a "
+        "body changed its process in a run.", "",
         "| scene | steps | contacts | " + " | ".join(f"{number} ranks" for number in ranks) + " |",
         "|---|--:|--:|" + "---|" * len(ranks),
     ]
@@ -93,8 +95,9 @@ def table(config):
                  f"{max(outcome.migrations, default=0)})"
                  for outcome in (config.outcomes[scene, number] for number in ranks)]
         lines.append(f"| {scene} | {known.steps} | {known.contacts} | " + " | ".join(cells) + " |")
-    lines += ["", "Runs that were interrupted by a signal and went on with another number of ranks, to the same bits:", "",
+    lines += ["", "Runs that were interrupted by a signal and went on with other ranks, to the same bits:", "",
               "| scene | ranks | interrupted after steps |", "|---|---|---|"]
-    lines += [f"| {scene} | {' -> '.join(str(number or 'serial') for number in numbers)} | {', '.join(map(str, steps))} |"
-              for scene, numbers, steps in config.restarts]
+    for scene, numbers, steps in config.restarts:
+        way = " -> ".join(str(number or "serial") for number in numbers)
+        lines.append(f"| {scene} | {way} | {', '.join(map(str, steps))} |")
     return "\n".join(lines) + "\n"

@@ -1,7 +1,8 @@
 """Run the tests of several processes: run_ranks.py ROOT PROGRAM [OPTION ...].
 
-ROOT is the repository, PROGRAM the one without MPI, POLYDEM_MPI_PROGRAM in the environment the one with it; without that
-the tests are skipped (code 77). Options are those of pytest, and --full for all combinations, which writes equality.md.
+ROOT is the repository, PROGRAM the one without MPI, POLYDEM_MPI_PROGRAM in the environment the one with it; without
+that the tests are skipped (code 77). Options are those of pytest, and --full for all combinations, which writes
+equality.md.
 """
 
 import os

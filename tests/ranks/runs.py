@@ -6,6 +6,7 @@ import subprocess
 from pathlib import Path
 
 import h5py
+from polydem_post import Trajectory
 
 #: Programs without and with MPI
 SERIAL = os.environ["POLYDEM_PROGRAM"]
@@ -55,6 +56,20 @@ def contents(folder):
     return found
 
 
+def frames(folder):
+    """What the reader sees in a result, wherever its segments begin: bytes by frame and name."""
+    result = Trajectory(folder)
+    found = {}
+    for number in range(len(result)):
+        for part in (result.frame(number), result.contacts(number), result.walls(number)):
+            for name, value in vars(part).items():
+                found[f"frame {number}: {type(part).__name__}.{name}"] = getattr(value, "tobytes", lambda: value)()
+    for name, values in result.ledger.items():
+        found[f"ledger: {name}"] = values.tobytes()
+    assert found, f"{folder} holds no frame"
+    return found
+
+
 def state_hash(output):
     """The hash that a run prints at its end."""
     return re.search(r"^state hash: (\S+)", output, re.MULTILINE).group(1)
@@ -66,5 +81,10 @@ def count(output, name):
 
 
 def differences(one, other):
-    """Names of what differs between two results, as `contents` gives them."""
+    """Names of what differs between two results, as `contents` or `frames` gives them."""
     return [name for name in sorted(one.keys() | other.keys()) if one.get(name) != other.get(name)]
+
+
+def newest(folder):
+    """When the newest checkpoint was written; 0 if there is none."""
+    return max((path.stat().st_mtime_ns for path in folder.glob("checkpoint_?.h5")), default=0)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from conftest import Outcome
-from runs import contents, count, differences, run, start, state_hash
+from runs import contents, count, differences, frames, newest, run, start, state_hash
 from scenes import SCENES, write_scene
 
 RANKS = (1, 2, 3, 4, 7)
@@ -17,10 +17,12 @@ THREADS = (1, 2)
 FINDERS = re.search(r"^\| &neighbours \| `finder` .*?\| (\w+(?:, \w+)+) \|",
                     (Path(__file__).parents[2] / "inputs" / "README.md").read_text(encoding="utf-8"),
                     re.MULTILINE).group(1).split(", ")
+#: How often bodies are handed out anew at least; grains in a stack hardly move
+LEAST_SETTLEMENTS = {"drum": 100, "gas": 100, "hopper": 100, "bed": 100, "stack": 1}
 #: What is tried unless all is: every scene on several numbers of ranks, every finder and number of threads somewhere
 QUICK = [(scene, ranks, 1 + (ranks + k) % 2, FINDERS[(3 * k + n) % len(FINDERS)])
          for k, scene in enumerate(SCENES)
-         for n, ranks in enumerate(((2, 4, 7), (1, 3, 7), (2, 3, 4), (1, 4, 7), (2, 3, 7))[k])]
+         for n, ranks in enumerate(((2, 4, 3), (1, 3, 7), (2, 3, 4), (1, 4, 2), (2, 3, 7))[k])]
 
 
 def pytest_generate_tests(metafunc):
@@ -42,7 +44,9 @@ def test_the_result_has_the_same_bits(combination, expected, outcomes, tmp_path)
     for name in ("steps", "contacts"):
         assert count(output, name) == getattr(expected(scene), name), name
     outcome.equal += 1
-    outcome.migrations.append(count(output, "migrations") if ranks > 1 else 0)
+    if ranks > 1:
+        assert count(output, "settlements") >= LEAST_SETTLEMENTS[scene], output
+        outcome.migrations.append(count(output, "migrations"))
 
 
 def interrupt(folder, namelist, ranks, options):
@@ -59,16 +63,11 @@ def interrupt(folder, namelist, ranks, options):
     return int(re.search(r"stopped early by the signal USR1 after step (\d+) of", message).group(1)), output
 
 
-def newest(folder):
-    """When the newest checkpoint was written; 0 if there is none."""
-    return max((path.stat().st_mtime_ns for path in folder.glob("checkpoint_?.h5")), default=0)
-
-
 @pytest.mark.parametrize("scene, ranks", [("drum", (3, 2, None)), ("gas", (None, 4, 3)), ("bed", (2, 7, 1))],
                          ids=("drum-3-2-serial", "gas-serial-4-3", "bed-2-7-1"))
 def test_a_run_goes_on_with_another_number_of_ranks(scene, ranks, restarts, tmp_path):
-    write_scene(tmp_path / "scene.nml", scene, longer=8)
-    options = ("--set", "checkpoint.steps=150")
+    write_scene(tmp_path / "scene.nml", scene, longer=3)
+    options = ("--set", "checkpoint.steps=100")
     whole, _ = run(tmp_path / "scene.nml", tmp_path / "whole", None, 1, options)
     folder = tmp_path / "result"
     steps = [interrupt(folder, tmp_path / "scene.nml", number, options)[0] for number in ranks[:2]]
@@ -76,5 +75,5 @@ def test_a_run_goes_on_with_another_number_of_ranks(scene, ranks, restarts, tmp_
     output, _ = run(tmp_path / "scene.nml", folder, ranks[2], 1, ("--continue", *options))
     assert f"step {steps[1]}\n" in output
     assert state_hash(output) == state_hash(whole)
-    assert differences(contents(tmp_path / "whole"), contents(folder)) == []
+    assert differences(frames(tmp_path / "whole"), frames(folder)) == []
     restarts.append((scene, ranks, steps))

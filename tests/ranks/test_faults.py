@@ -1,0 +1,202 @@
+"""Faults of runs of several processes: ranks that die or never come, errors of one rank, disks, and what is left."""
+
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import time
+
+import h5py
+import pytest
+from runs import ENVIRONMENT, PARALLEL, SERIAL, differences, frames, newest, run, start, state_hash
+from scenes import write_scene
+from seals import seal
+
+OPTIONS = ("--set", "checkpoint.steps=100")
+#: Exit codes, as the README of the repository lists them
+FAILED, BAD_INPUT, NO_FILE = 1, 2, 3
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A folder with a namelist, and the result of a run that nobody disturbed."""
+    folder = tmp_path_factory.mktemp("whole")
+    write_scene(folder / "scene.nml", "drum", longer=2)
+    output, _ = run(folder / "scene.nml", folder / "whole", None, 1, OPTIONS)
+    folder.joinpath("hash").write_text(state_hash(output), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def interrupted(whole):
+    """A result of three ranks that were interrupted after two checkpoints."""
+    folder = whole / "interrupted"
+    process = start(whole / "scene.nml", folder, 3, 1, OPTIONS)
+    wait_for(lambda: len(list(folder.glob("checkpoint_?.h5"))) == 2, process)
+    process.send_signal(signal.SIGUSR1)
+    process.communicate(timeout=60)
+    assert process.returncode == 75
+    return folder
+
+
+def wait_for(condition, process, seconds=60.0):
+    """Wait until a condition holds, while a process runs."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.002)
+
+
+def finish(whole, folder, ranks):
+    """Continue a run to its end, which must be the right one; give what it says."""
+    output, _ = run(whole / "scene.nml", folder, ranks, 1, ("--continue", *OPTIONS))
+    assert state_hash(output) == whole.joinpath("hash").read_text(encoding="utf-8")
+    assert differences(frames(whole / "whole"), frames(folder)) == []
+    return output
+
+
+def segments(folder):
+    """Bytes of the closed segments, by name"""
+    return {path.name: path.read_bytes() for path in folder.glob("trajectory_????.h5")}
+
+
+def ranks_of(mpirun):
+    """Numbers of the processes that an mpirun started"""
+    told = subprocess.run(["pgrep", "-P", str(mpirun.pid)], capture_output=True, text=True, check=False).stdout
+    return [int(word) for word in told.split()]
+
+
+def test_a_killed_rank_ends_the_run_which_goes_on_from_its_last_checkpoint(whole, request, tmp_path):
+    chance = random.Random(1)
+    folder = tmp_path / "result"
+    kills, wanted, patience = 0, request.config.getoption("kills"), 0.0
+    while kills < wanted:
+        if kills % 5 == 0:
+            shutil.rmtree(folder, ignore_errors=True)
+        before = segments(folder)
+        process = start(whole / "scene.nml", folder, chance.choice((2, 3, 4)), 1, ("--continue", *OPTIONS))
+        wait_for(lambda: (folder / "running.lock").exists() or process.poll() is not None, process)
+        time.sleep(chance.uniform(0.0, 1.5))
+        victims = ranks_of(process)
+        if victims:
+            os.kill(chance.choice(victims), signal.SIGKILL)
+        _, message = process.communicate(timeout=60)
+        if process.returncode == 0:
+            shutil.rmtree(folder)
+            continue
+        kills += 1
+        assert process.returncode == 128 + signal.SIGKILL and "signal 9" in message, (process.returncode, message)
+        after = segments(folder)
+        assert all(after.get(name) == content for name, content in before.items()), f"kill {kills} lost a segment"
+        if kills % 5 == 0 or kills == wanted:
+            finish(whole, folder, chance.choice((None, 1, 2, 3)))
+
+
+def test_without_mpirun_the_ranks_end_and_leave_a_good_checkpoint(whole, tmp_path):
+    folder = tmp_path / "result"
+    for number in (signal.SIGKILL, signal.SIGTERM):
+        before = newest(folder)
+        process = start(whole / "scene.nml", folder, 2, 1, ("--continue", *OPTIONS))
+        wait_for(lambda: newest(folder) > before, process)
+        ranks = ranks_of(process)
+        assert len(ranks) == 2
+        process.send_signal(number)
+        process.communicate(timeout=60)
+        end = time.monotonic() + 30
+        while any(os.path.exists(f"/proc/{rank}") for rank in ranks):
+            assert time.monotonic() < end, "ranks outlive mpirun"
+            time.sleep(0.02)
+    finish(whole, folder, 3)
+
+
+def test_a_rank_that_never_comes_ends_the_run(whole, tmp_path):
+    words = [PARALLEL, "run", str(whole / "scene.nml"), "--set", f"output.folder={tmp_path / 'result'}"]
+    end = subprocess.run(["mpirun", "-n", "2", *words, ":", "-n", "1", "false"], env=ENVIRONMENT, capture_output=True,
+                         text=True, timeout=60, check=False)
+    assert end.returncode != 0 and end.stderr != ""
+    assert not list((tmp_path / "result").glob("*.h5"))
+
+
+def test_the_program_without_mpi_refuses_to_be_several(whole, tmp_path):
+    words = [SERIAL, "run", str(whole / "scene.nml"), "--set", f"output.folder={tmp_path / 'result'}"]
+    end = subprocess.run(["mpirun", "-n", "3", *words], env=ENVIRONMENT, capture_output=True, text=True, timeout=60,
+                         check=False)
+    assert end.returncode == BAD_INPUT and "--ranks 3" in end.stderr, end
+    assert not (tmp_path / "result").exists()
+
+
+def message_of(text):
+    """The line of the program itself, which must be there once"""
+    lines = [line for line in text.splitlines() if line.startswith("polydem: ")]
+    assert len(lines) == 1, text
+    return lines[0]
+
+
+@pytest.mark.parametrize("ranks", (None, 3), ids=("serial", "3"))
+def test_no_number_in_a_checkpoint_is_found_with_its_body(ranks, whole, interrupted, tmp_path):
+    folder = tmp_path / "result"
+    shutil.copytree(interrupted, folder)
+    for path in folder.glob("checkpoint_?.h5"):
+        with h5py.File(path, "r+") as file:
+            row = 200
+            name = file["bodies/id"][row]
+            file["bodies/position"][row, 0] = float("nan")
+        seal(path)
+    _, text = run(whole / "scene.nml", folder, ranks, 1, ("--continue", *OPTIONS), code=FAILED)
+    assert f"body {name} " in message_of(text) and "step" in text, text
+
+
+def test_an_error_of_one_rank_is_told_once_as_by_one_process(whole, tmp_path):
+    options = ("--set", "forces.gravity=0,-5e5")
+    told = [message_of(run(whole / "scene.nml", tmp_path / f"of_{ranks}", ranks, 1, options, code=FAILED)[1])
+            for ranks in (None, 3)]
+    assert told[0] == told[1] and re.search(r"body \d+", told[0]), told
+    assert differences(frames(tmp_path / "of_None"), frames(tmp_path / "of_3")) == []
+
+
+def test_a_damaged_checkpoint_is_passed_over(whole, interrupted, tmp_path):
+    for k, damage in enumerate((lambda file, size: file.truncate(size // 2),
+                                lambda file, size: (file.seek(size // 2), file.write(b"\x55\xaa")))):
+        folder = tmp_path / f"damaged_{k}"
+        shutil.copytree(interrupted, folder)
+        newest = max(folder.glob("checkpoint_?.h5"), key=lambda path: path.stat().st_mtime_ns)
+        with open(newest, "r+b") as file:
+            damage(file, newest.stat().st_size)
+        output = finish(whole, folder, 2)
+        assert f"warning: {newest}: is damaged" in output and "the newest good one" in output, output
+
+
+def test_changed_settings_are_refused_with_the_difference(whole, interrupted, tmp_path):
+    folder = tmp_path / "changed"
+    shutil.copytree(interrupted, folder)
+    options = ("--continue", *OPTIONS, "--set", "forces.friction_coefficient=0.5")
+    _, text = run(whole / "scene.nml", folder, 3, 1, options, code=BAD_INPUT)
+    assert "forces.friction_coefficient was 0.23 and is 0.5" in message_of(text), text
+
+
+def test_a_folder_that_cannot_be_made_is_named(whole, tmp_path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    _, text = run(whole / "scene.nml", tmp_path / "file" / "result", 3, code=NO_FILE)
+    assert str(tmp_path / "file" / "result") in message_of(text)
+
+
+def test_a_disk_that_is_full_loses_nothing(whole, request, tmp_path):
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    for kilobytes in (300, 1000, 2500, 3000, 4000, 5000, 6000) if request.config.getoption("full") else (300, 4000):
+        mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", str(disk)]
+        if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
+            pytest.skip("no file system may be mounted here")
+        try:
+            _, text = run(whole / "scene.nml", disk / "result", 3, 1, OPTIONS, code=NO_FILE)
+            assert str(disk) in message_of(text)
+            before = segments(disk / "result")
+            subprocess.run(["mount", "-o", "remount,size=64m", str(disk)], check=True)
+            finish(whole, disk / "result", 2)
+            after = segments(disk / "result")
+            assert all(after[name] == content for name, content in before.items())
+        finally:
+            subprocess.run(["umount", str(disk)], check=True)
