@@ -1,4 +1,5 @@
-!> What a free body has to book in a step: powers of the forces of its contacts, and what it gets from outside.
+!> What a free body has to book in a step: powers of the forces of its contacts, and what it gets from outside; and
+!> what it has.
 !>
 !> The power of a force between two free bodies, f . (v1 - v2), is booked in two shares: f . v1 by the first and
 !> -f . v2 by the second. So a body needs no velocity but its own, and whoever moves it can book it; the shares add up
@@ -11,7 +12,7 @@ module polydem_body_rates
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: n_books, n_wall_books, add_rates, elastic_energy_of
+   public :: n_books, n_wall_books, n_motions, add_rates, elastic_energy_of, motion_of
 
    !> Books of a body: powers of the elastic normal forces, of damping with that of tilts, and of the tangential forces
    !> [W/m]
@@ -19,6 +20,8 @@ module polydem_body_rates
    !> Books of what fixed bodies do to a body: power [W/m]; force along x and y [N/m]; torque about the origin [N]; sums
    !> over contacts of the absolute values of forces [N/m] and torques [N]
    integer, parameter :: n_wall_books = 6
+   !> Numbers of `motion_of`
+   integer, parameter :: n_motions = 5
 
 contains
 
@@ -79,6 +82,26 @@ contains
             *contacts%elastic(c)*contacts%area(c)/contacts%length(c)
       end do
    end function elastic_energy_of
+
+   !> Kinetic energy [J/m], potential [J/m], momentum along x and y [N s/m] and angular momentum about the origin [N s]
+   !> of a free body
+   pure function motion_of(gravity, bodies, s) result(values)
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      real(wp) :: values(n_motions)
+
+      associate (m => bodies%mass(s), v => bodies%velocity(:, s), x => bodies%position(:, s), &
+                 spin => bodies%inertia(s)*bodies%angular_velocity(s))
+         values(1) = 0.5_wp*(m*(v(1)*v(1) + v(2)*v(2)) + spin*bodies%angular_velocity(s))
+         values(2) = -m*(gravity(1)*x(1) + gravity(2)*x(2))
+         values(3:4) = m*v
+         values(5) = m*(x(1)*v(2) - x(2)*v(1)) + spin
+      end associate
+   end function motion_of
 
    !> Powers of the elastic, damping and tangential forces of a contact on one of its bodies.
    pure subroutine add_power(bodies, contacts, c, mover, side, arm, power)

@@ -24,7 +24,7 @@ module polydem_ledger
    use polydem_archive, only: archive_t
    use polydem_assemble, only: incidence_t
    use polydem_bodies, only: bodies_t
-   use polydem_body_rates, only: add_rates, elastic_energy_of, n_books, n_wall_books
+   use polydem_body_rates, only: add_rates, elastic_energy_of, motion_of, n_books, n_motions, n_wall_books
    use polydem_contacts, only: contacts_t
    use polydem_exact_sum, only: exact_sum_t
    use polydem_kinds, only: ip, lp, wp, worth_threads
@@ -97,8 +97,9 @@ module polydem_ledger
 
    !> Places among the totals: kinetic energy, potential and momenta; mass times steps; torque of gravity and its
    !> absolute value; elastic energy; bodies whose last rates are unknown; behind them books, and books of fixed bodies
-   integer, parameter :: at_motion = 5, at_mass = 6, at_torque = 7, at_energy = 9, at_unknown = 10, &
-      at_books = at_unknown, at_walls = at_books + n_books, n_totals = at_walls + n_wall_books
+   integer, parameter :: at_mass = n_motions + 1, at_torque = at_mass + 1, at_energy = at_torque + 2, &
+      at_unknown = at_energy + 1, at_books = at_unknown, at_walls = at_books + n_books, &
+      n_totals = at_walls + n_wall_books
 
 contains
 
@@ -266,18 +267,40 @@ contains
       type(bodies_t), intent(in) :: bodies
       type(incidence_t), intent(in) :: incidence
       type(contacts_t), intent(in) :: contacts
-      integer(ip) :: k, s
+      integer(ip) :: b, n, n_blocks
 
-      !$omp parallel do if (size(bodies%free) > worth_threads) schedule(static) default(none) &
-      !$omp    shared(ledger, weight, gravity, bodies, incidence, contacts) private(k, s)
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
-         ledger%torque(s) = ledger%torque(s) + weight*torque_of(gravity, bodies, s)
-         if (has_contacts(incidence, s)) &
-            call add_rates(bodies, incidence, contacts, s, weight, ledger%book(:, s), ledger%wall_book(:, s))
+      n = size(bodies%free, kind=ip)
+      n_blocks = max(1_ip, n/worth_threads)
+      !$omp parallel do if (n_blocks > 1_ip) schedule(static) default(none) &
+      !$omp    shared(ledger, weight, gravity, bodies, incidence, contacts, n, n_blocks) private(b)
+      do b = 1_ip, n_blocks
+         call add_to_some(ledger, weight, gravity, bodies, incidence, contacts, &
+                          bodies%free(end_of(b - 1_ip, n_blocks, n) + 1_ip:end_of(b, n_blocks, n)))
       end do
       !$omp end parallel do
    end subroutine add_to_books
+
+   !> Add to the books of some bodies; a procedure of its own, so that its loops are compiled knowing that nothing
+   !> overlaps.
+   pure subroutine add_to_some(ledger, weight, gravity, bodies, incidence, contacts, slots)
+      type(ledger_t), intent(inout) :: ledger
+      real(wp), intent(in) :: weight, gravity(2)
+      type(bodies_t), intent(in) :: bodies
+      type(incidence_t), intent(in) :: incidence
+      type(contacts_t), intent(in) :: contacts
+      integer(ip), intent(in), contiguous :: slots(:)
+      integer(ip) :: k, s
+
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
+         ledger%torque(s) = ledger%torque(s) + weight*torque_of(gravity, bodies, s)
+      end do
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
+         if (has_contacts(incidence, s)) &
+            call add_rates(bodies, incidence, contacts, s, weight, ledger%book(:, s), ledger%wall_book(:, s))
+      end do
+   end subroutine add_to_some
 
    !> Whether a body has contacts, without which there are no powers
    pure logical function has_contacts(incidence, s)
@@ -307,7 +330,8 @@ contains
       !$omp parallel do if (n_blocks > 1_ip) schedule(static) default(none) &
       !$omp    shared(n, n_blocks, sums, ledger, gravity, bodies, incidence, contacts) private(b)
       do b = 1_ip, n_blocks
-         call add_block(ledger, gravity, bodies, incidence, contacts, 1_ip + part_of(b - 1_ip), part_of(b), sums(:, b))
+         call add_block(ledger, gravity, bodies, incidence, contacts, &
+                        end_of(b - 1_ip, n_blocks, n) + 1_ip, end_of(b, n_blocks, n), sums(:, b))
       end do
       !$omp end parallel do
       do b = 2_ip, n_blocks
@@ -317,17 +341,14 @@ contains
       end do
       call add_up_sums(team, sums(:, 1))
       total = sums(:, 1)%value()
-
-   contains
-
-      !> Last place of a block among the free bodies
-      pure integer(ip) function part_of(block)
-         integer(ip), intent(in) :: block
-
-         part_of = int((int(n, lp)*int(block, lp))/int(n_blocks, lp), ip)
-      end function part_of
-
    end function totals
+
+   !> Last place of the b-th of n_blocks blocks of n places
+   pure integer(ip) function end_of(b, n_blocks, n)
+      integer(ip), intent(in) :: b, n_blocks, n
+
+      end_of = int(int(n, lp)*int(b, lp)/int(n_blocks, lp), ip)
+   end function end_of
 
    !> Add some of the free bodies to sums.
    subroutine add_block(ledger, gravity, bodies, incidence, contacts, low, high, sums)
@@ -346,7 +367,7 @@ contains
       do k = low, high
          s = bodies%free(k)
          row = 0.0_wp
-         row(:at_motion) = motion_of(gravity, bodies, s)
+         row(:n_motions) = motion_of(gravity, bodies, s)
          row(at_mass) = bodies%mass(s)*real(ledger%steps, wp)
          row(at_torque) = ledger%torque(s)
          row(at_books + 1:at_walls) = ledger%book(:, s)
@@ -374,22 +395,5 @@ contains
 
       torque_of = bodies%mass(s)*(bodies%position(1, s)*gravity(2) - bodies%position(2, s)*gravity(1))
    end function torque_of
-
-   !> Kinetic energy [J/m], potential [J/m], momentum along x and y [N s/m] and angular momentum about the origin [N s]
-   !> of a free body
-   pure function motion_of(gravity, bodies, s) result(values)
-      real(wp), intent(in) :: gravity(2)
-      type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: s
-      real(wp) :: values(at_motion)
-
-      associate (m => bodies%mass(s), v => bodies%velocity(:, s), x => bodies%position(:, s), &
-                 spin => bodies%inertia(s)*bodies%angular_velocity(s))
-         values(1) = 0.5_wp*(m*(v(1)*v(1) + v(2)*v(2)) + spin*bodies%angular_velocity(s))
-         values(2) = -m*(gravity(1)*x(1) + gravity(2)*x(2))
-         values(3:4) = m*v
-         values(5) = m*(x(1)*v(2) - x(2)*v(1)) + spin
-      end associate
-   end function motion_of
 
 end module polydem_ledger
