@@ -211,6 +211,7 @@ contains
       run%history%scene = scene_hash(run%simulation%bodies)
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
       run%provenance%scene = hexadecimal(run%history%scene)
+      run%provenance%processes = run%team%size
       if (run%attempt%continues) call look_back(run%folder, settings, run%provenance%scene, run%attempt%may_change, &
                                                 run%past, error)
       if (allocated(error)) return

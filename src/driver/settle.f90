@@ -15,6 +15,7 @@ module polydem_settle
    use polydem_ledger, only: keep_books
    use polydem_mover, only: mover_t
    use polydem_pair_freight, only: receive_pairs, send_pairs
+   use polydem_rank_order, only: sort_by_rank
    use polydem_simulation_parts, only: fit_to_bodies, simulation_t
    use polydem_timers, only: stage_boxes, stage_forces, stage_integrate, stage_neighbours, stage_overlap
    implicit none
@@ -193,12 +194,13 @@ contains
       integer(ip), intent(in) :: owner(:)
       type(freight_t) :: freight
       type(mover_t) :: mover
-      integer(ip), allocatable :: counts(:), counts_received(:), slots(:)
+      integer(ip), allocatable :: counts(:), counts_received(:), slots(:), order(:)
       integer(ip) :: s
 
       associate (bodies => self%bodies)
          slots = pack([(s, s=1_ip, bodies%n)],.not. bodies%ghost)
-         call group(slots, merge(owner(slots), self%team%rank, owner(slots) >= 0_ip), self%team%size, counts)
+         call sort_by_rank(merge(owner(slots), self%team%rank, owner(slots) >= 0_ip), self%team%size, counts, order)
+         slots = slots(order)
          call load(bodies, slots, freight)
       end associate
       mover%slots = slots
@@ -284,7 +286,7 @@ contains
       !> Grown boxes of the free bodies, (4, body)
       real(wp), intent(in) :: boxes(:, :)
       integer(ip), allocatable, intent(out) :: slots(:), counts(:)
-      integer(ip), allocatable :: rank(:), longer(:)
+      integer(ip), allocatable :: rank(:), longer(:), order(:)
       integer(ip) :: needing(self%team%size), k, m, n
 
       allocate (slots(64), rank(64))
@@ -301,36 +303,9 @@ contains
          rank(n + 1_ip:n + m) = needing(:m)
          n = n + m
       end do
-      slots = slots(:n)
-      call group(slots, rank(:n), self%team%size, counts)
+      call sort_by_rank(rank(:n), self%team%size, counts, order)
+      slots = slots(order)
    end subroutine list_needed
-
-   !> Put slots into the order of their processes, those of one as they were, and count them.
-   subroutine group(slots, rank, n_ranks, counts)
-      integer(ip), intent(inout) :: slots(:)
-      !> Process of each
-      integer(ip), intent(in) :: rank(:)
-      integer(ip), intent(in) :: n_ranks
-      !> Slots of each process, (0:n_ranks - 1)
-      integer(ip), allocatable, intent(out) :: counts(:)
-      integer(ip) :: place(0:n_ranks - 1_ip), grouped(size(slots))
-      integer(ip) :: k, r
-
-      allocate (counts(0:n_ranks - 1_ip))
-      counts = 0_ip
-      do k = 1_ip, size(slots, kind=ip)
-         counts(rank(k)) = counts(rank(k)) + 1_ip
-      end do
-      place(0) = 0_ip
-      do r = 1_ip, n_ranks - 1_ip
-         place(r) = place(r - 1_ip) + counts(r - 1_ip)
-      end do
-      do k = 1_ip, size(slots, kind=ip)
-         place(rank(k)) = place(rank(k)) + 1_ip
-         grouped(place(rank(k))) = slots(k)
-      end do
-      slots = grouped
-   end subroutine group
 
    !> Slots of bodies given by their places among all of the run
    pure function slots_of_rows(row, wanted) result(slots)

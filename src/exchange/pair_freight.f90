@@ -2,6 +2,7 @@
 module polydem_pair_freight
    use polydem_contacts, only: contact_memory_t
    use polydem_kinds, only: ip, lp, wp
+   use polydem_rank_order, only: sort_by_rank
    use polydem_sort, only: sort_keys
    use polydem_team, only: team_t
    implicit none
@@ -42,42 +43,42 @@ contains
       type(pair_freight_t), intent(out) :: freight
       integer(lp), allocatable :: sent(:, :), received(:, :)
       real(wp), allocatable :: value_sent(:, :), value_received(:, :)
-      integer(ip) :: counts(0:team%size - 1_ip), place(0:team%size - 1_ip)
-      integer(ip), allocatable :: counts_received(:)
-      integer(ip) :: p, r, k, to(2)
+      integer(ip), allocatable :: pair(:), rank(:), counts(:), counts_received(:), order(:)
+      integer(ip) :: p, k, m, to(2)
 
-      counts = 0_ip
-      do p = 1_ip, n
-         if (.not. lead_is_mine(p)) cycle
-         to = destinations(owner(first(p)), owner(second(p)))
-         do k = 1_ip, 2_ip
-            if (to(k) >= 0_ip) counts(to(k)) = counts(to(k)) + 1_ip
-         end do
-      end do
-      place(0) = 0_ip
-      do r = 1_ip, team%size - 1_ip
-         place(r) = place(r - 1_ip) + counts(r - 1_ip)
-      end do
-      allocate (sent(2, sum(counts)), value_sent(2, sum(counts)))
-      value_sent = 0.0_wp
+      allocate (pair(2_ip*n), rank(2_ip*n))
+      m = 0_ip
       do p = 1_ip, n
          if (.not. lead_is_mine(p)) cycle
          to = destinations(owner(first(p)), owner(second(p)))
          do k = 1_ip, 2_ip
             if (to(k) < 0_ip) cycle
-            place(to(k)) = place(to(k)) + 1_ip
-            associate (q => place(to(k)))
-               sent(1, q) = ior(shiftl(int(row(first(p)), lp), 32), int(row(second(p)), lp))
-               sent(2, q) = int(memory%separating_edge(p), lp)
-               if (allocated(memory%tangential)) value_sent(1, q) = memory%tangential(p)
-               if (allocated(memory%area)) value_sent(2, q) = memory%area(p)
-            end associate
+            m = m + 1_ip
+            pair(m) = p
+            rank(m) = to(k)
          end do
+      end do
+      call sort_by_rank(rank(:m), team%size, counts, order)
+      allocate (sent(2, m), value_sent(2, m))
+      value_sent = 0.0_wp
+      do k = 1_ip, m
+         p = pair(order(k))
+         sent(1, k) = key_of(row, first(p), second(p))
+         sent(2, k) = int(memory%separating_edge(p), lp)
+         if (allocated(memory%tangential)) value_sent(1, k) = memory%tangential(p)
+         if (allocated(memory%area)) value_sent(2, k) = memory%area(p)
       end do
       call team%trade(sent, counts, received, counts_received)
       call team%trade(value_sent, counts, value_received, counts_received)
       call sort_pairs(received, value_received, freight)
    end subroutine send_pairs
+
+   !> Places of both bodies of a pair among all of the run in one word, the lower one in its upper half
+   pure integer(lp) function key_of(row, first, second)
+      integer(ip), intent(in) :: row(:), first, second
+
+      key_of = ior(shiftl(int(row(first), lp), 32), int(row(second), lp))
+   end function key_of
 
    !> The one or two processes that will have a pair; negative: none
    pure function destinations(owner_1, owner_2) result(to)
@@ -127,7 +128,7 @@ contains
       n_known = 0_ip
       k = 1_ip
       do p = 1_ip, n
-         key = ior(shiftl(int(row(first(p)), lp), 32), int(row(second(p)), lp))
+         key = key_of(row, first(p), second(p))
          do while (k <= size(freight%key))
             if (freight%key(k) >= key) exit
             k = k + 1_ip

@@ -5,6 +5,7 @@
 !> of all processes, one after the other, are what a process on its own would have.
 module polydem_row_blocks
    use polydem_kinds, only: dp, ip, lp
+   use polydem_rank_order, only: sort_by_rank
    use polydem_sort, only: sort_keys
    use polydem_team, only: team_t
    implicit none
@@ -67,7 +68,7 @@ contains
 
       self%n_known = n_known
       home = home_of(key, n_bodies, team%size)
-      call group_by_home(home, team%size, self%counts, self%slot)
+      call sort_by_rank(home, team%size, self%counts, self%slot)
       allocate (sent(1, size(key)))
       do k = 1_ip, size(key, kind=ip)
          sent(1, k) = key(self%slot(k))
@@ -170,27 +171,6 @@ contains
       ! The greatest r below body P/n.
       home_of = int((shiftr(key, 32)*int(n_processes, lp) - 1_lp)/int(n_bodies, lp), ip)
    end function home_of
-
-   !> Count the rows that go to each process, and list them in this order.
-   pure subroutine group_by_home(home, n_processes, counts, list)
-      integer(ip), intent(in) :: home(:), n_processes
-      integer(ip), allocatable, intent(out) :: counts(:), list(:)
-      integer(ip) :: next(0:n_processes), k
-
-      next = 0_ip
-      do k = 1_ip, size(home, kind=ip)
-         next(home(k) + 1_ip) = next(home(k) + 1_ip) + 1_ip
-      end do
-      allocate (counts(0:n_processes - 1_ip), list(size(home)))
-      counts = next(1:)
-      do k = 1_ip, n_processes
-         next(k) = next(k) + next(k - 1_ip)
-      end do
-      do k = 1_ip, size(home, kind=ip)
-         next(home(k)) = next(home(k)) + 1_ip
-         list(next(home(k))) = k
-      end do
-   end subroutine group_by_home
 
    !> Places of keys in their ascending order
    pure subroutine rank_keys(keys, ranked)

@@ -50,7 +50,9 @@ module polydem_provenance
       character(len=:), allocatable :: binding
       !> How idle threads wait
       character(len=:), allocatable :: wait_policy
-      !> OpenMP threads of the run
+      !> Processes that share the run
+      integer(ip) :: processes = 1_ip
+      !> OpenMP threads of each
       integer(ip) :: threads = 0_ip
       !> Processors that the run may use
       integer(ip) :: processors = 0_ip
@@ -151,6 +153,7 @@ contains
       call file%write('/provenance/load', provenance%load, error)
       call file%write('/provenance/binding', provenance%binding, error)
       call file%write('/provenance/wait_policy', provenance%wait_policy, error)
+      call file%write('/provenance/processes', provenance%processes, error)
       call file%write('/provenance/threads', provenance%threads, error)
       call file%write('/provenance/processors', provenance%processors, error)
       call file%write('/provenance/command_line', provenance%command_line, error)
