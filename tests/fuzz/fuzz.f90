@@ -8,6 +8,7 @@ program fuzz
    use, intrinsic :: iso_fortran_env, only: error_unit
    use fuzz_cases, only: spoilt_file, try_bodies, try_bytes, try_checkpoint, try_namelist, try_override, &
       try_scene, try_segment, try_trace, write_sound_file
+   use hostile_fields, only: field_t
    use hostile_file, only: count_open_objects, start_hdf5
    use polydem_clock, only: wall_seconds
    use polydem_errors, only: error_t, input_error, io_error, run_error
@@ -15,11 +16,13 @@ program fuzz
    use polydem_random, only: new_random, random_t
    use polydem_text_file, only: read_text_file
    use polydem_words, only: text_t
+   use spoilt_checkpoint, only: sound_checkpoint
    implicit none
 
    character(len=16), parameter :: namelists(*) = [character(len=16) :: 'stack.nml', 'drum.nml', 'gas.nml', &
       'heap.nml', 'hopper.nml', 'incline.nml', 'bed.nml', 'bench_scenes.nml']
    type(text_t) :: sound(size(namelists))
+   type(field_t), allocatable :: checkpoint(:)
    type(random_t) :: random
    type(error_t), allocatable :: error
    character(len=1024) :: words(4)
@@ -80,6 +83,7 @@ contains
       integer :: n
 
       random = new_random(0_ip)
+      if (words(1) == 'checkpoint') checkpoint = sound_checkpoint()
       n = index(words(1), '_bytes')
       if (n > 0) then
          call write_sound_file(words(1)(:n - 1), 'sound.h5', random)
@@ -108,7 +112,7 @@ contains
       case ('trace')
          call try_trace(random, error)
       case ('checkpoint')
-         call try_checkpoint(random, error)
+         call try_checkpoint(random, checkpoint, error)
       case ('packing', 'result')
          call try_segment(kind_of_case, random, error)
       case ('bodies_bytes', 'trace_bytes', 'checkpoint_bytes', 'packing_bytes', 'result_bytes')

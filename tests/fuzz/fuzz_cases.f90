@@ -128,14 +128,16 @@ contains
    end subroutine try_trace
 
    !> A checkpoint whose seal is right, and the run that goes on from it
-   subroutine try_checkpoint(random, error)
+   subroutine try_checkpoint(random, sound, error)
       !> Random numbers
       type(random_t), intent(inout) :: random
+      !> What a sound one holds
+      type(field_t), intent(in) :: sound(:)
       !> Why it was refused
       type(error_t), allocatable, intent(inout) :: error
       type(field_t), allocatable :: fields(:)
 
-      fields = sound_checkpoint()
+      fields = sound
       call spoil_fields(random, fields)
       call write_hostile_file(spoilt_file, fields, random, .false.)
       call put_behind_seal(spoilt_file)

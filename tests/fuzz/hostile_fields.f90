@@ -155,7 +155,7 @@ contains
 
       select case (random%whole(1_ip, 6_ip))
       case (1)
-         extent = [product(extent)]
+         if (product(real(extent, dp)) < 1.0e18_dp) extent = [product(extent)]
       case (2)
          extent = [extent, 1_hsize_t]
       case (3)
