@@ -207,6 +207,7 @@ contains
       call trade_freight(self%team, counts, freight, counts_received)
       self%domain%arrivals = self%domain%arrivals + &
          int(sum(counts_received) - counts_received(lbound(counts_received, 1) + self%team%rank), lp)
+      if (self%domain%settlements == 0_lp) self%domain%first_arrivals = self%domain%arrivals
       call unload(freight, (self%bodies%n_all), self%bodies, mover%slots)
       call self%integrator%start(self%bodies)
       call keep_columns(mover, self)
