@@ -17,12 +17,12 @@ contains
       type(simulation_t), intent(inout) :: self
       !> List to set them in
       type(counters_t), intent(inout) :: counters
-      integer(lp) :: sums(7), most(5)
+      integer(lp) :: sums(9), most(5)
 
       if (self%team%size == 1_ip) return
       associate (domain => self%domain)
          sums = [self%team%messages, self%team%bytes, domain%ghost_steps, domain%arrivals, domain%first_arrivals, &
-                 domain%step_messages, domain%step_bytes]
+                 domain%step_messages, domain%step_bytes, domain%first_messages, domain%first_bytes]
          most = [size(self%bodies%free, kind=lp), int(self%neighbours%pairs%n, lp), domain%ghost_steps, &
                  domain%step_messages, domain%step_bytes]
          call self%team%add_up(sums)
@@ -30,12 +30,15 @@ contains
          call counters%set('processes', int(self%team%size, lp))
          call counters%set('settlements', domain%settlements)
          call counters%set('divisions of space', domain%divisions)
+         call counters%set('rectangles', int(domain%regions%n_rectangles(), lp))
       end associate
       call counters%set('migrations', sums(4))
       call counters%set('migrations at the start', sums(5))
       call counters%set('ghosts, summed over steps', sums(3))
       call counters%set('messages', sums(1))
       call counters%set('bytes in messages', sums(2))
+      call counters%set('messages at the start', sums(8))
+      call counters%set('bytes at the start', sums(9))
       call counters%set('messages to ghosts', sums(6))
       call counters%set('bytes to ghosts', sums(7))
       call counters%set('most of a process: bodies', most(1))
