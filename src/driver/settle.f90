@@ -152,7 +152,13 @@ contains
       call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
       call fit_to_bodies(self, error, self%domain%grain)
       call self%domain%set_reference(self%boxes%bounds(:, :self%boxes%n), self%step)
-      self%domain%settlements = self%domain%settlements + 1_lp
+      associate (domain => self%domain)
+         domain%settlements = domain%settlements + 1_lp
+         if (domain%settlements > 1_lp) return
+         domain%first_arrivals = domain%arrivals
+         domain%first_messages = self%team%messages
+         domain%first_bytes = self%team%bytes
+      end associate
    end subroutine hand_out
 
    !> Process that will have each body, negative for fixed ones, (slot)

@@ -5,6 +5,7 @@ module polydem_simulation
    use polydem_contacts, only: is_degenerate
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t, input_error, raise, run_error
+   use polydem_exchange_counts, only: report_exchange
    use polydem_find_contacts, only: find_contacts
    use polydem_force_law, only: evaluate_law
    use polydem_guards, only: check_contacts, check_motion, check_places, check_step
@@ -121,8 +122,16 @@ contains
       logical :: shared
 
       shared = self%team%size > 1_ip
-      if (shared) call self%domain%ghosts%follow(self%team, self%bodies)
-      if (shared) call self%timers%lap(stage_exchange)
+      if (shared) then
+         associate (domain => self%domain, team => self%team)
+            domain%step_messages = domain%step_messages - team%messages
+            domain%step_bytes = domain%step_bytes - team%bytes
+            call domain%ghosts%follow(team, self%bodies)
+            domain%step_messages = domain%step_messages + team%messages
+            domain%step_bytes = domain%step_bytes + team%bytes
+         end associate
+         call self%timers%lap(stage_exchange)
+      end if
       if (.not. allocated(error)) then
          call turn_bodies(self%bodies, self%moving)
          call self%timers%lap(stage_integrate)
@@ -210,10 +219,9 @@ contains
       type(simulation_t), intent(inout) :: self
       !> List to set them in
       type(counters_t), intent(inout) :: counters
-      integer(lp) :: counts(6)
+      integer(lp) :: counts(2)
 
-      counts = [int(self%boxes%n, lp), self%team%messages, self%team%bytes, self%domain%ghost_steps, &
-                self%domain%arrivals, int(self%neighbours%pairs%n, lp)]
+      counts = [int(self%boxes%n, lp), int(self%neighbours%pairs%n, lp)]
       call self%team%add_up(counts)
       call collect_counts(self)
       call counters%set('steps', self%step)
@@ -225,16 +233,9 @@ contains
       call counters%set('contacts', self%sums(2))
       call counters%set('contacts without direction', self%sums(5))
       call self%neighbours%report(counters)
-      call counters%set('pairs', counts(6))
+      call counters%set('pairs', counts(2))
       if (allocated(self%law%constraint)) call self%law%constraint%report(counters)
-      if (self%team%size == 1_ip) return
-      call counters%set('processes', int(self%team%size, lp))
-      call counters%set('settlements', self%domain%settlements)
-      call counters%set('divisions of space', self%domain%divisions)
-      call counters%set('migrations', counts(5))
-      call counters%set('ghosts, summed over steps', counts(4))
-      call counters%set('messages', counts(2))
-      call counters%set('bytes in messages', counts(3))
+      call report_exchange(self, counters)
    end subroutine report_counters
 
    !> From the boxes of the bodies to the forces on them: the middle of the step.

@@ -40,6 +40,10 @@ module polydem_domain
       real(dp) :: division_seconds = 0.0_dp
       !> How often all was settled, space divided; bodies that came from other processes; ghosts, summed over steps
       integer(lp) :: settlements = 0_lp, divisions = 0_lp, arrivals = 0_lp, ghost_steps = 0_lp
+      !> What of that came when all was settled for the first time: bodies, messages of this process, their bytes
+      integer(lp) :: first_arrivals = 0_lp, first_messages = 0_lp, first_bytes = 0_lp
+      !> Messages of this process, and their bytes, that let ghosts follow in every step
+      integer(lp) :: step_messages = 0_lp, step_bytes = 0_lp
    contains
       procedure :: must_settle
       procedure :: set_reference

@@ -24,6 +24,8 @@ module polydem_regions
       integer(ip), allocatable :: owner(:)
       !> Those of them that meet `own`
       integer(ip), allocatable :: near(:)
+      !> Number of rectangles of all processes
+      integer(ip) :: n_published = 0_ip
       !> Rectangle on all boxes of this process [m]
       real(wp) :: own(4) = 0.0_wp
       !> Whether others come into a field of that rectangle
@@ -31,6 +33,7 @@ module polydem_regions
    contains
       procedure :: publish
       procedure :: needed_by
+      procedure :: n_rectangles
    end type regions_t
 
 contains
@@ -51,7 +54,8 @@ contains
       call cover(boxes, mine)
       call team%gather(rounded_outwards(mine), all_bounds, counts)
       counts = counts/4_ip
-      n = sum(counts) - counts(team%rank)
+      self%n_published = sum(counts)
+      n = self%n_published - counts(team%rank)
       if (allocated(self%owner)) deallocate (self%owner, self%near, self%rectangle)
       allocate (self%owner(n), self%rectangle(4, n))
       n = 0_ip
@@ -68,6 +72,13 @@ contains
       self%own = bounds_of(boxes)
       call draw_map(self)
    end subroutine publish
+
+   !> Number of rectangles that were published last, those of all processes
+   pure integer(ip) function n_rectangles(self)
+      class(regions_t), intent(in) :: self
+
+      n_rectangles = self%n_published
+   end function n_rectangles
 
    !> List the rectangles near this process, and mark the fields that they come into.
    pure subroutine draw_map(self)

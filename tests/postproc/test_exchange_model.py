@@ -53,26 +53,33 @@ def test_one_rank_costs_its_bodies_and_nothing_else(law):
 
 
 def test_every_part_of_the_time_is_what_it_was_made_of(law):
-    machine = replace(MACHINE, ghost=0.25, imbalance=1.2, sums=3, interval=10.0, publication=0.5)
+    machine = replace(MACHINE, ghost=0.25, imbalance=1.2, sums=3, interval=10.0, settlement=0.5, settled_bytes=100.0)
     step = predict(law, machine, 1e6, 64)
     ghosts = law.ghosts(1e6 / 64)
     assert step.bodies == pytest.approx(1.2 * 1e6 / 64 * 1e-6)
     assert step.ghosts == pytest.approx(0.25 * ghosts * 1e-6)
     assert step.neighbours == pytest.approx(8e-6 + ghosts * 48 / 1e9)
-    assert step.everyone == pytest.approx(3 * 6e-6 + (6e-6 + 64 * 2 * 32 / 1e9 + 0.5e-6 * 1e6 / 64) / 10.0)
+    assert step.everyone == pytest.approx(3 * 6e-6)
+    waits = (13 * 6 + 9 * 8) * 1e-6
+    assert step.settling == pytest.approx((waits + (64 * 2 * 32 + 100 * ghosts) / 1e9 + 0.5e-6 * 1e6 / 64) / 10.0)
+    assert step.total == pytest.approx(step.bodies + step.ghosts + step.neighbours + step.everyone + step.settling)
     assert predict(law, machine, 1e6, 2).neighbours == pytest.approx(1e-6 + law.ghosts(5e5) * 48 / 1e9)
 
 
 def test_the_time_falls_until_latency_stops_it(law):
     table = scale_table(law, MACHINE, 1e5)
-    steps = [float(row[7]) for row in table.rows]
+    steps = [float(row[8]) for row in table.rows]
     assert [int(row[0]) for row in table.rows] == list(RANKS)
     assert steps[:8] == sorted(steps[:8], reverse=True)
     assert min(steps) > 8.0
-    efficiencies = [float(row[9]) for row in table.rows]
+    efficiencies = [float(row[10]) for row in table.rows]
     assert efficiencies[0] == 100.0 and efficiencies == sorted(efficiencies, reverse=True)
-    for word in ("1.50 mean distances", "latency 1 us", "1 GB/s", "8 messages", "every 20 steps", "Left out"):
+    for word in ("1.50 mean distances", "latency 1 us", "1 GB/s", "8 messages", "every 40 steps", "Left out"):
         assert word in table.note
+
+
+def test_few_ranks_make_no_row_of_strips():
+    assert strip_table([counted(2), counted(8)]).rows == []
 
 
 def test_files_are_read_and_joined(tmp_path):

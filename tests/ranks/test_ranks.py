@@ -49,6 +49,33 @@ def test_the_result_has_the_same_bits(combination, expected, outcomes, tmp_path)
         outcome.migrations.append(count(output, "migrations"))
 
 
+@pytest.mark.parametrize("scene, row_bytes", [("drum", 48), ("hopper", 72)])
+def test_what_ranks_tell_each_other_is_counted(scene, row_bytes, tmp_path):
+    ranks = 3
+    write_scene(tmp_path / "scene.nml", scene)
+    # With such a margin every rank has all bodies, once and for all.
+    output, _ = run(tmp_path / "scene.nml", tmp_path / "result", ranks, 1, ("--set", "exchange.margin=100"))
+    counts = {name: count(output, name) for name in (
+        "steps", "settlements", "migrations", "migrations at the start", "messages", "messages at the start",
+        "bytes in messages", "bytes at the start", "rectangles")}
+    steps, told = counts["steps"], counts["steps"] - 1
+    ghosts = count(output, "ghosts, summed over steps")
+    bodies = ghosts // (2*steps)
+    assert ghosts == 2*bodies*steps and bodies > 100
+    assert counts["settlements"] == 1 and counts["rectangles"] >= ranks
+    assert 0 < counts["migrations"] == counts["migrations at the start"] < bodies
+    assert count(output, "messages to ghosts") == ranks*(ranks - 1)*told
+    assert count(output, "bytes to ghosts") == row_bytes*2*bodies*told
+    assert counts["messages"] >= counts["messages at the start"] + count(output, "messages to ghosts")
+    assert counts["bytes in messages"] >= counts["bytes at the start"] + count(output, "bytes to ghosts")
+    most = {name: count(output, f"most of a process: {name}") for name in ("bodies", "ghosts", "messages", "bytes")}
+    assert bodies <= ranks*most["bodies"] and most["bodies"] < bodies
+    assert most["messages"] == (ranks - 1)*told
+    assert most["bytes"] == row_bytes*2*most["bodies"]*told
+    # The one that has fewest bodies of its own has most ghosts.
+    assert 2*bodies*steps <= ranks*most["ghosts"] and most["ghosts"] < bodies*steps
+
+
 def interrupt(folder, namelist, ranks, options):
     """Begin or continue a run, and end it by a signal soon after its next checkpoint."""
     before = newest(folder)

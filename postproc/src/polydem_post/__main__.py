@@ -154,26 +154,36 @@ def _add_sweep(verbs) -> None:
 def _add_scale(verbs) -> None:
     scale = verbs.add_parser(
         "scale", help="reckon the time of a step on many ranks from counts",
-        description="Prints Markdown: how wide the strips of ghosts are that were counted, and the time of a step on 1 "
-                    "to 4096 ranks with all that is assumed.")
+        description="Prints Markdown: what the ranks of runs told each other, how wide the strips of ghosts are, and "
+                    "the time of a step on 1 to 4096 ranks with all that is assumed.")
     scale.set_defaults(action=_scale)
-    scale.add_argument("counts", type=Path, nargs="+", metavar="COUNTS.csv", help="files of count_exchange")
-    scale.add_argument("--bodies", type=_positive, default=1e6, metavar="N", help="bodies of all ranks (default: 1e6)")
-    scale.add_argument("--body", type=_positive, required=True, metavar="S", help="time of a step per body [s]")
+    scale.add_argument("counts", type=Path, nargs="+", metavar="COUNTS",
+                       help="folders of runs on several ranks, files of --save, files of count_exchange")
+    scale.add_argument("--save", type=Path, metavar="FILE.csv", help="write the counts of the runs")
+    scale.add_argument("--bodies", type=_positives, default=[1e6], metavar="N,...",
+                       help="bodies of all ranks, a table for each (default: 1e6)")
+    scale.add_argument("--body", type=_positive, metavar="S",
+                       help="time of a step per body on one rank [s]; without it counts only")
     for name, default, meaning in (
         ("latency", 2e-6, "time of a message of no length [s]"),
         ("bandwidth", 1e9, "of a rank [B/s]"),
         ("ghost", 0.5, "what a ghost costs, in bodies"),
         ("imbalance", 1.1, "work of the busiest rank over the mean"),
-        ("interval", 20.0, "steps between two publications of regions"),
-        ("publication", 0.5, "what one costs, in steps of the own bodies"),
+        ("interval", 40.0, "steps between two settlements"),
+        ("settlement", 1.0, "what one costs, in steps of the own bodies"),
+        ("settled-bytes", 300.0, "what one tells of a ghost"),
     ):
         scale.add_argument(f"--{name}", type=_positive, default=default, metavar="X",
                            help=f"{meaning} (default: {default:g})")
-    scale.add_argument("--sums", type=_count, default=1, metavar="K", help="sums over all ranks in a step (default: 1)")
-    scale.add_argument("--shape", default="drum", help="packing that was counted: box or drum (default: drum)")
+    scale.add_argument("--sums", type=_count, default=2, metavar="K", help="sums over all ranks in a step (default: 2)")
+    scale.add_argument("--shape", help="packing that was counted: run, box or drum (default: run if there are runs, "
+                                       "else drum)")
     scale.add_argument("--cut", default="bisection", help="bisection or morton (default: bisection)")
-    scale.add_argument("--margin", type=_positive, default=0.2, help="in long axes of a grain (default: 0.2)")
+    scale.add_argument("--margin", type=_positive, help="of count_exchange, in long axes of a grain (default: 0.2)")
+
+
+def _positives(text: str) -> list[float]:
+    return [_positive(word) for word in text.split(",")]
 
 
 def _positive(text: str) -> float:
@@ -311,12 +321,24 @@ def _sweep_program(options: argparse.Namespace) -> Path:
 
 def _scale(options: argparse.Namespace) -> None:
     from .exchange_model import Machine, fit_law, read_counts, scale_table, strip_table
+    from .exchange_runs import MARGIN, SHAPE, read_run, read_runs, runs_tables, write_runs
 
-    counts = read_counts(options.counts)
-    machine = Machine(**{field.name: getattr(options, field.name) for field in fields(Machine)})
-    law = fit_law(counts, options.shape, options.cut, options.margin)
-    print(strip_table(counts).document("markdown"))
-    print(scale_table(law, machine, options.bodies).document("markdown"), end="")
+    runs, files = [], []
+    for path in options.counts:
+        found = [read_run(path)] if path.is_dir() else read_runs(path)
+        runs += found
+        files += [] if found else [path]
+    counts = [run.as_count() for run in runs if run.ranks > 1] + (read_counts(files) if files else [])
+    if options.save:
+        write_runs(runs, options.save)
+    tables = runs_tables(runs) if runs else []
+    tables.append(strip_table(counts))
+    if options.body:
+        machine = Machine(**{field.name: getattr(options, field.name) for field in fields(Machine)})
+        shape = options.shape or (SHAPE if runs else "drum")
+        law = fit_law(counts, shape, options.cut, MARGIN if shape == SHAPE else options.margin or 0.2)
+        tables += [scale_table(law, machine, bodies) for bodies in options.bodies]
+    print("\n".join(table.document("markdown") for table in tables), end="")
 
 
 def _say(line: str) -> None:

@@ -1,7 +1,7 @@
 """Time of a step on many ranks, reckoned from counts.
 
-What ranks tell each other is counted exactly by `count_exchange` (tests/exchange), on any machine. A rank has ghosts
-in a strip around its region. If n grains fill a square of side sqrt(n), in mean distances of grains, and the strip
+What ranks tell each other is counted exactly, on any machine, by runs of the program (exchange_runs.py) and, in still
+packings, by `count_exchange` (tests/exchange). A rank has ghosts in a strip around its region. If n grains fill a square of side sqrt(n), in mean distances of grains, and the strip
 is w wide, then n + ghosts = (sqrt(n) + 2 w)^2, so
 
     ghosts per grain = 4 w sqrt(P/N) + 4 w^2 P/N
@@ -29,6 +29,9 @@ RANKS = tuple(2**k for k in range(13))
 
 #: Bytes of a rectangle that is told to all ranks
 RECTANGLE = 32
+
+#: What handing bodies out anew takes: calls in which all ranks take part, and rounds of messages to neighbours
+SETTLING_CALLS, SETTLING_ROUNDS = 13, 9
 
 
 @dataclass(frozen=True)
@@ -83,12 +86,14 @@ class Machine:
     ghost: float = 0.5
     #: Greatest work of a rank over the mean
     imbalance: float = 1.1
-    #: Sums over all ranks in a step
-    sums: int = 1
-    #: Steps between two publications of the regions
-    interval: float = 20.0
-    #: What a publication costs per body, in steps
-    publication: float = 0.5
+    #: Sums over all ranks in a step: to settle or fail together, and to know of signals
+    sums: int = 2
+    #: Steps between two settlements, in which bodies are handed out anew; the program aims at 40 or more
+    interval: float = 40.0
+    #: What a settlement costs per own body, in steps
+    settlement: float = 1.0
+    #: Bytes that it tells of a ghost: its shape and state
+    settled_bytes: float = 300.0
 
 
 @dataclass(frozen=True)
@@ -123,13 +128,15 @@ class Step:
     ghosts: float
     #: Messages to neighbours
     neighbours: float
-    #: Sums over all ranks, and the share of a step in the publication of regions
+    #: Sums over all ranks
     everyone: float
+    #: The share of a step in a settlement
+    settling: float
 
     @property
     def total(self) -> float:
         """Time of the step [s]."""
-        return self.bodies + self.ghosts + self.neighbours + self.everyone
+        return self.bodies + self.ghosts + self.neighbours + self.everyone + self.settling
 
 
 def read_counts(paths) -> list[Count]:
@@ -180,16 +187,19 @@ def predict(law: Law, machine: Machine, bodies: float, ranks: int) -> Step:
     """Times of a step of so many bodies on so many ranks; one rank alone talks to nobody."""
     own = bodies / ranks
     if ranks == 1:
-        return Step(own * machine.body, 0.0, 0.0, 0.0)
+        return Step(own * machine.body, 0.0, 0.0, 0.0, 0.0)
     ghosts = law.ghosts(own)
+    messages = min(law.messages, ranks - 1)
     stages = math.ceil(math.log2(ranks))
-    told = ranks * law.rectangles * RECTANGLE / machine.bandwidth
-    publication = stages * machine.latency + told + machine.publication * machine.body * own
+    waits = SETTLING_CALLS * stages + SETTLING_ROUNDS * messages
+    told = ranks * law.rectangles * RECTANGLE + ghosts * machine.settled_bytes
+    settlement = waits * machine.latency + told / machine.bandwidth + machine.settlement * machine.body * own
     return Step(
         bodies=machine.imbalance * own * machine.body,
         ghosts=ghosts * machine.ghost * machine.body,
-        neighbours=min(law.messages, ranks - 1) * machine.latency + ghosts * law.ghost_bytes / machine.bandwidth,
-        everyone=machine.sums * stages * machine.latency + publication / machine.interval,
+        neighbours=messages * machine.latency + ghosts * law.ghost_bytes / machine.bandwidth,
+        everyone=machine.sums * stages * machine.latency,
+        settling=settlement / machine.interval,
     )
 
 
@@ -197,13 +207,15 @@ def strip_table(counts: list[Count]) -> Table:
     """How wide the strip of ghosts is, for everything that was counted."""
     heading = ("packing", "cut", "margin", "counts", "strip", "least", "most", "messages", "rectangles per rank")
     table = Table("strips", "Width of the strip of ghosts, in mean distances of grains", heading, texts=2)
-    for shape, cut, margin in sorted({(count.shape, count.cut, count.margin) for count in counts}):
-        law = fit_law(counts, shape, cut, margin)
+    enough = [count for count in counts if count.ranks >= SURROUNDED and count.ghosts > 0]
+    for shape, cut, margin in sorted({(count.shape, count.cut, count.margin) for count in enough}):
+        law = fit_law(enough, shape, cut, margin)
         widths = [f"{width:.2f}" for width in (law.strip, *law.spread)]
         table.add(shape, cut, f"{margin:g}", law.counts, *widths, law.messages, f"{law.rectangles:.1f}")
     table.note = (
         "Ghosts per body are 4 w sqrt(P/N) + 4 w^2 P/N for N bodies on P ranks and a strip of width w; the rank with "
-        "most ghosts counts. Messages: those of the busiest rank in a step."
+        f"most ghosts counts, and only runs and packings on {SURROUNDED} ranks or more. Messages: those of the busiest "
+        "rank in a step. Margin 0: a run, which chooses its own."
     )
     return table
 
@@ -211,14 +223,14 @@ def strip_table(counts: list[Count]) -> Table:
 def scale_table(law: Law, machine: Machine, bodies: float, ranks=RANKS) -> Table:
     """Time of a step against the number of ranks, with all that is assumed."""
     heading = ("ranks", "bodies per rank", "ghosts per body", "bodies [us]", "ghosts [us]", "neighbours [us]",
-               "everyone [us]", "step [us]", "speed-up", "efficiency [%]")
+               "everyone [us]", "settling [us]", "step [us]", "speed-up", "efficiency [%]")
     table = Table("scale", f"Time of a step of {bodies:g} bodies, reckoned", heading, texts=0)
     alone = predict(law, machine, bodies, 1).total
     for size in ranks:
         step = predict(law, machine, bodies, size)
         own = bodies / size
         gain = alone / step.total
-        times = (step.bodies, step.ghosts, step.neighbours, step.everyone, step.total)
+        times = (step.bodies, step.ghosts, step.neighbours, step.everyone, step.settling, step.total)
         table.add(size, number(own, 4), number(law.ghosts(own) / own if size > 1 else 0.0),
                   *(number(1e6 * time) for time in times), number(gain), f"{100.0 * gain / size:.0f}")
     table.note = _assumptions(law, machine)
@@ -230,13 +242,15 @@ def _assumptions(law: Law, machine: Machine) -> str:
     return "\n".join((
         "Reckoned, not measured. Counted: "
         f"a strip of ghosts {law.strip:.2f} mean distances wide ({law.spread[0]:.2f} to {law.spread[1]:.2f} in "
-        f"{law.counts} counts), {law.messages} messages in a step, {law.ghost_bytes:g} bytes per ghost, "
+        f"{law.counts} counts), {law.messages} messages in a step, {law.ghost_bytes:.3g} bytes per ghost, "
         f"{law.rectangles:.1f} rectangles per rank.",
         f"Given: {1e6 * machine.body:g} us per body and step, latency {1e6 * machine.latency:g} us, bandwidth "
         f"{1e-9 * machine.bandwidth:g} GB/s per rank. Assumed: a ghost costs {machine.ghost:g} of a body; the busiest "
-        f"rank works {machine.imbalance:g} times the mean; {machine.sums} sum(s) over all ranks in a step, and a "
-        f"publication of regions every {machine.interval:g} steps that costs {machine.publication:g} steps of the own "
-        "bodies; both take a latency for each doubling of the ranks.",
+        f"rank works {machine.imbalance:g} times the mean; {machine.sums} sums over all ranks in a step; a settlement "
+        f"every {machine.interval:g} steps that costs {machine.settlement:g} steps of the own bodies, "
+        f"{SETTLING_CALLS} calls of all ranks, {SETTLING_ROUNDS} rounds of messages to neighbours and "
+        f"{machine.settled_bytes:g} bytes per ghost, and tells all ranks all rectangles. Sums and calls take a latency "
+        "for each doubling of the ranks.",
         "Messages follow one another and hide behind no work; every rank has neighbours on all sides, which is too "
         f"much below {SURROUNDED} ranks. Left out: contention in the network, that ranks of one machine share memory "
         "and caches, output, and that space is divided anew.",

@@ -1,0 +1,179 @@
+"""What the ranks of real runs told each other, from the counters of their results.
+
+Counts are exact on any machine, however many ranks share a processor. What every step tells ghosts is kept apart from
+what is told when bodies are handed out anew, and this from the first time, when rank 0 has all bodies.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+
+from .emit import Table
+from .exchange_model import Count
+from .statistics import number
+from .trajectory import ResultError, Trajectory
+
+#: Packing and margin under which counts of runs stand: a run chooses its margin itself
+SHAPE, MARGIN = "run", 0.0
+
+#: Counters of a run of several processes, and what they are called here
+COUNTERS = {
+    "settlements": "settlements",
+    "divisions": "divisions of space",
+    "rectangles": "rectangles",
+    "migrations": "migrations",
+    "first_migrations": "migrations at the start",
+    "ghosts": "ghosts, summed over steps",
+    "messages": "messages to ghosts",
+    "bytes": "bytes to ghosts",
+    "all_messages": "messages",
+    "all_bytes": "bytes in messages",
+    "first_messages": "messages at the start",
+    "first_bytes": "bytes at the start",
+    "most_bodies": "most of a process: bodies",
+    "most_pairs": "most of a process: pairs",
+    "most_ghosts": "most of a process: ghosts",
+    "most_messages": "most of a process: messages",
+    "most_bytes": "most of a process: bytes",
+}
+
+
+@dataclass(frozen=True)
+class RunCount:
+    """Exact counts of a run; those of ghosts and messages are summed over steps and, but for `most_...`, over ranks."""
+
+    #: Free bodies, ranks, steps
+    bodies: int
+    ranks: int
+    steps: int
+    #: How space is cut: bisection or morton
+    cut: str
+    #: How often bodies were handed out, the first time included; how often space was divided
+    settlements: int
+    divisions: int
+    #: Rectangles that cover the bodies of all ranks
+    rectangles: int
+    #: Bodies that went to another rank, and those of them that did when rank 0 gave out all
+    migrations: int
+    first_migrations: int
+    #: Ghosts, and the messages and bytes that let them follow
+    ghosts: int
+    messages: int
+    bytes: int
+    #: All messages and bytes, and those until bodies had been handed out for the first time
+    all_messages: int
+    all_bytes: int
+    first_messages: int
+    first_bytes: int
+    #: Pairs of all ranks at the end
+    pairs: int
+    #: Of the rank that has most: bodies and pairs at the end; ghosts, messages and bytes
+    most_bodies: int
+    most_pairs: int
+    most_ghosts: int
+    most_messages: int
+    most_bytes: int
+    #: Hash of the state at the end
+    state_hash: str
+
+    @property
+    def told_steps(self) -> int:
+        """Steps in which ghosts followed: all but the first, at whose beginning there are none."""
+        return max(self.steps - 1, 1)
+
+    @property
+    def later_settlements(self) -> int:
+        """Times that bodies were handed out after the first."""
+        return max(self.settlements - 1, 0)
+
+    def as_count(self) -> Count:
+        """The means of a step, as count_exchange counts them in a packing."""
+        steps, told = self.steps, self.told_steps
+        return Count(
+            shape=SHAPE, grains=self.bodies, ranks=self.ranks, cut=self.cut, margin=MARGIN,
+            grains_most=self.most_bodies, ghosts=round(self.ghosts / steps), ghosts_most=round(self.most_ghosts / steps),
+            messages=round(self.messages / told), messages_most=math.ceil(self.most_messages / told),
+            bytes=round(self.bytes / told), bytes_most=round(self.most_bytes / told), rectangles=self.rectangles)
+
+
+def read_run(folder) -> RunCount:
+    """Counts of the result in a folder."""
+    result = Trajectory(folder)
+    counters = result.counters
+    ranks = counters.get("processes", 1)
+    missing = [name for name in ("steps", "pairs", *(COUNTERS.values() if ranks > 1 else ())) if name not in counters]
+    if missing or counters["steps"] < 1:
+        raise ResultError(f"{folder}: the run lacks counts ({', '.join(missing) or 'no steps'})")
+    cut = re.search(r"\bcut\s*=\s*'(\w+)'", result.provenance["resolved_input"])
+    bodies = int((~result.frame(0).fixed).sum())
+    counts = {field: counters.get(name, 0) for field, name in COUNTERS.items()}
+    if ranks == 1:
+        counts.update(most_bodies=bodies, most_pairs=counters["pairs"])
+    return RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], cut=cut[1] if cut else "bisection",
+                    pairs=counters["pairs"], state_hash=result.state_hash, **counts)
+
+
+def write_runs(runs: list[RunCount], path: Path) -> None:
+    """Write counts, one run in a row."""
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [field.name for field in fields(RunCount)], lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(map(asdict, runs))
+
+
+def read_runs(path: Path) -> list[RunCount]:
+    """Counts that write_runs wrote; none if the file holds something else."""
+    kinds = {"str": str, "int": int}
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            reader = csv.DictReader(file)
+            if reader.fieldnames != [field.name for field in fields(RunCount)]:
+                return []
+            return [RunCount(**{field.name: kinds[field.type](row[field.name]) for field in fields(RunCount)})
+                    for row in reader]
+    except OSError as error:
+        raise ResultError(f"{path}: {error.strerror}") from error
+    except (TypeError, ValueError) as error:
+        raise ResultError(f"{path}: damaged ({error})") from error
+
+
+def runs_tables(runs: list[RunCount]) -> list[Table]:
+    """What steps tell, and what handing bodies out tells."""
+    heading = ("cut", "bodies", "ranks", "ghosts per body", "most ghosts", "pairs per ghost", "messages", "of one rank",
+               "bytes", "of one rank", "bodies, most/mean", "pairs, most/mean", "hash")
+    steps = Table("runs", "Exact counts of runs, means of a step", heading, texts=1)
+    heading = ("cut", "bodies", "ranks", "steps", "settlements", "divisions", "migrations", "messages", "bytes",
+               "bytes per ghost", "at the start", "messages", "bytes")
+    settling = Table("settling", "Exact counts of handing bodies out anew", heading, texts=1)
+    order = sorted(runs, key=lambda run: (run.bodies, run.cut, run.ranks))
+    alone = {run.bodies: run.pairs for run in order if run.ranks == 1}
+    for run in order:
+        count = run.as_count()
+        extra = run.pairs - alone.get(run.bodies, run.pairs)
+        steps.add(run.cut, run.bodies, run.ranks, number(run.ghosts / run.steps / run.bodies), count.ghosts_most,
+                  number(extra / count.ghosts) if extra and count.ghosts else "-", count.messages, count.messages_most,
+                  count.bytes, count.bytes_most, number(run.most_bodies * run.ranks / run.bodies, 4),
+                  number(run.most_pairs * run.ranks / run.pairs, 4), run.state_hash)
+        if run.ranks > 1:
+            settling.add(run.cut, run.bodies, run.ranks, run.steps, run.settlements, run.divisions, *_later(run),
+                         run.first_migrations, run.first_messages, run.first_bytes)
+    steps.note = ("Messages and bytes are those that let ghosts follow. Pairs per ghost: how many pairs more than one "
+                  "process all have together at the end. Runs of the same scene have the same hash on any number of ranks.")
+    settling.note = ("Settlements: how often bodies were handed out, the first time included. Migrations (of the whole "
+                     "run), messages and bytes (of one time) are those after the first, when rank 0 gives out all "
+                     "bodies; that is on the right.")
+    return [steps, settling]
+
+
+def _later(run: RunCount) -> tuple:
+    """Migrations; messages, bytes, and bytes per ghost of a settlement after the first."""
+    if run.later_settlements == 0:
+        return 0, "-", "-", "-"
+    told = (run.all_bytes - run.bytes - run.first_bytes) / run.later_settlements
+    messages = (run.all_messages - run.messages - run.first_messages) / run.later_settlements
+    return (run.migrations - run.first_migrations, round(messages), round(told),
+            number(told * run.steps / run.ghosts) if run.ghosts else "-")

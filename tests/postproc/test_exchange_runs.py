@@ -1,0 +1,118 @@
+"""Counts of runs on several ranks, from results whose counters are made up."""
+
+import shutil
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+from polydem_post.__main__ import main
+from polydem_post.exchange_runs import COUNTERS, MARGIN, SHAPE, read_run, read_runs, runs_tables, write_runs
+from polydem_post.trajectory import ResultError, Trajectory
+
+#: Of 16 ranks, 101 steps, settled three times
+VALUES = {
+    "settlements": 3, "divisions of space": 1, "rectangles": 70, "migrations": 1000, "migrations at the start": 900,
+    "ghosts, summed over steps": 10100, "messages": 7000, "bytes in messages": 1480000, "messages at the start": 500,
+    "bytes at the start": 900000, "messages to ghosts": 6000, "bytes to ghosts": 480000,
+    "most of a process: bodies": 3, "most of a process: pairs": 20, "most of a process: ghosts": 1010,
+    "most of a process: messages": 401, "most of a process: bytes": 48000,
+}
+
+
+@pytest.fixture
+def make_result(finished, tmp_path):
+    """Copy the finished result under a name, with these counters."""
+
+    def make(name, counters, cut="morton"):
+        folder = tmp_path / name
+        shutil.copytree(finished, folder)
+        with h5py.File(folder / "profile.h5", "a") as file:
+            group = file.require_group("counters")
+            for old in list(group):
+                del group[old]
+            group["name"] = np.array(list(counters), dtype=h5py.string_dtype())
+            group["value"] = np.array(list(counters.values()), dtype=np.int64)
+            del file["provenance/resolved_input"]
+            file["provenance/resolved_input"] = f"&exchange\n   cut = '{cut}'\n/\n"
+        return folder
+
+    return make
+
+
+@pytest.fixture
+def shared(make_result):
+    return make_result("shared", {"steps": 101, "pairs": 130, "processes": 16, **VALUES})
+
+
+@pytest.fixture
+def alone(make_result):
+    return make_result("alone", {"steps": 101, "pairs": 80})
+
+
+def test_all_counters_of_a_run_are_read(shared):
+    run = read_run(shared)
+    assert {name: getattr(run, field) for field, name in COUNTERS.items()} == VALUES
+    result = Trajectory(shared)
+    assert run.bodies == int((~result.frame(0).fixed).sum()) > 0
+    assert (run.ranks, run.steps, run.cut, run.pairs, run.state_hash) == (16, 101, "morton", 130, result.state_hash)
+
+
+def test_counts_are_means_of_a_step_and_ghosts_do_not_follow_in_the_first(shared):
+    run = replace(read_run(shared), bodies=40)
+    count = run.as_count()
+    assert (count.shape, count.margin, count.cut, count.grains, count.ranks) == (SHAPE, MARGIN, "morton", 40, 16)
+    assert (count.ghosts, count.ghosts_most, count.messages, count.bytes) == (100, 10, 60, 4800)
+    assert (count.messages_most, count.bytes_most, count.rectangles, count.grains_most) == (5, 480, 70, 3)
+
+
+def test_the_tables_tell_steps_from_settlements_and_these_from_the_first(shared, alone):
+    runs = [replace(read_run(folder), bodies=40) for folder in (shared, alone)]
+    steps, settling = runs_tables(runs)
+    rows = [dict(zip(steps.heading, row)) for row in steps.rows]
+    assert [row["ranks"] for row in rows] == ["1", "16"]
+    row = next(row for row in rows if row["ranks"] == "16")
+    assert (row["ghosts per body"], row["most ghosts"], row["pairs per ghost"]) == ("2.50", "10", "0.500")
+    assert (row["bodies, most/mean"], row["pairs, most/mean"]) == ("1.200", "2.462")
+    assert [row[3:] for row in settling.rows] == [("101", "3", "1", "100", "250", "50000", "500", "900", "500", "900000")]
+
+
+def test_a_run_on_one_rank_has_its_bodies_and_tells_nothing(alone):
+    run = read_run(alone)
+    assert (run.ranks, run.most_bodies, run.most_pairs, run.ghosts, run.messages) == (1, run.bodies, 80, 0, 0)
+    assert run.later_settlements == 0
+
+
+def test_what_is_saved_is_read_again_and_nothing_else_is(shared, alone, tmp_path):
+    runs = [read_run(shared), read_run(alone)]
+    write_runs(runs, tmp_path / "runs.csv")
+    assert read_runs(tmp_path / "runs.csv") == runs
+    (tmp_path / "other.csv").write_text("shape,grains\nbox,1\n", encoding="utf-8")
+    assert read_runs(tmp_path / "other.csv") == []
+    damaged = (tmp_path / "runs.csv").read_text(encoding="utf-8").replace(",morton,", ",morton,x", 1)
+    (tmp_path / "runs.csv").write_text(damaged, encoding="utf-8")
+    with pytest.raises(ResultError, match="runs.csv: damaged"):
+        read_runs(tmp_path / "runs.csv")
+    with pytest.raises(ResultError, match="none.csv: No such file"):
+        read_runs(tmp_path / "none.csv")
+
+
+def test_results_without_these_counts_are_errors(make_result):
+    lacking = {name: value for name, value in VALUES.items() if name != "rectangles"}
+    with pytest.raises(ResultError, match=r"lacks counts \(rectangles\)"):
+        read_run(make_result("old", {"steps": 5, "pairs": 3, "processes": 4, **lacking}))
+    with pytest.raises(ResultError, match="no steps"):
+        read_run(make_result("still", {"steps": 0, "pairs": 3}))
+
+
+def test_the_command_takes_folders_and_saved_files(shared, alone, tmp_path, capsys):
+    saved = str(tmp_path / "saved.csv")
+    assert main(["scale", str(shared), str(alone), "--save", saved]) == 0
+    printed = capsys.readouterr().out
+    assert "### Exact counts of runs, means of a step" in printed and "reckoned" not in printed
+    assert main(["scale", saved, "--body", "1e-6", "--bodies", "1e5,1e6", "--cut", "morton"]) == 0
+    again = capsys.readouterr().out
+    assert again.startswith(printed) and again.count("| 4096 |") == 2
+    assert "### Time of a step of 100000 bodies" in again and "| run | morton | 0 | 1 |" in again
+    assert main(["scale", saved, "--body", "1e-6"]) == 2
+    assert "nothing was counted for run bisection 0" in capsys.readouterr().err
