@@ -1,4 +1,4 @@
-!> What processes told each other so far, as exact counts: how bodies, ghosts and messages are spread over processes, and
+!> What processes told each other so far, in exact counts: how bodies, ghosts and messages are spread over them, and
 !> what a step needs apart from what is told when bodies are handed out anew.
 module polydem_exchange_counts
    use polydem_counters, only: counters_t

@@ -44,7 +44,7 @@ def main() -> int:
     program, launch = sys.argv[1], sys.argv[2:]
     rows = count(program, launch, 1) + count(program, launch, 4)
     wrong = [f"{row}: {what}" for row in rows for what in complaints(row)]
-    if len(rows) != 32:
+    if len(rows) != 40:
         wrong.append(f"{len(rows)} rows")
     for narrow, wide in zip(rows, rows[1:]):
         if narrow["margin"] < wide["margin"] and narrow["ghosts"] > wide["ghosts"]:

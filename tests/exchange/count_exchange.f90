@@ -16,7 +16,7 @@ program count_exchange
    implicit none
 
    !> How far a body may move until regions are published anew [m]
-   real(wp), parameter :: margins(4) = [0.1_wp, 0.2_wp, 0.5_wp, 1.0_wp]
+   real(wp), parameter :: margins(5) = [0.1_wp, 0.2_wp, 0.5_wp, 1.0_wp, 2.0_wp]
    !> Bytes of a body that moves: place, angle, and how fast they change
    integer(lp), parameter :: bytes_per_ghost = 48_lp
 

@@ -142,7 +142,7 @@ class Words(Toy):
     def test_help_needs_no_build(self):
         code, output, _ = self.call("--help")
         self.assertEqual(code, 0)
-        verbs = "run check info plot replay bench workprecision costs sweep test verify"
+        verbs = "run check info plot replay bench workprecision costs scale sweep test verify"
         for word in [*verbs.split(), "--no-install"]:
             self.assertIn(f"\n  {word} ", output)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
@@ -325,6 +325,14 @@ class Build(Toy):
         code, output, messages = self.call("info", launcher=os.path.join(moved, "polydem"), POLYDEM_PRESET="debug")
         self.assertEqual((code, output), (0, "<info>\n"))
         self.assertIn("building", messages)
+
+    def test_scale_needs_only_python(self):
+        self.write(".venv/bin/python", '#!/bin/bash\nprintf "<%s>\\n" "$@"\n')
+        os.chmod(os.path.join(self.folder, ".venv", "bin", "python"), 0o755)
+        code, output, messages = self.call("scale", "my counts.csv", "--body", "1e-6")
+        self.assertEqual((code, messages), (0, ""))
+        self.assertEqual(output, "<-m>\n<polydem_post>\n<scale>\n<my counts.csv>\n<--body>\n<1e-6>\n")
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build", "release", "src")))
 
     def test_workprecision_builds_three_precisions_and_hands_their_programs_on(self):
         self.write(".venv/bin/python", '#!/bin/bash\nprintf "%s\\n" "$@"\n')

@@ -24,7 +24,7 @@ VALUES = {
 def make_result(finished, tmp_path):
     """Copy the finished result under a name, with these counters."""
 
-    def make(name, counters, cut="morton"):
+    def make(name, counters, exchange="cut = 'morton'\n   margin = 0.0"):
         folder = tmp_path / name
         shutil.copytree(finished, folder)
         with h5py.File(folder / "profile.h5", "a") as file:
@@ -34,7 +34,7 @@ def make_result(finished, tmp_path):
             group["name"] = np.array(list(counters), dtype=h5py.string_dtype())
             group["value"] = np.array(list(counters.values()), dtype=np.int64)
             del file["provenance/resolved_input"]
-            file["provenance/resolved_input"] = f"&exchange\n   cut = '{cut}'\n/\n"
+            file["provenance/resolved_input"] = f"&boxes\n   margin = 7.0\n/\n&exchange\n   {exchange}\n/\n"
         return folder
 
     return make
@@ -58,6 +58,13 @@ def test_all_counters_of_a_run_are_read(shared):
     assert (run.ranks, run.steps, run.cut, run.pairs, run.state_hash) == (16, 101, "morton", 130, result.state_hash)
 
 
+def test_cut_and_margin_are_those_of_the_group_exchange(make_result):
+    counters = {"steps": 1, "pairs": 1}
+    assert read_run(make_result("a", counters)).margin == 0.0
+    run = read_run(make_result("b", counters, "margin = 9.5E-003\n   cut = 'bisection'"))
+    assert (run.cut, run.margin, run.as_count().margin) == ("bisection", 0.0095, 0.0095)
+
+
 def test_counts_are_means_of_a_step_and_ghosts_do_not_follow_in_the_first(shared):
     run = replace(read_run(shared), bodies=40)
     count = run.as_count()
@@ -74,7 +81,8 @@ def test_the_tables_tell_steps_from_settlements_and_these_from_the_first(shared,
     row = next(row for row in rows if row["ranks"] == "16")
     assert (row["ghosts per body"], row["most ghosts"], row["pairs per ghost"]) == ("2.50", "10", "0.500")
     assert (row["bodies, most/mean"], row["pairs, most/mean"]) == ("1.200", "2.462")
-    assert [row[3:] for row in settling.rows] == [("101", "3", "1", "100", "250", "50000", "500", "900", "500", "900000")]
+    expected = ("101", "3", "1", "100", "250", "50000", "500", "900", "500", "900000")
+    assert [row[4:] for row in settling.rows] == [expected]
 
 
 def test_a_run_on_one_rank_has_its_bodies_and_tells_nothing(alone):

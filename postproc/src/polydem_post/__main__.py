@@ -179,7 +179,8 @@ def _add_scale(verbs) -> None:
     scale.add_argument("--shape", help="packing that was counted: run, box or drum (default: run if there are runs, "
                                        "else drum)")
     scale.add_argument("--cut", default="bisection", help="bisection or morton (default: bisection)")
-    scale.add_argument("--margin", type=_positive, help="of count_exchange, in long axes of a grain (default: 0.2)")
+    scale.add_argument("--margin", type=_positive, help="of runs in m (default: those that choose their own), of "
+                                                        "count_exchange in long axes of a grain (default: 0.2)")
 
 
 def _positives(text: str) -> list[float]:
@@ -336,7 +337,7 @@ def _scale(options: argparse.Namespace) -> None:
     if options.body:
         machine = Machine(**{field.name: getattr(options, field.name) for field in fields(Machine)})
         shape = options.shape or (SHAPE if runs else "drum")
-        law = fit_law(counts, shape, options.cut, MARGIN if shape == SHAPE else options.margin or 0.2)
+        law = fit_law(counts, shape, options.cut, options.margin or (MARGIN if shape == SHAPE else 0.2))
         tables += [scale_table(law, machine, bodies) for bodies in options.bodies]
     print("\n".join(table.document("markdown") for table in tables), end="")
 

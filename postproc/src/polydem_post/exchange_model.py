@@ -1,8 +1,8 @@
 """Time of a step on many ranks, reckoned from counts.
 
 What ranks tell each other is counted exactly, on any machine, by runs of the program (exchange_runs.py) and, in still
-packings, by `count_exchange` (tests/exchange). A rank has ghosts in a strip around its region. If n grains fill a square of side sqrt(n), in mean distances of grains, and the strip
-is w wide, then n + ghosts = (sqrt(n) + 2 w)^2, so
+packings, by `count_exchange` (tests/exchange). A rank has ghosts in a strip around its region. If n grains fill a
+square of side sqrt(n), in mean distances of grains, and the strip is w wide, then n + ghosts = (sqrt(n) + 2 w)^2, so
 
     ghosts per grain = 4 w sqrt(P/N) + 4 w^2 P/N
 
@@ -46,7 +46,7 @@ class Count:
     ranks: int
     #: How space is cut: bisection or morton
     cut: str
-    #: How far grains may move until regions are found anew, in long axes
+    #: How far grains may move until regions are found anew, in long axes; of runs in m, 0 if they choose it
     margin: float
     #: Grains of the rank that has most
     grains_most: int
@@ -215,7 +215,7 @@ def strip_table(counts: list[Count]) -> Table:
     table.note = (
         "Ghosts per body are 4 w sqrt(P/N) + 4 w^2 P/N for N bodies on P ranks and a strip of width w; the rank with "
         f"most ghosts counts, and only runs and packings on {SURROUNDED} ranks or more. Messages: those of the busiest "
-        "rank in a step. Margin 0: a run, which chooses its own."
+        "rank in a step. Margin: of packings in long axes, of runs in m; 0: they chose it."
     )
     return table
 

@@ -17,7 +17,7 @@ from .exchange_model import Count
 from .statistics import number
 from .trajectory import ResultError, Trajectory
 
-#: Packing and margin under which counts of runs stand: a run chooses its margin itself
+#: Packing under which counts of runs stand, and the margin of a run that chooses its own
 SHAPE, MARGIN = "run", 0.0
 
 #: Counters of a run of several processes, and what they are called here
@@ -52,6 +52,8 @@ class RunCount:
     steps: int
     #: How space is cut: bisection or morton
     cut: str
+    #: How far bodies may move until they are handed out anew [m]; 0: the run chose it
+    margin: float
     #: How often bodies were handed out, the first time included; how often space was divided
     settlements: int
     divisions: int
@@ -94,8 +96,9 @@ class RunCount:
         """The means of a step, as count_exchange counts them in a packing."""
         steps, told = self.steps, self.told_steps
         return Count(
-            shape=SHAPE, grains=self.bodies, ranks=self.ranks, cut=self.cut, margin=MARGIN,
-            grains_most=self.most_bodies, ghosts=round(self.ghosts / steps), ghosts_most=round(self.most_ghosts / steps),
+            shape=SHAPE, grains=self.bodies, ranks=self.ranks, cut=self.cut, margin=self.margin,
+            grains_most=self.most_bodies,
+            ghosts=round(self.ghosts / steps), ghosts_most=round(self.most_ghosts / steps),
             messages=round(self.messages / told), messages_most=math.ceil(self.most_messages / told),
             bytes=round(self.bytes / told), bytes_most=round(self.most_bytes / told), rectangles=self.rectangles)
 
@@ -108,13 +111,15 @@ def read_run(folder) -> RunCount:
     missing = [name for name in ("steps", "pairs", *(COUNTERS.values() if ranks > 1 else ())) if name not in counters]
     if missing or counters["steps"] < 1:
         raise ResultError(f"{folder}: the run lacks counts ({', '.join(missing) or 'no steps'})")
-    cut = re.search(r"\bcut\s*=\s*'(\w+)'", result.provenance["resolved_input"])
+    group = re.search(r"^&exchange\b(.*?)^/", result.provenance["resolved_input"], re.DOTALL | re.MULTILINE)
+    entries = dict(re.findall(r"(\w+)\s*=\s*'?([^\s']+)", group[1])) if group else {}
     bodies = int((~result.frame(0).fixed).sum())
     counts = {field: counters.get(name, 0) for field, name in COUNTERS.items()}
     if ranks == 1:
         counts.update(most_bodies=bodies, most_pairs=counters["pairs"])
-    return RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], cut=cut[1] if cut else "bisection",
-                    pairs=counters["pairs"], state_hash=result.state_hash, **counts)
+    return RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], cut=entries.get("cut", "bisection"),
+                    margin=float(entries.get("margin", MARGIN)), pairs=counters["pairs"],
+                    state_hash=result.state_hash, **counts)
 
 
 def write_runs(runs: list[RunCount], path: Path) -> None:
@@ -127,7 +132,7 @@ def write_runs(runs: list[RunCount], path: Path) -> None:
 
 def read_runs(path: Path) -> list[RunCount]:
     """Counts that write_runs wrote; none if the file holds something else."""
-    kinds = {"str": str, "int": int}
+    kinds = {"str": str, "int": int, "float": float}
     try:
         with path.open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
@@ -143,26 +148,28 @@ def read_runs(path: Path) -> list[RunCount]:
 
 def runs_tables(runs: list[RunCount]) -> list[Table]:
     """What steps tell, and what handing bodies out tells."""
-    heading = ("cut", "bodies", "ranks", "ghosts per body", "most ghosts", "pairs per ghost", "messages", "of one rank",
-               "bytes", "of one rank", "bodies, most/mean", "pairs, most/mean", "hash")
+    heading = ("cut", "margin", "bodies", "ranks", "ghosts per body", "most ghosts", "pairs per ghost", "messages",
+               "of one rank", "bytes", "of one rank", "bodies, most/mean", "pairs, most/mean", "steps", "hash")
     steps = Table("runs", "Exact counts of runs, means of a step", heading, texts=1)
-    heading = ("cut", "bodies", "ranks", "steps", "settlements", "divisions", "migrations", "messages", "bytes",
-               "bytes per ghost", "at the start", "messages", "bytes")
+    heading = ("cut", "margin", "bodies", "ranks", "steps", "settlements", "divisions", "migrations", "messages",
+               "bytes", "bytes per ghost", "at the start", "messages", "bytes")
     settling = Table("settling", "Exact counts of handing bodies out anew", heading, texts=1)
-    order = sorted(runs, key=lambda run: (run.bodies, run.cut, run.ranks))
-    alone = {run.bodies: run.pairs for run in order if run.ranks == 1}
+    order = sorted(runs, key=lambda run: (run.bodies, run.margin, run.cut, run.ranks))
+    alone = {(run.bodies, run.steps): run.pairs for run in order if run.ranks == 1}
     for run in order:
         count = run.as_count()
-        extra = run.pairs - alone.get(run.bodies, run.pairs)
-        steps.add(run.cut, run.bodies, run.ranks, number(run.ghosts / run.steps / run.bodies), count.ghosts_most,
-                  number(extra / count.ghosts) if extra and count.ghosts else "-", count.messages, count.messages_most,
-                  count.bytes, count.bytes_most, number(run.most_bodies * run.ranks / run.bodies, 4),
-                  number(run.most_pairs * run.ranks / run.pairs, 4), run.state_hash)
+        extra = run.pairs - alone.get((run.bodies, run.steps), run.pairs)
+        steps.add(run.cut, f"{run.margin:g}", run.bodies, run.ranks, number(run.ghosts / run.steps / run.bodies),
+                  count.ghosts_most, number(extra / count.ghosts) if extra and count.ghosts else "-", count.messages,
+                  count.messages_most, count.bytes, count.bytes_most,
+                  number(run.most_bodies * run.ranks / run.bodies, 4),
+                  number(run.most_pairs * run.ranks / run.pairs, 4), run.steps, run.state_hash)
         if run.ranks > 1:
-            settling.add(run.cut, run.bodies, run.ranks, run.steps, run.settlements, run.divisions, *_later(run),
-                         run.first_migrations, run.first_messages, run.first_bytes)
-    steps.note = ("Messages and bytes are those that let ghosts follow. Pairs per ghost: how many pairs more than one "
-                  "process all have together at the end. Runs of the same scene have the same hash on any number of ranks.")
+            settling.add(run.cut, f"{run.margin:g}", run.bodies, run.ranks, run.steps, run.settlements, run.divisions,
+                         *_later(run), run.first_migrations, run.first_messages, run.first_bytes)
+    steps.note = ("Messages and bytes are those that let ghosts follow; margin in m, 0: chosen by the run. Pairs per "
+                  "ghost: how many pairs more than one process all have together at the end. Runs of the same scene and "
+                  "steps have the same hash on any number of ranks.")
     settling.note = ("Settlements: how often bodies were handed out, the first time included. Migrations (of the whole "
                      "run), messages and bytes (of one time) are those after the first, when rank 0 gives out all "
                      "bodies; that is on the right.")
