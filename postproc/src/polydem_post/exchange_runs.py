@@ -168,8 +168,8 @@ def runs_tables(runs: list[RunCount]) -> list[Table]:
             settling.add(run.cut, f"{run.margin:g}", run.bodies, run.ranks, run.steps, run.settlements, run.divisions,
                          *_later(run), run.first_migrations, run.first_messages, run.first_bytes)
     steps.note = ("Messages and bytes are those that let ghosts follow; margin in m, 0: chosen by the run. Pairs per "
-                  "ghost: how many pairs more than one process all have together at the end. Runs of the same scene and "
-                  "steps have the same hash on any number of ranks.")
+                  "ghost: how many pairs more than one process all have together at the end. Runs of the same scene "
+                  "and steps have the same hash on any number of ranks.")
     settling.note = ("Settlements: how often bodies were handed out, the first time included. Migrations (of the whole "
                      "run), messages and bytes (of one time) are those after the first, when rank 0 gives out all "
                      "bodies; that is on the right.")
