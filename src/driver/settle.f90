@@ -228,6 +228,7 @@ contains
       type(mover_t) :: mover
       integer(ip), allocatable :: sent(:), counts(:), counts_received(:), slots(:)
       real(wp), allocatable :: boxes(:, :)
+      integer(lp) :: n_ghosts(1)
       integer(ip) :: s, n
 
       n = self%bodies%n
@@ -249,6 +250,9 @@ contains
       call keep_columns(mover, self)
       call new_ghosts(self%domain%ghosts, counts, slots(sent), counts_received, slots(n + 1_ip:), &
                       self%settings%forces%midstep_slip)
+      n_ghosts = int(self%bodies%n - n, lp)
+      call self%team%add_up(n_ghosts)
+      self%domain%ghost_share = real(n_ghosts(1), wp)/real(self%bodies%n_all, wp)
    end subroutine fetch_ghosts
 
    !> Keep all that changes about bodies, also what lasts for this step only.

@@ -30,6 +30,8 @@ module polydem_domain
       real(wp) :: margin = 0.0_wp
       !> Median diameter of the free bodies of the run [m]
       real(wp) :: grain = 0.0_wp
+      !> Ghosts of all processes per body of the run
+      real(wp) :: ghost_share = 0.0_wp
       !> Boxes grown by the margin when all was settled, (4, box) [m]
       real(wp), allocatable :: reference(:, :)
       !> Step in which that was
@@ -52,8 +54,10 @@ module polydem_domain
 
    !> First margin in grains, and bounds of later ones
    real(wp), parameter :: first_margin = 0.15_wp, least_margin = 0.02_wp, greatest_margin = 2.0_wp
-   !> Settlements are as often as should be if so many steps lie between them
-   integer(lp), parameter :: few_steps = 40_lp, many_steps = 400_lp
+   !> What a settlement costs, in steps, and a ghost, in bodies (measured; see postproc/verdicts/scale)
+   real(wp), parameter :: settlement_cost = 4.0_wp, ghost_cost = 0.5_wp
+   !> Greatest change of the margin in a settlement
+   real(wp), parameter :: greatest_change = 3.0_wp
 
 contains
 
@@ -116,16 +120,20 @@ contains
       self%last_step = step
    end subroutine set_reference
 
-   !> Take a larger margin if settlements come too often, a smaller one if they are rare, unless one is given.
+   !> Choose the margin, unless one is given, so that settlements cost as much as ghosts do: a wide one makes settlements
+   !> rare, but ghosts many. Their interval grows with the margin, and so does the number of ghosts.
    subroutine adapt_margin(self, step)
       class(domain_t), intent(inout) :: self
-      !> Step of the settlement that begins; all processes know it, so that all have the same margin
+      !> Step of the settlement that begins; all processes know it and `ghost_share`, so that all have the same margin
       integer(lp), intent(in) :: step
-      real(wp), parameter :: change = 1.4_wp
+      real(wp) :: settling, following, factor
 
       if (self%settings%margin > 0.0_wp .or. self%last_step < 0_lp) return
-      if (step - self%last_step < few_steps) self%margin = min(change*self%margin, greatest_margin*self%grain)
-      if (step - self%last_step > many_steps) self%margin = max(self%margin/change, least_margin*self%grain)
+      settling = settlement_cost/real(max(1_lp, step - self%last_step), wp)
+      following = ghost_cost*self%ghost_share
+      factor = greatest_change
+      if (following*greatest_change**2 > settling) factor = max(1.0_wp/greatest_change, sqrt(settling/following))
+      self%margin = max(least_margin*self%grain, min(factor*self%margin, greatest_margin*self%grain))
    end subroutine adapt_margin
 
 end module polydem_domain
