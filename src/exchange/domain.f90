@@ -120,8 +120,8 @@ contains
       self%last_step = step
    end subroutine set_reference
 
-   !> Choose the margin, unless one is given, so that settlements cost as much as ghosts do: a wide one makes settlements
-   !> rare, but ghosts many. Their interval grows with the margin, and so does the number of ghosts.
+   !> Choose the margin, unless one is given, so that settlements cost as much as ghosts do: a wide one makes
+   !> settlements rare, but ghosts many. Their interval grows with the margin, and so does the number of ghosts.
    subroutine adapt_margin(self, step)
       class(domain_t), intent(inout) :: self
       !> Step of the settlement that begins; all processes know it and `ghost_share`, so that all have the same margin
