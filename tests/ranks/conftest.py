@@ -1,11 +1,12 @@
 """Options of the tests of ranks, results to compare with, and the table of all combinations."""
 
 import datetime
+import subprocess
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from runs import contents, count, run, state_hash
+from runs import PARALLEL, contents, count, run, state_hash
 from scenes import SCENES, write_scene
 
 HERE = Path(__file__).parent
@@ -80,13 +81,14 @@ def pytest_sessionfinish(session):
 def table(config):
     """What all combinations gave, in Markdown."""
     ranks = sorted({number for _, number in config.outcomes})
+    version = subprocess.run([PARALLEL, "--version"], capture_output=True, text=True, check=True).stdout.strip()
     combinations = max(outcome.tried for outcome in config.outcomes.values())
     lines = [
         "# The same bits for any number of processes", "",
-        f"Written by `run_ranks.py --full` on {datetime.date.today()}. Each cell: runs whose state hash, trajectory "
-        "(all frames, contacts, walls and rows of the ledger) and counts of steps and contacts were those of the "
-        f"program without MPI, of {combinations} runs with every finder on 1 and 2 threads; in brackets how often a "
-        "body changed its process in a run.", "",
+        f"Written by `run_ranks.py --full` on {datetime.date.today()} with {version}. Each cell: runs whose state hash, "
+        "trajectory (all frames, contacts, walls and rows of the ledger) and counts of steps and contacts were those "
+        f"of the program without MPI, of {combinations} runs with every finder on 1 and 2 threads; in brackets how "
+        "often a body changed its process in a run.", "",
         "| scene | steps | contacts | " + " | ".join(f"{number} ranks" for number in ranks) + " |",
         "|---|--:|--:|" + "---|" * len(ranks),
     ]
