@@ -16,7 +16,7 @@ module polydem_resume
    use polydem_watch, only: watch_t
    implicit none
    private
-   public :: past_t, is_finished, look_back, go_on
+   public :: past_t, find_finished, look_back, go_on
 
    !> What former attempts left
    type :: past_t
@@ -38,25 +38,28 @@ module polydem_resume
 
 contains
 
-   !> Whether a folder holds the finished result of the same settings.
-   logical function is_finished(folder, settings)
+   !> Look for the finished result of the same settings.
+   subroutine find_finished(folder, settings, last_state)
       !> Folder of the result
       character(len=*), intent(in) :: folder
       !> Settings of the run
       type(settings_t), intent(in) :: settings
+      !> Hash of its last state; not allocated if the folder holds no such result
+      character(len=:), allocatable, intent(out) :: last_state
       type(hdf5_file_t) :: file
       type(error_t), allocatable :: error
-      character(len=:), allocatable :: status
+      character(len=:), allocatable :: status, text
 
-      is_finished = .false.
       if (.not. exists(profile_path(folder))) return
       call file%open(profile_path(folder), error)
       if (.not. allocated(error)) call file%read('/status', status, error)
+      if (.not. allocated(error)) call file%read('/state_hash', text, error)
       call file%close(error)
-      if (.not. allocated(error)) is_finished = status == 'finished'
-      if (is_finished) is_finished = changed_entries(origin_of(profile_path(folder), 'resolved_input'), &
-                                                     settings%resolved) == ''
-   end function is_finished
+      if (allocated(error)) return
+      if (status /= 'finished') return
+      if (changed_entries(origin_of(profile_path(folder), 'resolved_input'), settings%resolved) /= '') return
+      call move_alloc(text, last_state)
+   end subroutine find_finished
 
    !> Choose the newest good checkpoint, and see to it that the settings are as they were.
    subroutine look_back(folder, settings, scene, may_change, past, error)

@@ -8,13 +8,13 @@ module polydem_run
    use polydem_hash, only: hexadecimal
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
-   use polydem_log_tables, only: write_header
+   use polydem_log_tables, only: write_hash, write_header
    use polydem_lone_team, only: lone_team_t
    use polydem_paths, only: make_folder
    use polydem_provenance, only: collect_provenance
    use polydem_result_folder, only: checkpoint_path, clear_result, clear_unfinished, default_folder, holds_result, &
       n_checkpoints
-   use polydem_resume, only: go_on, is_finished, look_back
+   use polydem_resume, only: find_finished, go_on, look_back
    use polydem_run_lock, only: lock_result, unlock_result
    use polydem_share_scene, only: share_scene, sharer_t
    use polydem_settings, only: settings_t
@@ -45,6 +45,7 @@ contains
       type(run_t) :: run
       logical :: is_locked
       integer(lp) :: finished(1)
+      character(len=:), allocatable :: last_state
 
       run%began = wall_seconds()
       if (present(attempt)) run%attempt = attempt
@@ -53,11 +54,12 @@ contains
       run%folder = result_folder(settings)
       finished = 0_lp
       if (run%team%leads() .and. run%attempt%continues) then
-         if (is_finished(run%folder, settings)) finished = 1_lp
+         call find_finished(run%folder, settings, last_state)
+         if (allocated(last_state)) finished = 1_lp
       end if
       call run%team%share(finished)
       if (finished(1) == 1_lp) then
-         if (run%team%leads()) call tell_finished(run%folder)
+         if (run%team%leads()) call tell_finished(run%folder, last_state)
          return
       end if
       is_locked = .false.
@@ -184,14 +186,15 @@ contains
          'to go on with it, --force to overwrite it, or another folder with --set output.folder=NAME')
    end subroutine check_free
 
-   !> Say that there is nothing to do.
-   subroutine tell_finished(folder)
-      character(len=*), intent(in) :: folder
+   !> Say that there is nothing to do, and how the run ended.
+   subroutine tell_finished(folder, last_state)
+      character(len=*), intent(in) :: folder, last_state
       type(log_t) :: log
       type(error_t), allocatable :: ignored
 
       call log%open('', ignored)
       call log%write_line(folder//' holds the finished result of these settings: nothing to do')
+      call write_hash(log, last_state)
       call log%close()
    end subroutine tell_finished
 

@@ -7,6 +7,7 @@ module polydem_run_output
    use polydem_common_hash, only: hash_all_bodies
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t, run_error
+   use polydem_hash, only: hexadecimal
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ledger, only: balance_t
    use polydem_ledger_row, only: ledger_row_t
@@ -183,7 +184,7 @@ contains
          call sum_up(run%watch, s, run%log)
       end associate
       if (allocated(error)) call run%log%write_line('stopped: '//status)
-      call write_hash(run%log, hash)
+      call write_hash(run%log, hexadecimal(hash))
       call run%log%close(late_error)
       if (.not. allocated(error) .and. allocated(late_error)) call move_alloc(late_error, error)
       call run%team%agree(error)

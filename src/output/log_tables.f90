@@ -1,7 +1,6 @@
 !> The standard parts of a log: its header, the table of times, the counters, the hash of the last state.
 module polydem_log_tables
    use polydem_counters, only: counters_t
-   use polydem_hash, only: hexadecimal
    use polydem_kinds, only: dp, ip, lp
    use polydem_log, only: line_width, log_t
    use polydem_provenance, only: provenance_t
@@ -123,10 +122,10 @@ contains
    subroutine write_hash(log, state_hash)
       !> Log
       type(log_t), intent(inout) :: log
-      !> Hash of the last state
-      integer(lp), intent(in) :: state_hash
+      !> Hash of the last state, as a profile holds it
+      character(len=*), intent(in) :: state_hash
 
-      call log%write_line('state hash: '//hexadecimal(state_hash))
+      call log%write_line('state hash: '//state_hash)
    end subroutine write_hash
 
    subroutine write_sum(log, name, part, whole)

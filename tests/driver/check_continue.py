@@ -154,6 +154,7 @@ def a_finished_run_stays_as_it_is(case):
     before = {name: os.stat(os.path.join("whole", name)).st_mtime_ns for name in os.listdir("whole")}
     code, output, message = case.run("whole", "--continue")
     assert (code, message) == (0, "") and "nothing to do" in output, (code, output, message)
+    assert output.splitlines()[-1] == case.expected[-1], (output, case.expected)
     assert before == {name: os.stat(os.path.join("whole", name)).st_mtime_ns for name in os.listdir("whole")}
     code, _, message = case.run("whole")
     assert code == BAD_INPUT and "give --continue to go on with it" in message, (code, message)
