@@ -40,6 +40,7 @@ module polydem_timers
       procedure :: start
       procedure :: lap
       procedure :: end_step
+      procedure :: add_rest
    end type timers_t
 
 contains
@@ -77,5 +78,18 @@ contains
          self%current(k) = -1.0_dp
       end do
    end subroutine end_step
+
+   !> Book the time since `start` or the last `lap` under a stage of a step that is closed. It counts in the total alone:
+   !> it is for what is done now and then, and must itself have the times of the step.
+   subroutine add_rest(self, stage)
+      class(timers_t), intent(inout) :: self
+      !> stage_boxes, ..., stage_output
+      integer, intent(in) :: stage
+      real(dp) :: now
+
+      now = wall_seconds()
+      self%total(stage) = self%total(stage) + (now - self%began)
+      self%began = now
+   end subroutine add_rest
 
 end module polydem_timers

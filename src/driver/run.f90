@@ -256,6 +256,7 @@ contains
       associate (s => run%simulation)
          if (s%step == s%n_steps) return
          if (is_due) then
+            call s%timers%start()
             ! The frames up to the checkpoint are safe before it is.
             call run%trajectory%close(error)
             if (allocated(error)) return
@@ -263,6 +264,7 @@ contains
             history%segments = int(run%trajectory%number, lp)
             history%seconds = history%seconds + (wall_seconds() - run%began)
             call run%checkpoints%write(run%folder, run%provenance, run%team, s, history, run%watch, error)
+            call s%timers%add_rest(stage_output)
          end if
          if (.not. must_stop) return
          if (.not. allocated(run%reason)) run%reason = 'the leader'
