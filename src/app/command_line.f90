@@ -162,7 +162,7 @@ contains
             only_files = .true.
             k = k + 1
          else
-            call take_option(arguments, k, which, value, error)
+            call take_option(arguments, command%verb, k, which, value, error)
             if (allocated(error)) return
             used(which) = .true.
             if (options(which)%name == '--set') then
@@ -199,8 +199,8 @@ contains
    end subroutine take_word
 
    !> Take the option at place k, with its value behind '=' or in the next argument, and step on.
-   pure subroutine take_option(arguments, k, which, value, error)
-      character(len=*), intent(in) :: arguments(:)
+   pure subroutine take_option(arguments, verb, k, which, value, error)
+      character(len=*), intent(in) :: arguments(:), verb
       integer, intent(inout) :: k
       integer, intent(out) :: which
       character(len=:), allocatable, intent(out) :: value
@@ -212,7 +212,8 @@ contains
       name = trim(arguments(k)(:equals - 1))
       which = option_at(name)
       if (which == 0) then
-         call raise(error, input_error, 'unknown option '//name//suggestion(name, options%name))
+         call raise(error, input_error, 'unknown option '//name// &
+                    suggestion(name, pack(options%name, takes(options, verb))))
          return
       end if
       value = ''
@@ -230,6 +231,15 @@ contains
       end if
       k = k + 1
    end subroutine take_option
+
+   !> Whether a verb takes an option; any option if there is no verb yet
+   elemental logical function takes(option, verb)
+      type(option_t), intent(in) :: option
+      character(len=*), intent(in) :: verb
+
+      takes = verb == ''
+      if (.not. takes) takes = any(split_words(option%verbs) == verb)
+   end function takes
 
    !> Row of an option; 0 if there is none
    pure integer function option_at(name)
@@ -332,7 +342,7 @@ contains
          return
       end if
       do k = 1, size(options)
-         if (used(k) .and. all(split_words(options(k)%verbs) /= command%verb)) then
+         if (used(k) .and. .not. takes(options(k), command%verb)) then
             call raise(error, input_error, command%verb//' does not take '//trim(options(k)%name)// &
                '; it belongs to '//join(split_words(options(k)%verbs), ' and '))
             return
@@ -366,7 +376,7 @@ contains
       end do
       text = text//'Options:'//line_end
       do k = 1, size(options)
-         if (verb /= '' .and. all(split_words(options(k)%verbs) /= verb)) cycle
+         if (.not. takes(options(k), verb)) cycle
          call_text = '  '//trim(options(k)%name)//' '//trim(options(k)%value)
          text = text//call_text//trim(options(k)%meaning)
          if (verb == '' .and. options(k)%verbs /= all_verbs) text = text//' ('// &

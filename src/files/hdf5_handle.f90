@@ -1,8 +1,8 @@
 !> An HDF5 file that is opened, flushed, asked and closed; what is in it is read and written by extensions.
 module polydem_hdf5_handle
    use hdf5, only: h5f_acc_rdonly_f, h5f_acc_rdwr_f, h5f_acc_trunc_f, h5f_scope_global_f, h5fclose_f, h5fcreate_f, &
-      h5fflush_f, h5fopen_f, h5p_file_access_f, h5p_file_create_f, h5pclose_f, h5pcreate_f, h5pset_userblock_f, hid_t, &
-      hsize_t
+      h5fflush_f, h5fis_hdf5_f, h5fopen_f, h5p_file_access_f, h5p_file_create_f, h5pclose_f, h5pcreate_f, &
+      h5pset_userblock_f, hid_t, hsize_t
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_access, only: access_together, fails_anywhere
    use polydem_hdf5_claim, only: believable_shape
@@ -107,6 +107,7 @@ contains
       character(len=*), intent(in) :: path
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
+      logical :: is_hdf5
       integer :: status
 
       if (.not. exists(path)) then
@@ -124,7 +125,12 @@ contains
       call h5fopen_f(path, h5f_acc_rdonly_f, self%id, status)
       if (status >= 0) return
       self%id = -1_hid_t
-      call raise(error, io_error, path//': cannot be opened as an HDF5 file'//locking_hint)
+      call h5fis_hdf5_f(path, is_hdf5, status)
+      if (status >= 0 .and. .not. is_hdf5) then
+         call raise(error, io_error, path//': is no HDF5 file')
+      else
+         call raise(error, io_error, path//': cannot be opened as an HDF5 file'//locking_hint)
+      end if
    end subroutine open_file
 
    !> Hand everything written so far to the operating system, so that it outlives this program.

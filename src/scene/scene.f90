@@ -43,7 +43,10 @@ contains
       if (settings%scene%name == 'file') then
          origin = settings%scene%bodies_file
          call read_bodies_file(origin, settings%scene%density, list, error)
-         if (allocated(error)) return
+         if (allocated(error)) then
+            error%message = settings%file//": 'bodies_file' in &scene: "//error%message
+            return
+         end if
       else
          call list_generated(settings, list, error)
       end if

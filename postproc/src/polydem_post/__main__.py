@@ -170,7 +170,7 @@ def _add_scale(verbs) -> None:
         ("ghost", 0.5, "what a ghost costs, in bodies"),
         ("imbalance", 1.1, "work of the busiest rank over the mean"),
         ("interval", 40.0, "steps between two settlements"),
-        ("settlement", 1.0, "what one costs, in steps of the own bodies"),
+        ("settlement", 4.0, "what one costs, in steps of the own bodies"),
         ("settled-bytes", 300.0, "what one tells of a ghost"),
     ):
         scale.add_argument(f"--{name}", type=_positive, default=default, metavar="X",

@@ -20,7 +20,7 @@ from .figure_style import (
     readable_decades,
     shared_legend,
 )
-from .statistics import median
+from .statistics import typical
 
 #: Finders in the figure of threads, and what they stand for
 PARALLEL = {
@@ -51,7 +51,7 @@ def all_finders(bench: Bench) -> Drawing | None:
         draw_estimates(
             axis,
             [case.boxes for case in cases],
-            [median(list(case.time().values())) for case in cases],
+            [typical(case.time()) for case in cases],
             label=finder + slope,
             **look(finder),
         )

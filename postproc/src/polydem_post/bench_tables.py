@@ -8,7 +8,7 @@ from . import cache, series
 from .bench import Bench, Case
 from .emit import Table
 from .paper_tables import depth_and_nodes, machines
-from .statistics import median, number, ratio_of_medians
+from .statistics import median, number, ratio_of_medians, typical
 
 #: Phases in the order of the columns
 PHASES = ("structure", "search", "filter", "order", "merge", "waiting")
@@ -61,7 +61,7 @@ def times(bench: Bench) -> Table:
         ),
     )
     for case in bench.select():
-        found = median(list(case.time().values()))
+        found = typical(case.time())
         if not found:
             continue
         loads = [float(s.case["load"]) for s in case.samples if "load" in s.case]
@@ -91,10 +91,10 @@ def phases(bench: Bench) -> Table:
         ("scene", "boxes", "finder", *PHASES, "share of the list [%]"),
     )
     for case in bench.select(threads=1, mode="replay"):
-        parts = [median(list(case.phase(name).values())) for name in PHASES]
+        parts = [typical(case.phase(name)) for name in PHASES]
         if not any(parts):
             continue
-        share = median(list(series.list_share(case).values()))
+        share = typical(series.list_share(case))
         table.add(
             case.scene, case.boxes, case.finder, *(number(part.value) for part in parts), number(100.0 * share.value)
         )
@@ -138,7 +138,7 @@ def first_step(bench: Bench) -> Table:
         ("scene", "boxes", "finder", "median [ns/box]", "interval [ns/box]", "worth later steps", "swaps/box"),
     )
     for case in bench.select(threads=1, mode="replay"):
-        first, later = median(list(case.first_step().values())), median(list(case.time().values()))
+        first, later = typical(case.first_step()), typical(case.time())
         if first:
             table.add(
                 case.scene,
@@ -162,7 +162,7 @@ def scenes(bench: Bench) -> Table:
         ("scene", "boxes", *finders),
     )
     for scene in dict.fromkeys(case.scene for case in found):
-        row = {case.finder: median(list(case.time().values())).value for case in found if case.scene == scene}
+        row = {case.finder: typical(case.time()).value for case in found if case.scene == scene}
         finite = [value for value in row.values() if np.isfinite(value)]
         if finite:
             boxes = next(case.boxes for case in found if case.scene == scene)
@@ -207,7 +207,7 @@ def list_cost(bench: Bench) -> Table:
     )
     for finder in ("quadtree", "pruned_quadtree"):
         for case in series.over_size(bench, finder):
-            searching = median(list(case.phase("search").values()))
+            searching = typical(case.phase("search"))
             visits = [visits_per_search(case, first) for first in (False, True)]
             if searching or np.isfinite(visits[1]):
                 table.add(
@@ -286,8 +286,8 @@ def live_stages(bench: Bench) -> Table:
         ("scene", "boxes", "finder", "threads", *names, "share of boxes and neighbours [%]"),
     )
     for case in cases:
-        parts = [median(list(case.stage(name).values())).value for name in names]
-        neighbourhood = median(list(case.stage("boxes", "neighbours").values())).value
+        parts = [typical(case.stage(name)).value for name in names]
+        neighbourhood = typical(case.stage("boxes", "neighbours")).value
         table.add(
             case.scene,
             case.boxes,

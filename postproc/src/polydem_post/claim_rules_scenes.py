@@ -8,7 +8,7 @@ from . import paper, series
 from .bench import Bench
 from .claims import CONFIRMED, CONTRADICTED, NOT_TESTABLE, Finding, Missing, claim, needed, of_parts, said
 from .series import OTHERS, SWEEP, TREE
-from .statistics import median, number
+from .statistics import median, number, of_one_bench, typical
 
 WEEK = 7.0 * 24.0 * 3600.0
 
@@ -29,7 +29,7 @@ def interpreter(bench: Bench) -> Finding:
     if not near:
         return Finding(NOT_TESTABLE, "-", reason)
     gains = [
-        1e6 * paper.OCTAVE[size][0] / (case.boxes * median(list(case.time().values())).value) for case, size in near
+        1e6 * paper.OCTAVE[size][0] / (case.boxes * typical(case.time()).value) for case, size in near
     ]
     return Finding(
         NOT_TESTABLE,
@@ -60,7 +60,7 @@ def ratios(bench: Bench) -> Finding:
     agreed = [_agrees(here, case) for case in everything]
     cut = any(int(case.facts.get("bodies", case.boxes)) < case.boxes for case in everything)
     unchecked = [case.scene for case in everything if "all_pairs" not in str(case.facts.get("checked", ""))]
-    ours = ", ".join(f"{case.scene}: {median(list(case.time().values())).text()} ns/box" for case in everything)
+    ours = ", ".join(f"{case.scene}: {typical(case.time()).text()} ns/box" for case in everything)
     if unchecked:
         raise Missing(f"the comparison with all_pairs on {', '.join(unchecked)}")
     return Finding(
@@ -127,7 +127,7 @@ def _others_win(bench: Bench, of_kind: str) -> tuple:
 
 
 def _middle(case) -> float:
-    return median(list(case.time().values())).value
+    return typical(case.time()).value
 
 
 @claim(
@@ -145,7 +145,7 @@ def week(bench: Bench) -> Finding:
     ]
     needed(cases, "./polydem bench with mode = 'live' on the drum of 12651 boxes, one thread")
     case = next((case for case in cases if case.finder == TREE), cases[0])
-    step = median([1e-9 * case.boxes * value for value in case.stage(*case.samples[0].stages).values()])
+    step = median([1e-9 * case.boxes * value for value in of_one_bench(case.stage(*case.samples[0].stages))])
     needed(step, "./polydem bench with mode = 'live' and more than one step")
     steps = WEEK / step.value
     return Finding(

@@ -10,7 +10,7 @@ from .paper_tables import clock_of
 from .cache import read_records
 from .claims import CONFIRMED, CONTRADICTED, IN_PART, NOT_TESTABLE, Finding, Missing, claim, needed, of_parts
 from .series import SWEEP, TREE
-from .statistics import median, number, pooled
+from .statistics import number, pooled, typical
 
 #: What has to be run for the drums of all sizes
 DRUMS = "./polydem bench on drums of at least three sizes, one thread, finders "
@@ -167,7 +167,7 @@ def memory(bench: Bench) -> Finding:
         raise Missing("the same bench on a second machine, and give both folders")
     times = {
         machine: {
-            case.scene: median(list(case.time().values())).value for case in series.over_size(bench.on(machine), TREE)
+            case.scene: typical(case.time()).value for case in series.over_size(bench.on(machine), TREE)
         }
         for machine in machines
     }
@@ -214,7 +214,7 @@ def caches(bench: Bench) -> Finding:
         beyond = [case for case in cases if 2.0 * size <= series.held_bytes(case) <= max(end, 4.0 * size)]
         if not inside or not beyond:
             continue
-        below, above = (median(list(_time_per_test(group[-1]).values())) for group in (inside, beyond))
+        below, above = (typical(_time_per_test(group[-1])) for group in (inside, beyond))
         rises.append(above.value >= 1.1 * below.value and above.low > below.high)
         found.append(
             f"{name}: {inside[-1].boxes} boxes {below.text()}, {beyond[-1].boxes} boxes {above.text()} ns per test"

@@ -91,7 +91,7 @@ class Machine:
     #: Steps between two settlements, in which bodies are handed out anew; the program aims at 40 or more
     interval: float = 40.0
     #: What a settlement costs per own body, in steps
-    settlement: float = 1.0
+    settlement: float = 4.0
     #: Bytes that it tells of a ghost: its shape and state
     settled_bytes: float = 300.0
 
@@ -151,7 +151,7 @@ def read_counts(paths) -> list[Count]:
         except (KeyError, TypeError, ValueError, UnicodeDecodeError) as error:
             raise ResultError(f"{path} is not a file of count_exchange") from error
     if not counts:
-        raise ResultError("there are no counts: give files of count_exchange")
+        raise ResultError("there are no counts: give runs of several ranks or files of count_exchange")
     return counts
 
 
@@ -166,6 +166,8 @@ def _count(row: dict) -> Count:
 def fit_law(counts: list[Count], shape: str, cut: str, margin: float) -> Law:
     """The law of one packing, cut and margin, from counts of at least SURROUNDED ranks."""
     mine = [count for count in counts if (count.shape, count.cut, count.margin) == (shape, cut, margin)]
+    if not counts:
+        raise ResultError("the time on many ranks is reckoned from runs of several ranks, of which there are none")
     if not mine:
         known = sorted({f"{count.shape} {count.cut} {count.margin:g}" for count in counts})
         raise ResultError(f"nothing was counted for {shape} {cut} {margin:g}; there are {', '.join(known)}")

@@ -9,7 +9,7 @@ from . import paper, series
 from .bench import Bench
 from .figure_style import PAPER, SETTINGS, Drawing, draw_estimates, draw_law, look, mark_caches, over_size, panels
 from .series import SWEEP, TREE
-from .statistics import median
+from .statistics import median, of_one_bench, typical
 
 #: Label of times
 TIME = "time per step [ms]"
@@ -165,7 +165,7 @@ def inlining(bench: Bench) -> Drawing | None:
         draw_estimates(
             left,
             [c.boxes for c in found],
-            [median(list(c.time().values())) for c in found],
+            [typical(c.time()) for c in found],
             label=name + slope,
             **look(finder),
         )
@@ -254,4 +254,4 @@ def interpreted(bench: Bench) -> Drawing | None:
 
 def _per_step(cases: list, quantity=series.total_time) -> list:
     """Time per step [ms]."""
-    return [median([1e-6 * case.boxes * value for value in quantity(case).values()]) for case in cases]
+    return [median([1e-6 * case.boxes * value for value in of_one_bench(quantity(case))]) for case in cases]

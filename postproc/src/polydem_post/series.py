@@ -128,7 +128,7 @@ class Law:
 def law(cases: list, quantity=total_time, largest: float = np.inf) -> Law | None:
     """Time per step [ms] against the number of boxes; nothing if there are fewer than three sizes."""
     measured = [
-        (case.boxes, [1e-6 * case.boxes * value for value in quantity(case).values()])
+        (case.boxes, [1e-6 * case.boxes * value for value in statistics.of_one_bench(quantity(case))])
         for case in cases
         if case.boxes <= largest
     ]

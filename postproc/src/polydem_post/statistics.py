@@ -83,6 +83,20 @@ def median(values) -> Estimate:
     return _estimate(float(np.median(values)), middles, values)
 
 
+def of_one_bench(repeats: dict) -> list:
+    """The values of the first bench, if several measured the same: (folder, repeat) -> value.
+
+    So what stands beside each other in a table or a figure is of the same turns.
+    """
+    first = next(iter(repeats), (None,))[0]
+    return [value for (folder, _), value in repeats.items() if folder == first]
+
+
+def typical(repeats: dict) -> Estimate:
+    """Median of the repeats of one bench."""
+    return median(of_one_bench(repeats))
+
+
 def median_of_ratios(upper: dict, lower: dict) -> Estimate:
     """Median of the ratios of two quantities that were measured side by side: repeat -> value."""
     shared = sorted(set(upper) & set(lower))

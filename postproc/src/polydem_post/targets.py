@@ -6,7 +6,7 @@ from . import series
 from .bench import Bench
 from .emit import Table
 from .series import SWEEP, TREE
-from .statistics import median
+from .statistics import typical
 
 #: Most time per box and step on the drum of 12651 boxes, one thread [ns]
 GREATEST = {TREE: 60.0, SWEEP: 90.0}
@@ -25,7 +25,7 @@ def targets(bench: Bench) -> Table:
     for case in bench.select(threads=1, mode="replay"):
         if case.finder not in GREATEST or series.kind(case.scene) != "drum" or series.parameter(case.scene) != 12651:
             continue
-        found = median(list(case.time().values()))
+        found = typical(case.time())
         if not found:
             continue
         verlet = bench.select(
