@@ -3,6 +3,7 @@
 !> Use in a procedure:      call raise(error, input_error, 'drum.nml:7: dt must be positive'); return
 !> Use at the call:         call read(..., error); if (allocated(error)) return
 module polydem_errors
+   use polydem_kinds, only: lp
    implicit none
    private
    public :: error_t, raise, run_error, input_error, io_error, stopped_early
@@ -22,6 +23,9 @@ module polydem_errors
       integer :: code = run_error
       !> What is wrong, where (file and line, or body, position and step), and what to do
       character(len=:), allocatable :: message
+      !> Of several processes that fail in the same step, the one with the least place speaks; that of the body or pair
+      !> among all of the run makes it the one that a single process would name
+      integer(lp) :: place = huge(0_lp)
    end type error_t
 
 contains

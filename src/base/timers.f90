@@ -79,8 +79,8 @@ contains
       end do
    end subroutine end_step
 
-   !> Book the time since `start` or the last `lap` under a stage of a step that is closed. It counts in the total alone:
-   !> it is for what is done now and then, and must itself have the times of the step.
+   !> Book the time since `start` or the last `lap` under a stage of a step that is closed. It counts in the total
+   !> alone: it is for what is done now and then, and must itself have the times of the step.
    subroutine add_rest(self, stage)
       class(timers_t), intent(inout) :: self
       !> stage_boxes, ..., stage_output

@@ -3,7 +3,10 @@ module polydem_boxes
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: boxes_t
+   public :: boxes_t, far
+
+   !> Greatest coordinate and greatest half side: what finders make of two boxes is then finite [m]
+   real(wp), parameter :: far = 0.25_wp*huge(1.0_wp)
 
    !> Boxes 1..n. A body of particle size has one box; a large one is cut into several that overlap a little.
    type :: boxes_t

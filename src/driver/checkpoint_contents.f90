@@ -7,7 +7,7 @@
 module polydem_checkpoint_contents
    use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t, state_hash, turn_bodies
-   use polydem_contacts, only: contact_memory_t
+   use polydem_contacts, only: contact_memory_t, memory_kinds
    use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_hash, only: mix_word
    use polydem_kept_bodies, only: keep_bodies
@@ -148,12 +148,17 @@ contains
       !> Number of pairs
       integer(ip), intent(in) :: n
       type(contact_memory_t), intent(inout) :: memory
+      integer :: k
 
       if (archive%gives_back) memory%separating_edge = spread(0_ip, 1, n)
       call archive%keep('/pairs/separating_edge', memory%separating_edge(:n), '1', &
                         'edge that separated the pair last: +k of the first body, -k of the second, 0 unknown')
-      call keep_column(archive, '/pairs/tangential', n, memory%tangential, 'N/m', 'tangential force remembered')
-      call keep_column(archive, '/pairs/area', n, memory%area, 'm2', 'area of the overlap at the last step')
+      do k = 1, size(memory_kinds)
+         associate (kind => memory_kinds(k))
+            call keep_column(archive, '/pairs/'//trim(kind%name), n, memory%column(k)%value, trim(kind%unit), &
+                             trim(kind%meaning))
+         end associate
+      end do
    end subroutine keep_memory
 
    !> Refuse edges that the bodies of a pair do not have.

@@ -2,6 +2,7 @@
 module polydem_guards
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_bodies, only: bodies_t
+   use polydem_boxes, only: far
    use polydem_body_sizes, only: measure_body
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_errors, only: error_t, raise, run_error
@@ -81,19 +82,21 @@ contains
             if (is_somewhere(bodies, s)) cycle
             call raise(error, run_error, 'step '//to_text(step)//': body '//to_text(bodies%id(s))//' at ('// &
                        to_text(bodies%position(1, s))//', '//to_text(bodies%position(2, s))//') m, turned by '// &
-                       to_text(bodies%angle(s))//', is nowhere: these must be finite numbers. Look at its '// &
-                       'velocity and forces in the step before')
+                       to_text(bodies%angle(s))//', is nowhere: these must be numbers up to '//to_text(far)// &
+                       '. Look at its velocity and forces in the step before')
+            call place_error(error, bodies, s)
          end associate
          return
       end do
    end subroutine check_places
 
-   !> Whether place and angle of a body are finite
+   !> Whether place and angle of a body are numbers with which boxes can be made
    pure logical function is_somewhere(bodies, s)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
 
-      is_somewhere = ieee_is_finite(bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s))
+      is_somewhere = abs(bodies%position(1, s)) <= far .and. abs(bodies%position(2, s)) <= far &
+         .and. abs(bodies%angle(s)) <= far
    end function is_somewhere
 
    !> Stop if a body has left the finite numbers; stop or warn if it moves too far in a step.
@@ -128,10 +131,25 @@ contains
          else if (is_first) then
             call guard%warning%respond(guard%choice, motion_text(guard, bodies, s, step), error)
          end if
-         if (allocated(error)) return
+         if (allocated(error)) then
+            call place_error(error, bodies, s)
+            return
+         end if
          is_first = .false.
       end do
    end subroutine check_motion
+
+   !> Say where among all of the run the body stands that an error names, or the first and the second body of a pair.
+   pure subroutine place_error(error, bodies, first, second)
+      type(error_t), intent(inout) :: error
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: first
+      integer(ip), intent(in), optional :: second
+
+      if (.not. allocated(bodies%row)) return
+      error%place = shiftl(int(bodies%row(first), lp), 31)
+      if (present(second)) error%place = error%place + int(bodies%row(second), lp)
+   end subroutine place_error
 
    !> How a body moves, and what to do about it
    function motion_text(guard, bodies, s, step) result(text)
@@ -227,20 +245,20 @@ contains
       type(contacts_t), intent(in) :: contacts
       !> Number of the step
       integer(lp), intent(in) :: step
-      !> Says how many there are
+      !> Names the first one
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: worst
+      integer(ip) :: c
 
       if (contacts%n_degenerate == 0_ip .or. degenerate == 'push') return
-      do worst = 1_ip, contacts%n
-         if (is_degenerate(contacts, worst)) exit
+      do c = 1_ip, contacts%n
+         if (is_degenerate(contacts, c)) exit
       end do
-      associate (i => contacts%first(worst), j => contacts%second(worst))
-         call raise(error, run_error, 'step '//to_text(step)//': '//to_text(contacts%n_degenerate)// &
-                    ' contacts have no direction, the first of the bodies '//to_text(bodies%id(i))//' and '// &
-                    to_text(bodies%id(j))//' near ('//to_text(bodies%position(1, i))//', '// &
-                    to_text(bodies%position(2, i))//') m: one body is inside the other, or they cross. '// &
-                    'Set degenerate = ''push'' in &overlap to go on')
+      associate (i => contacts%first(c), j => contacts%second(c))
+         call raise(error, run_error, 'step '//to_text(step)//': the contact of the bodies '//to_text(bodies%id(i))// &
+                    ' and '//to_text(bodies%id(j))//' near ('//to_text(bodies%position(1, i))//', '// &
+                    to_text(bodies%position(2, i))//') m has no direction: one body is inside the other, or they '// &
+                    'cross. Set degenerate = ''push'' in &overlap to go on')
+         call place_error(error, bodies, i, j)
       end associate
    end subroutine check_contacts
 

@@ -18,7 +18,7 @@ module polydem_recorder
    use polydem_work_meter, only: work_meter_t
    implicit none
    private
-   public :: recorder_t, first_trace_step
+   public :: recorder_t, check_recording, first_trace_step
 
    !> A recording under way
    type :: recorder_t
@@ -61,8 +61,6 @@ contains
       associate (output => simulation%settings%output, boxes => simulation%boxes)
          self%trace_steps = output%trace_steps
          self%first_step = first_trace_step(output%trace_start, simulation%dt)
-         call check_past(self, simulation%step, trace_path(folder), output%step_profile, error)
-         if (allocated(error)) return
          if (self%trace_steps > 0_ip .and. simulation%step <= self%first_step) then
             if (self%first_step + int(self%trace_steps, lp) - 1_lp > simulation%n_steps) call log%write_line( &
                'warning: the run ends before the trace is complete')
@@ -79,23 +77,28 @@ contains
    end subroutine open_recorder
 
    !> A run that goes on cannot go on recording, but may have recorded before or record later.
-   subroutine check_past(self, step, path, step_profile, error)
-      type(recorder_t), intent(in) :: self
-      integer(lp), intent(in) :: step
-      character(len=*), intent(in) :: path
-      logical, intent(in) :: step_profile
+   subroutine check_recording(simulation, folder, error)
+      !> Simulation before its first step, or where it goes on
+      type(simulation_t), intent(in) :: simulation
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      !> Says what cannot go on
       type(error_t), allocatable, intent(inout) :: error
+      integer(lp) :: first
       logical :: is_whole
 
-      if (step == 0_lp) return
-      if (step_profile) call raise(error, input_error, 'a run that records every step (step_profile in &output) '// &
-         'cannot go on after an interruption; begin it anew with --force instead of --continue')
-      if (self%trace_steps == 0_ip .or. self%first_step > step) return
-      is_whole = self%first_step + int(self%trace_steps, lp) - 1_lp <= step
-      if (is_whole) is_whole = exists(path)
-      if (.not. is_whole) call raise(error, input_error, 'the run was interrupted while it recorded a trace '// &
-         '(trace_steps in &output), which cannot go on; begin it anew with --force instead of --continue')
-   end subroutine check_past
+      associate (output => simulation%settings%output, step => simulation%step)
+         if (step == 0_lp) return
+         if (output%step_profile) call raise(error, input_error, 'a run that records every step (step_profile in '// &
+            '&output) cannot go on after an interruption; begin it anew with --force instead of --continue')
+         first = first_trace_step(output%trace_start, simulation%dt)
+         if (output%trace_steps == 0_ip .or. first > step) return
+         is_whole = first + int(output%trace_steps, lp) - 1_lp <= step
+         if (is_whole) is_whole = exists(trace_path(folder))
+         if (.not. is_whole) call raise(error, input_error, 'the run was interrupted while it recorded a trace '// &
+            '(trace_steps in &output), which cannot go on; begin it anew with --force instead of --continue')
+      end associate
+   end subroutine check_recording
 
    !> Record the step that was just done.
    subroutine record(self, simulation, error)

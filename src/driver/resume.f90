@@ -8,15 +8,15 @@ module polydem_resume
    use polydem_kinds, only: ip, lp
    use polydem_log, only: log_t
    use polydem_paths, only: exists, remove_file
-   use polydem_result_folder, only: checkpoint_path, holds_result, last_number, n_checkpoints, profile_path, &
-      segment_path
+   use polydem_result_folder, only: checkpoint_path, clear_unfinished, holds_result, last_number, n_checkpoints, &
+      profile_path, segment_path
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
    use polydem_watch, only: watch_t
    implicit none
    private
-   public :: past_t, find_finished, look_back, go_on
+   public :: past_t, find_finished, look_back, go_on, clear_surplus
 
    !> What former attempts left
    type :: past_t
@@ -26,7 +26,9 @@ module polydem_resume
       integer(lp) :: step = 0_lp
       !> Closed segments of the trajectory that stay
       integer(ip) :: segments = 0_ip
-      !> Step of the last frame in them; negative if there is none. Frames up to it are not written again.
+      !> Closed segments behind these that do not stay, as their frames are of former settings
+      integer(ip), private :: surplus = 0_ip
+      !> Step of the last frame in those that stay; negative if there is none. Frames up to it are not written again.
       integer(lp) :: last_frame = -1_lp
       !> What is to be said about it, for the log
       character(len=:), allocatable :: remark
@@ -177,7 +179,7 @@ contains
       if (allocated(error)) text = ''
    end function origin_of
 
-   !> Find the last frame in closed segments. With other settings, frames after the checkpoint are removed.
+   !> Find the last frame in closed segments. With other settings, segments after the checkpoint do not stay.
    subroutine count_segments(folder, is_changed, past, error)
       character(len=*), intent(in) :: folder
       logical, intent(in) :: is_changed
@@ -203,13 +205,30 @@ contains
                        ', at which the settings would change. Go on without changes until step '// &
                        to_text(past%last_frame)//' is passed')
          else
-            call remove_file(path, error)
+            past%surplus = past%surplus + 1_ip
             past%remark = past%remark//new_line('a')//'removed    '//path//', whose frames are of former settings'
          end if
          past%segments = past%segments - 1_ip
          past%last_frame = -1_lp
       end do
    end subroutine count_segments
+
+   !> Remove what former attempts left and the run does not keep: what is unfinished, the end of a finished run, and
+   !> segments of former settings. To be called when nothing can keep the run from going on.
+   subroutine clear_surplus(folder, past, error)
+      !> Folder of the result
+      character(len=*), intent(in) :: folder
+      !> What was found there
+      type(past_t), intent(in) :: past
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: number
+
+      call clear_unfinished(folder, error)
+      do number = past%segments + past%surplus, past%segments + 1_ip, -1_ip
+         if (.not. allocated(error)) call remove_file(segment_path(folder, number), error)
+      end do
+   end subroutine clear_surplus
 
    subroutine read_steps(path, steps, error)
       character(len=*), intent(in) :: path

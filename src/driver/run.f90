@@ -12,11 +12,12 @@ module polydem_run
    use polydem_lone_team, only: lone_team_t
    use polydem_paths, only: make_folder
    use polydem_provenance, only: collect_provenance
-   use polydem_result_folder, only: checkpoint_path, clear_result, clear_unfinished, default_folder, holds_result, &
+   use polydem_result_folder, only: checkpoint_path, clear_result, default_folder, holds_result, &
       n_checkpoints
-   use polydem_resume, only: find_finished, go_on, look_back
+   use polydem_recorder, only: check_recording
+   use polydem_resume, only: clear_surplus, find_finished, go_on, look_back
    use polydem_run_lock, only: lock_result, unlock_result
-   use polydem_share_scene, only: share_scene, sharer_t
+   use polydem_share_scene, only: check_team, share_scene, sharer_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: advance, new_simulation
    use polydem_strings, only: to_text
@@ -63,7 +64,8 @@ contains
          return
       end if
       is_locked = .false.
-      if (run%team%leads()) call begin(settings, force, run, is_locked, error)
+      call check_team(settings, run%team, error)
+      if (run%team%leads() .and. .not. allocated(error)) call begin(settings, force, run, is_locked, error)
       call run%team%agree(error)
       if (.not. allocated(error)) call join(settings, run, error)
       if (.not. allocated(error)) call go(run, error)
@@ -219,7 +221,6 @@ contains
                                                 run%past, error)
       if (allocated(error)) return
       goes_on = run%past%checkpoint > 0_ip .or. run%past%segments > 0_ip
-      if (goes_on) call clear_unfinished(run%folder, error)
       if (.not. goes_on) call clear_result(run%folder, error)
       call run%log%open(run%folder, error, appended=goes_on)
       if (allocated(error)) return
@@ -230,6 +231,8 @@ contains
       call new_watch(run%watch, run%simulation)
       call choose_intervals(run)
       if (.not. allocated(error)) call recall(run, error)
+      if (.not. allocated(error)) call check_recording(run%simulation, run%folder, error)
+      if (goes_on .and. .not. allocated(error)) call clear_surplus(run%folder, run%past, error)
    end subroutine prepare
 
    !> Look after checkpoints from now on, and go on from one if that is wanted.

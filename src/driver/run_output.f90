@@ -24,7 +24,7 @@ module polydem_run_output
    use polydem_timers, only: n_stages
    use polydem_trajectory, only: trajectory_t
    use polydem_wall_forces, only: complete_wall_forces
-   use polydem_watch, only: look, sum_up, watch_t
+   use polydem_watch, only: look, sum_up, tell_pending, watch_t
    implicit none
    private
    public :: run_t, attempt_t, choose_intervals, end_step, finish
@@ -171,6 +171,7 @@ contains
       associate (s => run%simulation)
          call hash_all_bodies(run%team, s%bodies, hash)
          call report_counters(s, counters)
+         call tell_pending(s, run%log)
          if (allocated(error)) call write_last_frame(run, error%code, late_error)
          call run%trajectory%close(late_error)
          call run%recorder%close(run%log, late_error)
@@ -223,7 +224,7 @@ contains
       real(wp), intent(in) :: interval, dt
 
       in_steps = 0_lp
-      if (interval > 0.0_wp) in_steps = max(1_lp, nint(interval/dt, lp))
+      if (interval > 0.0_wp) in_steps = max(1_lp, nint(min(interval/dt, 1.0e15_wp), lp))
    end function in_steps
 
    pure logical function is_due(step, interval)

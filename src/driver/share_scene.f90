@@ -16,7 +16,7 @@ module polydem_share_scene
    use polydem_team, only: team_t
    implicit none
    private
-   public :: share_scene, sharer_t
+   public :: check_team, share_scene, sharer_t
 
    !> An archive that gives all processes what the leader has of the whole run
    type, extends(archive_t) :: sharer_t
@@ -42,7 +42,6 @@ contains
       integer(lp) :: counts(4)
       real(dp) :: numbers(4)
 
-      call check_settings(settings, team, error)
       if (allocated(error)) return
       if (team%leads()) then
          counts = [int(self%bodies%n_all, lp), self%n_steps, size(self%motions, kind=lp), self%step]
@@ -72,10 +71,13 @@ contains
       allocate (self%team, source=team)
    end subroutine share_scene
 
-   !> Refuse what one process must do alone.
-   subroutine check_settings(settings, team, error)
+   !> Refuse what only one process can do.
+   subroutine check_team(settings, team, error)
+      !> Settings of a run
       type(settings_t), intent(in) :: settings
+      !> Processes that are to share it
       class(team_t), intent(in) :: team
+      !> Names the entry; the same on all processes
       type(error_t), allocatable, intent(inout) :: error
 
       if (team%size == 1_ip) return
@@ -84,7 +86,7 @@ contains
          'friction = ''cundall_strack'' in &forces')
       if (settings%output%trace_steps > 0_ip .or. settings%output%step_profile) call raise(error, input_error, &
          settings%file//': trace_steps and step_profile in &output record one process; run it without ranks')
-   end subroutine check_settings
+   end subroutine check_team
 
    subroutine share_fixed(team, n_all, bodies)
       class(team_t), intent(inout) :: team

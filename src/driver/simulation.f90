@@ -2,7 +2,7 @@
 module polydem_simulation
    use polydem_assemble, only: assemble_forces, index_contacts
    use polydem_bodies, only: bodies_t, turn_bodies
-   use polydem_contacts, only: is_degenerate
+   use polydem_contacts, only: at_area, is_degenerate
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_exchange_counts, only: report_exchange
@@ -104,6 +104,8 @@ contains
       call place_boxes(self, error)
       if (allocated(error)) return
       call find_and_push(self, self%dt, error)
+      ! Contacts may stop the run here; then nobody ends the step.
+      if (self%settings%overlap%degenerate == 'stop') call self%team%agree(error)
       if (allocated(error)) return
       call self%integrator%correct(self%dt, self%bodies)
       call self%timers%lap(stage_integrate)
@@ -304,11 +306,13 @@ contains
    !> Move the columns of memory along with the pair list.
    subroutine carry_memory(self)
       type(simulation_t), intent(inout) :: self
+      integer :: k
 
       associate (pairs => self%neighbours%pairs, memory => self%memory)
          call pairs%carry(memory%separating_edge, 0_ip)
-         if (allocated(memory%tangential)) call pairs%carry(memory%tangential, 0.0_wp)
-         if (allocated(memory%area)) call pairs%carry(memory%area, 0.0_wp)
+         do k = 1, size(memory%column)
+            if (allocated(memory%column(k)%value)) call pairs%carry(memory%column(k)%value, 0.0_wp)
+         end do
       end associate
    end subroutine carry_memory
 
@@ -342,7 +346,9 @@ contains
          call self%integrator%start(bodies)
       end associate
       ! A scheme that does not look at the forces at time 0 knows no contacts from before its first step.
-      if (.not. self%integrator%starts_from_forces .and. allocated(self%memory%area)) self%memory%area = 0.0_wp
+      associate (area => self%memory%column(at_area))
+         if (.not. self%integrator%starts_from_forces .and. allocated(area%value)) area%value = 0.0_wp
+      end associate
    end subroutine start_integration
 
    !> Take the step of the settings, or a fraction of the stable step that divides the duration.

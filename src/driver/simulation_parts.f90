@@ -136,11 +136,13 @@ contains
 
    subroutine allocate_memory(self)
       type(simulation_t), intent(inout) :: self
+      integer :: k
 
       self%memory = contact_memory_t()
       allocate (self%memory%separating_edge(0))
-      if (self%law%needs_tangential) allocate (self%memory%tangential(0))
-      if (self%law%needs_area) allocate (self%memory%area(0))
+      do k = 1, size(self%memory%column)
+         if (self%law%needs(k)) allocate (self%memory%column(k)%value(0))
+      end do
    end subroutine allocate_memory
 
    subroutine list_moving(self)

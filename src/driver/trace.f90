@@ -7,7 +7,7 @@
 !> it follows; and the attribute `dt`. Steps and boxes count from 0 in messages, as in the file.
 module polydem_trace
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use polydem_boxes, only: boxes_t
+   use polydem_boxes, only: boxes_t, far
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp, wp
@@ -195,8 +195,8 @@ contains
       if (allocated(error)) return
       call check_size(path, 'reach', size(reach, kind=lp), size(trace%fixed, kind=lp), 'boxes', error)
       if (allocated(error)) return
-      if (.not. all(ieee_is_finite(real(reach, wp))) .or. any(reach < 0.0_dp)) then
-         call raise(error, input_error, path//': reach must be finite and not negative')
+      if (.not. all(reach >= 0.0_dp .and. reach <= real(far, dp))) then
+         call raise(error, input_error, path//': reach must be a number from 0 to '//to_text(far))
          return
       end if
       trace%reach = max(trace%reach, real(reach, wp))
@@ -215,11 +215,12 @@ contains
       do s = 1_ip, trace%n_steps
          do b = 1_ip, size(trace%fixed, kind=ip)
             box = trace%bounds(:, b, s)
-            sound = all(ieee_is_finite(box))
+            sound = all(abs(box) <= far)
             if (sound) sound = all(box(1:2) <= box(3:4))
             if (.not. sound) then
                call raise(error, input_error, path//': aabb of step '//to_text(s - 1_ip)//', box '// &
-                          to_text(b - 1_ip)//': bounds must be finite numbers, xmin <= xmax and ymin <= ymax')
+                          to_text(b - 1_ip)//': bounds must be numbers up to '//to_text(far)// &
+                          ', xmin <= xmax and ymin <= ymax')
                return
             end if
             trace%reach(b) = max(trace%reach(b), maxval(0.5_wp*box(3:4) - 0.5_wp*box(1:2)))
@@ -281,8 +282,8 @@ contains
 
       if (size(vertices, 1) /= 2) then
          call raise(error, input_error, path//': vertices must have the shape (n, 2)')
-      else if (.not. all(ieee_is_finite(real(vertices, wp)))) then
-         call raise(error, input_error, path//': vertices must be finite numbers')
+      else if (.not. all(abs(vertices) <= real(far, dp))) then
+         call raise(error, input_error, path//': vertices must be numbers up to '//to_text(far))
       end if
       if (allocated(error)) return
       fit = size(offset) == n_boxes + 1_ip

@@ -4,17 +4,17 @@
 module polydem_watch
    use polydem_archive, only: archive_t
    use polydem_body_sizes, only: thickness_of_bodies
-   use polydem_depths, only: any_deeper, deepest_contact, depth_text
+   use polydem_depths, only: any_deeper, deepest_contact, depth_share, depth_text
    use polydem_energy_guard, only: check_energy, energy_guard_t, open_energy_guard
    use polydem_errors, only: error_t
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_simulation, only: check_stability, simulation_t
    use polydem_strings, only: to_text
    use polydem_warnings, only: warning_t
    implicit none
    private
-   public :: watch_t, new_watch, look, sum_up, keep_watch
+   public :: watch_t, new_watch, look, tell_pending, sum_up, keep_watch
 
    !> Guards with what they have seen
    type :: watch_t
@@ -88,11 +88,21 @@ contains
          if (looks .and. settings%energy /= 'off') call check_energy(watch%energy, simulation, error)
       end associate
       if (looks) call simulation%team%agree(error)
-      if (looks) call simulation%team%spread_text(simulation%guard%warning%text)
-      call simulation%guard%warning%tell(log)
+      if (looks .or. simulation%team%size == 1_ip) call tell_pending(simulation, log)
       call watch%overlap%tell(log)
       call watch%energy%warning%tell(log)
    end subroutine look
+
+   !> Write a warning of the motion of bodies that nobody has been told of; collective.
+   subroutine tell_pending(simulation, log)
+      !> The simulation
+      type(simulation_t), intent(inout) :: simulation
+      !> Log
+      type(log_t), intent(inout) :: log
+
+      call simulation%team%spread_text(simulation%guard%warning%text)
+      call simulation%guard%warning%tell(log)
+   end subroutine tell_pending
 
    !> Write how often there was reason to warn.
    subroutine sum_up(watch, simulation, log)
@@ -121,22 +131,25 @@ contains
 
    end subroutine sum_up
 
-   !> Look for deep contacts. Of several processes, the first one that has any speaks.
+   !> Look for deep contacts. Of several processes, the one that has the deepest speaks.
    subroutine look_at_depths(watch, simulation, error)
       type(watch_t), intent(inout) :: watch
       type(simulation_t), intent(inout) :: simulation
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
       integer(ip) :: worst
+      real(dp) :: share
 
+      share = 0.0_dp
       associate (s => simulation, settings => simulation%settings%guards)
          if (watch%generation /= s%generation) watch%thickness = thickness_of_bodies(s%bodies)
          watch%generation = s%generation
          if (any_deeper(s%contacts, watch%thickness, settings%overlap_limit)) then
             worst = deepest_contact(s%contacts, watch%thickness)
             text = depth_text(s%bodies, s%contacts, watch%thickness, worst)
+            share = real(depth_share(s%contacts, watch%thickness, worst), dp)
          end if
-         call s%team%spread_text(text)
+         call s%team%spread_text(text, share)
          if (.not. allocated(text)) return
          call watch%overlap%respond(settings%overlap, 'step '//to_text(s%step)//': '//text// &
                                     '. Take a smaller dt or a greater stiffness, or look for deep overlaps at the '// &

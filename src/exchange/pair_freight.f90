@@ -15,7 +15,7 @@ module polydem_pair_freight
       integer(lp), allocatable :: key(:)
       !> Edge that separated the pair last, (pair)
       integer(ip), allocatable :: edge(:)
-      !> Tangential force and area remembered, (2, pair) [N/m, m2]
+      !> Columns of the memory, zero where there is none, (column, pair)
       real(wp), allocatable :: value(:, :)
    end type pair_freight_t
 
@@ -45,6 +45,7 @@ contains
       real(wp), allocatable :: value_sent(:, :), value_received(:, :)
       integer(ip), allocatable :: pair(:), rank(:), counts(:), counts_received(:), order(:)
       integer(ip) :: p, k, m, to(2)
+      integer :: j
 
       allocate (pair(2_ip*n), rank(2_ip*n))
       m = 0_ip
@@ -59,14 +60,15 @@ contains
          end do
       end do
       call sort_by_rank(rank(:m), team%size, counts, order)
-      allocate (sent(2, m), value_sent(2, m))
+      allocate (sent(2, m), value_sent(size(memory%column), m))
       value_sent = 0.0_wp
       do k = 1_ip, m
          p = pair(order(k))
          sent(1, k) = key_of(row, first(p), second(p))
          sent(2, k) = int(memory%separating_edge(p), lp)
-         if (allocated(memory%tangential)) value_sent(1, k) = memory%tangential(p)
-         if (allocated(memory%area)) value_sent(2, k) = memory%area(p)
+         do j = 1, size(memory%column)
+            if (allocated(memory%column(j)%value)) value_sent(j, k) = memory%column(j)%value(p)
+         end do
       end do
       call team%trade(sent, counts, received, counts_received)
       call team%trade(value_sent, counts, value_received, counts_received)
@@ -124,6 +126,7 @@ contains
       integer(ip), intent(out) :: n_known
       integer(lp) :: key
       integer(ip) :: p, k
+      integer :: j
 
       n_known = 0_ip
       k = 1_ip
@@ -137,8 +140,9 @@ contains
          if (freight%key(k) /= key) cycle
          n_known = n_known + 1_ip
          memory%separating_edge(p) = freight%edge(k)
-         if (allocated(memory%tangential)) memory%tangential(p) = freight%value(1, k)
-         if (allocated(memory%area)) memory%area(p) = freight%value(2, k)
+         do j = 1, size(memory%column)
+            if (allocated(memory%column(j)%value)) memory%column(j)%value(p) = freight%value(j, k)
+         end do
       end do
    end subroutine receive_pairs
 

@@ -1,7 +1,7 @@
 !> Shapes that may be believed: a few bytes of HDF5 can claim more numbers than any memory holds.
 module polydem_hdf5_claim
-   use hdf5, only: h5dclose_f, h5dget_storage_size_f, h5dget_type_f, h5dopen_f, h5tclose_f, h5tget_size_f, hid_t, &
-      hsize_t, size_t
+   use hdf5, only: h5dclose_f, h5dget_storage_size_f, h5dget_type_f, h5dopen_f, h5fget_filesize_f, h5tclose_f, &
+      h5tget_size_f, hid_t, hsize_t, size_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_dataset, only: dataset_shape
    use polydem_hdf5_place, only: expect, place_t
@@ -27,7 +27,7 @@ contains
       !> Allocated if there is no such data set, or if it claims too much
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: dataset, kind_in_file
-      integer(hsize_t) :: stored
+      integer(hsize_t) :: stored, whole
       integer(size_t) :: bytes
       real(dp) :: claimed
       integer :: status, ignored
@@ -40,6 +40,9 @@ contains
       ! HDF5 1.10 calls it a failure if nothing is stored.
       call h5dget_storage_size_f(dataset, stored, status)
       if (status < 0) stored = 0_hsize_t
+      ! What is said to be stored may be a lie, too.
+      call h5fget_filesize_f(place%file, whole, status)
+      if (status >= 0) stored = min(stored, whole)
       call h5dget_type_f(dataset, kind_in_file, status)
       if (status >= 0) then
          call h5tget_size_f(kind_in_file, bytes, status)

@@ -5,7 +5,7 @@
 !> Meant for comparison; `rate_damping` is the same law without the artefacts of the difference.
 module polydem_book_damping
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contacts, only: at_area, contact_memory_t, contacts_t
    use polydem_force_part, only: force_part_t
    use polydem_kinds, only: ip, wp, worth_threads
    implicit none
@@ -49,11 +49,11 @@ contains
          if (dt > 0.0_wp) then
             mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
             force = self%coefficient*sqrt(self%stiffness/mobility)*contacts%inverse_length(c) &
-               *((contacts%area(c) - memory%area(contacts%pair(c)))/dt)
+               *((contacts%area(c) - memory%column(at_area)%value(contacts%pair(c)))/dt)
             force = min(force, approach_limit*contacts%elastic(c))
          end if
          contacts%normal_force(c) = max(0.0_wp, contacts%normal_force(c) + force)
-         memory%area(contacts%pair(c)) = contacts%area(c)
+         memory%column(at_area)%value(contacts%pair(c)) = contacts%area(c)
       end do
       !$omp end parallel do
    end subroutine add

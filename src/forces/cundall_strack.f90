@@ -9,7 +9,7 @@
 !> of a spring tied to the positions: of second order, and stable to w dt = 2 with velocity Verlet.
 module polydem_cundall_strack
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contacts, only: at_tangential, contact_memory_t, contacts_t
    use polydem_force_part, only: force_part_t
    use polydem_kinds, only: ip, wp, worth_threads
    implicit none
@@ -55,9 +55,9 @@ contains
          if (self%midstep) mean = slip &
             - 0.5_wp*dt*slip_of(bodies%acceleration, bodies%angular_acceleration, contacts, c)
          limit = self%coefficient*contacts%normal_force(c)
-         spring = memory%tangential(contacts%pair(c)) - self%stiffness*mean*dt
+         spring = memory%column(at_tangential)%value(contacts%pair(c)) - self%stiffness*mean*dt
          spring = max(-limit, min(limit, spring))
-         memory%tangential(contacts%pair(c)) = spring
+         memory%column(at_tangential)%value(contacts%pair(c)) = spring
          if (self%damping > 0.0_wp) then
             spring = spring - self%damping*sqrt(self%stiffness/tangential_mobility(bodies, contacts, c))*slip
             spring = max(-limit, min(limit, spring))

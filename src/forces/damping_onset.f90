@@ -8,7 +8,7 @@
 !> begins without a jump and needs no weight; theirs, between 1/2 and 1, does not change the order.)
 module polydem_damping_onset
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contacts, only: at_area, contact_memory_t, contacts_t
    use polydem_force_part, only: force_part_t
    use polydem_kinds, only: ip, wp, worth_threads
    implicit none
@@ -43,11 +43,11 @@ contains
       !$omp    shared(dt, contacts, memory) private(c, growth, damping)
       do c = 1_ip, contacts%n
          growth = contacts%rate(c)*dt
-         if (memory%area(contacts%pair(c)) <= 0.0_wp .and. contacts%area(c) < growth) then
+         if (memory%column(at_area)%value(contacts%pair(c)) <= 0.0_wp .and. contacts%area(c) < growth) then
             damping = contacts%normal_force(c) - contacts%elastic(c)
             contacts%normal_force(c) = max(0.0_wp, contacts%elastic(c) + (contacts%area(c)/growth + 0.5_wp)*damping)
          end if
-         memory%area(contacts%pair(c)) = contacts%area(c)
+         memory%column(at_area)%value(contacts%pair(c)) = contacts%area(c)
       end do
       !$omp end parallel do
    end subroutine add

@@ -31,7 +31,7 @@ module polydem_exact_friction
    use polydem_assemble, only: incidence_t
    use polydem_bodies, only: bodies_t
    use polydem_box_qp, only: box_qp_t, reserve_box_qp, solve_box_qp
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contacts, only: at_tangential, contact_memory_t, contacts_t
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t, raise, run_error
    use polydem_friction_network, only: build_network, free_velocities, friction_network_t, within
@@ -90,12 +90,12 @@ contains
          call free_velocities(dt, bodies, programme%free)
          programme%tolerance = self%tolerance
          do c = 1_ip, contacts%n
-            programme%force(c) = within(network%limit(c), memory%tangential(contacts%pair(c)))
+            programme%force(c) = within(network%limit(c), memory%column(at_tangential)%value(contacts%pair(c)))
          end do
          call solve_box_qp(programme, network, incidence, solved)
          do c = 1_ip, contacts%n
             contacts%tangential_force(c) = contacts%tangential_force(c) + programme%force(c)
-            memory%tangential(contacts%pair(c)) = programme%force(c)
+            memory%column(at_tangential)%value(contacts%pair(c)) = programme%force(c)
          end do
          if (contacts%n > 0_ip) self%n_solved = self%n_solved + 1_lp
          self%greatest_residual = max(self%greatest_residual, programme%residual)

@@ -8,7 +8,7 @@ module polydem_force_law
    use polydem_bodies, only: bodies_t
    use polydem_book_damping, only: book_damping_t
    use polydem_conservative_law, only: conservative_law_t, new_conservative_law
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contacts, only: at_area, at_tangential, contact_memory_t, contacts_t, memory_kinds
    use polydem_cundall_strack, only: cundall_strack_t
    use polydem_damping_onset, only: damping_onset_t
    use polydem_exact_friction, only: exact_friction_t
@@ -35,10 +35,8 @@ module polydem_force_law
       type(part_holder_t), allocatable, private :: parts(:)
       !> What acts after all parts; unallocated if there is none
       class(velocity_constraint_t), allocatable :: constraint
-      !> Whether a part remembers tangential forces
-      logical :: needs_tangential = .false.
-      !> Whether a part remembers the area of the last step
-      logical :: needs_area = .false.
+      !> Whether a part needs a column of memory, in the order of `memory_kinds`
+      logical :: needs(size(memory_kinds)) = .false.
       !> Whether the law asks for the effective area of overlaps
       logical :: needs_effective_area = .false.
       !> Whether a part adds torques of its own
@@ -72,7 +70,7 @@ contains
       if (settings%damping_from_touch) then
          call append(law, damping_onset_t())
          law%description = law%description//' from first touch'
-         law%needs_area = .true.
+         law%needs(at_area) = .true.
       end if
       if (settings%tilt_damping > 0.0_wp) then
          call append(law, tilt_damping_t(stiffness=settings%stiffness, share=settings%tilt_damping))
@@ -86,12 +84,12 @@ contains
                                            damping=settings%tangential_damping, &
                                            midstep=settings%midstep_slip))
          law%description = law%description//', Cundall-Strack friction'
-         law%needs_tangential = .true.
+         law%needs(at_tangential) = .true.
       case ('exact')
          law%constraint = exact_friction_t(coefficient=settings%friction_coefficient, &
                                            tolerance=settings%friction_tolerance)
          law%description = law%description//', exact friction'
-         law%needs_tangential = .true.
+         law%needs(at_tangential) = .true.
       end select
    end subroutine new_force_law
 
@@ -116,7 +114,7 @@ contains
          case ('book')
             call append(law, book_damping_t(stiffness=stiffness, coefficient=coefficient))
             law%description = law%description//', book damping'
-            law%needs_area = .true.
+            law%needs(at_area) = .true.
          end select
       end associate
    end subroutine append_damping

@@ -7,7 +7,7 @@ module polydem_run_lock
    use polydem_kinds, only: ip
    use polydem_line_writer, only: line_writer_t
    use polydem_machine, only: host_name
-   use polydem_paths, only: exists, remove_file
+   use polydem_paths, only: exists, remove_file, rename_file
    use polydem_processes, only: lives, own_process
    use polydem_strings, only: to_text
    implicit none
@@ -51,13 +51,13 @@ contains
             call raise(error, io_error, lock_path(folder)//': cannot be made: '//reason)
             return
          end if
-         owner = owner_of(folder)
+         owner = owner_of(lock_path(folder))
          call refuse_the_living(folder, owner, error)
-         if (.not. allocated(error)) call remove_file(lock_path(folder), error)
+         if (.not. allocated(error)) call drop_lock(folder, owner, error)
          if (allocated(error)) return
          call make_lock(folder, made, reason)
          if (.not. made) then
-            call raise(error, input_error, folder//': another run has just begun in this folder; choose another one')
+            call raise(error, input_error, just_begun(folder))
             return
          end if
          note = 'took over '//lock_path(folder)//' of process '//to_text(owner%process)//', which has ended'
@@ -71,8 +71,43 @@ contains
       character(len=*), intent(in) :: folder
       type(error_t), allocatable :: ignored
 
-      if (is_own(owner_of(folder))) call remove_file(lock_path(folder), ignored)
+      if (is_own(owner_of(lock_path(folder)))) call remove_file(lock_path(folder), ignored)
    end subroutine unlock_result
+
+   !> Remove the lock of a dead run. It is put aside first, in one indivisible step: another run may have seen the same
+   !> dead one, and what is put aside may already be its lock, which it gets back.
+   subroutine drop_lock(folder, dead, error)
+      character(len=*), intent(in) :: folder
+      type(owner_t), intent(in) :: dead
+      type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: ignored
+      type(owner_t) :: owner
+      character(len=:), allocatable :: aside
+
+      aside = lock_path(folder)//'.'//to_text(own_process())
+      call rename_file(lock_path(folder), aside, error)
+      if (allocated(error)) then
+         if (.not. exists(lock_path(folder))) then
+            error%code = input_error
+            error%message = just_begun(folder)
+         end if
+         return
+      end if
+      owner = owner_of(aside)
+      if (owner%process == dead%process .and. owner%host == dead%host) then
+         call remove_file(aside, error)
+      else
+         call rename_file(aside, lock_path(folder), ignored)
+         call raise(error, input_error, just_begun(folder))
+      end if
+   end subroutine drop_lock
+
+   function just_begun(folder) result(message)
+      character(len=*), intent(in) :: folder
+      character(len=:), allocatable :: message
+
+      message = folder//': another run has just begun in this folder; choose another one'
+   end function just_begun
 
    !> Make the empty file of a lock, which fails if it is there.
    subroutine make_lock(folder, made, reason)
@@ -101,12 +136,12 @@ contains
       if (allocated(error)) call remove_file(lock_path(folder), ignored)
    end subroutine sign_lock
 
-   function owner_of(folder) result(owner)
-      character(len=*), intent(in) :: folder
+   function owner_of(path) result(owner)
+      character(len=*), intent(in) :: path
       type(owner_t) :: owner
       integer :: unit, status
 
-      open (newunit=unit, file=lock_path(folder), status='old', action='read', iostat=status)
+      open (newunit=unit, file=path, status='old', action='read', iostat=status)
       if (status /= 0) return
       read (unit, *, iostat=status) owner%process, owner%host
       if (status /= 0) owner = owner_t()

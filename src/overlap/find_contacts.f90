@@ -121,11 +121,13 @@ contains
       integer(ip), intent(in) :: p
       type(overlap_t), intent(in) :: overlap
       type(contact_memory_t), intent(inout) :: memory
+      integer :: k
 
       if (allocated(memory%separating_edge)) memory%separating_edge(p) = overlap%separating_edge
       if (overlap%area > 0.0_wp) return
-      if (allocated(memory%tangential)) memory%tangential(p) = 0.0_wp
-      if (allocated(memory%area)) memory%area(p) = 0.0_wp
+      do k = 1, size(memory%column)
+         if (allocated(memory%column(k)%value)) memory%column(k)%value(p) = 0.0_wp
+      end do
    end subroutine remember
 
    !> Write one contact.

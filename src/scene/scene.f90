@@ -17,6 +17,7 @@ module polydem_scene
    use polydem_incline, only: list_incline
    use polydem_kinds, only: ip, wp
    use polydem_motion, only: motion_t, new_motion
+   use polydem_paths, only: exists
    use polydem_settings, only: scene_settings_t, settings_t
    use polydem_stack, only: list_stack
    use polydem_strings, only: to_text
@@ -42,11 +43,10 @@ contains
       origin = settings%file//': &scene'
       if (settings%scene%name == 'file') then
          origin = settings%scene%bodies_file
-         call read_bodies_file(origin, settings%scene%density, list, error)
-         if (allocated(error)) then
-            error%message = settings%file//": 'bodies_file' in &scene: "//error%message
-            return
-         end if
+         if (.not. exists(origin)) call raise(error, input_error, settings%file//": 'bodies_file' in &scene: "// &
+                                              origin//': there is no such file')
+         if (.not. allocated(error)) call read_bodies_file(origin, settings%scene%density, list, error)
+         if (allocated(error)) return
       else
          call list_generated(settings, list, error)
       end if

@@ -9,7 +9,7 @@ module polydem_contacts
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: contacts_t, contact_memory_t, reserve_contacts, is_degenerate
+   public :: contacts_t, contact_memory_t, memory_kinds, at_tangential, at_area, reserve_contacts, is_degenerate
 
    !> Structure of arrays over contacts 1..n; the arrays may be longer
    type :: contacts_t
@@ -63,14 +63,34 @@ module polydem_contacts
       real(wp), allocatable :: force(:, :)
    end type contacts_t
 
-   !> Columns that ride on the pair list; unallocated where no model asks for them
+   !> Something that force parts remember of pairs from step to step
+   type :: memory_kind_t
+      !> Name in checkpoints, and unit
+      character(len=16) :: name, unit
+      !> What it is
+      character(len=48) :: meaning
+   end type memory_kind_t
+
+   !> Rows of the table of what is remembered
+   integer, parameter :: at_tangential = 1, at_area = 2
+   !> All that can be remembered. The tangential force is that of the spring or of exact friction; the area serves
+   !> the book's backward difference, and to know new contacts
+   type(memory_kind_t), parameter :: memory_kinds(*) = [ &
+      memory_kind_t('tangential', 'N/m', 'tangential force remembered'), &
+      memory_kind_t('area', 'm2', 'area of the overlap at the last step')]
+
+   !> A column of memory
+   type :: memory_column_t
+      !> Value of each pair, zero when its bodies do not overlap; not allocated where no model asks for it, (pair)
+      real(wp), allocatable :: value(:)
+   end type memory_column_t
+
+   !> What is remembered of pairs: columns that ride on the pair list
    type :: contact_memory_t
       !> Edge that separated the pair last: +k of the first body, -k of the second, 0 unknown
       integer(ip), allocatable :: separating_edge(:)
-      !> Tangential force of the last step: of the spring, or of exact friction [N/m]
-      real(wp), allocatable :: tangential(:)
-      !> Area at the last step [m2], for the book's backward difference and to know new contacts
-      real(wp), allocatable :: area(:)
+      !> Columns in the order of the table
+      type(memory_column_t) :: column(size(memory_kinds))
    end type contact_memory_t
 
 contains

@@ -140,8 +140,8 @@ contains
       leads = self%rank == 0_ip
    end function leads
 
-   !> Let all processes know of a failure of any: all have the error of the lowest rank that has one. Flags are made
-   !> the greatest over all along the way.
+   !> Let all processes know of a failure of any: all have the error of the least place, and of those that of the lowest
+   !> rank. Flags are made the greatest over all along the way.
    subroutine agree(self, error, flags)
       class(team_t), intent(inout) :: self
       !> Failure of this process; afterwards the same on all
@@ -150,41 +150,55 @@ contains
       integer(lp), intent(inout), optional :: flags(:)
       integer(lp), allocatable :: values(:)
       character(len=:), allocatable :: text
+      logical :: speaks
 
       if (self%size == 1_ip) return
       allocate (values(1))
-      values(1) = 0_lp
-      ! The greatest of these is that of the lowest rank.
-      if (allocated(error)) values(1) = int(self%size - self%rank, lp)
+      values(1) = merge(1_lp, 0_lp, allocated(error))
       if (present(flags)) values = [values, flags]
       call self%maximise(values)
       if (present(flags)) flags = values(2:)
       if (values(1) == 0_lp) return
+      values = [-huge(0_lp)]
+      if (allocated(error)) values(1) = -error%place
+      call self%maximise(values)
+      speaks = allocated(error)
+      if (speaks) speaks = -error%place == values(1)
       values = [0_lp]
-      if (allocated(error)) then
+      if (speaks) then
          values(1) = int(error%code, lp)
          text = error%message
       end if
       call self%spread_text(text)
-      if (allocated(error)) then
+      if (.not. allocated(error)) allocate (error)
+      if (speaks) then
          if (error%message /= text) values(1) = 0_lp
-      else
-         allocate (error)
       end if
       call self%maximise(values)
       error%code = int(values(1))
       error%message = text
    end subroutine agree
 
-   !> Give all processes the text of the lowest rank that has one, if any has; collective.
-   subroutine spread_text(self, text)
+   !> Give all processes the text of the greatest weight, if any has one, and of those that of the lowest rank.
+   !> Collective.
+   subroutine spread_text(self, text, weight)
       class(team_t), intent(inout) :: self
       !> The text; unallocated: none
       character(len=:), allocatable, intent(inout) :: text
+      !> Its weight, greater than the least number there is; all texts weigh the same if absent
+      real(dp), intent(in), optional :: weight
       integer(lp) :: first(2)
+      real(dp) :: weights(1)
       integer(lp), allocatable :: codes(:)
 
       if (self%size == 1_ip) return
+      if (present(weight)) then
+         weights = -huge(0.0_dp)
+         if (allocated(text)) weights = weight
+         call self%maximise(weights)
+         if (weights(1) <= -huge(0.0_dp)) return
+         if (allocated(text) .and. weight < weights(1)) deallocate (text)
+      end if
       first = 0_lp
       if (allocated(text)) first(1) = int(self%size - self%rank, lp)
       call self%maximise(first(:1))

@@ -3,7 +3,7 @@ module networks
    use polydem_assemble, only: incidence_t, index_contacts
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_contacts, only: contact_memory_t, contacts_t, reserve_contacts
+   use polydem_contacts, only: at_tangential, contact_memory_t, contacts_t, reserve_contacts
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_random, only: random_t
@@ -237,8 +237,8 @@ contains
 
       scene%contacts%n = n_contacts
       scene%contacts%tangential_force(1:n_contacts) = 0.0_wp
-      allocate (scene%memory%tangential(n_contacts))
-      scene%memory%tangential = 0.0_wp
+      allocate (scene%memory%column(at_tangential)%value(n_contacts))
+      scene%memory%column(at_tangential)%value = 0.0_wp
       call index_contacts(scene%bodies%n, scene%contacts, scene%incidence)
    end subroutine finish
 

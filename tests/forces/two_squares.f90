@@ -2,7 +2,7 @@
 module two_squares
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_contacts, only: contact_memory_t, contacts_t, reserve_contacts
+   use polydem_contacts, only: at_area, at_tangential, contact_memory_t, contacts_t, reserve_contacts
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    implicit none
@@ -53,8 +53,8 @@ contains
       contacts%elastic(1) = 0.0_wp
       contacts%normal_force(1) = 0.0_wp
       contacts%tangential_force(1) = 0.0_wp
-      memory%tangential = [0.0_wp]
-      memory%area = [0.0_wp]
+      memory%column(at_tangential)%value = [0.0_wp]
+      memory%column(at_area)%value = [0.0_wp]
    end subroutine make_contact
 
 end module two_squares

@@ -10,6 +10,7 @@ import argparse
 import os
 import re
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -87,6 +88,22 @@ def watch(process, folder, limit):
     return True
 
 
+def stack_of_the_greedy(command, folder, environment):
+    """Messages of a process that takes more and more memory, ended by a signal on its way so that its stack is told."""
+    options = environment["ASAN_OPTIONS"] + ":handle_abort=1:hard_rss_limit_mb=0"
+    with open(folder / "messages", "w+b") as messages:
+        process = subprocess.Popen(command, cwd=folder, env={**environment, "ASAN_OPTIONS": options},
+                                   stdout=subprocess.DEVNULL, stderr=messages)
+        while process.poll() is None:
+            time.sleep(0.02)
+            pages = Path(f"/proc/{process.pid}/statm").read_text(encoding="utf-8").split()
+            if pages and int(pages[1]) * resource.getpagesize() > MEMORY // 4:
+                process.send_signal(signal.SIGABRT)
+                process.wait()
+        messages.seek(0)
+        return messages.read().decode("utf-8", errors="replace")
+
+
 def limit_memory():
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
@@ -115,6 +132,8 @@ def try_kind(fuzz, inputs, kind, first, last, limit):
                 break
             what = "hang"
             if in_time:
+                if "hard rss limit exhausted" in text:
+                    text += stack_of_the_greedy([fuzz, kind, inputs, str(case), str(case)], folder, environment)
                 maps = (folder / "maps").read_text(errors="replace")
                 what = "broken promise" if "broken promise" in text else fault_of(text, maps, fuzz)
             findings.append((case, what, text))

@@ -1,7 +1,7 @@
 !> What several processes tell each other, run by mpirun: ends with code 1 and a word about all that is wrong.
 program team_checks
    use, intrinsic :: iso_fortran_env, only: error_unit
-   use polydem_errors, only: error_t, io_error, raise
+   use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_join_team, only: join_team
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_team, only: route_t, team_t
@@ -145,8 +145,26 @@ contains
       if (allocated(failure)) call expect(failure%code == io_error, 'its code')
       call expect(all(flags == [0_lp, int(team%size, lp) - 1_lp]), 'flags')
       deallocate (failure)
+      ! Now both say where: the highest rank has the least place.
+      if (team%rank >= team%size - 2_ip) then
+         write (name, '(i0)') team%rank
+         call raise(failure, input_error, 'rank '//trim(name)//' failed')
+         failure%place = int(team%size - team%rank, lp)
+      end if
+      call team%agree(failure)
+      write (name, '(i0)') team%size - 1_ip
+      if (allocated(failure)) call expect(failure%message == 'rank '//trim(name)//' failed', 'the least place')
+      if (allocated(failure)) call expect(failure%code == input_error, 'its code')
+      deallocate (failure)
       call team%agree(failure)
       call expect(.not. allocated(failure), 'no failure')
+      text = name
+      write (text, '(i0)') team%rank
+      call team%spread_text(text, real(mod(team%rank, 2_ip), dp))
+      call expect(text == merge('1', '0', team%size > 1_ip), 'the text of the greatest weight')
+      deallocate (text)
+      call team%spread_text(text, 1.0_dp)
+      call expect(.not. allocated(text), 'no text, whatever its weight')
       call team%spread_text(text)
       call expect(.not. allocated(text), 'no text')
       if (team%rank == team%size - 1_ip) text = 'a word'
