@@ -238,7 +238,8 @@ contains
       if (n /= size(rows%whole)) status = -1
       if (n == size(rows%whole)) status = merge(0, -1, all(extent(:n - 1) == rows%whole(:n - 1)))
       call expect(status, 'add rows of another shape to', place, error)
-      if (allocated(error) .or. rows%whole(n) == 0_hsize_t) return
+      if (allocated(error)) return
+      if (rows%whole(n) == 0_hsize_t) return
       slab = rows
       slab%start(n) = slab%start(n) + extent(n)
       extent(n) = extent(n) + rows%whole(n)
