@@ -95,8 +95,9 @@ contains
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
 
-      is_somewhere = abs(bodies%position(1, s)) <= far .and. abs(bodies%position(2, s)) <= far &
-         .and. abs(bodies%angle(s)) <= far
+      is_somewhere = ieee_is_finite(bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s))
+      if (is_somewhere) is_somewhere = abs(bodies%position(1, s)) <= far .and. abs(bodies%position(2, s)) <= far &
+                                       .and. abs(bodies%angle(s)) <= far
    end function is_somewhere
 
    !> Stop if a body has left the finite numbers; stop or warn if it moves too far in a step.

@@ -189,13 +189,16 @@ contains
       type(trace_t), intent(inout) :: trace
       type(error_t), allocatable, intent(inout) :: error
       real(dp), allocatable :: reach(:)
+      logical :: good
 
       if (.not. file%has('/reach')) return
       call file%read('/reach', reach, error)
       if (allocated(error)) return
       call check_size(path, 'reach', size(reach, kind=lp), size(trace%fixed, kind=lp), 'boxes', error)
       if (allocated(error)) return
-      if (.not. all(reach >= 0.0_dp .and. reach <= real(far, dp))) then
+      good = all(ieee_is_finite(reach))
+      if (good) good = all(reach >= 0.0_dp .and. reach <= real(far, dp))
+      if (.not. good) then
          call raise(error, input_error, path//': reach must be a number from 0 to '//to_text(far))
          return
       end if
@@ -215,8 +218,8 @@ contains
       do s = 1_ip, trace%n_steps
          do b = 1_ip, size(trace%fixed, kind=ip)
             box = trace%bounds(:, b, s)
-            sound = all(abs(box) <= far)
-            if (sound) sound = all(box(1:2) <= box(3:4))
+            sound = all(ieee_is_finite(box))
+            if (sound) sound = all(abs(box) <= far) .and. all(box(1:2) <= box(3:4))
             if (.not. sound) then
                call raise(error, input_error, path//': aabb of step '//to_text(s - 1_ip)//', box '// &
                           to_text(b - 1_ip)//': bounds must be numbers up to '//to_text(far)// &
@@ -282,10 +285,14 @@ contains
 
       if (size(vertices, 1) /= 2) then
          call raise(error, input_error, path//': vertices must have the shape (n, 2)')
-      else if (.not. all(abs(vertices) <= real(far, dp))) then
-         call raise(error, input_error, path//': vertices must be numbers up to '//to_text(far))
+         return
       end if
-      if (allocated(error)) return
+      fit = all(ieee_is_finite(vertices))
+      if (fit) fit = all(abs(vertices) <= real(far, dp))
+      if (.not. fit) then
+         call raise(error, input_error, path//': vertices must be numbers up to '//to_text(far))
+         return
+      end if
       fit = size(offset) == n_boxes + 1_ip
       if (fit) fit = offset(1) == 0_ip .and. offset(n_boxes + 1_ip) == size(vertices, 2) .and. &
                      all(offset(2:) >= offset(:n_boxes))
