@@ -42,7 +42,6 @@ contains
       integer(lp) :: counts(4)
       real(dp) :: numbers(4)
 
-      if (allocated(error)) return
       if (team%leads()) then
          counts = [int(self%bodies%n_all, lp), self%n_steps, size(self%motions, kind=lp), self%step]
          numbers = real([self%dt, self%expected_stable_step, self%maker%grain, self%guard%limit], dp)

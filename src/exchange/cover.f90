@@ -221,9 +221,7 @@ contains
       !> Bounds of the centres, times two
       real(wp), intent(in) :: low, high
 
-      ! Of bodies at the end of the numbers a difference may be infinite; min and max take NaN for the other one.
-      bin_of = 1 + int(min(max((box(axis) + box(axis + 2) - low)/(high - low), 0.0_wp), 1.0_wp)*real(n_bins, wp))
-      bin_of = min(max(bin_of, 1), n_bins)
+      bin_of = min(n_bins, 1 + int((box(axis) + box(axis + 2) - low)/(high - low)*real(n_bins, wp)))
    end function bin_of
 
    !> Rectangle on two others

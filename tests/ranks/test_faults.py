@@ -204,12 +204,16 @@ def test_bodies_at_the_end_of_the_numbers_are_told(tmp_path):
     options = ("--set", "overlap.degenerate=push", "--set", "forces.gravity=0,0", "--set", "integrate.dt=1",
                "--set", "integrate.duration=2", "--set", "output.frame_interval=1", "--set", "output.ledger=.false.",
                "--force")
-    write_crossing(tmp_path / "bodies.h5", ())
-    with h5py.File(tmp_path / "bodies.h5", "r+") as file:
-        file["velocity"][2] = (4e307, 0.0)
-        file["velocity"][4] = (-4e307, 4e307)
+    with h5py.File(tmp_path / "bodies.h5", "w") as file:
+        file["vertex"] = [(0.03 * k + i, 0.011 * k + j) for k in range(12)
+                          for i, j in ((0.0, 0.0), (0.02, 0.0), (0.02, 0.02), (0.0, 0.02))]
+        file["vertex_start"] = [4 * k for k in range(13)]
+        file["fixed"] = [0] * 12
+        file["velocity"] = [{3: (4e307, 0.0), 7: (-4e307, 4e307), 9: (-4e307, 2e307)}.get(k, (0.0, 0.0))
+                            for k in range(12)]
     told = [run(scene, tmp_path / f"of_{ranks}", ranks, 1, options, code=FAILED) for ranks in (None, 2, 3)]
-    assert len({message_of(text) for _, text in told}) == 1 and "is nowhere" in told[0][1], told
+    assert len({message_of(text) for _, text in told}) == 1, told
+    assert "step 2: body 4 at (8." in told[0][1] and "is nowhere" in told[0][1], told
     assert len({state_hash(output) for output, _ in told}) == 1, told
 
 
