@@ -38,6 +38,8 @@ module polydem_command_line
       character(len=:), allocatable :: samples
       !> Whether a replay compares every list with that of all pairs
       logical :: oracle = .false.
+      !> Whether the files of a result are compared with their checksums
+      logical :: checks = .false.
       !> Whether help is wanted, on the verb or on all
       logical :: help = .false.
       !> Whether the version is wanted
@@ -98,6 +100,8 @@ module polydem_command_line
       option_t('--steps', 'N', 'replay', 'replay the first steps of the trace only (default: all)'), &
       option_t('--samples', 'FOLDER', 'replay', 'write one file of measurements per replay (default: none)'), &
       option_t('--oracle', '', 'replay', 'compare every list with that of all pairs, whatever the trace knows'), &
+      option_t('--check', '', 'info', &
+      'compare all files of the result in a folder with their checksums; code 3 if one is wrong'), &
       option_t('--help', '', all_verbs, 'show this help'), &
       option_t('--version', '', all_verbs, 'show the version')]
 
@@ -283,6 +287,8 @@ contains
          command%samples = value
       case ('--oracle')
          command%oracle = .true.
+      case ('--check')
+         command%checks = .true.
       case ('--help')
          command%help = .true.
       case default
@@ -352,6 +358,8 @@ contains
          '--continue does not go with --force, which begins anew; give one of them')
       if (command%may_change .and. .not. command%continues) call raise(error, input_error, '--changed needs --continue')
       if (command%help .or. command%version .or. command%file /= '') return
+      if (command%checks) call raise(error, input_error, '--check needs the folder of a result: polydem info '// &
+         '--check RESULT')
       do k = 1, size(verbs)
          if (verbs(k)%name /= command%verb .or. verbs(k)%file_is_optional) cycle
          call raise(error, input_error, &

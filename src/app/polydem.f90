@@ -7,6 +7,7 @@ program polydem
    use polydem_bench_settings, only: bench_settings_t
    use polydem_build_info, only: git_revision, program_version
    use polydem_check, only: check_simulation
+   use polydem_check_result, only: check_result
    use polydem_command_line, only: command_t, read_command_line, usage
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: start_library
@@ -84,7 +85,11 @@ contains
          if (.not. allocated(error)) call run_bench(bench, error)
       case default
          if (command%file == '') call describe_program(error)
-         if (command%file /= '') call describe_result(command%file, error)
+         if (command%checks) then
+            call check_result(command%file, error)
+         else if (command%file /= '') then
+            call describe_result(command%file, error)
+         end if
       end select
    end subroutine obey
 

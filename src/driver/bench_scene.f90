@@ -4,7 +4,8 @@ module polydem_bench_scene
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_paths, only: exists
    use polydem_read_settings, only: read_settings
-   use polydem_result_folder, only: holds_result, profile_path, trace_path
+   use polydem_replaced, only: holds_result
+   use polydem_result_folder, only: profile_path, trace_path
    use polydem_run, only: result_folder, run_simulation
    use polydem_settings, only: settings_t
    use polydem_words, only: quoted

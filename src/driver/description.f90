@@ -10,7 +10,7 @@ module polydem_description
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: describe, list_overlaps
+   public :: describe, has_deep_contacts, list_overlaps
 
 contains
 
@@ -43,6 +43,15 @@ contains
          end if
       end associate
    end subroutine describe
+
+   !> Whether there are contacts that `list_overlaps` lists
+   logical function has_deep_contacts(simulation)
+      !> A simulation at time 0
+      type(simulation_t), intent(in) :: simulation
+
+      has_deep_contacts = count_deeper(simulation%contacts, thickness_of_bodies(simulation%bodies), &
+                                       simulation%settings%guards%listed_depth) > 0_ip
+   end function has_deep_contacts
 
    !> Write how deep contacts are at the start, and a table of the deep ones.
    subroutine list_overlaps(simulation, folder, log, error)

@@ -6,6 +6,7 @@ module polydem_recorder
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_list_hash, only: list_hash
    use polydem_log, only: log_t
+   use polydem_manifest, only: manifest_t
    use polydem_paths, only: exists
    use polydem_provenance, only: provenance_t
    use polydem_result_folder, only: steps_path, trace_path
@@ -45,7 +46,7 @@ module polydem_recorder
 contains
 
    !> Prepare what the settings of the simulation ask for, and record the present step if it is the first one.
-   subroutine open_recorder(self, simulation, folder, provenance, log, error)
+   subroutine open_recorder(self, simulation, folder, provenance, log, manifest, error)
       class(recorder_t), intent(inout) :: self
       !> Simulation before its first step, or where it goes on
       type(simulation_t), intent(inout) :: simulation
@@ -55,6 +56,8 @@ contains
       type(provenance_t), intent(in) :: provenance
       !> Log, for warnings
       type(log_t), intent(inout) :: log
+      !> List of the files of the result, which owns those that are to be written
+      type(manifest_t), intent(inout) :: manifest
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
@@ -64,16 +67,20 @@ contains
          if (self%trace_steps > 0_ip .and. simulation%step <= self%first_step) then
             if (self%first_step + int(self%trace_steps, lp) - 1_lp > simulation%n_steps) call log%write_line( &
                'warning: the run ends before the trace is complete')
-            call self%trace%open(trace_path(folder), boxes%body(:boxes%n), boxes%fixed(:boxes%n), &
+            call manifest%reopen(trace_path(folder), error)
+            if (.not. allocated(error)) &
+               call self%trace%open(trace_path(folder), boxes%body(:boxes%n), boxes%fixed(:boxes%n), &
                                  boxes%reach(:boxes%n), simulation%dt, provenance, error)
          end if
          if (output%step_profile) then
+            call manifest%reopen(steps_path(folder), error)
+            if (allocated(error)) return
             call self%steps%open(steps_path(folder), stage_names, phase_names, count_names, provenance, error)
             allocate (self%row%stage(n_stages), self%row%phase(n_phases), self%row%count(n_counts))
             call self%meter%look(simulation%neighbours%finder, self%row%phase, self%row%count)
          end if
       end associate
-      if (.not. allocated(error)) call record_boxes(self, simulation, error)
+      if (.not. allocated(error)) call record_boxes(self, simulation, manifest, error)
    end subroutine open_recorder
 
    !> A run that goes on cannot go on recording, but may have recorded before or record later.
@@ -101,14 +108,16 @@ contains
    end subroutine check_recording
 
    !> Record the step that was just done.
-   subroutine record(self, simulation, error)
+   subroutine record(self, simulation, manifest, error)
       class(recorder_t), intent(inout) :: self
       !> Simulation; its finder may be asked for its state
       type(simulation_t), intent(inout) :: simulation
+      !> List of the files of the result
+      type(manifest_t), intent(inout) :: manifest
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
-      call record_boxes(self, simulation, error)
+      call record_boxes(self, simulation, manifest, error)
       if (.not. self%steps%is_open .or. allocated(error)) return
       associate (row => self%row)
          row%step = simulation%step
@@ -122,17 +131,23 @@ contains
    end subroutine record
 
    !> Complete what is recorded, and say so if it is less than was asked for.
-   subroutine close_recorder(self, log, error)
+   subroutine close_recorder(self, log, manifest, error)
       class(recorder_t), intent(inout) :: self
       !> Log
       type(log_t), intent(inout) :: log
+      !> List of the files of the result
+      type(manifest_t), intent(inout) :: manifest
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
+      logical :: was_open(2)
 
+      was_open = [self%trace%is_open, self%steps%is_open]
       if (self%trace%is_open) call log%write_line('warning: the run ended before the trace was complete; there are '// &
          to_text(self%trace%n_steps)//' of '//to_text(self%trace_steps)//' steps')
       call self%trace%close(error)
       call self%steps%close(error)
+      if (was_open(1)) call manifest%close_file(trace_path(''), error)
+      if (was_open(2)) call manifest%close_file(steps_path(''), error)
    end subroutine close_recorder
 
    !> The first step at or after a time
@@ -147,16 +162,19 @@ contains
       first_trace_step = ceiling(min(start/dt, 1.0e15_wp) - slack, lp)
    end function first_trace_step
 
-   subroutine record_boxes(self, simulation, error)
+   subroutine record_boxes(self, simulation, manifest, error)
       type(recorder_t), intent(inout) :: self
       type(simulation_t), intent(in) :: simulation
+      type(manifest_t), intent(inout) :: manifest
       type(error_t), allocatable, intent(inout) :: error
 
       if (.not. self%trace%is_open .or. simulation%step < self%first_step) return
       associate (boxes => simulation%boxes, pairs => simulation%neighbours%pairs)
          call self%trace%add(simulation%step, boxes%bounds(:, :boxes%n), pairs%n, list_hash(pairs), error)
       end associate
-      if (self%trace%n_steps == self%trace_steps) call self%trace%close(error)
+      if (self%trace%n_steps < self%trace_steps) return
+      call self%trace%close(error)
+      call manifest%close_file(trace_path(''), error)
    end subroutine record_boxes
 
 end module polydem_recorder

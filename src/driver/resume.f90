@@ -3,13 +3,14 @@ module polydem_resume
    use polydem_changed_entries, only: changed_entries
    use polydem_checkpoint_contents, only: history_t, keep_progress, keep_run
    use polydem_checkpoint_file, only: checkpoint_file_t
+   use polydem_checked_files, only: check_closed, find_segments, read_frames
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: ip, lp
    use polydem_log, only: log_t
-   use polydem_paths, only: exists, remove_file
-   use polydem_result_folder, only: checkpoint_path, clear_unfinished, holds_result, last_number, n_checkpoints, &
-      profile_path, segment_path
+   use polydem_manifest, only: manifest_t
+   use polydem_paths, only: exists
+   use polydem_result_folder, only: checkpoint_path, n_checkpoints, name_in, profile_path, segment_path, trace_path
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
@@ -32,41 +33,56 @@ module polydem_resume
       integer(lp) :: last_frame = -1_lp
       !> What is to be said about it, for the log
       character(len=:), allocatable :: remark
+      !> Frames, first and last step of the last segment that has its name, if it is not closed in the manifest; else 0
+      integer(lp), private :: unlisted(3) = 0_lp
       !> Closed segments when the checkpoint was written
       integer(lp), private :: segments_then = 0_lp
       !> Commit of the program that wrote the checkpoint, and the settings in force then
       character(len=:), allocatable, private :: revision, former
    end type past_t
 
+   !> What is said of another scene
+   character(len=*), parameter :: other_bodies = 'the bodies at the start are others'
+
 contains
 
-   !> Look for the finished result of the same settings.
-   subroutine find_finished(folder, settings, last_state)
+   !> Look for the finished result of the same settings and bodies.
+   subroutine find_finished(folder, settings, scene, manifest, last_state, error)
       !> Folder of the result
       character(len=*), intent(in) :: folder
       !> Settings of the run
       type(settings_t), intent(in) :: settings
+      !> Hash of its bodies at the start, as in the provenance of results
+      character(len=*), intent(in) :: scene
+      !> Good manifest of the folder, which lists a closed profile
+      type(manifest_t), intent(in) :: manifest
       !> Hash of its last state; not allocated if the folder holds no such result
       character(len=:), allocatable, intent(out) :: last_state
+      !> Says that it is finished, but not whole any more
+      type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      type(error_t), allocatable :: error
-      character(len=:), allocatable :: status, text
+      character(len=:), allocatable :: path, status, text
 
-      if (.not. exists(profile_path(folder))) return
-      call file%open(profile_path(folder), error)
+      path = profile_path(folder)
+      call check_closed(manifest, folder, error, only=name_in(path))
+      if (.not. allocated(error)) call file%open(path, error)
       if (.not. allocated(error)) call file%read('/status', status, error)
       if (.not. allocated(error)) call file%read('/state_hash', text, error)
       call file%close(error)
       if (allocated(error)) return
       if (status /= 'finished') return
-      if (changed_entries(origin_of(profile_path(folder), 'resolved_input'), settings%resolved) /= '') return
-      call move_alloc(text, last_state)
+      if (origin_of(path, 'scene') /= scene) return
+      if (changed_entries(origin_of(path, 'resolved_input'), settings%resolved) /= '') return
+      call check_closed(manifest, folder, error)
+      if (.not. allocated(error)) call move_alloc(text, last_state)
    end subroutine find_finished
 
    !> Choose the newest good checkpoint, and see to it that the settings are as they were.
-   subroutine look_back(folder, settings, scene, may_change, past, error)
+   subroutine look_back(folder, manifest, settings, scene, may_change, past, error)
       !> Folder of the result, which nobody else writes to
       character(len=*), intent(in) :: folder
+      !> Good manifest of the folder
+      type(manifest_t), intent(in) :: manifest
       !> Settings of the run
       type(settings_t), intent(in) :: settings
       !> Hash of its bodies at the start, as in the provenance of results
@@ -79,40 +95,44 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: changes
 
-      call choose_checkpoint(folder, past, error)
+      call check_closed(manifest, folder, error)
+      if (.not. allocated(error)) call choose_checkpoint(folder, past, error)
       if (allocated(error)) return
       if (past%checkpoint == 0_ip) then
-         call look_without_checkpoint(folder, settings, scene, past, error)
+         call look_without_checkpoint(folder, manifest, settings, scene, past, error)
          return
       end if
       changes = changed_entries(past%former, settings%resolved)
       if (changes /= '' .and. .not. may_change) then
          call raise(error, input_error, 'the settings are not those of the run in '//folder//': '//changes// &
                     '. Undo that, or give --changed to go on with them from step '//to_text(past%step))
+      else if (origin_of(checkpoint_path(folder, past%checkpoint), 'scene') /= scene) then
+         call raise(error, input_error, folder//' holds the result of another run: '//other_bodies//'. Undo that '// &
+                    '(has a bodies file changed?), or give --force instead of --continue to overwrite it')
       end if
       if (allocated(error)) return
       if (changes /= '') past%remark = past%remark//new_line('a')//'changed    '//changes
-      call count_segments(folder, changes /= '', past, error)
+      call count_segments(folder, manifest, scene, changes /= '', past, error)
    end subroutine look_back
 
    !> Begin with the first step, but keep the closed segments of a run of the same scene and settings.
-   subroutine look_without_checkpoint(folder, settings, scene, past, error)
+   subroutine look_without_checkpoint(folder, manifest, settings, scene, past, error)
       character(len=*), intent(in) :: folder, scene
+      type(manifest_t), intent(in) :: manifest
       type(settings_t), intent(in) :: settings
       type(past_t), intent(inout) :: past
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path, changes, former
 
-      if (holds_result(folder)) past%remark = 'there is no checkpoint in '//folder// &
-         ': the run begins with its first step'
+      past%remark = 'there is no checkpoint in '//folder//': the run begins with its first step'
       path = segment_path(folder, 1_ip)
       if (.not. exists(path)) path = profile_path(folder)
       if (.not. exists(path)) return
       changes = changed_entries(origin_of(path, 'resolved_input'), settings%resolved)
       former = origin_of(path, 'scene')
-      if (changes == '' .and. former /= scene) changes = 'the bodies at the start are others'
+      if (changes == '' .and. former /= scene) changes = other_bodies
       if (changes == '') then
-         call count_segments(folder, .false., past, error)
+         call count_segments(folder, manifest, scene, .false., past, error)
       else
          call raise(error, input_error, folder//' holds the result of another run, and no checkpoint: '//changes// &
                     '. Give --force instead of --continue to overwrite it')
@@ -180,15 +200,19 @@ contains
    end function origin_of
 
    !> Find the last frame in closed segments. With other settings, segments after the checkpoint do not stay.
-   subroutine count_segments(folder, is_changed, past, error)
-      character(len=*), intent(in) :: folder
+   subroutine count_segments(folder, manifest, scene, is_changed, past, error)
+      character(len=*), intent(in) :: folder, scene
+      type(manifest_t), intent(in) :: manifest
       logical, intent(in) :: is_changed
       type(past_t), intent(inout) :: past
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp), allocatable :: steps(:)
-      character(len=:), allocatable :: path
+      character(len=:), allocatable :: path, problem
+      integer, allocatable :: places(:)
+      integer(lp) :: steps(2)
 
-      past%segments = last_number(folder)
+      call find_segments(manifest, folder, places, problem)
+      past%segments = size(places, kind=ip)
+      call find_unlisted(folder, manifest, scene, places, past, error)
       if (int(past%segments, lp) < past%segments_then) then
          call raise(error, io_error, segment_path(folder, past%segments + 1_ip)//' is missing, though it was there '// &
                     'at the checkpoint of step '//to_text(past%step)//'. Bring it back, or begin anew with --force '// &
@@ -196,9 +220,9 @@ contains
       end if
       do while (past%segments > 0_ip .and. .not. allocated(error))
          path = segment_path(folder, past%segments)
-         call read_steps(path, steps, error)
-         if (allocated(error)) return
-         past%last_frame = steps(size(steps))
+         steps = past%unlisted(2:)
+         if (past%segments <= size(places)) steps = manifest%entry(places(past%segments))%frames(2:)
+         past%last_frame = steps(2)
          if (.not. is_changed .or. past%last_frame <= past%step) return
          if (steps(1) <= past%step) then
             call raise(error, input_error, path//' holds frames before and after step '//to_text(past%step)// &
@@ -213,36 +237,59 @@ contains
       end do
    end subroutine count_segments
 
+   !> Look for a segment that has its name, but is not closed in the manifest, since a kill came between. It was whole
+   !> before it got its name.
+   subroutine find_unlisted(folder, manifest, scene, places, past, error)
+      character(len=*), intent(in) :: folder, scene
+      type(manifest_t), intent(in) :: manifest
+      integer, intent(in) :: places(:)
+      type(past_t), intent(inout) :: past
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: path
+      integer(lp) :: last
+
+      path = segment_path(folder, past%segments + 1_ip)
+      if (.not. manifest%owns(name_in(path))) return
+      if (.not. exists(path)) return
+      call read_frames(path, past%unlisted, error)
+      if (allocated(error)) return
+      last = -1_lp
+      if (size(places) > 0) last = manifest%entry(places(size(places)))%frames(3)
+      if (past%unlisted(2) <= last) call raise(error, io_error, path//' does not follow the segment before, which '// &
+         'ends with step '//to_text(last)//'. Move it away; its frames are computed again')
+      if (origin_of(path, 'scene') /= scene) call raise(error, io_error, path//' is a segment of another run: '// &
+         other_bodies//'. Move it away; its frames are computed again')
+      past%segments = past%segments + 1_ip
+   end subroutine find_unlisted
+
    !> Remove what former attempts left and the run does not keep: what is unfinished, the end of a finished run, and
    !> segments of former settings. To be called when nothing can keep the run from going on.
-   subroutine clear_surplus(folder, past, error)
+   subroutine clear_surplus(folder, manifest, past, error)
       !> Folder of the result
       character(len=*), intent(in) :: folder
+      !> Its manifest, which is written to
+      type(manifest_t), intent(inout) :: manifest
       !> What was found there
       type(past_t), intent(in) :: past
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: number
+      integer :: k
 
-      call clear_unfinished(folder, error)
-      do number = past%segments + past%surplus, past%segments + 1_ip, -1_ip
-         if (.not. allocated(error)) call remove_file(segment_path(folder, number), error)
+      call manifest%empty(profile_path(folder), error)
+      do k = 1, manifest%n
+         if (.not. allocated(error)) call manifest%empty(trim(manifest%entry(k)%name), error, stays=.true.)
       end do
+      do number = past%segments + past%surplus, past%segments + 1_ip, -1_ip
+         call manifest%empty(segment_path(folder, number), error)
+         call manifest%forget(segment_path(folder, number), error)
+      end do
+      if (past%unlisted(1) > 0_lp .and. past%surplus == 0_ip) &
+         call manifest%close_file(segment_path(folder, past%segments), error, past%unlisted)
+      k = manifest%place_of(name_in(trace_path(folder)))
+      if (k == 0) return
+      if (.not. manifest%entry(k)%is_closed) call manifest%close_file(trace_path(folder), error)
    end subroutine clear_surplus
-
-   subroutine read_steps(path, steps, error)
-      character(len=*), intent(in) :: path
-      integer(lp), allocatable, intent(out) :: steps(:)
-      type(error_t), allocatable, intent(inout) :: error
-      type(hdf5_file_t) :: file
-
-      call file%open(path, error)
-      if (allocated(error)) return
-      call file%read('/frames/step', steps, error)
-      call file%close(error)
-      if (allocated(error)) return
-      if (size(steps) == 0) call raise(error, io_error, path//': holds no frame')
-   end subroutine read_steps
 
    !> Bring a simulation to the state of the checkpoint.
    subroutine go_on(folder, past, revision, simulation, history, watch, log, error)

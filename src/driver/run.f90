@@ -1,7 +1,9 @@
 !> A run from its settings to its result.
 module polydem_run
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use polydem_checked_files, only: check_manifest
    use polydem_checkpoint_contents, only: history_t, keep_whole, scene_hash
+   use polydem_claim_folder, only: claim_folder
    use polydem_clock, only: wall_seconds
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t, input_error, raise, stopped_early
@@ -12,8 +14,9 @@ module polydem_run
    use polydem_lone_team, only: lone_team_t
    use polydem_paths, only: make_folder
    use polydem_provenance, only: collect_provenance
-   use polydem_result_folder, only: checkpoint_path, clear_result, default_folder, holds_result, &
-      n_checkpoints
+   use polydem_replaced, only: recover, replaced_name
+   use polydem_replacement, only: give_up_replaced, say, undo_replacement
+   use polydem_result_folder, only: checkpoint_path, default_folder, n_checkpoints, name_in, overlaps_path, profile_path
    use polydem_recorder, only: check_recording
    use polydem_resume, only: clear_surplus, find_finished, go_on, look_back
    use polydem_run_lock, only: lock_result, unlock_result
@@ -45,7 +48,6 @@ contains
       class(team_t), intent(in), optional :: team
       type(run_t) :: run
       logical :: is_locked
-      integer(lp) :: finished(1)
       character(len=:), allocatable :: last_state
 
       run%began = wall_seconds()
@@ -53,42 +55,90 @@ contains
       if (present(team)) allocate (run%team, source=team)
       if (.not. allocated(run%team)) allocate (lone_team_t :: run%team)
       run%folder = result_folder(settings)
-      finished = 0_lp
-      if (run%team%leads() .and. run%attempt%continues) then
-         call find_finished(run%folder, settings, last_state)
-         if (allocated(last_state)) finished = 1_lp
-      end if
-      call run%team%share(finished)
-      if (finished(1) == 1_lp) then
-         if (run%team%leads()) call tell_finished(run%folder, last_state)
-         return
-      end if
       is_locked = .false.
+      if (run%team%leads() .and. run%attempt%continues) call look_for_end(settings, run, last_state, error)
+      if (is_over(run, last_state)) return
       call check_team(settings, run%team, error)
-      if (run%team%leads() .and. .not. allocated(error)) call begin(settings, force, run, is_locked, error)
+      if (run%team%leads() .and. .not. allocated(error)) call begin(settings, force, run, is_locked, last_state, error)
       call run%team%agree(error)
+      if (.not. allocated(error)) then
+         if (is_over(run, last_state)) then
+            if (is_locked) call unlock_result(run%folder)
+            return
+         end if
+      end if
       if (.not. allocated(error)) call join(settings, run, error)
       if (.not. allocated(error)) call go(run, error)
+      if (is_locked .and. allocated(error)) call undo_replacement(run)
       if (is_locked) call unlock_result(run%folder)
    end subroutine run_simulation
 
+   !> Look whether there is nothing left to do, without changing anything.
+   subroutine look_for_end(settings, run, last_state, error)
+      type(settings_t), intent(in) :: settings
+      type(run_t), intent(inout) :: run
+      !> Hash of the last state, if the run is finished
+      character(len=:), allocatable, intent(out) :: last_state
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      call run%manifest%read(run%folder)
+      k = run%manifest%place_of(name_in(profile_path(run%folder)))
+      if (k == 0 .or. allocated(run%manifest%problem) .or. run%manifest%owns(replaced_name)) return
+      if (.not. run%manifest%entry(k)%is_closed) return
+      call build_scene(settings, run, error)
+      if (.not. allocated(error)) call find_finished(run%folder, settings, run%provenance%scene, run%manifest, &
+                                                     last_state, error)
+   end subroutine look_for_end
+
+   !> Make the simulation at its start, unless that was done before.
+   subroutine build_scene(settings, run, error)
+      type(settings_t), intent(in) :: settings
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(run%provenance%scene)) return
+      call new_simulation(settings, run%simulation, error)
+      if (allocated(error)) return
+      run%history%scene = scene_hash(run%simulation%bodies)
+      run%provenance%scene = hexadecimal(run%history%scene)
+   end subroutine build_scene
+
+   !> Whether the leader found that there is nothing left to do, which it then says; collective.
+   logical function is_over(run, last_state)
+      type(run_t), intent(inout) :: run
+      !> Hash of the last state, allocated if the leader found so
+      character(len=:), allocatable, intent(in) :: last_state
+      integer(lp) :: found(1)
+
+      found = merge(1_lp, 0_lp, allocated(last_state))
+      call run%team%share(found)
+      is_over = found(1) == 1_lp
+      if (is_over .and. run%team%leads()) call tell_finished(run%folder, last_state)
+   end function is_over
+
    !> What the leader does alone: the scene, the folder, and what former attempts left there.
-   subroutine begin(settings, force, run, is_locked, error)
+   subroutine begin(settings, force, run, is_locked, last_state, error)
       type(settings_t), intent(in) :: settings
       logical, intent(in) :: force
       type(run_t), intent(inout) :: run
       !> Whether the folder is locked
       logical, intent(inout) :: is_locked
+      !> Hash of the last state, if it turns out that the run is finished
+      character(len=:), allocatable, intent(inout) :: last_state
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: note
+      character(len=:), allocatable :: note, restored
 
-      call check_free(run, force, error)
-      if (.not. allocated(error)) call new_simulation(settings, run%simulation, error)
+      call check_wanted(run, force, error)
+      if (.not. allocated(error)) call build_scene(settings, run, error)
       if (.not. allocated(error)) call make_folder(run%folder, error)
       if (.not. allocated(error)) call lock_result(run%folder, note, error)
       if (allocated(error)) return
       is_locked = .true.
-      call prepare(settings, force, note, run, error)
+      call recover(run%folder, restored, error)
+      if (allocated(restored)) call say(restored)
+      if (allocated(restored) .and. run%attempt%continues) call look_for_end(settings, run, last_state, error)
+      if (.not. allocated(last_state) .and. .not. allocated(error)) call prepare(settings, force, note, run, error)
    end subroutine begin
 
    !> Let all processes know what the leader knows, and open what they write together.
@@ -135,7 +185,7 @@ contains
       call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error, &
                                run%past%segments, run%team)
       if (run%team%size == 1_ip .and. .not. allocated(error)) &
-         call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, error)
+         call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, run%manifest, error)
    end subroutine join
 
    !> The first frame, unless a former attempt wrote it, all steps, and the end.
@@ -144,14 +194,17 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: is_due, must_stop
 
-      if (run%past%checkpoint == 0_ip) call end_step(run, error)
+      if (run%past%checkpoint == 0_ip) then
+         call end_step(run, error)
+         if (.not. allocated(error)) call give_up_replaced(run, error)
+      end if
       do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
          call advance(run%simulation, error)
          call agree_on_step(run, is_due, must_stop, error)
          if (.not. allocated(error)) call end_step(run, error)
          call run%simulation%timers%lap(stage_output)
          call run%simulation%timers%end_step()
-         if (.not. allocated(error)) call run%recorder%record(run%simulation, error)
+         if (.not. allocated(error)) call run%recorder%record(run%simulation, run%manifest, error)
          if (.not. allocated(error)) call save(run, is_due, must_stop, error)
       end do
       call finish(run, run%history%seconds + (wall_seconds() - run%began), error)
@@ -177,16 +230,18 @@ contains
       call run%simulation%timers%lap(stage_exchange)
    end subroutine agree_on_step
 
-   !> Refuse to overwrite a result unless that is wanted.
-   subroutine check_free(run, force, error)
-      type(run_t), intent(in) :: run
+   !> Refuse to overwrite a result unless that is wanted, and to go on with one whose manifest is damaged.
+   subroutine check_wanted(run, force, error)
+      type(run_t), intent(inout) :: run
       logical, intent(in) :: force
       type(error_t), allocatable, intent(inout) :: error
 
-      if (force .or. run%attempt%continues) return
-      if (holds_result(run%folder)) call raise(error, input_error, run%folder//' holds a result; give --continue '// &
-         'to go on with it, --force to overwrite it, or another folder with --set output.folder=NAME')
-   end subroutine check_free
+      call run%manifest%read(run%folder)
+      call check_manifest(run%manifest, error)
+      if (force .or. run%attempt%continues .or. .not. run%manifest%is_found) return
+      call raise(error, input_error, run%folder//' holds a result; give --continue '// &
+                 'to go on with it, --force to overwrite it, or another folder with --set output.folder=NAME')
+   end subroutine check_wanted
 
    !> Say that there is nothing to do, and how the run ended.
    subroutine tell_finished(folder, last_state)
@@ -208,32 +263,43 @@ contains
       character(len=:), allocatable, intent(in) :: note
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: scene
       logical :: goes_on
 
       ! Again, now that nobody else can write there.
-      call check_free(run, force, error)
+      call check_wanted(run, force, error)
       if (allocated(error)) return
-      run%history%scene = scene_hash(run%simulation%bodies)
+      scene = run%provenance%scene
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
-      run%provenance%scene = hexadecimal(run%history%scene)
+      run%provenance%scene = scene
       run%provenance%processes = run%team%size
-      if (run%attempt%continues) call look_back(run%folder, settings, run%provenance%scene, run%attempt%may_change, &
-                                                run%past, error)
+      if (run%manifest%is_found .and. run%attempt%continues) &
+         call look_back(run%folder, run%manifest, settings, scene, run%attempt%may_change, run%past, error)
       if (allocated(error)) return
       goes_on = run%past%checkpoint > 0_ip .or. run%past%segments > 0_ip
-      if (.not. goes_on) call clear_result(run%folder, error)
-      call run%log%open(run%folder, error, appended=goes_on)
+      call claim_folder(run%simulation, run%folder, force, goes_on, run%manifest, error)
+      if (.not. allocated(error)) call run%log%open(run%folder, error, appended=goes_on)
       if (allocated(error)) return
       call write_header(run%log, run%provenance, run%folder)
       if (allocated(note)) call run%log%write_line(note)
       call describe(run%simulation, run%log)
-      call list_overlaps(run%simulation, run%folder, run%log, error)
+      call write_overlaps(run, error)
       call new_watch(run%watch, run%simulation)
       call choose_intervals(run)
       if (.not. allocated(error)) call recall(run, error)
       if (.not. allocated(error)) call check_recording(run%simulation, run%folder, error)
-      if (goes_on .and. .not. allocated(error)) call clear_surplus(run%folder, run%past, error)
+      if (goes_on .and. .not. allocated(error)) call clear_surplus(run%folder, run%manifest, run%past, error)
    end subroutine prepare
+
+   !> Write what is said of deep contacts at the start, and the table of them.
+   subroutine write_overlaps(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+
+      call run%manifest%reopen(overlaps_path(run%folder), error)
+      if (.not. allocated(error)) call list_overlaps(run%simulation, run%folder, run%log, error)
+      call run%manifest%close_file(overlaps_path(run%folder), error)
+   end subroutine write_overlaps
 
    !> Look after checkpoints from now on, and go on from one if that is wanted.
    subroutine recall(run, error)
@@ -261,7 +327,7 @@ contains
          if (is_due) then
             call s%timers%start()
             ! The frames up to the checkpoint are safe before it is.
-            call run%trajectory%close(error)
+            call run%trajectory%close(error, run%manifest)
             if (allocated(error)) return
             history = run%history
             history%segments = int(run%trajectory%number, lp)

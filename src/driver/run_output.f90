@@ -14,9 +14,11 @@ module polydem_run_output
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_counters, write_hash, write_ranks, write_timings
    use polydem_machine, only: resident_memory
+   use polydem_manifest, only: manifest_t
    use polydem_profile, only: write_profile
    use polydem_provenance, only: provenance_t
    use polydem_recorder, only: recorder_t
+   use polydem_result_folder, only: profile_path
    use polydem_resume, only: past_t
    use polydem_simulation, only: report_counters, simulation_t, time_of
    use polydem_strings, only: to_text
@@ -72,6 +74,8 @@ module polydem_run_output
       type(balance_t) :: balance
       !> Folder of the result
       character(len=:), allocatable :: folder
+      !> List of its files, kept by the leader
+      type(manifest_t) :: manifest
       !> Steps between two frames, 0 for none
       integer(lp) :: frame_steps = 0_lp
       !> Steps between two lines of the log
@@ -119,13 +123,16 @@ contains
       associate (s => run%simulation, output => run%simulation%settings%output)
          call complete_wall_forces(run%team, s%bodies, s%contacts)
          if (output%contacts .and. output%ledger) then
-            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, row=run%row)
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, row=run%row, &
+                                            manifest=run%manifest)
          else if (output%contacts) then
-            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts)
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, &
+                                            manifest=run%manifest)
          else if (output%ledger) then
-            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, row=run%row)
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, row=run%row, &
+                                            manifest=run%manifest)
          else
-            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error)
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, manifest=run%manifest)
          end if
          run%last_frame = s%step
       end associate
@@ -173,11 +180,12 @@ contains
          call report_counters(s, counters)
          call tell_pending(s, run%log)
          if (allocated(error)) call write_last_frame(run, error%code, late_error)
-         call run%trajectory%close(late_error)
-         call run%recorder%close(run%log, late_error)
+         call run%trajectory%close(late_error, run%manifest)
+         call run%recorder%close(run%log, run%manifest, late_error)
          call run%checkpoints%close(run%log)
          if (run%team%leads()) call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, &
                                                   status, late_error, memory)
+         call run%manifest%close_file(profile_path(run%folder), late_error)
          call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n_all)
          call write_spread(run, run%log)
          call write_counters(run%log, counters)

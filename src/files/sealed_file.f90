@@ -4,7 +4,8 @@
 !> shows it). It states how many bytes follow and what their hash is. So a file that was cut or in which bits
 !> flipped is found before anybody, HDF5 among them, relies on what it says.
 !>
-!> The hash is that of the hashes of slices, which threads share.
+!> The hash is that of the hashes of slices, which threads share. Files without a seal have one as well, that of all
+!> their bytes, for whoever writes it down elsewhere.
 module polydem_sealed_file
    use, intrinsic :: iso_fortran_env, only: file_storage_size
    use polydem_errors, only: error_t, io_error, raise
@@ -13,7 +14,7 @@ module polydem_sealed_file
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: seal_length, seal_file, check_seal
+   public :: seal_length, seal_file, check_seal, hash_file
 
    !> Length of the seal [B]; the least that HDF5 allows
    integer(ip), parameter :: seal_length = 512_ip
@@ -70,6 +71,32 @@ contains
       end if
    end subroutine check_seal
 
+   !> Length and hash of a whole file.
+   subroutine hash_file(path, bytes, hash, problem)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Its length [B]
+      integer(lp), intent(out) :: bytes
+      !> Hash of all its bytes
+      integer(lp), intent(out) :: hash
+      !> Why it cannot be read; not allocated if it was
+      character(len=:), allocatable, intent(out) :: problem
+      character(len=256) :: reason
+      integer :: unit, status
+
+      bytes = 0_lp
+      hash = 0_lp
+      open (newunit=unit, file=path, access='stream', form='unformatted', action='read', status='old', &
+            iostat=status, iomsg=reason)
+      if (status == 0) then
+         inquire (unit=unit, size=bytes, iostat=status, iomsg=reason)
+         bytes = max(0_lp, bytes*int(file_storage_size/8, lp))
+         if (status == 0) call hash_bytes(unit, 0_ip, bytes, hash, status, reason)
+         close (unit)
+      end if
+      if (status /= 0) problem = 'it cannot be read: '//trim(reason)
+   end subroutine hash_file
+
    !> The seal that fits the bytes behind it.
    subroutine make_seal(unit, seal, status, reason)
       integer, intent(in) :: unit
@@ -80,15 +107,16 @@ contains
 
       inquire (unit=unit, size=bytes, iostat=status, iomsg=reason)
       bytes = bytes*int(file_storage_size/8, lp) - int(seal_length, lp)
-      if (status == 0) call hash_bytes(unit, max(0_lp, bytes), hash, status, reason)
+      if (status == 0) call hash_bytes(unit, seal_length, max(0_lp, bytes), hash, status, reason)
       if (status /= 0) return
       seal = 'polydem: '//to_text(bytes)//' bytes follow, hash '//hexadecimal(hash)
       seal(seal_length:) = new_line('a')
    end subroutine make_seal
 
-   !> Hash of the bytes behind the seal.
-   subroutine hash_bytes(unit, bytes, hash, status, reason)
+   !> Hash of so many bytes behind the first ones, which are left out.
+   subroutine hash_bytes(unit, left_out, bytes, hash, status, reason)
       integer, intent(in) :: unit
+      integer(ip), intent(in) :: left_out
       integer(lp), intent(in) :: bytes
       integer(lp), intent(out) :: hash
       integer, intent(out) :: status
@@ -101,7 +129,7 @@ contains
       hash = bytes
       status = 0
       allocate (words(slice*n_slices))
-      read (unit, pos=seal_length + 1_ip, iostat=status, iomsg=reason)
+      read (unit, pos=left_out + 1_ip, iostat=status, iomsg=reason)
       left = bytes/8_lp
       do while (left > 0_lp .and. status == 0)
          n = int(min(left, size(words, kind=lp)), ip)

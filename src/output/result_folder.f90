@@ -8,22 +8,20 @@
 !>     overlaps.csv               contacts that were deep at the start, if there were any
 !>     log.txt                    what the run printed
 !>     checkpoint_1.h5, _2.h5     the last two checkpoints, in turns
+!>     manifest.txt               which of these files there are, with checksums (polydem_manifest)
+!>     running.lock               who writes there (polydem_run_lock)
+!>     replaced                   the result that `--force` replaces, until the new one has a frame (polydem_replaced)
 module polydem_result_folder
-   use polydem_errors, only: error_t
    use polydem_kinds, only: ip
-   use polydem_paths, only: exists, remove_file
-   use polydem_segment_path, only: last_number, open_suffix, segment_path
+   use polydem_segment_path, only: open_suffix, segment_number, segment_path
    use polydem_strings, only: to_text
    implicit none
    private
    public :: segment_path, profile_path, log_path, trace_path, steps_path, overlaps_path, checkpoint_path
-   public :: default_folder, holds_result, clear_result, clear_unfinished, open_suffix, unfinished, last_number
-   public :: n_checkpoints
+   public :: default_folder, n_checkpoints, open_suffix, unfinished, name_in, segment_number
 
    !> End of the name of any other file that is not complete
    character(len=*), parameter :: unfinished = '.unfinished'
-   !> Segments are looked for until so many numbers in a row are missing
-   integer(ip), parameter :: greatest_gap = 100_ip
    !> Checkpoints that are kept
    integer(ip), parameter :: n_checkpoints = 2_ip
 
@@ -98,81 +96,13 @@ contains
       path = folder//'/checkpoint_'//to_text(number)//'.h5'
    end function checkpoint_path
 
-   !> Whether a folder holds a result that a run would overwrite
-   logical function holds_result(folder)
-      !> Folder of the result
-      character(len=*), intent(in) :: folder
-      integer(ip) :: number
-
-      holds_result = exists(profile_path(folder))
-      if (.not. holds_result) holds_result = exists(log_path(folder))
-      do number = 1_ip, greatest_gap
-         if (.not. holds_result) holds_result = has_segment(folder, number)
-      end do
-      do number = 1_ip, n_checkpoints
-         if (.not. holds_result) holds_result = exists(checkpoint_path(folder, number))
-      end do
-   end function holds_result
-
-   !> Remove a former result, so that its segments do not mix with new ones; other files stay.
-   subroutine clear_result(folder, error)
-      !> Folder of the result
-      character(len=*), intent(in) :: folder
-      !> Allocated on failure
-      type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: number, last
-
-      ! The checkpoints first: without one, nobody goes on with what a kill in the middle of this would leave.
-      do number = 1_ip, n_checkpoints
-         call remove_if_there(checkpoint_path(folder, number), error)
-      end do
-      call remove_if_there(log_path(folder), error)
-      call remove_if_there(overlaps_path(folder), error)
-      call remove_if_there(trace_path(folder), error)
-      call remove_if_there(steps_path(folder), error)
-      call clear_unfinished(folder, error)
-      last = 0_ip
-      number = 1_ip
-      do while (number <= last + greatest_gap)
-         if (has_segment(folder, number)) last = number
-         call remove_if_there(segment_path(folder, number), error)
-         call remove_if_there(segment_path(folder, number)//open_suffix, error)
-         number = number + 1_ip
-      end do
-   end subroutine clear_result
-
-   !> Remove what a run that did not end left unfinished: files that were not complete, and the open segment. What is
-   !> complete stays, but for the profile, which says that a run has ended.
-   subroutine clear_unfinished(folder, error)
-      !> Folder of the result
-      character(len=*), intent(in) :: folder
-      !> Allocated on failure
-      type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: number
-
-      call remove_if_there(profile_path(folder), error)
-      call remove_if_there(profile_path(folder)//unfinished, error)
-      call remove_if_there(trace_path(folder)//unfinished, error)
-      call remove_if_there(steps_path(folder)//unfinished, error)
-      do number = 1_ip, n_checkpoints
-         call remove_if_there(checkpoint_path(folder, number)//unfinished, error)
-      end do
-      call remove_if_there(segment_path(folder, last_number(folder) + 1_ip)//open_suffix, error)
-   end subroutine clear_unfinished
-
-   logical function has_segment(folder, number)
-      character(len=*), intent(in) :: folder
-      integer(ip), intent(in) :: number
-
-      has_segment = exists(segment_path(folder, number))
-      if (.not. has_segment) has_segment = exists(segment_path(folder, number)//open_suffix)
-   end function has_segment
-
-   subroutine remove_if_there(path, error)
+   !> Name of a file without its folder
+   pure function name_in(path) result(name)
+      !> Path of the file
       character(len=*), intent(in) :: path
-      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: name
 
-      if (exists(path)) call remove_file(path, error)
-   end subroutine remove_if_there
+      name = path(index(path, '/', back=.true.) + 1:)
+   end function name_in
 
 end module polydem_result_folder

@@ -15,6 +15,7 @@ module polydem_trajectory
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ledger_row, only: ledger_row_t
    use polydem_lone_team, only: lone_team_t
+   use polydem_manifest, only: manifest_t
    use polydem_paths, only: make_folder, rename_file, sync_file
    use polydem_provenance, only: provenance_t
    use polydem_result_folder, only: open_suffix, segment_path
@@ -43,11 +44,14 @@ module polydem_trajectory
       integer(ip) :: capacity = 1_ip
       !> Frames in the open segment
       integer(ip) :: n_frames = 0_ip
+      !> Steps of the first and the last of them
+      integer(lp) :: steps(2) = 0_lp
       !> Contacts in the open segment
       integer(lp) :: n_contacts = 0_lp
    contains
       procedure :: open => open_trajectory
       procedure :: write_frame
+      procedure :: bring_to_disk
       procedure :: close => close_trajectory
    end type trajectory_t
 
@@ -87,7 +91,7 @@ contains
 
    !> Write a frame and flush it; after a failure its segment stays open as it is. Give `contacts` in all frames or
    !> in none, and so `row`.
-   subroutine write_frame(self, step, time, bodies, error, contacts, row)
+   subroutine write_frame(self, step, time, bodies, error, contacts, row, manifest)
       class(trajectory_t), intent(inout) :: self
       !> Number of the step
       integer(lp), intent(in) :: step
@@ -101,11 +105,13 @@ contains
       type(contacts_t), intent(in), optional :: contacts
       !> Entries of the ledger
       type(ledger_row_t), intent(in), optional :: row
+      !> List of the files of the result, to which segments are added; that of the leader counts
+      type(manifest_t), intent(inout), optional :: manifest
 
       if (self%is_open) then
          call keep_room(self%team, segment_path(self%folder, self%number)//open_suffix, room_for(bodies), error)
       else
-         call open_segment(self, bodies, error)
+         call open_segment(self, bodies, error, manifest)
       end if
       if (.not. allocated(error)) call fill_frame(self, step, time, bodies, error, contacts, row)
       if (allocated(error)) then
@@ -113,8 +119,10 @@ contains
          self%is_open = .false.
          return
       end if
+      if (self%n_frames == 0_ip) self%steps(1) = step
+      self%steps(2) = step
       self%n_frames = self%n_frames + 1_ip
-      if (self%n_frames == self%capacity) call close_segment(self, error)
+      if (self%n_frames == self%capacity) call close_segment(self, error, manifest)
    end subroutine write_frame
 
    subroutine fill_frame(self, step, time, bodies, error, contacts, row)
@@ -133,20 +141,31 @@ contains
       if (.not. allocated(error)) call self%file%flush(error)
    end subroutine fill_frame
 
-   !> Close the open segment, if there is one, however few frames it has.
-   subroutine close_trajectory(self, error)
-      class(trajectory_t), intent(inout) :: self
+   !> Wait until the frames of the open segment, if there is one, are on the disk; called by the leader alone.
+   subroutine bring_to_disk(self, error)
+      class(trajectory_t), intent(in) :: self
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
-      if (self%is_open) call close_segment(self, error)
+      if (self%is_open) call sync_file(segment_path(self%folder, self%number)//open_suffix, error)
+   end subroutine bring_to_disk
+
+   !> Close the open segment, if there is one, however few frames it has.
+   subroutine close_trajectory(self, error, manifest)
+      class(trajectory_t), intent(inout) :: self
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      !> List of the files of the result, as for `write_frame`
+      type(manifest_t), intent(inout), optional :: manifest
+
+      if (self%is_open) call close_segment(self, error, manifest)
    end subroutine close_trajectory
 
-   subroutine open_segment(self, bodies, error)
+   subroutine open_segment(self, bodies, error, manifest)
       type(trajectory_t), intent(inout) :: self
       type(bodies_t), intent(in) :: bodies
       type(error_t), allocatable, intent(inout) :: error
-
+      type(manifest_t), intent(inout), optional :: manifest
       character(len=:), allocatable :: path
 
       self%number = self%number + 1_ip
@@ -154,7 +173,8 @@ contains
       self%n_frames = 0_ip
       self%n_contacts = 0_lp
       if (self%team%leads()) then
-         call self%file%create(path, error)
+         if (present(manifest)) call manifest%own(segment_path(self%folder, self%number), error)
+         if (.not. allocated(error)) call self%file%create(path, error)
          if (.not. allocated(error)) call start_segment(self%file, self%provenance, error)
       end if
       call share_file(self%team, self%file, path, room_for(bodies), error)
@@ -171,9 +191,10 @@ contains
       room_for = 2000000_lp + 1000_lp*int(bodies%n_all, lp)
    end function room_for
 
-   subroutine close_segment(self, error)
+   subroutine close_segment(self, error, manifest)
       type(trajectory_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
+      type(manifest_t), intent(inout), optional :: manifest
       character(len=:), allocatable :: path
 
       path = segment_path(self%folder, self%number)
@@ -183,6 +204,7 @@ contains
          if (.not. allocated(error)) call sync_file(path//open_suffix, error)
          if (.not. allocated(error)) call rename_file(path//open_suffix, path, error)
          if (.not. allocated(error)) call sync_file(self%folder, error)
+         if (present(manifest)) call manifest%close_file(path, error, [int(self%n_frames, lp), self%steps])
       end if
       call self%team%agree(error)
    end subroutine close_segment

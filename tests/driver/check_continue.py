@@ -162,7 +162,11 @@ def a_finished_run_stays_as_it_is(case):
 
 def a_run_without_checkpoint_begins_with_its_first_step(case):
     assert "no checkpoint" not in case.finish("fresh")
-    os.makedirs("early")
+    process = start(case.program, "early", "--set", "checkpoint.steps=0", "--set", "output.frames_per_segment=1000")
+    wait_for(lambda: os.path.exists("early/trajectory_0001.h5.open"))
+    process.kill()
+    process.communicate()
+    assert not closed_segments("early") and not checkpoints_of("early")
     with open("early/trajectory_0001.h5.open", "w", encoding="utf-8") as file:
         file.write("what a kill left")
     assert "there is no checkpoint in early: the run begins with its first step" in case.finish("early")
@@ -183,6 +187,10 @@ def a_missing_segment_is_noticed(case):
     os.remove("gap/trajectory_0001.h5")
     code, _, message = case.run("gap", "--continue")
     assert code == NO_FILE and "gap/trajectory_0001.h5 is missing" in message, (code, message)
+    with open("gap/trajectory_0001.h5", "w", encoding="utf-8") as file:
+        file.write("what somebody put there")
+    code, _, message = case.run("gap", "--continue")
+    assert code == NO_FILE and "gap/trajectory_0001.h5 is damaged: it has 23 bytes" in message, (code, message)
 
 
 def a_run_that_a_guard_stops_leaves_frames_and_checkpoint(case):

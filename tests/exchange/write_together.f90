@@ -19,7 +19,6 @@ program write_together
    use polydem_lone_team, only: lone_team_t
    use polydem_own_rows, only: lay_out_bodies, lay_out_pairs, lay_out_parts
    use polydem_provenance, only: provenance_t
-   use polydem_result_folder, only: clear_result
    use polydem_row_blocks, only: row_blocks_t
    use polydem_strings, only: to_text
    use polydem_team, only: team_t
@@ -110,7 +109,6 @@ contains
       type(ledger_row_t) :: row
       integer(lp) :: step
 
-      if (team%leads()) call clear_result(folder, error)
       call team%agree(error)
       call sample_provenance(provenance)
       call trajectory%open(folder, per_segment, provenance, error, team=team)
