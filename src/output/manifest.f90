@@ -18,8 +18,8 @@
 !> steps.h5 and overlaps.csv get closed; log.txt, running.lock, the folder `replaced` (polydem_replaced) and the
 !> checkpoints, which have seals of their own, do not.
 !>
-!> A line is written with one call and brought to disk at once. A kill may leave a part of the last one, without an
-!> end: it is ignored, and cut off by the next one who writes.
+!> A line is written with one call and brought to disk at once. Of the last one a kill may leave a part without an end,
+!> which is ignored, and cut off by the next one who writes.
 module polydem_manifest
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_folders, only: is_there, read_bytes
@@ -206,7 +206,12 @@ contains
       character(len=:), allocatable :: line
       integer :: k
 
-      call self%read(folder)
+      self%folder = folder
+      self%is_torn = .false.
+      self%is_spoilt = .false.
+      self%chain = 0_lp
+      self%n = 0
+      if (.not. allocated(self%entry)) allocate (self%entry(16))
       call chain_line(first_text, self%chain, line)
       self%text = line//line_end
       do k = 1, size(names)
@@ -290,7 +295,7 @@ contains
       place_of = 0
       do k = self%n, 1, -1
          if (self%entry(k)%name == name) place_of = k
-         if (place_of > 0) return
+         if (place_of > 0) exit
       end do
    end function place_of
 
@@ -326,8 +331,7 @@ contains
 
       k = self%place_of(name_in(path))
       if (k == 0 .or. .not. self%is_active .or. allocated(error)) return
-      if (.not. self%entry(k)%is_closed) return
-      call append(self, 'owns '//name_in(path), error)
+      if (self%entry(k)%is_closed) call append(self, 'owns '//name_in(path), error)
       if (.not. allocated(error)) self%entry(k) = entry_t(name=name_in(path))
    end subroutine reopen
 

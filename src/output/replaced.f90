@@ -152,14 +152,14 @@ contains
       !> Whether any was elsewhere
       logical, intent(out) :: was_moved
       type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: name
       integer :: k
 
       was_moved = .false.
       do k = 1, manifest%n
-         associate (name => trim(manifest%entry(k)%name))
-            if (.not. was_moved) was_moved = is_there(aside(folder)//'/'//name)
-            call move(name, aside(folder), folder, error)
-         end associate
+         name = trim(manifest%entry(k)%name)
+         if (.not. was_moved) was_moved = is_there(aside(folder)//'/'//name)
+         call move(name, aside(folder), folder, error)
       end do
       if (.not. allocated(error)) call sync_file(folder, error)
       if (allocated(error)) return
