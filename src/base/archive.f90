@@ -126,7 +126,7 @@ contains
 
       if (allocated(self%error)) return
       if (storage_size(values) > storage_size(1.0_dp)) then
-         words = transfer(values, 0_lp, n*(storage_size(values)/storage_size(0_lp)))
+         words = transfer(values, [0_lp])
          call self%exchange_longs(name, words, unit, meaning//'; bits of the working precision')
          if (self%gives_back .and. .not. allocated(self%error)) values = transfer(words, values, n)
       else

@@ -197,7 +197,8 @@ contains
       call check_size(path, 'reach', size(reach, kind=lp), size(trace%fixed, kind=lp), 'boxes', error)
       if (allocated(error)) return
       good = all(ieee_is_finite(reach))
-      if (good) good = all(reach >= 0.0_dp .and. reach <= real(far, dp))
+      ! In the working precision: the double one may not hold what is far there.
+      if (good) good = all(reach >= 0.0_dp .and. real(reach, wp) <= far)
       if (.not. good) then
          call raise(error, input_error, path//': reach must be a number from 0 to '//to_text(far))
          return
@@ -288,7 +289,7 @@ contains
          return
       end if
       fit = all(ieee_is_finite(vertices))
-      if (fit) fit = all(abs(vertices) <= real(far, dp))
+      if (fit) fit = all(abs(real(vertices, wp)) <= far)
       if (.not. fit) then
          call raise(error, input_error, path//': vertices must be numbers up to '//to_text(far))
          return

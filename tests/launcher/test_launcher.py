@@ -7,6 +7,7 @@ commands and a made-up apt-get, which links the real commands, stand for a machi
 """
 
 import os
+import re
 import shutil
 import signal
 import statistics
@@ -142,7 +143,7 @@ class Words(Toy):
     def test_help_needs_no_build(self):
         code, output, _ = self.call("--help")
         self.assertEqual(code, 0)
-        verbs = "run check info plot replay bench workprecision costs scale sweep test verify"
+        verbs = "run check info plot replay bench workprecision costs scale sweep test build verify"
         for word in [*verbs.split(), "--no-install"]:
             self.assertIn(f"\n  {word} ", output)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
@@ -152,6 +153,7 @@ class Words(Toy):
         self.assertEqual(self.call("fly"), (2, "", "polydem: there is no verb fly; see ./polydem --help\n"))
         self.assertEqual(self.call("test", "a", "b")[0], 2)
         self.assertEqual(self.call("test", "--quick")[0], 2)
+        self.assertEqual(self.call("build", "--quick")[0], 2)
 
 
 class Ranks(Toy):
@@ -346,6 +348,40 @@ class Build(Toy):
             expected += ["--program", f"{precision}={program}"]
         self.assertEqual(output.splitlines(), [*expected, "stack", "--repeats", "2"])
         self.assertEqual(self.call("workprecision", "--help")[1].splitlines(), [*expected[:3], "--help"])
+
+    def test_build_judges_every_preset(self):
+        presets = ("release", "mpi", "single", "quadruple", "debug")
+        verdict = re.compile(r"(\w+) +(ok, \d+ s|failed)")
+
+        def judge(*names):
+            code, output, messages = self.call("build", *names)
+            found = [verdict.fullmatch(line).groups() for line in output.splitlines()]
+            return code, [name for name, _ in found], {name for name, word in found if word == "failed"}, messages
+
+        code, names, failed, messages = judge()
+        self.assertEqual((code, names, failed), (0, list(presets), set()), messages)
+        for name in presets:
+            for path in ("src/app/polydem", "tests/verification/verify"):
+                self.assertTrue(os.access(os.path.join(self.folder, "build", name, path), os.X_OK))
+        self.write("src/app/CMakeLists.txt",
+                   "add_executable(polydem main.f90)\ntarget_compile_options(polydem PRIVATE -Wall)\n"
+                   "if(PROJECT_BINARY_DIR MATCHES quadruple)\n  target_sources(polydem PRIVATE wrong.f90)\nendif()\n"
+                   "if(PROJECT_BINARY_DIR MATCHES single)\n  target_sources(polydem PRIVATE loose.f90)\nendif()\n")
+        self.write("src/app/wrong.f90", "subroutine wrong()\n   integer :: k = 'no number'\nend subroutine wrong\n")
+        self.write("src/app/loose.f90", "subroutine loose()\n   integer :: idle\nend subroutine loose\n")
+        # A program that is there and up to date must not hide its warnings.
+        self.assertEqual(self.call("--version", POLYDEM_PRESET="single")[0], 0)
+        for _ in range(2):
+            code, names, failed, messages = judge()
+            self.assertEqual((code, names, failed), (1, list(presets), {"single", "quadruple"}), messages)
+            self.assertIn("Warning: Unused variable", messages)
+            self.assertIn("Error: ", messages)
+        self.write("src/app/loose.f90", "subroutine loose()\nend subroutine loose\n")
+        self.assertEqual(judge("single", "mpi")[:3], (0, ["single", "mpi"], set()))
+        self.assertEqual(judge("single", "quadruple")[:3], (1, ["single", "quadruple"], {"quadruple"}))
+        code, output, messages = self.call("build", "single", "triple")
+        self.assertEqual((code, output), (2, ""))
+        self.assertIn("there is no preset triple, but release", messages)
 
     def test_simultaneous_first_calls_build_once(self):
         calls = [subprocess.Popen([self.launcher, "info"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

@@ -81,7 +81,8 @@ def pytest_sessionfinish(session):
 def table(config):
     """What all combinations gave, in Markdown."""
     ranks = sorted({number for _, number in config.outcomes})
-    version = subprocess.run([PARALLEL, "--version"], capture_output=True, text=True, check=True).stdout.strip()
+    told = subprocess.run([PARALLEL, "--version"], capture_output=True, text=True, check=True).stdout
+    version = next(line for line in told.splitlines() if line.startswith("polydem "))
     combinations = max(outcome.tried for outcome in config.outcomes.values())
     lines = [
         "# The same bits for any number of processes", "",

@@ -12,6 +12,10 @@ from polydem_post import Trajectory
 SERIAL = os.environ["POLYDEM_PROGRAM"]
 PARALLEL = os.environ["POLYDEM_MPI_PROGRAM"]
 
+#: Lines that the program writes about what is wrong, its Fortran library or a sanitizer. Libraries of MPI may say more.
+OWN_LINE = re.compile(r"polydem: |.*(Fortran runtime|At line \d|Error termination|Note: The following floating-point|"
+                      r"Program received signal|Sanitizer|runtime error:|libgomp: )")
+
 #: How ranks are started where there may be fewer cores: they take turns, and nobody is bound
 ENVIRONMENT = {
     **os.environ,
@@ -78,6 +82,11 @@ def state_hash(output):
 def count(output, name):
     """A count that a run prints at its end."""
     return int(re.search(rf"^{name} +(\d+)$", output, re.MULTILINE).group(1))
+
+
+def complaints(text):
+    """The lines of standard error that are ours, and not of the MPI library or of mpirun"""
+    return [line for line in text.splitlines() if OWN_LINE.match(line)]
 
 
 def differences(one, other):

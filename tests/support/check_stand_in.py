@@ -1,9 +1,10 @@
 """Test of the stand-in for pFUnit: bad test files are refused with file and line, failures reach the exit code.
 
-usage: check_stand_in.py PROGRAM      the program built from failing/test_failing.pf
+usage: check_stand_in.py FAILING REFUSED      the programs built from failing/test_failing.pf and test_refused.pf
 """
 
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -11,7 +12,11 @@ import unittest
 import xml.etree.ElementTree
 
 HERE = os.path.dirname(os.path.abspath(__file__))
-PROGRAM = ""
+sys.dont_write_bytecode = True
+sys.path.insert(0, HERE)
+import translate as translator  # noqa: E402
+
+PROGRAM = REFUSED = ""
 
 GOOD = """\
 module test_x
@@ -36,7 +41,9 @@ BAD = [
     ("subroutine works()", "subroutine works(x)", 6, "a plain subroutine"),
     ("subroutine works()", "integer function works()", 6, "a subroutine must follow"),
     ("   subroutine works()", "   subroutine " + 64*"a" + "()", 6, "longer than 63"),
-    ("   @test\n", "   subroutine run()\n   end subroutine run\n   @test\n", 5, "choose another name"),
+    ("   @test\n", "\t@test\n", 5, "a tab"),
+    ("      @assertTrue", "\t@assertTrue", 7, "a tab"),
+    ("   implicit none\n", "   implicit none\n   integer k\n", 4, "needs ::"),
     ("@assertTrue(.true.)", "@assertTruth(.true.)", 7, "unknown assert @assertTruth"),
     ("@assertTrue(.true.)", "if (.true.) @assertTrue(.true.)", 7, "alone on its line"),
     ("@assertTrue(.true.)", "@assertTrue(.true.) ! yes", 7, "on one line"),
@@ -52,6 +59,53 @@ BAD = [
     ("end module test_x\n", "   @test\nend module test_x\n", 10, "a subroutine must follow"),
 ]
 
+# Where a name of a test may meet one that pFUnit exports: what replaces what in GOOD, and the line.
+NAMED = [
+    ("   @test\n", "   subroutine {name}()\n   end subroutine {name}\n   @test\n", 5),
+    ("   @test\n", "   pure character(len=2) function {name}()\n   end function {name}\n   @test\n", 5),
+    ("      @assertTrue(.true.)\n", "      @assertTrue(.true.)\n   contains\n      SUBROUTINE {name}()\n"
+     "      end subroutine {name}\n", 9),
+    ("subroutine works()", "subroutine {name}()", 6),
+    ("   implicit none\n", "   implicit none\n   integer :: one(2, 2), {name}, three\n", 4),
+    ("   implicit none\n", "   implicit none\n   character, parameter :: a = &\n      '&', &\n      {name} = 'a'\n", 4),
+    ("   implicit none\n", "   implicit none\n   type, abstract :: {name}\n   end type {name}\n", 4),
+    ("   implicit none\n", "   implicit none\n   type {name}\n      integer :: k\n   end type\n", 4),
+    ("   implicit none\n", "   implicit none\n   interface {name}\n      procedure works\n   end interface\n", 4),
+    ("   implicit none\n", "   implicit none\n   enum, bind(c)\n      enumerator :: one = 1, {name}\n   end enum\n", 5),
+    ("   implicit none\n", "   use helpers, only: one, {name}\n   implicit none\n", 3),
+    ("   implicit none\n", "   use helpers, only: one, &\n      {name} => two\n   implicit none\n", 3),
+    ("   subroutine works()\n", "   subroutine works()\n      use, intrinsic :: helpers, only: {name}\n", 7),
+]
+
+# Names that are no names of the module, so that pFUnit does not mind.
+HARMLESS = """\
+module test_x
+   use, intrinsic :: iso_fortran_env, only: output => error_unit
+   use funit, only: throw, catch
+   use helpers, only: mine => run
+   implicit none
+   ! integer :: run
+   character(len=*), parameter :: text = &
+      'integer :: run'
+   type :: one_t
+      integer :: run
+   end type one_t
+   type(one_t) :: several
+   interface
+      subroutine other(run)
+         integer, intent(in) :: run
+      end subroutine other
+   end interface
+contains
+   @test
+   subroutine works()
+      integer :: near, t
+
+      near = several%run; t = near
+   end subroutine works
+end module test_x
+"""
+
 
 def translate(text):
     """Exit code and messages of the translator for a file test_x.pf."""
@@ -64,15 +118,40 @@ def translate(text):
     return result.returncode, result.stderr
 
 
-def run(*options):
+def run(*options, program=None):
     """Exit code and output of the program with a failing test."""
-    result = subprocess.run([PROGRAM, *options], capture_output=True, text=True, check=False)
+    result = subprocess.run([program or PROGRAM, *options], capture_output=True, text=True, check=False)
     return result.returncode, result.stdout
 
 
 class Translation(unittest.TestCase):
     def test_accepts_a_good_file(self):
         self.assertEqual(translate(GOOD), (0, ""))
+
+    def test_accepts_names_that_pfunit_does_not_see(self):
+        self.assertEqual(translate(HARMLESS), (0, ""))
+
+    def test_refuses_every_name_of_pfunit_wherever_it_stands(self):
+        with open(os.path.join(HERE, "funit_names.txt"), encoding="utf-8") as file:
+            names = file.read().split()
+        self.assertGreater(len(names), 100)
+        with tempfile.TemporaryDirectory() as folder:
+            source = os.path.join(folder, "test_x.pf")
+            for old, new, line in NAMED:
+                self.assertEqual(GOOD.count(old), 1)
+                for name in ["mine", *names, *translator.OF_SUITE]:
+                    with self.subTest(new=new, name=name):
+                        with open(source, "w", encoding="utf-8") as file:
+                            file.write(GOOD.replace(old, new.format(name=name.capitalize())))
+                        refused = ""
+                        try:
+                            translator.Translator(source).translate("out.f90")
+                        except translator.Wrong as wrong:
+                            refused = f"{wrong.line} {wrong}"
+                        of_module = "implicit none" in old and "use helpers" not in new
+                        expected = name in names or name != "mine" and of_module
+                        words = f"{line} pFUnit has a name {name.capitalize()} of its own: choose another"
+                        self.assertEqual(refused, words if expected else "")
 
     def test_refuses_bad_files_with_file_and_line(self):
         for old, new, line, words in BAD:
@@ -91,6 +170,14 @@ class Verdict(unittest.TestCase):
         for words in ("[test_failing.pf:18]", "one & <two>", "expected: <2> but found: <1>",
                       "Tests run: 2, Failures: 1", "Encountered 1 or more failures/errors during testing"):
             self.assertIn(words, output)
+
+    def test_what_compares_nothing_is_refused(self):
+        code, output = run("-v", program=REFUSED)
+        started = re.findall(r"Start: <(.*)>", output)
+        self.assertEqual((code, len(started)), (2, 7))
+        self.assertEqual(re.findall(r"^ in: (.*)$", output, re.MULTILINE), started)
+        self.assertEqual(output.count("a tolerance must be a finite number that is not negative"), 6)
+        self.assertEqual(output.count("nothing is relatively equal to zero or to what is not finite"), 1)
 
     def test_the_filter_chooses(self):
         code, output = run("-f", "suite.passes")
@@ -115,5 +202,5 @@ class Verdict(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    PROGRAM = sys.argv.pop(1)
+    PROGRAM, REFUSED = sys.argv.pop(1), sys.argv.pop(1)
     unittest.main()

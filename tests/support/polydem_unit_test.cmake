@@ -64,7 +64,7 @@ function(polydem_stand_in_test target sources helpers uses)
     set(translated "${CMAKE_CURRENT_BINARY_DIR}/${stem}.f90")
     add_custom_command(OUTPUT "${translated}"
       COMMAND "${Python3_EXECUTABLE}" "${support}/translate.py" "${CMAKE_CURRENT_SOURCE_DIR}/${source}" "${translated}"
-      DEPENDS "${source}" "${support}/translate.py"
+      DEPENDS "${source}" "${support}/translate.py" "${support}/funit_names.txt"
       COMMENT "Translating ${source}" VERBATIM)
     list(APPEND generated "${translated}")
     string(APPEND suite_uses "   use ${stem}_suite, only: add_${stem} => add_tests\n")

@@ -17,13 +17,24 @@ ASSERTS = {"equal": "Equal", "notequal": "NotEqual", "relativelyequal": "Relativ
 MARKS = ("test", "before", "after")
 LONGEST = 124  # columns of an assert that pFUnit can still extend
 LONGEST_NAME = 63  # of a procedure in Fortran
-TAKEN = ("run",)  # names that pFUnit's module exports too
+# Names that pFUnit's module exports too, and those of the function that pFUnit writes behind a module
+with open(os.path.join(os.path.dirname(os.path.abspath(__file__)), "funit_names.txt"), encoding="utf-8") as names_file:
+    TAKEN = frozenset(names_file.read().split())
+OF_SUITE = frozenset(("suite", "t"))
 
 MODULE = re.compile(r"\s*module\s+(\w+)\s*$", re.IGNORECASE)
 END_MODULE = re.compile(r"\s*end\s*module\b", re.IGNORECASE)
 SUBROUTINE = re.compile(r"\s*subroutine\s+(\w+)\s*(\(\s*\))?\s*$", re.IGNORECASE)
 ANY_SUBROUTINE = re.compile(r"\s*([\w() ]+\s)?subroutine\s", re.IGNORECASE)
-PROCEDURE = re.compile(r"\s*(?!end\b)(?:[\w() ]+\s)?(?:subroutine|function)\s+(\w+)", re.IGNORECASE)
+PROCEDURE = re.compile(r"\s*(?!end\b)(?:[\w()=*: ]+\s)?(?:subroutine|function)\s+(\w+)", re.IGNORECASE)
+CONTAINS = re.compile(r"\s*contains\s*$", re.IGNORECASE)
+USE = re.compile(r"\s*use\b(?:[^:]*::)?\s*(\w+)\s*(?:,\s*only\s*:(.*))?$", re.IGNORECASE)
+OPEN = re.compile(r"\s*(?:abstract\s+)?interface\b\s*(\w*)|\s*type\b(?!\s*\()[^:]*?(?:::)?\s*(\w+)\s*$|\s*enum\b",
+                  re.IGNORECASE)
+CLOSE = re.compile(r"\s*end\s*(interface|type|enum)\b", re.IGNORECASE)
+ENUMERATOR = re.compile(r"\s*enumerator\b", re.IGNORECASE)
+UNMARKED = re.compile(r"\s*(?:integer|real|complex|logical|character|double|(?:type|class|procedure)\s*\()",
+                      re.IGNORECASE)
 DIRECTIVE = re.compile(r"\s*@(\w+)\s*(\(.*)?$")
 
 SUITE = """
@@ -84,6 +95,19 @@ def closes_at_end(arguments):
     return False
 
 
+def listed(text):
+    """Leading names of the items of a list that commas separate, commas in parentheses and brackets apart"""
+    depth, item, items = 0, "", []
+    for character in text + ",":
+        depth += (character in "([") - (character in ")]")
+        if character == "," and depth == 0:
+            items.append(item)
+            item = ""
+        else:
+            item += character
+    return [match[1] for match in (re.match(r"\s*(\w+)", item) for item in items) if match]
+
+
 def assert_call(text, word, arguments, number, file_name):
     """The Fortran of an assert, on one line."""
     name = ASSERTS.get(word[len("assert"):].lower())
@@ -109,6 +133,10 @@ class Translator:
         self.module = None
         self.mark = None  # (word, line) of an annotation that waits for its subroutine
         self.found = {"test": [], "before": [], "after": []}
+        self.statement = ""  # what a line continues, without its ampersand
+        self.first = 0  # line where that begins
+        self.open = False  # within a type, an interface or a list of enumerators of the module
+        self.in_head = False  # before the procedures of the module
 
     def directive(self, text, number):
         """Translate a line that begins with @."""
@@ -142,11 +170,53 @@ class Translator:
                 raise Wrong(number, f"module {self.module} must be named {stem} as its file")
             if code != text.rstrip():
                 raise Wrong(number, "pFUnit wants nothing behind the name of a module")
-        defined = PROCEDURE.match(code)
-        if defined and defined.group(1).lower() in TAKEN:
-            raise Wrong(number, f"pFUnit has a procedure {defined.group(1)} of its own: choose another name")
+            self.in_head = True
+            self.refuse([self.module], number)
+        if text.strip() and not text.lstrip().startswith("!"):
+            if not self.statement:
+                self.first = number
+            self.statement += code.strip().lstrip("&")
+            if self.statement.endswith("&"):
+                self.statement = self.statement[:-1] + " "
+            else:
+                for statement in self.statement.split(";"):
+                    self.names(statement, self.first)
+                self.statement = ""
         if self.mark and code.strip():
             self.subroutine(code, number)
+
+    def names(self, statement, number):
+        """Look at the names that a statement gives to procedures, and to whatever the module has before them."""
+        defined = PROCEDURE.match(statement)
+        if defined:
+            self.refuse([defined.group(1)], number)
+        used = USE.match(statement)
+        if used and used.group(2) and used.group(1).lower() != "funit":
+            self.refuse(listed(used.group(2)), number)
+        if used or not self.in_head:
+            return
+        opening, marked = OPEN.match(statement), statement.split("::")
+        if CONTAINS.match(statement) and not self.open:
+            self.in_head = False
+        elif CLOSE.match(statement):
+            self.open = False
+        elif self.open:
+            if ENUMERATOR.match(statement):
+                self.refuse(listed(marked[-1]), number, OF_SUITE)
+        elif opening:
+            self.refuse([name for name in opening.groups() if name], number, OF_SUITE)
+            self.open = True
+        elif len(marked) > 1:
+            self.refuse(listed("::".join(marked[1:])), number, OF_SUITE)
+        elif UNMARKED.match(statement):
+            raise Wrong(number, "a declaration needs :: before its names")
+
+    @staticmethod
+    def refuse(names, number, more=frozenset()):
+        """Refuse names that pFUnit has, too."""
+        for name in names:
+            if name.lower() in TAKEN | more:
+                raise Wrong(number, f"pFUnit has a name {name} of its own: choose another")
 
     def subroutine(self, code, number):
         """Take the subroutine that an annotation stands above."""
@@ -169,6 +239,8 @@ class Translator:
             lines = file.read().splitlines()
         out = [f'# 1 "{self.path}"']
         for number, text in enumerate(lines, 1):
+            if "\t" in text:
+                raise Wrong(number, "a tab: write blanks")
             if text.lstrip().startswith("@"):
                 out.append(self.directive(text, number))
             else:

@@ -211,6 +211,21 @@ REAL_CORE = """
       if (.not. conform(shape_expected, shape_actual, message, location)) return
       allowed = 0.0_{kind}
       if (present(tolerance)) allowed = tolerance
+      ! A comparison with NaN would end a program that traps it.
+      good = ieee_is_finite(allowed)
+      if (good) good = allowed >= 0.0_{kind}
+      if (.not. good) then
+         call fail('a tolerance must be a finite number that is not negative', message, location)
+         return
+      end if
+      if (relation == 'RelativelyEqual') then
+         good = all(ieee_is_finite(expected))
+         if (good) good = all(abs(expected) > 0.0_{kind})
+         if (.not. good) then
+            call fail('nothing is relatively equal to zero or to what is not finite', message, location)
+            return
+         end if
+      end if
       do k = 1, size(actual)
          e = expected(min(k, size(expected)))
          a = actual(k)
