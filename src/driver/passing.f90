@@ -4,6 +4,10 @@
 !> pushes it out at the far side. So its direction turns by more than a right angle from one step to the next
 !> while the bodies overlap all the time. Directions of the last step are remembered with the pairs, each packed into
 !> one number; so what is found depends neither on processes nor on where a run was interrupted.
+!>
+!> Where the centre of a body is inside another, their overlap reaches from the centre to the outline, so that its depth is
+!> at least an eighth of a body as thick as the thinner one. Only contacts deeper than half of that are looked at; corners
+!> that touch in passing turn round, too, but are harmless.
 module polydem_passing
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t
@@ -11,32 +15,49 @@ module polydem_passing
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: find_passing, passing_text, packed_direction, is_turned_round
+   public :: find_passing, passing_text, packed_direction, is_turned_round, centre_inside, least_depth
+
+   !> Depth of contacts that are looked at, as a share of the thinner body
+   real(wp), parameter :: least_depth = 0.0625_wp
 
 contains
 
-   !> Find the first contact whose bodies pass through each other, 0 if there is none, and remember the directions.
-   subroutine find_passing(bodies, contacts, radius, remembered, found)
+   !> Find the first contact whose bodies pass through each other, and whether any is deeper than a limit, in one go; and
+   !> remember the directions.
+   subroutine find_passing(bodies, contacts, thickness, radius, limit, remembered, found, any_deep)
       !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies
       !> Contacts of the step
       type(contacts_t), intent(in) :: contacts
+      !> Thickness of each body, (slot) [m]
+      real(wp), intent(in) :: thickness(:)
       !> Greatest distance of a vertex from the centre of each body, (slot) [m]
       real(wp), intent(in) :: radius(:)
+      !> Share of the thinner body
+      real(wp), intent(in) :: limit
       !> Directions of the last step, packed; zero for bodies that did not overlap, (pair)
       real(wp), intent(inout) :: remembered(:)
-      !> Place in the table of contacts
+      !> Place in the table of contacts, 0 if there is none
       integer(ip), intent(out) :: found
-      real(wp) :: before
+      !> Whether any contact is deeper than the limit
+      logical, intent(out) :: any_deep
+      real(wp) :: before, now, share
       integer(ip) :: c, first
+      logical :: deep
 
       first = huge(first)
+      deep = .false.
       !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
-      !$omp    shared(bodies, contacts, radius, remembered) private(c, before) reduction(min:first)
+      !$omp    shared(bodies, contacts, thickness, radius, limit, remembered) private(c, before, now, share) &
+      !$omp    reduction(min:first) reduction(.or.:deep)
       do c = 1_ip, contacts%n
+         now = packed_direction(contacts%direction(1, c), contacts%direction(2, c))
          before = remembered(contacts%pair(c))
-         remembered(contacts%pair(c)) = packed_direction(contacts%direction(:, c))
-         if (is_turned_round(before, contacts%direction(:, c))) then
+         remembered(contacts%pair(c)) = now
+         share = contacts%length(c)*min(thickness(contacts%first(c)), thickness(contacts%second(c)))
+         if (contacts%area(c) <= least_depth*share) cycle
+         deep = deep .or. contacts%area(c) > limit*share
+         if (is_turned_round(before, now)) then
             first = min(first, c)
          else if (centre_inside(bodies, radius, contacts%first(c), contacts%second(c))) then
             first = min(first, c)
@@ -47,6 +68,7 @@ contains
       !$omp end parallel do
       found = 0_ip
       if (first < huge(first)) found = first
+      any_deep = deep
    end subroutine find_passing
 
    !> What happens at a contact that was found, and what to do about it
@@ -90,7 +112,9 @@ contains
 
    !> Whether the centre of a body is inside another body
    pure logical function centre_inside(bodies, radius, s, other)
+      !> Bodies
       type(bodies_t), intent(in) :: bodies
+      !> Greatest distance of a vertex from the centre of each body, (slot) [m]
       real(wp), intent(in) :: radius(:)
       !> Slots of the body and of the other one
       integer(ip), intent(in) :: s, other
@@ -111,29 +135,24 @@ contains
       end do
    end function centre_inside
 
-   !> A unit vector as one number from 1 to 5, the share of its second component in the sum of both
-   pure real(wp) function packed_direction(direction)
+   !> A unit vector as one number from 1 to 5 that grows with its angle, by one for each right angle from any other
+   pure real(wp) function packed_direction(x, y)
       !> The vector
-      real(wp), intent(in) :: direction(2)
+      real(wp), intent(in) :: x, y
       real(wp) :: share
 
-      share = direction(2)/(abs(direction(1)) + abs(direction(2)))
-      packed_direction = merge(2.0_wp + share, 4.0_wp - share, direction(1) >= 0.0_wp)
+      share = y/(abs(x) + abs(y))
+      packed_direction = merge(2.0_wp + share, 4.0_wp - share, x >= 0.0_wp)
    end function packed_direction
 
-   !> Whether a direction is more than a right angle from a packed one; no if that is none
-   pure logical function is_turned_round(packed, direction)
-      !> A direction packed by `packed_direction`, or 0 for none
-      real(wp), intent(in) :: packed
-      !> The direction now
-      real(wp), intent(in) :: direction(2)
-      real(wp) :: share, along
+   !> Whether two directions are more than a right angle apart; no if the former is none
+   pure logical function is_turned_round(before, now)
+      !> The former direction packed by `packed_direction`, or 0 for none
+      real(wp), intent(in) :: before
+      !> The present direction, packed
+      real(wp), intent(in) :: now
 
-      is_turned_round = .false.
-      if (packed <= 0.0_wp) return
-      share = merge(packed - 2.0_wp, 4.0_wp - packed, packed <= 3.0_wp)
-      along = merge(1.0_wp - abs(share), abs(share) - 1.0_wp, packed <= 3.0_wp)
-      is_turned_round = along*direction(1) + share*direction(2) < 0.0_wp
+      is_turned_round = before > 0.0_wp .and. abs(now - before) > 1.0_wp .and. abs(now - before) < 3.0_wp
    end function is_turned_round
 
 end module polydem_passing

@@ -12,7 +12,7 @@ module polydem_watch
    use polydem_guards, only: place_of
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
-   use polydem_passing, only: find_passing, passing_text
+   use polydem_passing, only: find_passing, least_depth, passing_text
    use polydem_simulation, only: check_stability, simulation_t
    use polydem_strings, only: to_text
    use polydem_warnings, only: warning_t
@@ -22,7 +22,7 @@ module polydem_watch
 
    !> Guards with what they have seen
    type :: watch_t
-      !> Thickness of each body, (slot) [m]; only for the depth of contacts
+      !> Thickness of each body, (slot) [m]; only if contacts are watched
       real(wp), allocatable :: thickness(:)
       !> Generation of these bodies
       integer(ip), private :: generation = 0_ip
@@ -55,7 +55,8 @@ contains
       type(simulation_t), intent(in) :: simulation
 
       associate (settings => simulation%settings%guards)
-         if (settings%overlap /= 'off') watch%thickness = thickness_of_bodies(simulation%bodies)
+         if (settings%overlap /= 'off' .or. settings%passing /= 'off') &
+            watch%thickness = thickness_of_bodies(simulation%bodies)
          if (settings%energy /= 'off') call open_energy_guard(watch%energy, simulation%contacts)
       end associate
    end subroutine new_watch
@@ -93,8 +94,7 @@ contains
 
       looks = is_last .or. mod(simulation%step, interval) == 0_lp
       associate (settings => simulation%settings%guards)
-         if (settings%overlap /= 'off') call look_at_depths(watch, simulation, error)
-         if (settings%passing /= 'off') call look_at_passing(watch, simulation, error)
+         if (settings%overlap /= 'off' .or. settings%passing /= 'off') call look_at_contacts(watch, simulation, error)
          if (looks .and. settings%step /= 'off') call look_at_step(watch, simulation, log, error)
          if (looks .and. settings%energy /= 'off') call check_energy(watch%energy, simulation, error)
          if (looks .or. settings%passing == 'stop') call simulation%team%agree(error)
@@ -188,10 +188,38 @@ contains
 
    end subroutine sum_up
 
-   !> Look for deep contacts. Of several processes, the one that has the deepest speaks: at once if that stops the run.
-   subroutine look_at_depths(watch, simulation, error)
+   !> Look for deep contacts, and for bodies on their way through each other.
+   subroutine look_at_contacts(watch, simulation, error)
       type(watch_t), intent(inout) :: watch
       type(simulation_t), intent(inout) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: limit
+      integer(ip) :: found
+      logical :: any_deep
+
+      associate (s => simulation, settings => simulation%settings%guards)
+         if (watch%generation /= s%generation) watch%thickness = thickness_of_bodies(s%bodies)
+         watch%generation = s%generation
+         limit = huge(limit)
+         if (settings%overlap /= 'off') limit = settings%overlap_limit
+         found = 0_ip
+         if (settings%passing /= 'off') then
+            call find_passing(s%bodies, s%contacts, watch%thickness, s%guard%radius, limit, &
+                              s%memory%column(at_direction)%value, found, any_deep)
+         end if
+         ! Shallow contacts are left out in the search for passing bodies.
+         if (settings%passing == 'off' .or. limit < least_depth) &
+            any_deep = any_deeper(s%contacts, watch%thickness, limit)
+         if (settings%overlap /= 'off') call respond_to_depth(watch, simulation, any_deep, error)
+         if (found > 0_ip .and. .not. allocated(error)) call respond_to_passing(watch, simulation, found, error)
+      end associate
+   end subroutine look_at_contacts
+
+   !> Tell of the deepest contact. Of several processes, the one that has it speaks: at once if that stops the run.
+   subroutine respond_to_depth(watch, simulation, any_deep, error)
+      type(watch_t), intent(inout) :: watch
+      type(simulation_t), intent(inout) :: simulation
+      logical, intent(in) :: any_deep
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
       integer(ip) :: worst
@@ -199,9 +227,7 @@ contains
 
       share = 0.0_dp
       associate (s => simulation, settings => simulation%settings%guards)
-         if (watch%generation /= s%generation) watch%thickness = thickness_of_bodies(s%bodies)
-         watch%generation = s%generation
-         if (any_deeper(s%contacts, watch%thickness, settings%overlap_limit)) then
+         if (any_deep) then
             worst = deepest_contact(s%contacts, watch%thickness)
             text = depth_text(s%bodies, s%contacts, watch%thickness, worst)
             share = real(depth_share(s%contacts, watch%thickness, worst), dp)
@@ -212,27 +238,25 @@ contains
                                     '. Take a smaller dt or a greater stiffness, or look for deep overlaps at the '// &
                                     'start (relaxed_depth in &guards)', error, share)
       end associate
-   end subroutine look_at_depths
+   end subroutine respond_to_depth
 
-   !> Look for bodies on their way through each other. Of several processes, the one that has the first pair speaks.
-   subroutine look_at_passing(watch, simulation, error)
+   !> Tell of bodies on their way through each other. Of several processes, the one that has the first pair speaks.
+   subroutine respond_to_passing(watch, simulation, found, error)
       type(watch_t), intent(inout) :: watch
       type(simulation_t), intent(inout) :: simulation
+      !> Place in the table of contacts
+      integer(ip), intent(in) :: found
       type(error_t), allocatable, intent(inout) :: error
       integer(lp) :: place
-      integer(ip) :: found
 
-      if (allocated(error)) return
       associate (s => simulation)
-         call find_passing(s%bodies, s%contacts, s%guard%radius, s%memory%column(at_direction)%value, found)
-         if (found == 0_ip) return
          place = place_of(s%bodies, s%contacts%first(found), s%contacts%second(found))
          call watch%passing%respond(s%settings%guards%passing, 'step '//to_text(s%step)//': '// &
                                     passing_text(s%bodies, s%contacts, s%guard%radius, found), error, &
                                     -real(place, dp))
          if (allocated(error)) error%place = place
       end associate
-   end subroutine look_at_passing
+   end subroutine respond_to_passing
 
    !> Compare the step with the stable step of the contacts, and warn when the share has grown by a tenth.
    subroutine look_at_step(watch, simulation, log, error)
