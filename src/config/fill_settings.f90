@@ -141,6 +141,7 @@ contains
          call take(values, 'guards.step', guards%step)
          call take(values, 'guards.overlap', guards%overlap)
          call take(values, 'guards.overlap_limit', guards%overlap_limit)
+         call take(values, 'guards.passing', guards%passing)
          call take(values, 'guards.energy', guards%energy)
          call take(values, 'guards.energy_limit', guards%energy_limit)
          call take(values, 'guards.listed_depth', guards%listed_depth)

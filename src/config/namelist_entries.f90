@@ -180,10 +180,12 @@ module polydem_namelist_entries
       'Greatest move of a point in a step, as a share of the thinnest body'), &
       entry_t('guards', 'step', 'word', 1, 'stop', '', 'stop warn off', '', &
       'A time step above the stable one of the contacts; above half of that there is a warning'), &
-      entry_t('guards', 'overlap', 'word', 1, 'off', '', 'stop warn off', '', &
+      entry_t('guards', 'overlap', 'word', 1, 'warn', '', 'stop warn off', '', &
       'A contact that is deep against its bodies'), &
       entry_t('guards', 'overlap_limit', 'real', 1, '0.25', '', '> 0, <= 1e6', 'overlap: stop warn', &
       'Greatest depth (area over length) of a contact, as a share of the thinner body'), &
+      entry_t('guards', 'passing', 'word', 1, 'warn', '', 'stop warn off', '', &
+      'A body whose centre is inside another, or a contact that turns round in a step'), &
       entry_t('guards', 'energy', 'word', 1, 'off', '', 'stop warn off', '', &
       'Energy that neither gravity nor walls gave; needs the ledger, looks every 100 steps'), &
       entry_t('guards', 'energy_limit', 'real', 1, '0.1', '', '> 0, <= 1e6', 'energy: stop warn', &

@@ -159,6 +159,8 @@ module polydem_settings
       character(len=:), allocatable :: overlap
       !> Greatest depth as a share of the thinner body
       real(wp) :: overlap_limit
+      !> Centres inside other bodies, contacts that turn round: 'stop', 'warn' or 'off'
+      character(len=:), allocatable :: passing
       !> Energy that neither gravity nor walls gave: 'stop', 'warn' or 'off'
       character(len=:), allocatable :: energy
       !> Greatest such energy as a share of the energy turned over

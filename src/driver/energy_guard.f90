@@ -16,7 +16,7 @@ module polydem_energy_guard
    use polydem_warnings, only: warning_t
    implicit none
    private
-   public :: energy_guard_t, open_energy_guard, check_energy
+   public :: energy_guard_t, open_energy_guard, check_energy, stored_energy
 
    !> What must be known to tell given from ungiven energy
    type :: energy_guard_t
@@ -34,12 +34,21 @@ contains
       type(energy_guard_t), intent(out) :: guard
       !> Contacts at the start with their forces
       type(contacts_t), intent(in) :: contacts
+
+      guard%stored = stored_energy(contacts)
+   end subroutine open_energy_guard
+
+   !> Elastic energy of contacts, taken as half of force times depth [J/m]
+   pure real(wp) function stored_energy(contacts)
+      !> Contacts with their forces
+      type(contacts_t), intent(in) :: contacts
       integer(ip) :: c
 
+      stored_energy = 0.0_wp
       do c = 1_ip, contacts%n
-         guard%stored = guard%stored + 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)
+         stored_energy = stored_energy + 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)
       end do
-   end subroutine open_energy_guard
+   end function stored_energy
 
    !> Compare the energy with what was given; collective, and all processes come to the same result.
    subroutine check_energy(guard, simulation, error)

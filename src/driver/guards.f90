@@ -6,13 +6,14 @@ module polydem_guards
    use polydem_body_sizes, only: measure_body
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_errors, only: error_t, raise, run_error
-   use polydem_kinds, only: ip, lp, wp, worth_threads
+   use polydem_kinds, only: dp, ip, lp, wp, worth_threads
    use polydem_settings, only: guards_settings_t
    use polydem_strings, only: to_text
    use polydem_warnings, only: warning_t
    implicit none
    private
-   public :: motion_guard_t, new_motion_guard, check_places, check_motion, check_step, check_contacts
+   public :: motion_guard_t, new_motion_guard, check_places, check_motion, check_step, check_contacts, &
+      place_of, greatest_move
 
    !> What is needed to see whether bodies move too far in a step
    type :: motion_guard_t
@@ -130,7 +131,7 @@ contains
          if (.not. is_finite(guard, bodies, s, dt)) then
             call raise(error, run_error, motion_text(guard, bodies, s, step))
          else if (is_first) then
-            call guard%warning%respond(guard%choice, motion_text(guard, bodies, s, step), error)
+            call guard%warning%respond(guard%choice, motion_text(guard, bodies, s, step), error, weight_of(bodies, s))
          end if
          if (allocated(error)) then
             call place_error(error, bodies, s)
@@ -147,10 +148,34 @@ contains
       integer(ip), intent(in) :: first
       integer(ip), intent(in), optional :: second
 
-      if (.not. allocated(bodies%row)) return
-      error%place = shiftl(int(bodies%row(first), lp), 31)
-      if (present(second)) error%place = error%place + int(bodies%row(second), lp)
+      error%place = place_of(bodies, first, second)
    end subroutine place_error
+
+   !> Place of a body among all of the run, or of a pair among all pairs; huge if that is not known
+   pure integer(lp) function place_of(bodies, first, second)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body, or of the first of the pair
+      integer(ip), intent(in) :: first
+      !> Slot of the second body of the pair
+      integer(ip), intent(in), optional :: second
+
+      place_of = huge(place_of)
+      if (.not. allocated(bodies%row)) return
+      place_of = shiftl(int(bodies%row(first), lp), 31)
+      if (present(second)) place_of = place_of + int(bodies%row(second), lp)
+   end function place_of
+
+   !> Weight of a warning of a body: of several, a lone process warns of the first, of free ones before walls
+   pure real(dp) function weight_of(bodies, s)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+
+      weight_of = 0.0_dp
+      if (.not. allocated(bodies%row)) return
+      weight_of = -real(bodies%row(s), dp)
+      if (bodies%fixed(s)) weight_of = weight_of - real(bodies%n_all, dp)
+   end function weight_of
 
    !> How a body moves, and what to do about it
    function motion_text(guard, bodies, s, step) result(text)
@@ -190,6 +215,29 @@ contains
       is_finite = ieee_is_finite(move_of(guard, bodies, s, dt) &
                                  + (bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s)))
    end function is_finite
+
+   !> Greatest distance that a point of any body that may move goes in a step at its present velocity [m]
+   pure subroutine greatest_move(guard, bodies, dt, move, slot)
+      !> The guard
+      type(motion_guard_t), intent(in) :: guard
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Step [s]
+      real(wp), intent(in) :: dt
+      !> The distance, 0 if nothing moves [m]
+      real(wp), intent(out) :: move
+      !> Slot of the body, 0 if nothing moves
+      integer(ip), intent(out) :: slot
+      integer(ip) :: k
+
+      move = 0.0_wp
+      slot = 0_ip
+      do k = 1_ip, size(guard%moving, kind=ip)
+         if (.not. move_of(guard, bodies, guard%moving(k), dt) > move) cycle
+         slot = guard%moving(k)
+         move = move_of(guard, bodies, slot, dt)
+      end do
+   end subroutine greatest_move
 
    !> Greatest distance that a point of a body moves in a step [m]
    pure real(wp) function move_of(guard, bodies, s, dt)

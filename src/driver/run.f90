@@ -5,6 +5,7 @@ module polydem_run
    use polydem_checkpoint_contents, only: history_t, keep_whole, scene_hash
    use polydem_claim_folder, only: claim_folder
    use polydem_clock, only: wall_seconds
+   use polydem_dangers, only: warn_of_dangers
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t, input_error, raise, stopped_early
    use polydem_hash, only: hexadecimal
@@ -26,7 +27,7 @@ module polydem_run
    use polydem_strings, only: to_text
    use polydem_team, only: team_t
    use polydem_timers, only: stage_exchange, stage_output, timers_t
-   use polydem_watch, only: look, new_watch
+   use polydem_watch, only: look, new_watch, set_warning_counts, tell_pending, warning_counts
    use polydem_run_output, only: attempt_t, choose_intervals, end_step, finish, run_t
    implicit none
    private
@@ -216,17 +217,17 @@ contains
       !> Whether a checkpoint is due, and whether the run must end after it
       logical, intent(out) :: is_due, must_stop
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp) :: flags(3)
+      integer(lp) :: flags(5)
 
       is_due = .false.
       if (run%team%leads()) call run%checkpoints%look(run%simulation%step, is_due, run%reason)
       must_stop = allocated(run%reason)
       if (run%team%size == 1_ip) return
-      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), run%simulation%guard%warning%count]
+      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), warning_counts(run%watch, run%simulation)]
       call run%team%agree(error, flags)
       is_due = flags(1) == 1_lp
       must_stop = flags(2) == 1_lp
-      run%simulation%guard%warning%count = flags(3)
+      call set_warning_counts(run%watch, run%simulation, flags(3:))
       call run%simulation%timers%lap(stage_exchange)
    end subroutine agree_on_step
 
@@ -285,6 +286,7 @@ contains
       call describe(run%simulation, run%log)
       call write_overlaps(run, error)
       call new_watch(run%watch, run%simulation)
+      call warn_of_dangers(run%simulation, run%log, run%watch%at_start)
       call choose_intervals(run)
       if (.not. allocated(error)) call recall(run, error)
       if (.not. allocated(error)) call check_recording(run%simulation, run%folder, error)
@@ -326,6 +328,8 @@ contains
          if (s%step == s%n_steps) return
          if (is_due) then
             call s%timers%start()
+            ! Warnings are not kept but their number.
+            call tell_pending(run%watch, s, run%log)
             ! The frames up to the checkpoint are safe before it is.
             call run%trajectory%close(error, run%manifest)
             if (allocated(error)) return

@@ -29,7 +29,7 @@ module polydem_run_output
    use polydem_watch, only: look, sum_up, tell_pending, watch_t
    implicit none
    private
-   public :: run_t, attempt_t, choose_intervals, end_step, finish
+   public :: run_t, attempt_t, choose_intervals, count_frames, end_step, finish
 
    !> Lines of the log if no interval is given
    integer(lp), parameter :: default_lines = 20_lp
@@ -178,7 +178,7 @@ contains
       associate (s => run%simulation)
          call hash_all_bodies(run%team, s%bodies, hash)
          call report_counters(s, counters)
-         call tell_pending(s, run%log)
+         call tell_pending(run%watch, s, run%log)
          if (allocated(error)) call write_last_frame(run, error%code, late_error)
          call run%trajectory%close(late_error, run%manifest)
          call run%recorder%close(run%log, run%manifest, late_error)
@@ -226,6 +226,20 @@ contains
          end if
       end associate
    end subroutine choose_intervals
+
+   !> Frames of a whole run
+   pure integer(lp) function count_frames(simulation)
+      !> The simulation
+      type(simulation_t), intent(in) :: simulation
+      integer(lp) :: interval
+
+      associate (n => simulation%n_steps)
+         interval = in_steps(simulation%settings%output%frame_interval, simulation%dt)
+         if (interval == 0_lp) interval = n
+         ! The last step has one in any case.
+         count_frames = 1_lp + (n + interval - 1_lp)/interval
+      end associate
+   end function count_frames
 
    !> An interval in steps, at least one; 0 for none
    pure integer(lp) function in_steps(interval, dt)

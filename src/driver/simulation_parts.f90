@@ -3,7 +3,7 @@ module polydem_simulation_parts
    use polydem_assemble, only: incidence_t
    use polydem_bodies, only: bodies_t
    use polydem_boxes, only: boxes_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contacts, only: at_direction, contact_memory_t, contacts_t
    use polydem_domain, only: domain_t
    use polydem_errors, only: error_t
    use polydem_force_law, only: force_law_t, new_force_law
@@ -143,6 +143,7 @@ contains
       do k = 1, size(self%memory%column)
          if (self%law%needs(k)) allocate (self%memory%column(k)%value(0))
       end do
+      if (self%settings%guards%passing /= 'off') allocate (self%memory%column(at_direction)%value(0))
    end subroutine allocate_memory
 
    subroutine list_moving(self)

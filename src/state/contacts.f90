@@ -9,7 +9,8 @@ module polydem_contacts
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: contacts_t, contact_memory_t, memory_kinds, at_tangential, at_area, reserve_contacts, is_degenerate
+   public :: contacts_t, contact_memory_t, memory_kinds, at_tangential, at_area, at_direction, &
+      reserve_contacts, is_degenerate
 
    !> Structure of arrays over contacts 1..n; the arrays may be longer
    type :: contacts_t
@@ -72,12 +73,13 @@ module polydem_contacts
    end type memory_kind_t
 
    !> Rows of the table of what is remembered
-   integer, parameter :: at_tangential = 1, at_area = 2
+   integer, parameter :: at_tangential = 1, at_area = 2, at_direction = 3
    !> All that can be remembered. The tangential force is that of the spring or of exact friction; the area serves
-   !> the book's backward difference, and to know new contacts
+   !> the book's backward difference, and to know new contacts; the direction, packed in one number, serves a guard
    type(memory_kind_t), parameter :: memory_kinds(*) = [ &
       memory_kind_t('tangential', 'N/m', 'tangential force remembered'), &
-      memory_kind_t('area', 'm2', 'area of the overlap at the last step')]
+      memory_kind_t('area', 'm2', 'area of the overlap at the last step'), &
+      memory_kind_t('direction', '1', 'direction at the last step, packed')]
 
    !> A column of memory
    type :: memory_column_t

@@ -47,9 +47,10 @@ def run(program, folder, *options):
 
 
 def books_of(output):
-    """What must be equal in runs that are: hash, works and residuals, counts of pairs and contacts."""
-    books = re.findall(r"^(?:state hash|work |residuals).*$|^(?:steps|pairs|contacts)\b.* \d+$", output, re.MULTILINE)
-    assert len(books) == 9, output
+    """What must be equal in runs that are: hash, works and residuals, counts of pairs, contacts and warnings."""
+    books = re.findall(r"^(?:state hash|work |residuals|warnings: ).*$|^(?:steps|pairs|contacts)\b.* \d+$", output,
+                       re.MULTILINE)
+    assert len(books) == 12, output
     return books
 
 

@@ -21,6 +21,7 @@ FAILURES = {
     "fast": ("--set", "forces.gravity=0,-5e5"),
     "far": ("--set", "guards.displacement=stop", "--set", "guards.displacement_limit=1e-6"),
     "deep": ("--set", "guards.overlap=stop", "--set", "guards.overlap_limit=1e-6"),
+    "through": ("--set", "guards.passing=stop", "--set", "forces.stiffness=5e3"),
 }
 CROSSING = """&scene name = 'file', bodies_file = '{bodies}' /
 &forces gravity = 0, -9.81, stiffness = 1e4 /
@@ -228,6 +229,20 @@ def test_a_warning_of_any_rank_is_told(tmp_path):
         output, _ = run(scene, tmp_path / f"warned_{ranks}", ranks, 1, options)
         told[ranks] = re.findall(r"^warning: step 1: body 8 .*$", output, re.MULTILINE)
     assert len(told[None]) == 1 and all(warning == told[None] for warning in told.values()), told
+
+
+def test_warnings_and_their_counts_do_not_depend_on_ranks_or_checkpoints(whole, tmp_path):
+    options = ("--set", "guards.displacement=warn", "--set", "guards.displacement_limit=0.02", "--set",
+               "guards.step=warn", "--set", "forces.stiffness=5e3", "--set", "checkpoint.steps=7")
+    told = {}
+    for ranks in (None, 2, 3, 4):
+        output, _ = run(whole / "scene.nml", tmp_path / f"of_{ranks}", ranks, 1, options)
+        told[ranks] = (re.findall(r"^warning: .*$", output, re.MULTILINE),
+                       re.findall(r"^warnings: .*$", output, re.MULTILINE), state_hash(output))
+    assert [any(each in text for text in told[None][0]) for each in
+            (" may move more than ", " overlap by ", " is inside body ", " of the stable step")] == [True] * 4, told
+    assert len(told[None][1]) == 5, told
+    assert all(sorted(each[0]) == sorted(told[None][0]) and each[1:] == told[None][1:] for each in told.values()), told
 
 
 def test_what_is_refused_leaves_a_result_as_it_was(whole, tmp_path):
