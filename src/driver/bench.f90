@@ -4,18 +4,19 @@
 !> and the cases (finder, threads) the inner one, rotated by one at each repeat, so that slow spells of the machine meet
 !> all cases. Repeat 0 warms up and checks every list. A sample that is on disk is not taken again.
 module polydem_bench
-   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+   use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_set_num_threads
    use polydem_bench_scene, only: provide_result, read_scene, scene_t
    use polydem_bench_settings, only: bench_settings_t
    use polydem_bench_subject, only: complete_case, find_reference, load_subject, subject_t, take_sample
    use polydem_bench_summary, only: ns_per_box, write_summary
    use polydem_check_sample, only: check_sample
+   use polydem_crowding, only: crowding_text
    use polydem_errors, only: error_t
    use polydem_finder, only: finder_t
    use polydem_finder_factory, only: new_finder
    use polydem_kinds, only: dp, ip, lp
    use polydem_log, only: log_t
-   use polydem_machine, only: cores_online, load_average
+   use polydem_machine, only: load_average
    use polydem_paths, only: exists, make_folder
    use polydem_provenance, only: collect_provenance, provenance_t, threads_are_bound
    use polydem_reference, only: reference_t
@@ -104,13 +105,14 @@ contains
    !> Tell what makes timings doubtful.
    subroutine write_warnings(bench)
       type(bench_t), intent(inout) :: bench
+      character(len=:), allocatable :: warning
       character(len=12) :: number
       real(dp) :: load
       logical :: bound
 
       associate (threads => bench%settings%threads, log => bench%log)
-         if (maxval(threads) > cores_online()) call log%write_line('warning: '//to_text(maxval(threads))// &
-            ' threads, but '//to_text(cores_online())//' processors; such timings say little')
+         warning = crowding_text(maxval(threads), int(omp_get_num_procs(), ip))
+         if (warning /= '') call log%write_line(warning//'; such timings say little')
          load = load_average()
          write (number, '(f12.2)') load
          if (load > quiet_load) call log%write_line('warning: this machine is busy, its load was '// &

@@ -20,11 +20,13 @@ contains
 
    !> Build the scene, and print the settings in force, the parts in use, sizes, masses, speeds and steps, the memory,
    !> and the warnings with which a run would begin. What would stop a run at once is an error here, too.
-   subroutine check_simulation(settings, error)
+   subroutine check_simulation(settings, error, crowding)
       !> Checked settings
       type(settings_t), intent(in) :: settings
       !> Bad input, or what would stop a run at its first step
       type(error_t), allocatable, intent(inout) :: error
+      !> A warning if processes have more threads than processors; none if absent or empty
+      character(len=*), intent(in), optional :: crowding
       type(simulation_t) :: simulation
       type(log_t) :: log
       integer(lp) :: before, after, frames
@@ -38,6 +40,9 @@ contains
       call write_lines(log, settings%resolved)
       call describe(simulation, log)
       call list_overlaps(simulation, '', log, error)
+      if (present(crowding)) then
+         if (crowding /= '') call log%write_line(crowding)
+      end if
       call log%write_line('memory     '//to_text(after)//' KiB resident, of which '//to_text(after - before)// &
                           ' KiB for the scene, its boxes, pairs and contacts')
       frames = count_frames(simulation)

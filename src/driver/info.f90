@@ -1,5 +1,6 @@
 !> What this program is, and what a result holds.
 module polydem_info
+   use polydem_crowding, only: crowding_text
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp, wp
@@ -9,7 +10,7 @@ module polydem_info
    use polydem_provenance, only: collect_provenance, provenance_t
    use polydem_result_folder, only: open_suffix, profile_path, segment_path
    use polydem_sealed_file, only: check_seal
-   use polydem_strings, only: to_text
+   use polydem_strings, only: printable, to_text
    implicit none
    private
    public :: describe_program, describe_result
@@ -26,10 +27,13 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(provenance_t) :: provenance
       type(log_t) :: log
+      character(len=:), allocatable :: warning
 
       call collect_provenance(provenance, '-', '', '', 0_ip)
       call log%open('', error)
       call write_header(log, provenance, '-')
+      warning = crowding_text(provenance%threads, provenance%processors)
+      if (warning /= '') call log%write_line(warning)
       call log%close(error)
    end subroutine describe_program
 
@@ -111,7 +115,7 @@ contains
          if (.not. file%has('/provenance/'//trim(facts(k)))) cycle
          call file%read('/provenance/'//trim(facts(k)), text, error)
          if (allocated(error)) return
-         call log%write_line('   '//facts(k)//text)
+         call log%write_line('   '//facts(k)//printable(text))
       end do
    end subroutine describe_origin
 
@@ -156,9 +160,9 @@ contains
 
       call file%read('/status', text, error)
       if (allocated(error)) return
-      call log%write_line('   status          '//text)
+      call log%write_line('   status          '//printable(text))
       call file%read('/state_hash', text, error)
-      if (.not. allocated(error)) call log%write_line('   state hash      '//text)
+      if (.not. allocated(error)) call log%write_line('   state hash      '//printable(text))
    end subroutine describe_end
 
 end module polydem_info

@@ -5,19 +5,19 @@
 !> the mean over the steps, divided by the number of boxes, fixed ones included. One thread: its processor time;
 !> more: elapsed time.
 module polydem_replay
-   use, intrinsic :: iso_fortran_env, only: output_unit
    use omp_lib, only: omp_set_num_threads
    use polydem_boxes, only: boxes_t
    use polydem_errors, only: error_t
    use polydem_hash, only: hexadecimal, mix_word
    use polydem_kinds, only: dp, ip, lp
+   use polydem_line_writer, only: line_writer_t
    use polydem_neighbours, only: neighbours_t
    use polydem_paths, only: make_folder
    use polydem_provenance, only: collect_provenance, provenance_t
    use polydem_reference, only: expect_by_oracle, new_reference, reference_t, total_hash
    use polydem_replay_sample, only: replay_sample
    use polydem_sample_file, only: case_t, sample_t, write_sample
-   use polydem_strings, only: to_text
+   use polydem_strings, only: printable, to_text
    use polydem_trace, only: first_boxes, read_trace, trace_t
    use polydem_work, only: count_names, n_counts, n_phases, n_sums, phase_names
    implicit none
@@ -69,7 +69,7 @@ contains
       case%checked = 'npairs'
       if (ask_oracle) case%checked = 'all_pairs '//to_text(trace%n_steps)//' steps'
       call replay_all(trace, boxes, repeats, case, reference, warm_up, best, error, samples)
-      if (.not. allocated(error)) call print_record(repeats, warm_up, best)
+      if (.not. allocated(error)) call print_record(repeats, warm_up, best, error)
    end subroutine replay_trace
 
    !> The warm-up, and all timed passes.
@@ -209,43 +209,54 @@ contains
    end subroutine ask_all_pairs
 
    !> Print key=value lines.
-   subroutine print_record(repeats, warm_up, best)
+   subroutine print_record(repeats, warm_up, best, error)
       integer(ip), intent(in) :: repeats
       type(sample_t), intent(in) :: warm_up, best
+      type(error_t), allocatable, intent(inout) :: error
+      type(line_writer_t) :: screen
       integer(lp) :: total(n_counts)
       integer :: k
 
+      call screen%open_screen()
       associate (case => warm_up%case)
-         write (output_unit, '(2a)') 'trace=', case%trace, 'finder=', case%finder
-         write (output_unit, '(a,i0)') 'boxes=', case%boxes, 'walls=', case%fixed, 'bodies=', case%bodies, &
-            'steps=', case%steps, 'threads=', case%threads, 'repeats=', repeats
-         if (case%threads == 1_ip) call print_times(best%processor, case%boxes)
-         if (case%threads > 1_ip) call print_times(best%elapsed, case%boxes)
+         call screen%put_line('trace='//printable(case%trace))
+         call screen%put_line('finder='//case%finder)
+         call screen%put_line('boxes='//to_text(case%boxes))
+         call screen%put_line('walls='//to_text(case%fixed))
+         call screen%put_line('bodies='//to_text(case%bodies))
+         call screen%put_line('steps='//to_text(case%steps))
+         call screen%put_line('threads='//to_text(case%threads))
+         call screen%put_line('repeats='//to_text(repeats))
+         if (case%threads == 1_ip) call print_times(screen, best%processor, case%boxes)
+         if (case%threads > 1_ip) call print_times(screen, best%elapsed, case%boxes)
          do k = 1, n_phases
-            call print_time('ns_'//trim(phase_names(k))//'_after_first=', best%phase(k, 2:), case%boxes)
+            call print_time(screen, 'ns_'//trim(phase_names(k))//'_after_first=', best%phase(k, 2:), case%boxes)
          end do
-         write (output_unit, '(a,i0)') 'pairs_total=', case%pairs_total
-         write (output_unit, '(2a)') 'pair_hash=0x', hexadecimal(case%pair_hash), &
-            'checked_against=', case%checked(:index(case%checked//' ', ' ') - 1)
+         call screen%put_line('pairs_total='//to_text(case%pairs_total))
+         call screen%put_line('pair_hash=0x'//hexadecimal(case%pair_hash))
+         call screen%put_line('checked_against='//case%checked(:index(case%checked//' ', ' ') - 1))
       end associate
       total = sum(warm_up%count, dim=2)
       total(n_sums + 1:) = warm_up%count(n_sums + 1:, size(warm_up%count, 2))
       do k = 1, n_counts
-         if (total(k) /= 0_lp) write (output_unit, '(2a,i0)') trim(count_names(k)), '=', total(k)
+         if (total(k) /= 0_lp) call screen%put_line(trim(count_names(k))//'='//to_text(total(k)))
       end do
-      write (output_unit, '(a)') 'result=ok'
+      call screen%put_line('result=ok')
+      call screen%close(error)
    end subroutine print_record
 
-   subroutine print_times(step_seconds, n_boxes)
+   subroutine print_times(screen, step_seconds, n_boxes)
+      type(line_writer_t), intent(inout) :: screen
       real(dp), intent(in) :: step_seconds(:)
       integer(ip), intent(in) :: n_boxes
 
-      call print_time('ns_per_box_per_step=', step_seconds, n_boxes)
-      call print_time('ns_per_box_per_step_after_first=', step_seconds(2:), n_boxes)
+      call print_time(screen, 'ns_per_box_per_step=', step_seconds, n_boxes)
+      call print_time(screen, 'ns_per_box_per_step_after_first=', step_seconds(2:), n_boxes)
    end subroutine print_times
 
    !> Print the mean time of a step per box in nanoseconds.
-   subroutine print_time(key, step_seconds, n_boxes)
+   subroutine print_time(screen, key, step_seconds, n_boxes)
+      type(line_writer_t), intent(inout) :: screen
       character(len=*), intent(in) :: key
       real(dp), intent(in) :: step_seconds(:)
       integer(ip), intent(in) :: n_boxes
@@ -253,7 +264,7 @@ contains
 
       if (size(step_seconds) == 0) return
       write (number, '(f24.3)') 1.0e9_dp*sum(step_seconds)/real(size(step_seconds), dp)/real(n_boxes, dp)
-      write (output_unit, '(2a)') key, trim(adjustl(number))
+      call screen%put_line(key//trim(adjustl(number)))
    end subroutine print_time
 
    !> Name of a file without path and suffix

@@ -5,6 +5,7 @@ module polydem_run
    use polydem_checkpoint_contents, only: history_t, keep_whole, scene_hash
    use polydem_claim_folder, only: claim_folder
    use polydem_clock, only: wall_seconds
+   use polydem_crowding, only: crowding
    use polydem_dangers, only: warn_of_dangers
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t, input_error, raise, stopped_early
@@ -59,6 +60,7 @@ contains
       is_locked = .false.
       if (run%team%leads() .and. run%attempt%continues) call look_for_end(settings, run, last_state, error)
       if (is_over(run, last_state)) return
+      run%crowding = crowding(run%team)
       call check_team(settings, run%team, error)
       if (run%team%leads() .and. .not. allocated(error)) call begin(settings, force, run, is_locked, last_state, error)
       call run%team%agree(error)
@@ -282,6 +284,7 @@ contains
       if (.not. allocated(error)) call run%log%open(run%folder, error, appended=goes_on)
       if (allocated(error)) return
       call write_header(run%log, run%provenance, run%folder)
+      if (run%crowding /= '') call run%log%write_line(run%crowding)
       if (allocated(note)) call run%log%write_line(note)
       call describe(run%simulation, run%log)
       call write_overlaps(run, error)

@@ -50,6 +50,8 @@ module polydem_run_output
       class(team_t), allocatable :: team
       !> How it was asked for
       type(attempt_t) :: attempt
+      !> A warning if processes have more threads than processors, else empty
+      character(len=:), allocatable :: crowding
       !> When it began, by the clock [s]
       real(dp) :: began = 0.0_dp
       !> What former attempts left

@@ -15,6 +15,7 @@ module polydem_hdf5_dataset
       h5s_unlimited_f, h5t_enum_f, h5t_float_f, h5t_integer_f, h5t_native_double, h5z_filter_deflate_f, hid_t, &
       hsize_t, size_t
    use polydem_errors, only: error_t, input_error, io_error, raise
+   use polydem_hdf5_links, only: check_storage, close_ways_out, complain_of_way_out, leads_out
    use polydem_hdf5_place, only: expect, place_t
    use polydem_hdf5_slab, only: read_slab, slab_t, write_slab
    use polydem_kinds, only: bp, dp, ip, lp
@@ -49,7 +50,10 @@ contains
 
       call h5dont_atexit_f(status)
       call h5iis_valid_f(h5t_native_double, is_open, status)
-      if (.not. is_open) call h5open_f(status)
+      if (.not. is_open) then
+         call h5open_f(status)
+         call close_ways_out()
+      end if
       if (status == 0) call h5eset_auto_f(0, status)
       if (status /= 0) call raise(error, io_error, 'the HDF5 library does not start')
    end subroutine start_library
@@ -84,7 +88,8 @@ contains
       byte_type = h5kind_to_type(bp, h5_integer_kind)
    end function byte_type
 
-   !> Whether a name exists; every group on the way is looked up, as HDF5 demands.
+   !> Whether a name exists; every group on the way is looked up, as HDF5 demands. A name in another file exists, so
+   !> that whoever reads it hears of that.
    logical function has_link(place)
       !> File and name
       type(place_t), intent(in) :: place
@@ -97,8 +102,9 @@ contains
          end if
          call h5lexists_f(place%file, place%name(:k - 1), has_link, status)
          if (status /= 0) has_link = .false.
-         if (.not. has_link) return
+         if (.not. has_link) exit
       end do
+      if (.not. has_link) has_link = leads_out(place)
    end function has_link
 
    !> Write a new data set of fixed shape.
@@ -264,10 +270,19 @@ contains
       if (.not. has_link(place)) then
          call raise(error, input_error, place%path//': there is no '//place%name)
          return
+      else if (leads_out(place)) then
+         call complain_of_way_out(place, error)
+         return
       end if
       call h5dopen_f(place%file, place%name, dataset, status)
       call expect(status, 'open the data set', place, error)
       if (allocated(error)) return
+      ! Before the shape, for which HDF5 may look into other files.
+      call check_storage(dataset, place, error)
+      if (allocated(error)) then
+         call h5dclose_f(dataset, ignored)
+         return
+      end if
       call h5dget_space_f(dataset, space, status)
       if (status >= 0) call h5sget_simple_extent_ndims_f(space, n, status)
       if (status >= 0) then

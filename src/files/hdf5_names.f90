@@ -5,6 +5,7 @@ module polydem_hdf5_names
    use hdf5, only: h5_index_name_f, h5_iter_inc_f, h5gclose_f, h5gget_info_f, h5gopen_f, h5i_dataset_f, h5iget_type_f, &
       h5lget_name_by_idx_f, h5oclose_f, h5oopen_f, hid_t, hsize_t, size_t
    use polydem_errors, only: error_t
+   use polydem_hdf5_links, only: leads_out
    use polydem_hdf5_place, only: expect, place_t
    implicit none
    private
@@ -57,14 +58,16 @@ contains
       end do
    end subroutine read_name
 
-   !> Whether a name stands for a data set, rather than a group, a type, or a link to nowhere
+   !> Whether a name stands for a data set, rather than a group, a type, or a link to nowhere; one in another file
+   !> counts, and whoever reads it hears of that
    logical function is_dataset(place)
       !> File and name
       type(place_t), intent(in) :: place
       integer(hid_t) :: object
       integer :: kind_of_object, status
 
-      is_dataset = .false.
+      is_dataset = leads_out(place)
+      if (is_dataset) return
       call h5oopen_f(place%file, place%name, object, status)
       if (status < 0) return
       call h5iget_type_f(object, kind_of_object, status)

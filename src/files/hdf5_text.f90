@@ -13,6 +13,7 @@ module polydem_hdf5_text
       h5t_string, hid_t, hsize_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_dataset, only: dataset_shape, write_dataset
+   use polydem_hdf5_links, only: complain_of_way_out, leads_out
    use polydem_hdf5_place, only: expect, place_t
    use polydem_hdf5_slab, only: slab_of
    implicit none
@@ -217,6 +218,10 @@ contains
       integer :: status, ignored
 
       there = .false.
+      if (leads_out(place)) then
+         call complain_of_way_out(place, error)
+         return
+      end if
       call h5oopen_f(place%file, place%name, object, status)
       call expect(status, 'open', place, error)
       if (allocated(error)) return

@@ -2,7 +2,7 @@
 !>
 !> So every line outlives the program, and every failure is noticed: `flush` of Fortran does not tell of a full disk.
 module polydem_line_writer
-   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_loc, c_new_line, c_null_char, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_loc, c_new_line, c_null_char, c_ptr, c_size_t
    use, intrinsic :: iso_fortran_env, only: output_unit
    use polydem_errors, only: error_t, io_error, raise
    use polydem_paths, only: exists, last_failure
@@ -10,7 +10,8 @@ module polydem_line_writer
    private
    public :: line_writer_t
 
-   !> A text file that is being written, or the screen; nothing happens while it is closed or after a failure.
+   !> A text file that is being written, or the screen; nothing happens while it is closed or after a failure. Whoever
+   !> reads the screen through a pipe may stop reading, as `head` does: that is no failure.
    type :: line_writer_t
       private
       !> Descriptor of the operating system, negative if closed
@@ -22,13 +23,19 @@ module polydem_line_writer
    contains
       procedure :: open => open_writer
       procedure :: open_screen
+      procedure :: open_errors
       procedure :: put
       procedure :: put_line
       procedure :: close => close_writer
+      procedure, private :: is_screen
    end type line_writer_t
 
    !> Descriptor of standard output
    integer(c_int), parameter :: standard_output = 1_c_int
+   !> Descriptor of standard error
+   integer(c_int), parameter :: standard_error = 2_c_int
+   !> EPIPE of errno on Linux: nobody reads the pipe any more
+   integer(c_int), parameter :: unread = 32_c_int
    !> Permissions of a new file before umask: rw-rw-rw-
    integer(c_int), parameter :: read_and_write = int(o'666', c_int)
    !> O_WRONLY and O_APPEND of Linux
@@ -62,6 +69,11 @@ module polydem_line_writer
          import :: c_int
          integer(c_int), value :: descriptor
       end function c_close
+
+      !> Where errno stands (Linux)
+      type(c_ptr) function errno_location() bind(C, name='__errno_location')
+         import :: c_ptr
+      end function errno_location
    end interface
 
 contains
@@ -96,6 +108,15 @@ contains
       self%descriptor = standard_output
    end subroutine open_screen
 
+   !> Write to standard error.
+   subroutine open_errors(self)
+      class(line_writer_t), intent(inout) :: self
+
+      self%name = 'standard error'
+      if (allocated(self%failure)) deallocate (self%failure)
+      self%descriptor = standard_error
+   end subroutine open_errors
+
    !> Write a text as it is; a failure is kept for `close`.
    subroutine put(self, text)
       class(line_writer_t), intent(inout) :: self
@@ -103,10 +124,11 @@ contains
       character(len=*), intent(in) :: text
       character(kind=c_char), target :: bytes(len(text))
       integer(c_size_t) :: written
-      integer :: k, n
+      integer(c_int), pointer :: number
+      integer :: k, n, ignored
 
       if (self%descriptor < 0_c_int .or. allocated(self%failure)) return
-      if (self%descriptor == standard_output) flush (output_unit)
+      if (self%descriptor == standard_output) flush (output_unit, iostat=ignored)
       do k = 1, len(text)
          bytes(k) = text(k:k)
       end do
@@ -114,7 +136,12 @@ contains
       do while (n < len(text))
          written = c_write(self%descriptor, c_loc(bytes(n + 1)), int(len(text) - n, c_size_t))
          if (written <= 0_c_size_t) then
-            self%failure = last_failure()
+            call c_f_pointer(errno_location(), number)
+            if (self%is_screen() .and. number == unread) then
+               self%descriptor = -1_c_int
+            else
+               self%failure = last_failure()
+            end if
             return
          end if
          n = n + int(written)
@@ -137,11 +164,18 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (self%descriptor < 0_c_int) return
-      if (self%descriptor /= standard_output) then
+      if (.not. self%is_screen()) then
          if (c_close(self%descriptor) /= 0_c_int .and. .not. allocated(self%failure)) self%failure = last_failure()
       end if
       self%descriptor = -1_c_int
       if (allocated(self%failure)) call raise(error, io_error, self%name//': cannot be written: '//self%failure)
    end subroutine close_writer
+
+   !> Whether standard output or error is written to
+   pure logical function is_screen(self)
+      class(line_writer_t), intent(in) :: self
+
+      is_screen = self%descriptor == standard_output .or. self%descriptor == standard_error
+   end function is_screen
 
 end module polydem_line_writer

@@ -5,14 +5,18 @@ module polydem_paths
    use polydem_kinds, only: lp
    implicit none
    private
-   public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_room, sync_file, last_failure, disk_hint
+   public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_room, sync_file
+   public :: last_failure, failure_text, disk_hint
 
    !> What to do if a file cannot be written
    character(len=*), parameter :: disk_hint = &
-      '. Is the disk full? Make room, or choose another folder, and run again; files that were closed before are whole'
+      '. Is the disk full, or the length of files limited (ulimit -f)? Make room, or choose another folder, and run'// &
+      ' again; files that were closed before are whole'
 
    !> F_OK of access(2)
    integer(c_int), parameter :: existence = 0_c_int
+   !> R_OK of access(2)
+   integer(c_int), parameter :: may_read = 4_c_int
    !> O_RDONLY of open(2)
    integer(c_int), parameter :: read_only = 0_c_int
    !> O_WRONLY of open(2)
@@ -25,6 +29,10 @@ module polydem_paths
    integer(c_int), parameter :: no_room(2) = [28_c_int, 122_c_int]
    !> Permissions of a new folder before umask: rwxrwxrwx
    integer(c_int), parameter :: all_permissions = int(o'777', c_int)
+   !> Those of them that are the owner's
+   integer(c_int), parameter :: of_owner = int(o'700', c_int)
+   !> The user who may read and write everything
+   integer(c_int), parameter :: superuser = 0_c_int
 
    interface
       !> POSIX access(2)
@@ -40,6 +48,17 @@ module polydem_paths
          character(kind=c_char), intent(in) :: path(*)
          integer(c_int), value :: mode
       end function c_mkdir
+
+      !> POSIX umask(2)
+      integer(c_int) function c_umask(mask) bind(C, name='umask')
+         import :: c_int
+         integer(c_int), value :: mask
+      end function c_umask
+
+      !> POSIX geteuid(2)
+      integer(c_int) function c_user() bind(C, name='geteuid')
+         import :: c_int
+      end function c_user
 
       !> POSIX rename(2)
       integer(c_int) function c_rename(from, to) bind(C, name='rename')
@@ -123,7 +142,8 @@ contains
       is_folder = exists(path//'/.')
    end function is_folder
 
-   !> Make a folder and the folders above it; nothing happens if it is there.
+   !> Make a folder and the folders above it, and bring their names to disk; none is made if it is there. It is an
+   !> error, and nothing is made, if the umask takes from the owner any right to files and folders that are made.
    subroutine make_folder(path, error)
       !> Path of the folder
       character(len=*), intent(in) :: path
@@ -132,18 +152,53 @@ contains
       character(len=:), allocatable :: reason
       integer :: k
 
+      call check_umask(path, error)
+      if (allocated(error)) return
       reason = ''
       do k = 2, len(path) + 1
          if (k <= len(path)) then
             if (path(k:k) /= '/') cycle
          end if
          if (exists(path(:k - 1))) cycle
-         if (c_mkdir(path(:k - 1)//c_null_char, all_permissions) /= 0_c_int) reason = last_failure()
+         if (c_mkdir(path(:k - 1)//c_null_char, all_permissions) /= 0_c_int) then
+            reason = last_failure()
+         else
+            call sync_folder_of(path(:k - 1), error)
+         end if
       end do
+      if (allocated(error)) return
       if (is_folder(path)) return
       if (exists(path)) reason = 'it is a file'
       call raise(error, io_error, "cannot make the folder '"//path//"': "//reason)
    end subroutine make_folder
+
+   subroutine check_umask(path, error)
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(inout) :: error
+      integer(c_int) :: mask, ignored
+      character(len=4) :: digits
+
+      ! To read it is to set it.
+      mask = c_umask(0_c_int)
+      ignored = c_umask(mask)
+      if (iand(mask, of_owner) == 0_c_int) return
+      if (c_user() == superuser) return
+      write (digits, '(o4.4)') mask
+      call raise(error, io_error, "'"//path//"': the umask "//digits//' takes from you the right to read, write or '// &
+                 'enter what is made there; nothing is made. Call umask 022 and run again')
+   end subroutine check_umask
+
+   !> Bring the list of names in which a new folder stands to disk. A folder whose list nobody may read is left to the
+   !> system.
+   subroutine sync_folder_of(path, error)
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: above
+
+      above = path(:index(path, '/', back=.true.))
+      if (above == '') above = '.'
+      if (c_access(above//c_null_char, may_read) == 0_c_int) call sync_file(above, error)
+   end subroutine sync_folder_of
 
    !> Give a file another name in one indivisible step, replacing what had that name.
    subroutine rename_file(from, to, error)
@@ -218,17 +273,26 @@ contains
    function last_failure() result(reason)
       character(len=:), allocatable :: reason
       integer(c_int), pointer :: number
+
+      call c_f_pointer(errno_location(), number)
+      reason = failure_text(number)
+   end function last_failure
+
+   !> A number of errno in the words of the operating system
+   function failure_text(number) result(reason)
+      !> The number
+      integer(c_int), intent(in) :: number
+      character(len=:), allocatable :: reason
       character(kind=c_char), pointer :: letters(:)
       type(c_ptr) :: text
       integer :: k
 
-      call c_f_pointer(errno_location(), number)
       text = c_strerror(number)
       call c_f_pointer(text, letters, [c_strlen(text)])
       allocate (character(len=size(letters)) :: reason)
       do k = 1, size(letters)
          reason(k:k) = letters(k)
       end do
-   end function last_failure
+   end function failure_text
 
 end module polydem_paths

@@ -1,20 +1,22 @@
-!> Signals that ask a run to end (POSIX): INT, TERM and USR1.
+!> Signals (POSIX): INT, TERM and USR1, which ask a run to end, and those of a write that fails.
 !>
 !> The first one is only noted, the second one of its kind ends the program at once. The note is kept by the operating
 !> system and not by a variable: a handler that does nothing is installed for one call, after which the
 !> signal has its default action again, and that can be asked for at any time. A signal that is ignored, as INT is
 !> in background jobs, stays so.
 module polydem_signals
-   use, intrinsic :: iso_c_binding, only: c_associated, c_funloc, c_funptr, c_int, c_loc, c_long, c_null_funptr, &
-      c_null_ptr, c_ptr
+   use, intrinsic :: iso_c_binding, only: c_associated, c_funloc, c_funptr, c_int, c_intptr_t, c_loc, c_long, &
+      c_null_funptr, c_null_ptr, c_ptr
    implicit none
    private
-   public :: await_signals, caught_signal, release_signals
+   public :: await_signals, caught_signal, release_signals, survive_failed_writes
 
    !> SIGINT, SIGTERM and SIGUSR1 (POSIX, Linux)
    integer(c_int), parameter :: numbers(3) = [2_c_int, 15_c_int, 10_c_int]
    !> Their names
    character(len=*), parameter :: names(3) = [character(len=4) :: 'INT', 'TERM', 'USR1']
+   !> SIGPIPE and SIGXFSZ (Linux): nobody reads the pipe any more, the file would be longer than ulimit -f allows
+   integer(c_int), parameter :: of_writes(2) = [13_c_int, 25_c_int]
    !> Bits of SA_RESTART (calls that were interrupted go on) and SA_RESETHAND (for one call) of Linux
    integer, parameter :: restart_bit = 28, one_call_bit = 31
    !> Longs in a sigset_t of the GNU C library, 1024 bits
@@ -42,6 +44,16 @@ module polydem_signals
    end interface
 
 contains
+
+   !> From now on, a write to a pipe that nobody reads or beyond the greatest length of a file fails as others do, with
+   !> a status, and does not end the program.
+   subroutine survive_failed_writes()
+      integer :: k
+
+      do k = 1, size(of_writes)
+         call set_action(of_writes(k), address_of_nothing())
+      end do
+   end subroutine survive_failed_writes
 
    !> From now on, note the first signal of each kind.
    subroutine await_signals()
@@ -85,6 +97,11 @@ contains
    type(c_funptr) function address_of_note()
       address_of_note = c_funloc(note)
    end function address_of_note
+
+   !> SIG_IGN: the signal is ignored
+   type(c_funptr) function address_of_nothing()
+      address_of_nothing = transfer(1_c_intptr_t, c_null_funptr)
+   end function address_of_nothing
 
    !> Whether a signal has its default action
    logical function is_default(signal)

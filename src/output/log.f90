@@ -8,6 +8,7 @@ module polydem_log
    use polydem_line_writer, only: line_writer_t
    use polydem_machine, only: terminal_watches
    use polydem_result_folder, only: log_path
+   use polydem_strings, only: printable
    implicit none
    private
    public :: log_t, line_width
@@ -66,7 +67,7 @@ contains
       if (folder /= '') call self%file%open(log_path(folder), error, appended)
    end subroutine open_log
 
-   !> Write a line on the screen and into the file.
+   !> Write a line, or several, on the screen and into the file, without control characters.
    subroutine write_line(self, text)
       class(log_t), intent(inout) :: self
       !> The line
@@ -75,8 +76,8 @@ contains
       if (self%live_length > 0) call write_live(self, repeat(' ', self%live_length))
       if (self%live_length > 0) call self%screen%put(achar(13))
       self%live_length = 0
-      call self%screen%put_line(text)
-      call self%file%put_line(text)
+      call self%screen%put_line(printable(text, keeps_lines=.true.))
+      call self%file%put_line(printable(text, keeps_lines=.true.))
    end subroutine write_line
 
    !> Write the line of an interval, with the rate since the last one and the time to the end at that rate.

@@ -4,7 +4,7 @@ module polydem_log_tables
    use polydem_kinds, only: dp, ip, lp
    use polydem_log, only: line_width, log_t
    use polydem_provenance, only: provenance_t
-   use polydem_strings, only: to_text
+   use polydem_strings, only: printable, to_text
    use polydem_timers, only: n_stages, stage_names, timers_t
    implicit none
    private
@@ -30,11 +30,8 @@ contains
          if (p%processes > 1_ip) call write_wrapped(log, 'processes  '//to_text(p%processes)//', by MPI, each with')
          call write_wrapped(log, 'threads    '//to_text(p%threads)//' on '//to_text(p%processors)// &
                             ' processors')
-         if (p%threads > p%processors) then
-            call write_wrapped(log, 'warning: more threads than processors; the run will be slow')
-         end if
-         call write_wrapped(log, 'input      '//p%input_file//', seed '//to_text(p%seed))
-         call write_wrapped(log, 'result     '//folder)
+         call write_wrapped(log, 'input      '//printable(p%input_file)//', seed '//to_text(p%seed))
+         call write_wrapped(log, 'result     '//printable(folder))
          call write_wrapped(log, 'started    '//p%started)
       end associate
    end subroutine write_header

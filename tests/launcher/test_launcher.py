@@ -190,6 +190,48 @@ class Ranks(Toy):
         self.assertEqual((noted["OMPI_MCA_rmaps_base_oversubscribe"], noted["OMPI_MCA_mpi_yield_when_idle"],
                           noted["OMP_WAIT_POLICY"]), ("1", "1", "passive"))
 
+    def test_mpirun_that_went_after_the_build_is_installed_or_named(self):
+        self.call("--version", POLYDEM_PRESET="mpi")
+        machine = self.bare_machine()
+        commands = machine["COMMANDS"]
+        for name in ("gfortran", "cmake", "ninja", "git"):
+            os.symlink(shutil.which(name), os.path.join(commands, name))
+        for name in ("mpifort", "h5pfc"):
+            os.symlink(os.path.join(self.folder, "mpi", name), os.path.join(commands, name))
+        os.remove(os.path.join(commands, "apt-get"))
+        code, output, messages = self.call("run", "x", "--ranks", "1", **machine)
+        self.assertEqual((code, output), (1, ""))
+        self.assertEqual(messages, "polydem: missing Debian packages: openmpi-bin\n"
+                         "polydem: no apt-get here: please install them (or what they contain) yourself\n")
+        real = os.path.join(self.folder, "mpi", "mpirun")
+        self.write("commands/apt-get", APT_GET + f'ln -sf "{real}" "$COMMANDS/mpirun"\n')
+        os.chmod(os.path.join(commands, "apt-get"), 0o755)
+        code, output, messages = self.call("run", "x", "--ranks", "1", "--threads", "1", **machine)
+        self.assertEqual((code, output.splitlines()[:2]), (0, ["1 ranks", "<run>"]), messages)
+        self.assertIn("missing Debian packages: openmpi-bin", messages)
+
+    def test_a_reader_who_stops_does_not_end_mpirun(self):
+        self.call("--version", POLYDEM_PRESET="mpi")
+        # As mpirun does, this one ends badly if it cannot write.
+        self.write("mpi/mpirun", "#!/bin/bash\nfor k in {1..20000}; do echo line $k || exit 9; done\n"
+                   'echo warning >&2 || exit 9\necho done >"$NOTES/done"\nexit 75\n')
+        for streams in ("", "2>&1"):
+            line = f"{{ '{self.launcher}' run x --ranks 1 --threads 1 {streams}; echo $? >'{self.folder}/code'; }}"
+            shown = subprocess.run(["bash", "-c", f"{line} | head -n 1"], capture_output=True, text=True,
+                                   env=self.environment, timeout=60, check=False)
+            self.assertEqual((shown.stdout, self.read("code"), self.read("done")), ("line 1\n", ["75"], ["done"]))
+            os.remove(os.path.join(self.folder, "done"))
+        code, output, messages = self.call("run", "x", "--ranks", "1", "--threads", "1")
+        self.assertEqual((code, len(output.splitlines()), messages), (75, 20000, "warning\n"))
+
+    def test_a_small_stack_is_named(self):
+        self.call("--version", POLYDEM_PRESET="mpi")
+        for size, expected in ((64, 2), (1023, 2), (1024, 0), (8192, 0)):
+            line = f"ulimit -s {size}; exec '{self.launcher}' run x --ranks 1 --threads 1"
+            shown = subprocess.run(["bash", "-c", line], capture_output=True, text=True, env=self.environment)
+            self.assertEqual(shown.returncode, expected, shown.stderr)
+            self.assertEqual(f"the stack may have {size} KiB only" in shown.stderr, expected == 2)
+
     def test_a_binding_of_the_user_stays(self):
         _, _, noted = self.run_ranks("run", "x", "--ranks", "1", "--threads", "1", OMP_PROC_BIND="close",
                                      OMPI_MCA_rmaps_base_mapping_policy="slot:PE=1")
@@ -404,6 +446,78 @@ class Build(Toy):
             code, _, messages = self.call("test", label)
             self.assertEqual(code, 2)
             self.assertIn(f"no test has the label {label}", messages)
+
+
+class Stranger(Toy):
+    """Calls by a user without rights; root may do everything, so that root becomes that user."""
+
+    def call_as_stranger(self, *words, mask=0o022):
+        def before():
+            if os.getuid() == 0:
+                os.setgroups([])
+                os.setgid(65534)
+                os.setuid(65534)
+            os.umask(mask)
+        done = subprocess.run([self.launcher, *words], capture_output=True, text=True, env=self.environment, cwd="/tmp",
+                              preexec_fn=before, check=False)
+        return done.returncode, done.stdout, done.stderr
+
+    def open_to_all(self, mode):
+        for folder, _, names in os.walk(self.folder):
+            os.chmod(folder, mode)
+            for name in names:
+                path = os.path.join(folder, name)
+                runs = path.endswith(("polydem", "mpirun"))
+                if not os.path.islink(path):
+                    os.chmod(path, mode if runs else mode & 0o666)
+
+    def test_a_folder_that_may_only_be_read_is_named(self):
+        self.open_to_all(0o555)
+        self.addCleanup(self.open_to_all, 0o755)
+        code, output, messages = self.call_as_stranger("run", "x.nml")
+        self.assertEqual((code, output), (1, ""))
+        self.assertEqual(len(messages.splitlines()), 1, messages)
+        for part in (f"{self.folder} may not be written to", "copy the whole folder", "have its owner call"):
+            self.assertIn(part, messages)
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
+        # What is built already runs.
+        self.open_to_all(0o755)
+        self.call("--version")
+        self.open_to_all(0o555)
+        self.assertEqual(self.call_as_stranger("run", "x.nml"), (0, "<run>\n<x.nml>\n", ""))
+        self.assertEqual(self.call_as_stranger("--help")[0], 0)
+
+    def test_a_umask_that_takes_ones_own_rights_is_named(self):
+        self.open_to_all(0o777)
+        for mask in (0o777, 0o277, 0o700, 0o400, 0o200, 0o100):
+            code, output, messages = self.call_as_stranger("info", mask=mask)
+            self.assertEqual((code, output), (1, ""))
+            self.assertEqual(len(messages.splitlines()), 1, messages)
+            self.assertIn(f"the umask {mask:04o} takes from you the rights", messages)
+            self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
+
+
+class Streams(Toy):
+    """Streams that are closed, and pipes that nobody reads."""
+
+    def test_closed_streams(self):
+        self.call("--version")
+        for k in range(8):
+            closed = " ".join(("<&-", ">&-", "2>&-")[i] for i in range(3) if k & 1 << i)
+            for words, code in (("--help", 0), ("info", 0), ("fly", 2)):
+                done = subprocess.run(["bash", "-c", f"'{self.launcher}' {words} {closed}"], capture_output=True,
+                                      text=True, env=self.environment, check=False)
+                self.assertEqual(done.returncode, code, (closed, words, done))
+                self.assertEqual(done.stdout == "", k & 2 != 0 or code == 2)
+                self.assertEqual(done.stderr == "", k & 4 != 0 or code == 0, (closed, words, done))
+
+    def test_a_message_that_nobody_reads_does_not_end_a_call(self):
+        reader, writer = os.pipe()
+        os.close(reader)
+        done = subprocess.run([self.launcher, "info"], stdout=subprocess.PIPE, stderr=writer, text=True,
+                              env=self.environment, check=False)
+        os.close(writer)
+        self.assertEqual((done.returncode, done.stdout), (0, "<info>\n"))
 
 
 class BareMachine(Toy):

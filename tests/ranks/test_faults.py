@@ -304,3 +304,14 @@ def test_a_disk_that_is_full_loses_nothing(whole, request, tmp_path):
             assert all(after[name] == content for name, content in before.items())
         finally:
             subprocess.run(["umount", str(disk)], check=True)
+
+
+def test_more_threads_than_processors_of_all_ranks_together_draw_a_warning(whole, tmp_path):
+    processors = len(os.sched_getaffinity(0))
+    for ranks in sorted({1, processors, processors + 1}):
+        output, _ = run(whole / "scene.nml", tmp_path / str(ranks), ranks, 1, OPTIONS)
+        told = f"warning: more threads than processors ({ranks} on {processors})"
+        assert (told in output) == (ranks > processors), output
+        assert (told in (tmp_path / str(ranks) / "log.txt").read_text(encoding="utf-8")) == (ranks > processors)
+    _, message = run(whole / "scene.nml", tmp_path / "many", 2, 64*processors + 1, OPTIONS, code=2)
+    assert message.count("threads are too many") == 1 and not (tmp_path / "many").exists(), message
