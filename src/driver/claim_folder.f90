@@ -43,10 +43,7 @@ contains
       if (.not. manifest%is_found) then
          if (.not. allocated(error)) call manifest%begin(folder, [lock, names], error)
       else if (force) then
-         associate (settings => simulation%settings)
-            call check_inputs(manifest, folder, [character(len=max(len(settings%file), &
-                              len(settings%scene%bodies_file))) :: settings%file, settings%scene%bodies_file], error)
-         end associate
+         call check_inputs(manifest, folder, inputs_of(simulation), error)
          call manifest%take_up()
          if (.not. allocated(error)) call put_aside(manifest, folder, error)
          names = [character(len=longest) :: lock, names, replaced_name]
@@ -62,6 +59,19 @@ contains
          end do
       end if
    end subroutine claim_folder
+
+   !> Paths of what a run reads; a scene that reads no such file has an empty one
+   function inputs_of(simulation) result(inputs)
+      type(simulation_t), intent(in) :: simulation
+      character(len=:), allocatable :: inputs(:)
+
+      associate (file => simulation%settings%file, scene => simulation%settings%scene)
+         allocate (character(len=max(len(file), len(scene%bodies_file), len(scene%packing))) :: inputs(3))
+         inputs(1) = file
+         inputs(2) = scene%bodies_file
+         inputs(3) = scene%packing
+      end associate
+   end function inputs_of
 
    !> The names of the files that a run may write, but for segments
    subroutine list_own_names(simulation, names)

@@ -2,7 +2,6 @@
 !> the run fails before.
 module polydem_replacement
    use polydem_errors, only: error_t
-   use polydem_kinds, only: lp
    use polydem_log, only: log_t
    use polydem_replaced, only: drop_replaced, recover, replaced_name
    use polydem_run_output, only: run_t
@@ -26,15 +25,14 @@ contains
       call run%team%agree(error)
    end subroutine give_up_replaced
 
-   !> Put a result back that a run was to replace, if the run failed before its first frame.
-   subroutine undo_replacement(run)
-      !> The run, which has ended with an error
-      type(run_t), intent(in) :: run
+   !> Put a result back that a run was to replace, if the run failed before it got over its first frame.
+   subroutine undo_replacement(folder)
+      !> Folder of the result, which is locked
+      character(len=*), intent(in) :: folder
       character(len=:), allocatable :: note
       type(error_t), allocatable :: ignored
 
-      if (run%last_frame >= 0_lp) return
-      call recover(run%folder, note, ignored)
+      call recover(folder, note, ignored)
       if (allocated(note)) call say(note)
    end subroutine undo_replacement
 

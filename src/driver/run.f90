@@ -72,7 +72,7 @@ contains
       end if
       if (.not. allocated(error)) call join(settings, run, error)
       if (.not. allocated(error)) call go(run, error)
-      if (is_locked .and. allocated(error)) call undo_replacement(run)
+      if (is_locked .and. allocated(error)) call undo_replacement(run%folder)
       if (is_locked) call unlock_result(run%folder)
    end subroutine run_simulation
 
@@ -242,6 +242,8 @@ contains
       call run%manifest%read(run%folder)
       call check_manifest(run%manifest, error)
       if (force .or. run%attempt%continues .or. .not. run%manifest%is_found) return
+      ! What an interrupted --force left is brought in order first.
+      if (run%manifest%owns(replaced_name)) return
       call raise(error, input_error, run%folder//' holds a result; give --continue '// &
                  'to go on with it, --force to overwrite it, or another folder with --set output.folder=NAME')
    end subroutine check_wanted

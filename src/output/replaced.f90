@@ -178,6 +178,9 @@ contains
       integer :: k, j
 
       call former%read(aside(folder), obsolete_name)
+      if (allocated(former%problem)) call raise(error, io_error, former%problem//'. It lists the files of a result '// &
+         'that --force has replaced. If this happens again, remove that folder')
+      if (allocated(error)) return
       do k = 1, former%n
          if (is_kept(former%entry(k)%name)) cycle
          forms = forms_of(trim(former%entry(k)%name))
