@@ -5,9 +5,9 @@
 !> while the bodies overlap all the time. Directions of the last step are remembered with the pairs, each packed into
 !> one number; so what is found depends neither on processes nor on where a run was interrupted.
 !>
-!> Where the centre of a body is inside another, their overlap reaches from the centre to the outline, so that its depth is
-!> at least an eighth of a body as thick as the thinner one. Only contacts deeper than half of that are looked at; corners
-!> that touch in passing turn round, too, but are harmless.
+!> Where the centre of a body is inside another, their overlap reaches from the centre to the outline; of 20 000 random
+!> pairs of all shapes none was less deep than an eighth of the thinner body. Only contacts deeper than half of that are
+!> looked at. Corners that touch in passing turn round, too, but are harmless.
 module polydem_passing
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t
@@ -22,8 +22,8 @@ module polydem_passing
 
 contains
 
-   !> Find the first contact whose bodies pass through each other, and whether any is deeper than a limit, in one go; and
-   !> remember the directions.
+   !> Find the first contact whose bodies pass through each other, and whether any is deeper than a limit, in one go;
+   !> and remember the directions.
    subroutine find_passing(bodies, contacts, thickness, radius, limit, remembered, found, any_deep)
       !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies

@@ -1,0 +1,70 @@
+"""What `check` and `run` say about danger: nothing about scenes of inputs, and all about scenes that are dangerous.
+
+usage: check_dangers.py PROGRAM INPUTS
+
+Each dangerous scene is one of inputs with a mistake in it. `check` ends with code 0 unless a run would stop at once,
+and a run that goes on ends with the number of its warnings.
+"""
+
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+#: Scenes whose warnings are true: bars that lie across each other, without forces, and grains as soft as a liquid, both
+#: for finders alone
+TRUE_WARNINGS = {
+    "rods.nml": ["contacts are deep at the start", "the area law is not conservative", "overlap by", "is inside body"],
+    "soft.nml": ["contacts are deep at the start", "is so fast", "overlap by", "is inside body"],
+}
+#: Scene, mistake, part of the warning, exit code of `check`
+DANGERS = (
+    ("stack", ("integrate.fraction=258", "integrate.duration=10"), "is 2.58E+02 times the stable step", 1),
+    ("bed", ("integrate.fraction=258", "integrate.duration=10"), "is 2.58E+02 times the stable step", 0),
+    ("bed", ("scene.short_axis=8", "scene.long_axis_min=8", "scene.long_axis_max=11"), "lengths are in metres", 0),
+    ("gas", ("scene.overlap=.true.", "scene.fraction=0.9"), "contacts are deep at the start", 0),
+    ("gas", ("scene.speed=500",), "it may pass through unseen", 1),
+    ("gas", ("forces.damping=none",), "the area law is not conservative", 0),
+)
+
+
+def checked(program, path, *settings):
+    """Exit code of `check`, its warnings and its message."""
+    command = [program, "check", str(path)] + [word for each in settings for word in ("--set", each)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    for line in ("extent     x ", "sizes      ", "thinnest   body ", "masses     ", "speeds     ", "frames     "):
+        assert done.returncode == 2 or f"\n{line}" in done.stdout, (path.name, line, done.stdout)
+    return done.returncode, re.findall(r"^warning: (.*)$", done.stdout, re.MULTILINE), done.stderr
+
+
+def main():
+    program, inputs = sys.argv[1], Path(sys.argv[2])
+    scenes = [path for path in sorted(inputs.rglob("*.nml")) if "&scene" in path.read_text(encoding="utf-8")]
+    assert len(scenes) >= 20, scenes
+    n_checked = 0
+    for path in scenes:
+        code, told, message = checked(program, path)
+        if code == 2:
+            # A scene of bodies that another run or a program makes.
+            assert re.search("(packing|bodies_file).*there is no such file", message), (path.name, message)
+            continue
+        expected = TRUE_WARNINGS.get(path.name, [])
+        assert code == 0 and len(told) == len(expected), (path.name, code, told, message)
+        assert all(part in line for part, line in zip(expected, told)), (path.name, told)
+        n_checked += 1
+    assert n_checked >= 16, n_checked
+    for scene, settings, part, expected in DANGERS:
+        code, told, message = checked(program, inputs / f"{scene}.nml", *settings)
+        assert code == expected and any(part in line for line in told), (scene, settings, code, told, message)
+    with tempfile.TemporaryDirectory() as work:
+        scene, settings, part, _ = DANGERS[-1]
+        words = [*settings, "integrate.duration=1e-3", f"output.folder={work}/result"]
+        command = [program, "run", str(inputs / f"{scene}.nml")] + [word for each in words for word in ("--set", each)]
+        subprocess.run(command, capture_output=True, timeout=120, check=True)
+        log = (Path(work) / "result" / "log.txt").read_text(encoding="utf-8")
+        assert part in log and "\nwarnings: 1 of the scene as it is at the start\nstate hash: " in log, log
+
+
+if __name__ == "__main__":
+    main()
