@@ -106,6 +106,7 @@ contains
          case%fixed = count(simulation%boxes%fixed(:case%boxes), kind=ip)
          case%bodies = simulation%bodies%n
          case%dt = real(simulation%dt, dp)
+         case%input = scene%settings%resolved
          case%steps = steps
          if (steps == 0_ip) case%steps = scene%settings%output%trace_steps
       end associate

@@ -164,6 +164,7 @@ contains
       case%bodies = boxes%n_bodies
       case%steps = trace%n_steps
       case%dt = trace%dt
+      case%input = trace%input
       case%identity = 0_lp
       do s = 1_ip, trace%n_steps
          do b = 1_ip, boxes%n

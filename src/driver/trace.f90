@@ -4,7 +4,7 @@
 !> for fixed ones; and may hold `npairs` (steps) and `pair_hash` (steps), the exact number of pairs and the sum
 !> of their hashes; `body` (boxes), the body of each box, from 1, ascending; `reach` (boxes), the greatest half
 !> side of each box at any angle; or the polygons `vertices` (n, 2) and `vertex_offset` (boxes + 1), from which
-!> it follows; and the attribute `dt`. Steps and boxes count from 0 in messages, as in the file.
+!> it follows; the attribute `dt`; and `provenance/resolved_input`, the settings of the run that made it. Steps and boxes count from 0 in messages, as in the file.
 module polydem_trace
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_boxes, only: boxes_t, far
@@ -35,6 +35,8 @@ module polydem_trace
       integer(ip), allocatable :: n_pairs(:)
       !> Sum of the hashes of the pairs of each step; not allocated if the trace has none
       integer(lp), allocatable :: pair_hash(:)
+      !> Settings of the run that recorded it, resolved; empty if the trace does not say
+      character(len=:), allocatable :: input
    end type trace_t
 
    !> Bounds are read in blocks of about so many numbers, so that they are not in memory twice
@@ -64,6 +66,9 @@ contains
       if (.not. allocated(error)) call read_reach(path, file, trace, error)
       if (.not. allocated(error)) call read_polygons(path, file, trace, error)
       if (.not. allocated(error)) call file%read_real_attribute('/', 'dt', trace%dt, error)
+      trace%input = ''
+      if (.not. allocated(error) .and. file%has('/provenance/resolved_input')) call file%read( &
+         '/provenance/resolved_input', trace%input, error)
       if (.not. ieee_is_finite(trace%dt) .or. trace%dt < 0.0_dp) call raise(error, input_error, path// &
          ': the attribute dt must be finite and not negative')
       if (allocated(error)) then

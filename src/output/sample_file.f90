@@ -22,6 +22,8 @@ module polydem_sample_file
       character(len=:), allocatable :: scene, mode, finder
       !> Where the boxes come from: a trace, or a namelist file with overrides
       character(len=:), allocatable :: trace
+      !> Settings of the run that made the boxes, resolved; empty or not allocated: not known
+      character(len=:), allocatable :: input
       !> What the lists of pairs were checked against
       character(len=:), allocatable :: checked
       !> Number of threads, and of the repeat; repeat 0 is the warm-up
@@ -92,6 +94,7 @@ contains
       type(hdf5_file_t), intent(inout) :: file
       type(sample_t), intent(in) :: sample
       type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: input
 
       associate (case => sample%case)
          call file%write('/case/scene', case%scene, error, '1', 'name of the scene')
@@ -111,6 +114,9 @@ contains
                          'hash of all bounds (replay), or of the last state (live)')
          call file%write('/case/checked', case%checked, error, '1', 'what the lists of pairs were compared with')
          call file%write('/case/trace', case%trace, error, '1', 'where the boxes come from')
+         input = ''
+         if (allocated(case%input)) input = case%input
+         call file%write('/case/input', input, error, '1', 'settings of the run that made the boxes; empty: not known')
       end associate
       call file%write('/case/time_utc', sample%time_utc, error, '1', 'when the sample was begun')
       call file%write('/case/load', sample%load, error, '1', 'load of the machine then, average over a minute')

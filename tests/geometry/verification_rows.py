@@ -1,6 +1,7 @@
 """Rows of the table of `./polydem verify` that come from Python: columns and numbers as in verification_table.f90."""
 
 import os
+import subprocess
 from dataclasses import astuple, dataclass
 
 HEADINGS = ("benchmark", "quantity", "expected", "got", "error", "tolerance", "seconds", "verdict")
@@ -41,6 +42,13 @@ def print_row(row):
           f"{row.tolerance:9s} {row.seconds:>7s} {row.verdict}", flush=True)
 
 
+def revision():
+    """The revision of the sources, with -dirty if they have changed since."""
+    command = ["git", "-C", os.path.dirname(os.path.abspath(__file__)), "describe", "--always", "--dirty", "--exclude=*"]
+    asked = subprocess.run(command, capture_output=True, text=True, check=False)
+    return f"revision {asked.stdout.strip()}" if asked.returncode == 0 else "an unknown revision"
+
+
 def write_rows(rows, folder, behind):
     """Write table.csv and table.md into a folder, or behind the rows that are there."""
     os.makedirs(folder, exist_ok=True)
@@ -49,7 +57,7 @@ def write_rows(rows, folder, behind):
     markdown = [f"| {' | '.join(row)} |" for row in cells]
     if not behind:
         csv.insert(0, ",".join(HEADINGS))
-        markdown = ["# Verification", "", "| " + " | ".join(HEADINGS).replace("seconds", "s") + " |",
+        markdown = ["# Verification", "", f"Sources of {revision()}.", "", "| " + " | ".join(HEADINGS).replace("seconds", "s") + " |",
                     "|---|---|--:|--:|--:|--:|--:|---|", *markdown]
     for name, lines in (("table.csv", csv), ("table.md", markdown)):
         with open(os.path.join(folder, name), "a" if behind else "w", encoding="utf-8") as file:

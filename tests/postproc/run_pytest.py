@@ -1,4 +1,4 @@
-"""Run the tests of the Python package: run_pytest.py ROOT TESTS WRITE_SAMPLE PROGRAM.
+"""Run the tests of the Python package: run_pytest.py ROOT TESTS WRITE_SAMPLE PROGRAM [OPTION...].
 
 Takes the Python of ROOT/.venv, which the launcher makes, or else the Python that runs this file.
 """
@@ -26,7 +26,7 @@ def main() -> int:
     environment["POLYDEM_WRITE_SAMPLE"] = str(write_sample)
     environment["POLYDEM_PROGRAM"] = str(program)
     environment["POLYDEM_SOURCE_DIR"] = str(root)
-    command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests)]
+    command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests), *sys.argv[5:]]
     return subprocess.run(command, env=environment).returncode
 
 

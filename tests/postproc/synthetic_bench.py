@@ -26,6 +26,54 @@ STAGES = ("boxes", "neighbours", "overlap", "forces", "integrate", "exchange", "
 SIZES = (2522, 5058, 7599, 10014, 12651, 100000)
 
 
+#: Kind of scene -> entries of &scene by which the program makes such a scene, and of &boxes
+ENTRIES = {
+    "drum": ("name = 'drum' boxes = {boxes} motion = 'rotation' motion_rate = 0.25", "margin = 0.0"),
+    "bed": ("name = 'bed' bodies = {boxes} width = 0.0", "margin = 0.0"),
+    "column": ("name = 'bed' bodies = {boxes} width = 0.08", "margin = 0.0"),
+    "hopper": ("name = 'hopper' bodies = {boxes} opening = 0.1 slope = 60", "margin = 0.0"),
+    "gas": ("name = 'gas' bodies = {boxes} fraction = {number} speed = 0.5", "margin = 0.0"),
+    "sizes": ("name = 'gas' bodies = {boxes} fraction = 0.3 speed = 0.5 size_ratio = {number}", "margin = 0.0"),
+    "rods": ("name = 'gas' bodies = {boxes} fraction = 0.1 speed = 0.0 spin = 20.0 slender", "margin = 0.0"),
+    "soft": ("name = 'gas' bodies = {boxes} fraction = 2.0 speed = 0.1 overlap = .true.", "margin = 0.0"),
+    "range": ("name = 'gas' bodies = {boxes} fraction = 0.3 speed = 0.5", "margin = {number}"),
+    "worst": ("name = 'gas' bodies = {boxes} fraction = 0.3 speed = 0.5 order = 'descending'", "margin = 0.0"),
+    "rest": ("name = 'gas' bodies = {boxes} fraction = 0.3 speed = 1.0 movers = 1", "margin = 0.0"),
+    "line": ("name = 'channel' bodies = {boxes} fraction = 0.3 speed = 0.5", "margin = 0.0"),
+    "other": ("name = 'heap' bodies = {boxes}", "margin = 0.0"),
+}
+
+#: What the names of the scenes of these tests stand for; the package does not look at names
+NAMED = {"worst": "worst", "one": "rest", "channel": "line"}
+
+
+def input_of(kind, boxes, number=0.3):
+    """The resolved input of a run that makes a scene of a kind, as a sample records it."""
+    scene, margin = (text.format(boxes=boxes, number=number) for text in ENTRIES[kind])
+    slender = "slender" in scene
+    axes = {"short_axis": 5e-4 if slender else 8e-3, "long_axis_min": 25e-3 if slender else 8e-3,
+            "long_axis_max": 25e-3 if slender else 11e-3}
+    entries = scene.replace(" slender", "").replace(" = ", "=").split()
+    entries += [f"{name}={value}" for name, value in axes.items()]
+    groups = {
+        "scene": entries,
+        "boxes": [margin.replace(" ", "")],
+        "forces": ["gravity=0.0, 0.0" if "'gas'" in scene else "gravity=0.0, -9.81"],
+        "output": ["trace_start=0.9", f"folder='{kind}_{boxes}'"],
+    }
+    return "".join(
+        f"&{group}\n" + "".join(f"   {entry.replace('=', ' = ')}\n" for entry in listed) + "/\n"
+        for group, listed in groups.items()
+    )
+
+
+def _named_input(name, boxes):
+    """The input of a scene of these tests by its name."""
+    first, *rest = name.split("_")
+    numbers = [float(word) for word in rest if word.replace(".", "").isdigit()]
+    return input_of(NAMED.get(first, first), boxes, *numbers[:1]) if first in ENTRIES or first in NAMED else ""
+
+
 @dataclass
 class Truth:
     """Time per step of one finder: 1e-9 * time * boxes**exponent seconds."""
@@ -38,6 +86,9 @@ class Truth:
     gain: float = 1.0
     #: Count -> number per box
     counts: dict = field(default_factory=dict)
+    #: By how much its times, and those of its structure alone, differ from repeat to repeat, up and down in turns
+    sway: float = 0.0
+    structure_sway: float = 0.0
 
 
 @dataclass
@@ -70,11 +121,15 @@ def write_sample(
     pair_hash="00ab",
     checked="all_pairs 6 steps",
     first_counts=None,
+    made_by=None,
 ):
-    """Write one sample."""
+    """Write one sample; `made_by` is the recorded input: by the name of the scene if absent, none if False."""
     (folder / "samples").mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng([boxes, repeat, threads, *map(ord, finder + name)])
     step = 1e-9 * truth.time * machine.slowness * float(boxes) ** truth.exponent / (truth.gain if threads > 1 else 1.0)
+    turn = (repeat + threads) % 3 - 1
+    step *= (1.0 + truth.sway) ** turn
+    shares = np.array(truth.shares) * [(1.0 + truth.structure_sway) ** turn, *np.ones(len(PHASES) - 1)]
     elapsed = step * random.lognormal(0.0, noise) * np.ones(steps)
     elapsed[0] *= first
     with h5py.File(folder / "samples" / f"{name}-{finder}-{threads}-{repeat}.h5", "w") as file:
@@ -98,6 +153,8 @@ def write_sample(
             "checked": checked,
             "trace": f"traces/{name}/trace.h5",
         }
+        if made_by is not False:
+            facts["input"] = _named_input(name, boxes) if made_by is None else made_by
         write_facts(file, "case", facts)
         write_facts(
             file,
@@ -117,7 +174,7 @@ def write_sample(
         file["steps/elapsed"] = elapsed
         file["steps/processor"] = elapsed
         file["steps/pairs"] = np.full(steps, 2 * boxes, dtype=np.int32)
-        write_columns(file, "phase", PHASES, np.outer(elapsed, truth.shares))
+        write_columns(file, "phase", PHASES, np.outer(elapsed, shares))
         if mode == "live":
             write_columns(file, "stage", STAGES, np.outer(elapsed, (0.1, 1.0, 3.0, 1.0, 0.5, 0.0)))
         if repeat == 0:
@@ -132,7 +189,7 @@ def write_sample(
 def write_facts(file, group, facts):
     """Texts as the Fortran program writes them, of fixed length, and numbers."""
     for name, value in facts.items():
-        file[f"{group}/{name}"] = np.bytes_(value) if isinstance(value, str) else value
+        file[f"{group}/{name}"] = np.bytes_(value or " ") if isinstance(value, str) else value
 
 
 def write_columns(file, what, names, table):
@@ -175,7 +232,7 @@ def write_drums(
                     )
 
 
-def write_hard_scenes(folder, of_finders, machine=Machine(), repeats=3):
+def write_hard_scenes(folder, of_finders, machine=Machine(), repeats=3, changes=None):
     """One scene of every kind that a claim names; times of the paper's two finders change as the claims say."""
     factors = {
         "bed": (1.1, 1.0, 3.0),
@@ -183,8 +240,9 @@ def write_hard_scenes(folder, of_finders, machine=Machine(), repeats=3):
         "soft_3": (9.0, 9.0, 1.0),
         "range_4": (9.0, 9.0, 1.0),
         "hopper": (1.0, 1.0, 1.0),
-        "sizes_1": (1.0, 1.0, 1.0),
+        "sizes_3": (1.0, 1.0, 1.0),
         "sizes_100": (2.0, 2.0, 1.0),
+        **(changes or {}),
     }
     for name, by_finder in factors.items():
         for finder, factor in zip(("quadtree", "sort_and_sweep", "linked_cells"), by_finder):

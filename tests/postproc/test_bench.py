@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from polydem_post import series
 from polydem_post.bench import build_label, read_bench
+from polydem_post.scene_kinds import OTHER, kind_of, settings_of
 from polydem_post.statistics import median
 from polydem_post.trajectory import ResultError
-from synthetic_bench import Machine, Truth, truths, write_drums, write_sample
+from synthetic_bench import ENTRIES, Machine, Truth, input_of, truths, write_drums, write_sample
 
 TRUTH = Truth(40.0, counts={"swaps": 0.25})
 
@@ -125,23 +126,59 @@ def test_a_broken_sample_and_a_foreign_file_are_named(tmp_path):
         read_bench([tmp_path])
 
 
-@pytest.mark.parametrize(
-    "name, kind",
-    [
-        ("drum_2522", "drum"),
-        ("drums_12651", "drum"),
-        ("patch", "drum"),
-        ("bed_static", "bed"),
-        ("gas_0.1", "gas"),
-        ("sizes_100", "sizes"),
-        ("worst_order_5000", "worst"),
-        ("range_0.01", "range"),
-        ("one_mover", "rest"),
-        ("bedrock", "bedrock"),
-    ],
-)
-def test_the_kind_of_a_scene_is_the_beginning_of_its_name(name, kind):
-    assert series.kind(name) == kind
+@pytest.mark.parametrize("kind", list(ENTRIES))
+@pytest.mark.parametrize("name", ["drum_1000", "gas_0.3", "x"])
+def test_the_kind_of_a_scene_is_what_its_samples_record_whatever_its_name(tmp_path, kind, name):
+    write_sample(tmp_path, name, "quadtree", TRUTH, 1000, made_by=input_of(kind, 1000, 2.0))
+    (case,) = read_bench([tmp_path]).cases
+    assert series.kind(case) == kind
+
+
+@pytest.mark.parametrize("made_by", [False, "", "drum", "&scene\n/\n", "&boxes\n   margin = 0.0\n/\n"])
+def test_a_scene_of_which_nothing_is_recorded_is_unknown(tmp_path, made_by):
+    write_sample(tmp_path, "drum_1000", "quadtree", TRUTH, 1000, made_by=made_by)
+    (case,) = read_bench([tmp_path]).cases
+    assert series.kind(case) == "unknown"
+
+
+#: Changes of a recorded input that make another kind of it
+CHANGES = [
+    ("drum", "motion = 'rotation'", "motion = 'none'"),
+    ("drum", "motion_rate = 0.25", "motion_rate = 0.0"),
+    ("drum", "margin = 0.0", "margin = 0.01"),
+    ("drum", "name = 'drum'", "name = 'file'"),
+    ("bed", "trace_start = 0.9", "trace_start = 0.0"),
+    ("bed", "margin = 0.0", "margin = 0.01"),
+    ("gas", "speed = 0.5", "speed = 0.0"),
+    ("gas", "gravity = 0.0, 0.0", "gravity = 0.0, -9.81"),
+    ("soft", "fraction = 2.0", "fraction = 0.3"),
+    ("range", "margin = 2.0", "margin = 1e-6"),
+]
+
+
+@pytest.mark.parametrize("kind, old, new", CHANGES)
+def test_a_scene_that_is_made_otherwise_is_of_another_kind(kind, old, new):
+    text = input_of(kind, 1000, 2.0)
+    assert old in text
+    assert kind_of(settings_of(text)) == kind
+    assert kind_of(settings_of(text.replace(old, new))) == OTHER
+
+
+def test_drums_of_another_rate_do_not_join_a_series(tmp_path):
+    for boxes in (1000, 2000, 4000):
+        write_sample(tmp_path, f"drum_{boxes}", "quadtree", TRUTH, boxes)
+    fast = input_of("drum", 8000).replace("motion_rate = 0.25", "motion_rate = 2.0")
+    write_sample(tmp_path, "drum_8000", "quadtree", TRUTH, 8000, made_by=fast)
+    cases = series.over_size(read_bench([tmp_path]).on(), "quadtree")
+    assert [case.boxes for case in cases] == [1000, 2000, 4000]
+
+
+def test_finders_on_different_boxes_of_one_name_are_not_compared(tmp_path):
+    write_sample(tmp_path / "a", "drum_1000", "quadtree", TRUTH, 1000)
+    other = input_of("drum", 1000).replace("motion_rate = 0.25", "motion_rate = 2.0")
+    write_sample(tmp_path / "b", "drum_1000", "sort_and_sweep", TRUTH, 1000, made_by=other)
+    bench = read_bench([tmp_path / "a", tmp_path / "b"])
+    assert series.pairs_of(bench.select(finder="quadtree"), bench.select(finder="sort_and_sweep")) == []
 
 
 def test_the_slope_of_a_series_and_its_counts_are_those_of_the_truth(tmp_path):

@@ -1,21 +1,24 @@
 """Verdicts follow the data: a bench that behaves as the paper says confirms its claims, and another one does not."""
 
+import itertools
 from dataclasses import replace
 
 import pytest
 from polydem_post import claim_rules_structure, complexity
-from polydem_post.bench import read_bench
+from polydem_post.bench import Case, read_bench
 from polydem_post.claims import (
     CONFIRMED,
     CONTRADICTED,
     IN_PART,
     NOT_MEASURED,
     NOT_TESTABLE,
+    UNDECIDED,
     claims_document,
     judge_all,
     of_parts,
 )
-from synthetic_bench import Machine, truths, write_drums, write_hard_scenes, write_sample
+from polydem_post.targets import targets
+from synthetic_bench import Machine, input_of, truths, write_drums, write_hard_scenes, write_sample
 
 SIZES = (2522, 5058, 12651, 100000)
 SLOWER = Machine("beta", "AMD EPYC", clock="3.3 GHz", slowness=1.3)
@@ -195,5 +198,153 @@ def test_nothing_measured_says_what_to_run_for_every_claim_but_the_untestable(tm
     assert all(f"| C{k} |" in text for k in range(1, 20))
 
 
-def test_parts_are_all_some_or_none():
-    assert [of_parts(parts) for parts in ([True, True], [True, False], [False])] == [CONFIRMED, IN_PART, CONTRADICTED]
+@pytest.mark.parametrize("parts", [p for n in (1, 2, 3) for p in itertools.product([True, False, None], repeat=n)])
+def test_a_verdict_on_parts_is_given_if_undecided_parts_cannot_change_it(parts):
+    possible = set()
+    for filled in itertools.product(*([part] if part is not None else [True, False] for part in parts)):
+        possible.add(CONFIRMED if all(filled) else IN_PART if any(filled) else CONTRADICTED)
+    assert of_parts(list(parts)) == (possible.pop() if len(possible) == 1 else UNDECIDED)
+
+
+#: Claims that are judged by exact numbers, without an interval, and those that never are
+EXACT = {"C7", "C8", "C11", "C15", "C16", "C17"}
+NEVER = {"C9", "C14"}
+
+
+def several(**changes):
+    """The truths with several finders changed: name=dictionary."""
+    finders = as_the_paper_says()
+    return {name: replace(truth, **changes.get(name, {})) for name, truth in finders.items()}
+
+
+def of_drums(*finders, **options):
+    """Benches of drums alone that follow some truths: inside the rule, outside, and on both sides of a bound."""
+    return [lambda folder, each=each: verdicts(folder, each, hard=False, **options) for each in finders]
+
+
+def with_scenes(*benches):
+    """The same with one scene of every kind: (truths, changed factors of scenes)."""
+
+    def made(folder, finders, changes):
+        write_drums(folder, finders, sizes=SIZES, repeats=3)
+        write_hard_scenes(folder, finders, changes=changes)
+        return {claim.id: finding for claim, finding in judge_all(read_bench([folder]))}
+
+    return [lambda folder, each=each: made(folder, *each) for each in benches]
+
+
+def two_machines(slowness, noise=0.01):
+    return lambda folder: verdicts(
+        folder, machines=(Machine(), replace(SLOWER, slowness=slowness)), hard=False, noise=noise
+    )
+
+
+def a_jump(jump, noise):
+    def made(folder):
+        for boxes in (2522, 5058, 100000):
+            truth = replace(truths()["quadtree"], time=45.0 * (jump if boxes > 50000 else 1.0), structure_sway=0.0)
+            for repeat in range(6):
+                write_sample(folder, f"drum_{boxes}", "quadtree", truth, boxes, repeat=repeat, noise=noise)
+        return {claim.id: finding for claim, finding in judge_all(read_bench([folder]))}
+
+    return made
+
+
+def other_builds(slowness, sway=0.0):
+    finders = as_the_paper_says()
+    for name in ("quadtree", "sort_and_sweep"):
+        finders[f"{name}_o2"] = replace(finders[name], time=slowness * finders[name].time, sway=sway)
+    return finders
+
+
+UPDATE = {"exponent": 1.4, "time": 1.0}
+#: Claim -> benches whose whole interval is inside the rule, outside of it, and on both sides of a bound
+BENCHES = {
+    "C1": of_drums(
+        as_the_paper_says(),
+        several(quadtree={"exponent": 1.2}, sort_and_sweep={"exponent": 1.3}),
+        several(quadtree={"exponent": 1.05, "sway": 0.1}),
+    ),
+    "C2": of_drums(
+        as_the_paper_says(), several(quadtree={"time": 90.0}), several(quadtree={"time": 50.0, "sway": 0.05})
+    ),
+    "C3": of_drums(
+        several(quadtree={**UPDATE, "shares": (0.1, 0.5, 0.25, 0.1, 0.05, 0.0)}, sort_and_sweep=UPDATE),
+        several(quadtree={"shares": (0.5, 0.1, 0.25, 0.1, 0.05, 0.0)}),
+        several(
+            quadtree={**UPDATE, "shares": (0.16, 0.5, 0.25, 0.05, 0.04, 0.0), "structure_sway": 0.3},
+            sort_and_sweep=UPDATE,
+        ),
+    ),
+    "C4": of_drums(
+        as_the_paper_says(),
+        several(quadtree={"shares": (0.6, 0.2, 0.1, 0.05, 0.05, 0.0)}),
+        several(quadtree={"shares": (0.3, 0.3, 0.25, 0.1, 0.05, 0.0), "structure_sway": 0.2}),
+    ),
+    "C5": of_drums(
+        as_the_paper_says(),
+        several(partitioned_sweep={"gain": 3.0}, quadtree={"gain": 1.0}, sort_and_sweep={"gain": 0.9}),
+        several(quadtree={"gain": 1.2, "sway": 0.1}),
+    ),
+    "C6": of_drums(
+        as_the_paper_says(),
+        several(quadtree={"exponent": 1.5, "time": 0.72}),
+        several(quadtree_called={"sway": 0.4}),
+    ),
+    "C10": [two_machines(1.3), two_machines(0.7), two_machines(1.0, noise=0.1)],
+    "C12": with_scenes(
+        (as_the_paper_says(), None),
+        (as_the_paper_says(), {"bed": (0.8, 1.0, 3.0), "gas_10": (1.5, 1.0, 3.0), "soft_3": (1.0, 1.0, 9.0)}),
+        (several(linked_cells={"sway": 20.0}), None),
+    ),
+    "C13": [a_jump(1.5, 0.01), a_jump(1.0, 0.01), a_jump(1.1, 0.1)],
+    "C18": of_drums(other_builds(1.01), other_builds(1.3), other_builds(1.05, sway=0.1)),
+    "C19": with_scenes(
+        (as_the_paper_says(), None),
+        (as_the_paper_says(), {"range_4": (1.0, 1.0, 9.0)}),
+        (several(linked_cells={"sway": 20.0}), None),
+    ),
+}
+
+
+def test_every_claim_is_judged_by_intervals_by_exact_numbers_or_never():
+    assert set(BENCHES) | EXACT | NEVER == {f"C{k}" for k in range(1, 20)}
+    assert len(BENCHES) + len(EXACT) + len(NEVER) == 19
+
+
+@pytest.mark.parametrize("where, verdict", list(enumerate([CONFIRMED, CONTRADICTED, UNDECIDED])))
+@pytest.mark.parametrize("claim", list(BENCHES))
+def test_only_a_whole_interval_confirms_or_contradicts(tmp_path, claim, where, verdict):
+    finding = BENCHES[claim][where](tmp_path)[claim]
+    assert finding.verdict == verdict, finding
+
+
+@pytest.mark.parametrize("claim", sorted(set(BENCHES) - {"C12", "C19"}))
+def test_what_was_measured_once_has_no_interval_and_is_undecided(tmp_path, monkeypatch, claim):
+    monkeypatch.setattr(Case, "values", _first_repeat_alone)
+    finding = BENCHES[claim][0](tmp_path)[claim]
+    assert finding.verdict == UNDECIDED, finding
+
+
+def _first_repeat_alone(case, quantity):
+    return {(str(s.path.parent), 1): quantity(s) for s in case.samples if s.repeat == 1}
+
+
+@pytest.mark.parametrize("made_by", [input_of("gas", 1000), input_of("bed", 1000), input_of("other", 1000), False])
+def test_what_is_called_a_drum_and_is_none_says_nothing_about_drums(tmp_path, made_by):
+    found = verdicts(tmp_path, hard=False, made_by=made_by)
+    for claim in sorted(set(found) - {"C8"}):
+        assert found[claim].verdict in (NOT_MEASURED, NOT_TESTABLE), (claim, found[claim])
+    bench = read_bench([tmp_path / "alpha"])
+    assert not targets(bench.on()).rows
+    assert ("of drum_2522, drum_5058" in claims_document(bench)) is (made_by is False)
+
+
+def test_drums_of_any_name_confirm_what_drums_do(tmp_path):
+    for boxes in SIZES:
+        for finder, truth in as_the_paper_says().items():
+            for repeat in range(4):
+                made_by = input_of("drum", boxes)
+                write_sample(tmp_path, f"gas_{boxes}", finder, truth, boxes, repeat=repeat, made_by=made_by)
+    found = {claim.id: finding for claim, finding in judge_all(read_bench([tmp_path]))}
+    assert (found["C1"].verdict, found["C2"].verdict, found["C4"].verdict) == (CONFIRMED, CONFIRMED, CONFIRMED)

@@ -90,7 +90,7 @@ def test_files_are_read_and_joined(tmp_path):
 
 
 def test_damaged_and_missing_files_are_errors(tmp_path):
-    with pytest.raises(ResultError, match="none.csv: No such file"):
+    with pytest.raises(ResultError, match="none.csv: there is no such file"):
         read_counts([tmp_path / "none.csv"])
     (tmp_path / "bad.csv").write_text("shape,grains\nbox,many\n", encoding="utf-8")
     with pytest.raises(ResultError, match="is not a file of count_exchange"):

@@ -91,6 +91,17 @@ def test_a_run_on_one_rank_has_its_bodies_and_tells_nothing(alone):
     assert run.later_settlements == 0
 
 
+def test_tables_of_runs_name_the_revision_that_counted(shared, alone, tmp_path):
+    runs = [read_run(shared), read_run(alone)]
+    assert all(run.revision not in ("", "not recorded") for run in runs)
+    for table in runs_tables(runs):
+        assert runs[0].revision in table.document("markdown")
+    write_runs(runs, tmp_path / "runs.csv")
+    older = [line.rpartition(",")[0] for line in (tmp_path / "runs.csv").read_text().splitlines()]
+    (tmp_path / "runs.csv").write_text("\n".join(older) + "\n")
+    assert {run.revision for run in read_runs(tmp_path / "runs.csv")} == {"not recorded"}
+
+
 def test_what_is_saved_is_read_again_and_nothing_else_is(shared, alone, tmp_path):
     runs = [read_run(shared), read_run(alone)]
     write_runs(runs, tmp_path / "runs.csv")
@@ -99,9 +110,9 @@ def test_what_is_saved_is_read_again_and_nothing_else_is(shared, alone, tmp_path
     assert read_runs(tmp_path / "other.csv") == []
     damaged = (tmp_path / "runs.csv").read_text(encoding="utf-8").replace(",morton,", ",morton,x", 1)
     (tmp_path / "runs.csv").write_text(damaged, encoding="utf-8")
-    with pytest.raises(ResultError, match="runs.csv: damaged"):
+    with pytest.raises(ResultError, match="runs.csv: is not a file of ./polydem scale --save, or was damaged: line 2: margin"):
         read_runs(tmp_path / "runs.csv")
-    with pytest.raises(ResultError, match="none.csv: No such file"):
+    with pytest.raises(ResultError, match="none.csv: there is no such file"):
         read_runs(tmp_path / "none.csv")
 
 

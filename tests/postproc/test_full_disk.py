@@ -6,7 +6,7 @@ import warnings
 import pytest
 from conftest import WRITE_SAMPLE
 from numpy.testing import assert_array_equal
-from polydem_post import Trajectory
+from polydem_post import NoManifest, Trajectory
 
 
 def test_a_failed_write_ends_with_one_message_and_keeps_closed_segments(tmp_path):
@@ -34,4 +34,5 @@ def test_a_failed_profile_leaves_no_part_of_it(tmp_path):
     assert sorted(path.name for path in folder.iterdir()) == ["trajectory_0001.h5", "trajectory_0002.h5"]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.simplefilter("ignore", NoManifest)
         assert len(Trajectory(folder)) == 5

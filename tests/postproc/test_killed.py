@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
-from polydem_post import Trajectory
+from polydem_post import NoManifest, Trajectory
 
 
 def wait_for(writer, frame):
@@ -38,6 +38,7 @@ def test_finds_all_flushed_frames_of_a_killed_run(start_writer, frames):
     assert (n_closed, n_open) == (frames // 4, 1 if frames % 4 else 0)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.simplefilter("ignore", NoManifest)
         run = Trajectory(folder)
     assert len(run) == frames
     assert_good(run)
@@ -63,6 +64,7 @@ def test_keeps_closed_segments_whenever_a_run_is_killed(start_writer, seed):
     n_closed = len(list(folder.glob("*.h5")))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        warnings.simplefilter("ignore", NoManifest)
         run = Trajectory(folder)
     assert len(run) >= 5 * n_closed
     if flushed and not caught:

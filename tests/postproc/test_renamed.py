@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from numpy.testing import assert_array_equal
-from polydem_post import Trajectory
+from polydem_post import NoManifest, Trajectory
 
 
 @pytest.fixture
@@ -15,6 +15,7 @@ def growing(start_writer):
     while int(writer.stdout.readline()) < 6:
         pass
     warnings.simplefilter("error")
+    warnings.simplefilter("ignore", NoManifest)
     return folder
 
 

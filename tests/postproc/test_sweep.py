@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import platform
 import signal
 import subprocess
 import sys
@@ -14,7 +15,8 @@ import pytest
 from polydem_post import Trajectory
 from polydem_post.__main__ import main
 from polydem_post.sweep import Row, Run, expand, make_sweep, read_table
-from polydem_post.sweep_run import Runner, available_cores, environment, state_of
+from polydem_post.sweep_collect import read_outcome
+from polydem_post.sweep_run import Runner, available_cores, environment, is_running, state_of
 from polydem_post.trajectory import ResultError
 
 #: Stands for the program. The entry toy.does says what a run does; toy.seconds how long it takes.
@@ -32,6 +34,9 @@ else:
     result = entries["output.folder"]
     again = os.path.isdir(result)
     os.makedirs(result, exist_ok=True)
+    profile = os.path.join(result, "profile.h5")
+    if os.path.exists(profile):
+        print("all is done"); sys.exit(0)
     began = time.time()
     def stop(number, _):
         if entries["toy.does"] != "deafen":
@@ -51,6 +56,12 @@ else:
         os.kill(os.getpid(), signal.SIGKILL)
     if does == "stop" and not again:
         print("stopped"); sys.exit(75)
+    if does == "leave":
+        import h5py
+        with h5py.File(profile + ".new", "w") as file:
+            file.attrs["schema_version"] = 1
+            file["status"] = b"finished"
+        os.replace(profile + ".new", profile)
 """
 
 
@@ -317,6 +328,91 @@ def test_a_second_signal_does_not_wait(sweep_of):
     said = process.communicate(timeout=60)[0]
     assert process.returncode == 75, said
     assert states(sweep) == {"a": "interrupted"}
+
+
+def await_end(run):
+    """Wait until nobody is at a run any more."""
+    for _ in range(1000):
+        if not is_running(run):
+            return
+        time.sleep(0.02)
+    pytest.fail("the run does not end")
+
+
+def test_a_run_that_outlives_its_sweep_is_running_is_not_started_twice_and_counts_when_it_finishes(sweep_of):
+    program, sweep = sweep_of(("a", "leave", "3"), ("b", "finish", ""))
+    process = start(program, sweep, "--cores", "1")
+    await_steps(sweep, 1)
+    process.kill()
+    process.communicate(timeout=60)
+    assert states(sweep) == {"a": "running", "b": "not run"}
+    process = start(program, sweep, "--cores", "1")
+    said = process.communicate(timeout=60)[0]
+    assert process.returncode == 75, said
+    assert "a: left out, since another call has it, or has left it running" in said
+    assert states(sweep)["b"] == "finished"
+    assert read_outcome(sweep, sweep.runs[0]).facts == {"state": "running", "attempts": 0}
+    await_end(sweep.runs[0])
+    assert states(sweep) == {"a": "finished", "b": "finished"}
+    assert len(calls_of(sweep.runs[0])) == 1
+    process = start(program, sweep, "--cores", "1")
+    said = process.communicate(timeout=60)[0]
+    assert process.returncode == 0, said
+    assert [len(calls_of(run)) for run in sweep.runs] == [1, 1]
+    assert [attempt["exit_code"] for attempt in sweep.runs[0].attempts()] == [0]
+
+
+@pytest.mark.parametrize("code", [75, 1, 2, -9])
+def test_a_result_that_finished_unseen_is_not_failed_whatever_was_booked_before(sweep_of, code):
+    program, sweep = sweep_of(("a", "leave", ""))
+    run = sweep.runs[0]
+    (run.folder / "attempts.csv").write_text(f"started,seconds,exit_code,threads\nx,1.0,{code},1\n")
+    assert states(sweep)["a"] in ("stopped", "failed", "interrupted")
+    command = [str(program), "run", "x.nml", "--set", f"output.folder={run.result}", "--set", "toy.does=leave"]
+    assert subprocess.run(command, check=False).returncode == 0
+    assert states(sweep) == {"a": "finished"}
+    assert Runner(program, 1, 1, say=lambda _: None).run(sweep.runs) == 0
+    assert [attempt["exit_code"] for attempt in run.attempts()] == [code, 0]
+    assert len(calls_of(run)) == 1
+
+
+def test_an_orphan_that_fails_or_is_killed_runs_again(sweep_of):
+    program, sweep = sweep_of(("a", "fail_once", "1"), ("b", "wait", ""))
+    process = start(program, sweep, "--cores", "2")
+    await_steps(sweep, 2)
+    process.kill()
+    process.communicate(timeout=60)
+    assert states(sweep) == {"a": "running", "b": "running"}
+    await_end(sweep.runs[0])
+    subprocess.run(["pkill", "-9", "-f", str(sweep.runs[1].result)], check=True)
+    await_end(sweep.runs[1])
+    assert states(sweep) == {"a": "not run", "b": "not run"}
+    assert Runner(program, 2, 1, say=lambda _: None).run(sweep.runs) == 0
+    assert states(sweep) == {"a": "finished", "b": "finished"}
+
+
+@pytest.mark.parametrize("text, holds", [("{own} {host}", True), ("{own} elsewhere", True), ("999999999 {host}", False),
+                                         ("", False), ("x y", False), ("99999999999999999999999 {host}", False)])
+def test_a_result_that_somebody_writes_is_running(sweep_of, text, holds):
+    program, sweep = sweep_of(("a", "finish", ""))
+    run = sweep.runs[0]
+    run.result.mkdir()
+    (run.result / "running.lock").write_text(text.format(own=os.getpid(), host=platform.node()))
+    assert states(sweep) == {"a": "running" if holds else "not run"}
+    assert Runner(program, 1, 1, say=lambda _: None).run(sweep.runs) == (75 if holds else 0)
+    assert len(calls_of(run)) == (0 if holds else 1)
+
+
+def test_a_finished_run_of_bodies_from_a_file_is_asked_again(sweep_of):
+    program, sweep = sweep_of(("a", "leave", ""))
+    run = sweep.runs[0]
+    assert Runner(program, 1, 1, say=lambda _: None).run(sweep.runs) == 0
+    assert Runner(program, 1, 1, say=lambda _: None).run(sweep.runs) == 0
+    assert len(run.attempts()) == 1
+    with h5py.File(run.result / "profile.h5", "a") as file:
+        file["provenance/resolved_input"] = "&scene\n   bodies_file = 'a.h5'\n/\n"
+    assert Runner(program, 1, 1, say=lambda _: None).run(sweep.runs) == 0
+    assert len(run.attempts()) == 2
 
 
 def test_two_calls_share_the_runs(sweep_of):

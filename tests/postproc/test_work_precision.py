@@ -129,10 +129,13 @@ def test_the_report_is_written_and_the_same_every_time(tmp_path):
     assert len(read_samples(tmp_path)) == len(made_up())
     page = write_precision_report(tmp_path)[-1]
     first = page.read_text(encoding="utf-8")
-    assert first.startswith("## Speed against error\n\n### Recommendation\n")
+    assert first.startswith("## Speed against error\n\nSamples of a revision that is not recorded.\n\n### Recommendation\n")
     assert (tmp_path / "report" / "figures" / "workprecision_flat_impact.svg").exists()
     write_precision_report(tmp_path, figures=False)
     assert page.read_text(encoding="utf-8") == first
+    (tmp_path / "programs.txt").write_text("double: polydem 0.1.0 (git abc)\n", encoding="utf-8")
+    told = write_precision_report(tmp_path, figures=False)[-1].read_text(encoding="utf-8")
+    assert told.count("Samples of double: polydem 0.1.0 (git abc).") > 1
 
 
 def test_files_of_something_else_are_refused(tmp_path):

@@ -1,6 +1,6 @@
 """Reads, tabulates and draws results of polydem."""
 
-from .trajectory import Contacts, Frame, ResultError, Trajectory, Walls
+from .trajectory import Contacts, Frame, NoManifest, ResultError, Trajectory, Walls
 
-__all__ = ["Contacts", "Frame", "ResultError", "Trajectory", "Walls"]
+__all__ = ["Contacts", "Frame", "NoManifest", "ResultError", "Trajectory", "Walls"]
 __version__ = "0.1.0"

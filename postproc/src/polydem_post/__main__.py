@@ -4,28 +4,56 @@ from __future__ import annotations
 
 import argparse
 import math
+import os
 import sys
 import warnings
 from dataclasses import fields, replace
 from pathlib import Path
 
 from . import __version__
+from .emit import printable
 from .table import FORMATS, timing_table
 from .trajectory import ResultError, Trajectory
 
 #: Exit code of a result that cannot be used, as in the program itself
 INPUT_ERROR = 2
 
+#: Exit code of what no reader foresaw, and of a program whose output nobody reads any more, as shells have it
+UNFORESEEN, CLOSED_PIPE = 1, 141
+
+#: Variable of the environment that shows where an unforeseen error happened
+TRACEBACK = "POLYDEM_TRACEBACK"
+
 
 def main(arguments: list[str] | None = None) -> int:
     """Do what the command line says; return the exit code."""
     options = _parser().parse_args(arguments)
-    warnings.showwarning = lambda message, *_: print(f"warning: {message}", file=sys.stderr)
+    warnings.showwarning = lambda message, *_: print(f"warning: {printable(str(message))}", file=sys.stderr)
     try:
-        return options.action(options) or 0
+        code = options.action(options) or 0
+        sys.stdout.flush()
+        return code
     except ResultError as error:
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {printable(str(error))}", file=sys.stderr)
         return INPUT_ERROR
+    except BrokenPipeError:
+        return _end_quietly()
+    except Exception as error:  # the last resort: what no reader foresaw is told in a sentence as well
+        if os.environ.get(TRACEBACK):
+            raise
+        words = " ".join(str(error).split())
+        print(f"error: {options.verb} cannot go on: {type(error).__name__}: {printable(words)[:300]}. A file may be damaged; "
+              f"{TRACEBACK}=1 shows where", file=sys.stderr)
+        return UNFORESEEN
+
+
+def _end_quietly() -> int:
+    """What to give back when the reader of a pipe, as in `| head -1`, has seen enough."""
+    try:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the rest is written when Python ends
+    except (OSError, ValueError):
+        pass
+    return CLOSED_PIPE
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -343,7 +371,7 @@ def _scale(options: argparse.Namespace) -> None:
 
 
 def _say(line: str) -> None:
-    print(line, flush=True)
+    print(printable(line), flush=True)
 
 
 if __name__ == "__main__":

@@ -5,11 +5,13 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 
 import h5py
 import numpy as np
 
+from .scene_kinds import settings_of
 from .trajectory import UNREADABLE, ResultError, open_file
 
 #: What the root of a sample says it is
@@ -76,6 +78,11 @@ class Case:
     def provenance(self) -> dict:
         """Where its first sample comes from."""
         return self.samples[0].provenance
+
+    @property
+    def settings(self) -> dict:
+        """Settings of the run that made its scene, 'group.key' -> text; empty if they are not recorded."""
+        return _settings(str(self.facts.get("input", "")))
 
     @property
     def boxes(self) -> int:
@@ -159,9 +166,20 @@ class Bench:
         build = build or next((name for name, _ in samples.most_common(1)), None)
         return Bench([case for case in here if case.build == build], self.folders)
 
+    @property
+    def origin(self) -> str:
+        """What made the samples: the programs, their revisions and builds."""
+        made = {program_of(sample.provenance): None for case in self.cases for sample in case.samples}
+        return f"Samples of {'; '.join(made)}."
+
     def provenance(self, machine: str) -> dict:
         """Where the first case of a machine comes from."""
         return next(case.provenance for case in self.cases if case.machine == machine)
+
+
+@lru_cache(maxsize=None)
+def _settings(text: str) -> dict:
+    return settings_of(text)
 
 
 def read_bench(folders) -> Bench:
@@ -200,7 +218,7 @@ def read_sample(path: Path) -> Sample:
             if not content.startswith(CONTENT):
                 raise ResultError(f"{path}: is not a sample of a bench")
             steps = file["steps"]
-            return Sample(
+            return _sound(Sample(
                 path,
                 _facts(file["case"]),
                 _facts(file["provenance"]),
@@ -210,9 +228,40 @@ def read_sample(path: Path) -> Sample:
                 _columns(steps, "phase"),
                 _columns(steps, "count"),
                 _columns(steps, "stage"),
-            )
+            ))
         except UNREADABLE as error:
             raise ResultError(f"{path}: cannot be read ({error})") from error
+
+
+#: Facts of a sample without which it cannot be used, and whether they are numbers above a bound
+NEEDED = {"scene": None, "mode": None, "finder": None, "threads": 1, "repeat": 0, "boxes": 1, "steps": 1}
+
+
+def _sound(sample: Sample) -> Sample:
+    """The sample; ResultError if facts are missing, or columns are not numbers, one per step."""
+    for name, least in NEEDED.items():
+        value = sample.case.get(name)
+        good = isinstance(value, str) if least is None else isinstance(value, (int, np.integer)) and value >= least
+        if not good:
+            shown = " ".join(repr(value).split())[:40]
+            raise ResultError(f"{sample.path}: case/{name} is missing or not what a sample has: {shown}")
+    steps = int(sample.case["steps"])
+    named = {"elapsed": sample.elapsed, "processor": sample.processor, "pairs": sample.pairs}
+    for group in (sample.phases, sample.counts, sample.stages):
+        named.update(group)
+    for name, column in named.items():
+        column = np.asarray(column)
+        if column.dtype.kind not in "iuf" or column.shape != (steps,) or not np.isfinite(column).all():
+            raise ResultError(f"{sample.path}: {name} is not one finite number for each of {steps} steps")
+        if column.min() < 0:
+            raise ResultError(f"{sample.path}: {name} has a negative entry")
+    return sample
+
+
+def program_of(provenance: dict) -> str:
+    """The program that made something, with its revision and its kind of build."""
+    version, revision = (str(provenance.get(name, "unknown")) for name in ("version", "revision"))
+    return f"polydem {version} (revision {revision}, {provenance.get('build_type', 'unknown build')})"
 
 
 def build_label(provenance: dict) -> str:
@@ -228,7 +277,7 @@ def build_label(provenance: dict) -> str:
 
 def _check_case(case: Case) -> None:
     """All samples of a case must have seen the same boxes and have found the same pairs."""
-    for name in ("boxes", "pairs_total", "pair_hash"):
+    for name in ("boxes", "pairs_total", "pair_hash", "input"):
         values = {
             str(sample.case.get(name)) for sample in case.samples if sample.case.get("steps") == case.facts["steps"]
         }
@@ -279,7 +328,7 @@ def _facts(group: h5py.Group) -> dict:
             continue
         value = entry[()]
         if isinstance(value, bytes):
-            value = value.decode("utf-8").strip()
+            value = value.decode("utf-8", errors="replace").strip()
         elif np.ndim(value) == 0:
             value = value.item()
         facts[name] = value

@@ -102,7 +102,7 @@ def _threaded_scene(bench: Bench) -> str | None:
     counts = {}
     for case in bench.select(mode="replay"):
         if case.threads > 1 and case.finder in PARALLEL:
-            drum = series.kind(case.scene) == "drum"
+            drum = series.kind(case) == "drum"
             counts.setdefault((case.scene, drum, case.boxes), set()).add(case.finder)
     best = max(counts, key=lambda key: (key[1], len(counts[key]), key[2]), default=None)
     return best[0] if best else None
@@ -110,7 +110,7 @@ def _threaded_scene(bench: Bench) -> str | None:
 
 def misses(bench: Bench) -> Drawing | None:
     """Simulated misses per box over size."""
-    records = [record for record in cache.read_records(bench.folders) if series.kind(record.scene) == "drum"]
+    records = series.records_of(bench, cache.read_records(bench.folders), "drum")
     models = list(dict.fromkeys(record.model for record in records))
     if not records:
         return None

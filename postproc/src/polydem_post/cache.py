@@ -9,14 +9,15 @@ from __future__ import annotations
 
 import csv
 import os
-from dataclasses import asdict, astuple, dataclass, fields
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 
 import h5py
 
 from .cachegrind import Model, count_hardware, finder_functions, simulate
 from .complexity import SOURCES
-from .trajectory import ResultError
+from .records import read_records as read_all
+from .trajectory import UNREADABLE, ResultError, insist_on_own_data
 
 #: Name of the file in a bench folder
 FILE = "cache.csv"
@@ -55,19 +56,9 @@ def read_records(folders) -> list[Record]:
         path = Path(folder) / FILE
         if not path.exists():
             continue
-        with path.open(newline="", encoding="utf-8") as file:
-            for row in csv.DictReader(file):
-                record = _record(path, row)
-                records.setdefault((record.scene, record.finder, record.model), record)
+        for record in read_all(path, Record, "./polydem cache"):
+            records.setdefault((record.scene, record.finder, record.model), record)
     return sorted(records.values(), key=lambda record: (record.boxes, record.scene, record.finder))
-
-
-def _record(path: Path, row: dict) -> Record:
-    kinds = {"str": str, "int": int, "float": float}
-    try:
-        return Record(**{field.name: kinds[str(field.type)](row[field.name]) for field in fields(Record)})
-    except (KeyError, TypeError, ValueError) as error:
-        raise ResultError(f"{path}: is not a file of ./polydem cache ({error})") from error
 
 
 def count_misses(
@@ -155,9 +146,12 @@ def _extent(trace: Path) -> tuple:
     """Steps and boxes of a trace."""
     try:
         with h5py.File(trace, "r") as file:
+            insist_on_own_data(trace, file)
             steps, boxes, _ = file["aabb"].shape
+            if boxes < 1:
+                raise ValueError("no boxes")
             return int(steps), int(boxes)
-    except (OSError, KeyError, ValueError) as error:
+    except UNREADABLE as error:
         raise ResultError(f"{trace}: is not a trace ({error})") from error
 
 

@@ -18,7 +18,7 @@ from .statistics import number
     "no numbers",
     "elapsed time on the most threads of which there are processors: partitioned_sweep not faster than "
     "sort_and_sweep on one "
-    "thread; sort_and_sweep (two threads) and quadtree at least 1.2 times as fast as themselves on one",
+    "thread; sort_and_sweep (two threads) and quadtree at least 1.2 times as fast as themselves on one; intervals included",
     "speed_up",
 )
 def parallel(bench: Bench) -> Finding:
@@ -29,7 +29,7 @@ def parallel(bench: Bench) -> Finding:
             here.select(scene=case.scene, mode="replay", finder=base, threads=1), f"'{base}' on one thread as well"
         )[0]
         gain = series.ratio(one, case, series.elapsed_time)
-        parts.append(gain.value <= 1.0 if least is None else gain.value >= least)
+        parts.append(gain.at_most(1.0) if least is None else gain.at_least(least))
         own = here.select(scene=case.scene, mode="replay", finder=finder, threads=1)
         against = (
             f", {series.ratio(own[0], case, series.elapsed_time).text()} against itself"

@@ -1,4 +1,8 @@
-"""Verdicts on the paper's claims, each computed from the samples by a rule that states its threshold."""
+"""Verdicts on the paper's claims, each computed from the samples by a rule that states its threshold.
+
+A claim is confirmed if the whole interval of what was measured lies within the rule, contradicted if it lies outside
+altogether, else undecided: a verdict does not hang on noise. Counts are exact and have no interval.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,7 @@ from .emit import Table
 CONFIRMED = "confirmed"
 IN_PART = "confirmed in part"
 CONTRADICTED = "contradicted"
+UNDECIDED = "undecided"
 NOT_TESTABLE = "not testable here"
 NOT_MEASURED = "not measured"
 
@@ -67,15 +72,26 @@ def claim(identifier: str, text: str, paper: str, threshold: str, where: str):
 
 
 def of_parts(parts: list) -> str:
-    """Verdict of a claim of several parts, each true or false."""
-    if all(parts):
-        return CONFIRMED
-    return IN_PART if any(parts) else CONTRADICTED
+    """Verdict of a claim of several parts, each True, False or None for undecided.
+
+    All true: confirmed; all false: contradicted; some true and some false: confirmed in part. If undecided parts could
+    change that, the claim is undecided.
+    """
+    if True in parts and False in parts:
+        return IN_PART
+    if None in parts:
+        return UNDECIDED
+    return CONFIRMED if all(parts) else CONTRADICTED
+
+
+def word(part: bool | None) -> str:
+    """yes, no or undecided."""
+    return "undecided" if part is None else "yes" if part else "no"
 
 
 def said(**parts) -> str:
-    """Which parts are as the paper says: bed yes, gas no."""
-    return ", ".join(f"{name.replace('_', ' ')} {'yes' if part else 'no'}" for name, part in parts.items())
+    """Which parts are as the paper says: bed yes, gas no, overlaps undecided."""
+    return ", ".join(f"{name.replace('_', ' ')} {word(part)}" for name, part in parts.items())
 
 
 def needed(found, what: str):
@@ -100,6 +116,15 @@ def verdict_table(judged: list) -> Table:
     return table
 
 
+def _left_out(bench: Bench) -> str:
+    """Which scenes no rule about kinds of scenes has counted; ends the sentence."""
+    from .scene_kinds import UNKNOWN
+    from .series import kind
+
+    unknown = list(dict.fromkeys(case.scene for case in bench.select() if kind(case) == UNKNOWN))
+    return f"; of {', '.join(unknown)} it is not recorded, so they count for no kind." if unknown else "."
+
+
 def claims_document(bench: Bench) -> str:
     """claims.md: the verdicts, then for each claim its rule and its reasons."""
     judged = judge_all(bench)
@@ -108,10 +133,14 @@ def claims_document(bench: Bench) -> str:
         "# The claims of the paper, and what these samples say",
         "",
         f"Samples: {', '.join(str(folder) for folder in bench.folders)}. Machines: "
-        f"{'; '.join(bench.named('machine'))}. "
+        f"{'; '.join(bench.named('machine'))}. {bench.origin} "
         f"Verdicts are of {'; '.join(main.named('machine'))}, build {'; '.join(main.named('build'))}, if a rule "
         "does not "
-        "compare machines or builds. Intervals: 95 %, over repeats on this machine.",
+        "compare machines or builds. Intervals: 95 %, over repeats on this machine. Confirmed: the whole interval is "
+        "within the rule; contradicted: all of it is outside; else undecided. Of several parts: confirmed or contradicted "
+        "if all parts are, confirmed in part if some are confirmed and some contradicted, undecided if undecided parts "
+        "could change the verdict. What a scene is follows from the settings recorded with its samples"
+        + _left_out(main),
         "",
         verdict_table(judged).written("markdown"),
         "",

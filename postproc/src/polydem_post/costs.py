@@ -17,11 +17,12 @@ import csv
 import os
 import re
 import subprocess
-from dataclasses import asdict, astuple, dataclass, fields
+from dataclasses import asdict, astuple, dataclass
 from pathlib import Path
 
 from .cachegrind import SAME_PLACES, simulate
 from .emit import FORMATS, SUFFIXES, Table
+from .records import read_records
 from .statistics import Estimate, median, median_of_ratios, number
 from .trajectory import ResultError, Trajectory
 
@@ -220,14 +221,13 @@ def read_samples(path: Path) -> list[Sample]:
     """The samples of a file, none if there is no file."""
     if not path.exists():
         return []
-    kinds = {"str": str, "int": int, "float": float}
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-            columns = [(each.name, kinds[str(each.type)]) for each in fields(Sample)]
-            return [Sample(**{name: kind(row[name]) for name, kind in columns}) for row in rows]
-    except (KeyError, TypeError, ValueError) as error:
-        raise ResultError(f"{path}: is not a file of ./polydem costs ({error})") from error
+    samples = read_records(path, Sample, "./polydem costs")
+    for number_of_line, each in enumerate(samples, 2):
+        if each.kind not in ("time", "memory", "count") or each.model not in {model.name for model in MODELS}:
+            raise ResultError(f"{path}: line {number_of_line}: there is no model {each.model!r} or kind {each.kind!r}")
+        if min(each.bodies, each.steps, each.threads) < 1 or each.step <= 0.0:
+            raise ResultError(f"{path}: line {number_of_line}: bodies, steps, threads and time of a step must be above 0")
+    return samples
 
 
 def _write(path: Path, samples: list) -> None:

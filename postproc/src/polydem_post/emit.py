@@ -4,7 +4,11 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from dataclasses import dataclass, field
+
+#: Letters that steer a terminal, but for the end of a line and the tabulator
+STEERING = re.compile("[\x00-\x08\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069]")
 
 #: How a table can be written
 FORMATS = ("text", "markdown", "latex", "csv")
@@ -32,6 +36,12 @@ LATEX = {
 }
 
 
+def printable(text: str) -> str:
+    """A text without what steers a terminal, which files may hold: such letters are written as \\x1b."""
+    text = text.encode("utf-8", errors="backslashreplace").decode("utf-8")
+    return STEERING.sub(lambda match: repr(match.group())[1:-1], text)
+
+
 @dataclass
 class Table:
     """Columns and rows of texts."""
@@ -48,10 +58,12 @@ class Table:
     note: str = ""
     #: How many columns, from the left, hold names or sentences; the others hold numbers and stand to the right
     texts: int = 1
+    #: What made the numbers: the program and its revision
+    origin: str = ""
 
     def add(self, *cells) -> None:
         """Append a row."""
-        row = tuple(str(cell) for cell in cells)
+        row = tuple(printable(str(cell)) for cell in cells)
         if len(row) != len(self.heading):
             raise ValueError(f"table {self.name}: a row of {len(row)} cells under {len(self.heading)} headings")
         self.rows.append(row)
@@ -62,15 +74,16 @@ class Table:
 
     def document(self, form: str) -> str:
         """What a file holds: the rows with title and note, in a form that the reader of that form understands."""
+        note = "\n".join(part for part in [self.note, printable(self.origin)] if part)
         if form == "csv":
             return self.written(form) + "\n"
         if form == "markdown":
-            parts = [f"### {self.title}", self.written(form), self.note]
+            parts = [f"### {self.title}", self.written(form), note]
             return "\n\n".join(part for part in parts if part) + "\n"
         if form == "latex":
-            comments = [f"% {line}" for line in [self.title, *self.note.splitlines()] if line]
+            comments = [f"% {line}" for line in [self.title, *note.splitlines()] if line]
             return "\n".join([*comments, self.written(form)]) + "\n"
-        return "\n".join(part for part in [self.title, self.written(form), self.note] if part) + "\n"
+        return "\n".join(part for part in [self.title, self.written(form), note] if part) + "\n"
 
 
 def _text(table: Table) -> str:

@@ -12,12 +12,12 @@ from the cost of a body, latency and bandwidth, which are measured elsewhere and
 
 from __future__ import annotations
 
-import csv
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 from .emit import Table
+from .records import read_records
 from .statistics import number
 from .trajectory import ResultError
 
@@ -143,24 +143,16 @@ def read_counts(paths) -> list[Count]:
     """Counts of all files, which count_exchange wrote for different numbers of ranks."""
     counts = []
     for path in map(Path, paths):
-        try:
-            with path.open(newline="", encoding="utf-8") as file:
-                counts += [_count(row) for row in csv.DictReader(file)]
-        except OSError as error:
-            raise ResultError(f"{path}: {error.strerror}") from error
-        except (KeyError, TypeError, ValueError, UnicodeDecodeError) as error:
-            raise ResultError(f"{path} is not a file of count_exchange") from error
+        counts += read_records(path, Count, "count_exchange")
+        for count in counts:
+            numbers = (count.margin, count.grains_most, count.ghosts, count.ghosts_most, count.messages, count.messages_most,
+                       count.bytes, count.bytes_most, count.rectangles)
+            if count.grains < 1 or count.ranks < 1 or min(numbers) < 0:
+                raise ResultError(f"{path}: is not a file of count_exchange, or was damaged: a count is negative, or there "
+                                  "are no grains or ranks")
     if not counts:
         raise ResultError("there are no counts: give runs of several ranks or files of count_exchange")
     return counts
-
-
-def _count(row: dict) -> Count:
-    kinds = {"str": str, "int": int, "float": float}
-    count = Count(**{field.name: kinds[field.type](row[field.name]) for field in fields(Count)})
-    if count.grains < 1 or count.ranks < 1:
-        raise ValueError("no grains or ranks")
-    return count
 
 
 def fit_law(counts: list[Count], shape: str, cut: str, margin: float) -> Law:

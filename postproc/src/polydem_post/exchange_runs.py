@@ -14,6 +14,7 @@ from pathlib import Path
 
 from .emit import Table
 from .exchange_model import Count
+from .records import read_lines, read_records
 from .statistics import number
 from .trajectory import ResultError, Trajectory
 
@@ -40,6 +41,10 @@ COUNTERS = {
     "most_messages": "most of a process: messages",
     "most_bytes": "most of a process: bytes",
 }
+
+
+#: Revision in files of --save that do not have it
+NOT_RECORDED = "not recorded"
 
 
 @dataclass(frozen=True)
@@ -81,6 +86,8 @@ class RunCount:
     most_bytes: int
     #: Hash of the state at the end
     state_hash: str
+    #: Revision of the program
+    revision: str = NOT_RECORDED
 
     @property
     def told_steps(self) -> int:
@@ -111,39 +118,53 @@ def read_run(folder) -> RunCount:
     missing = [name for name in ("steps", "pairs", *(COUNTERS.values() if ranks > 1 else ())) if name not in counters]
     if missing or counters["steps"] < 1:
         raise ResultError(f"{folder}: the run lacks counts ({', '.join(missing) or 'no steps'})")
-    group = re.search(r"^&exchange\b(.*?)^/", result.provenance["resolved_input"], re.DOTALL | re.MULTILINE)
+    resolved = str(result.provenance.get("resolved_input", ""))
+    group = re.search(r"^&exchange\b(.*?)^/", resolved, re.DOTALL | re.MULTILINE)
     entries = dict(re.findall(r"(\w+)\s*=\s*'?([^\s']+)", group[1])) if group else {}
+    if len(result) == 0:
+        raise ResultError(f"{folder}: holds no frames")
     bodies = int((~result.frame(0).fixed).sum())
     counts = {field: counters.get(name, 0) for field, name in COUNTERS.items()}
     if ranks == 1:
         counts.update(most_bodies=bodies, most_pairs=counters["pairs"])
-    return RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], cut=entries.get("cut", "bisection"),
-                    margin=float(entries.get("margin", MARGIN)), pairs=counters["pairs"],
-                    state_hash=result.state_hash, **counts)
+    try:
+        margin = float(entries.get("margin", MARGIN))
+    except ValueError as error:
+        raise ResultError(f"{folder}: its margin of exchange is no number: {entries['margin'][:40]!r}") from error
+    run = RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], cut=entries.get("cut", "bisection"),
+                   margin=margin, pairs=counters["pairs"], state_hash=result.state_hash,
+                   revision=str(result.provenance.get("revision", NOT_RECORDED)), **counts)
+    _insist_on_counts(folder, run)
+    return run
 
 
 def write_runs(runs: list[RunCount], path: Path) -> None:
     """Write counts, one run in a row."""
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [field.name for field in fields(RunCount)], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(map(asdict, runs))
+    try:
+        with path.open("w", newline="", encoding="utf-8") as file:
+            writer = csv.DictWriter(file, [field.name for field in fields(RunCount)], lineterminator="\n")
+            writer.writeheader()
+            writer.writerows(map(asdict, runs))
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be written ({error.strerror})") from error
 
 
 def read_runs(path: Path) -> list[RunCount]:
     """Counts that write_runs wrote; none if the file holds something else."""
-    kinds = {"str": str, "int": int, "float": float}
-    try:
-        with path.open(newline="", encoding="utf-8") as file:
-            reader = csv.DictReader(file)
-            if reader.fieldnames != [field.name for field in fields(RunCount)]:
-                return []
-            return [RunCount(**{field.name: kinds[field.type](row[field.name]) for field in fields(RunCount)})
-                    for row in reader]
-    except OSError as error:
-        raise ResultError(f"{path}: {error.strerror}") from error
-    except (TypeError, ValueError) as error:
-        raise ResultError(f"{path}: damaged ({error})") from error
+    rows, columns = read_lines(path), [field.name for field in fields(RunCount)]
+    if not rows or list(rows[0]) not in (columns, columns[:-1]):
+        return []
+    runs = read_records(path, RunCount, "./polydem scale --save")
+    for run in runs:
+        _insist_on_counts(path, run)
+    return runs
+
+
+def _insist_on_counts(place, run: RunCount) -> None:
+    """Refuse counts that no run has."""
+    counts = [value for value in asdict(run).values() if isinstance(value, (int, float))]
+    if min(run.bodies, run.ranks, run.steps) < 1 or min(counts) < 0:
+        raise ResultError(f"{place}: was damaged: there are no bodies, ranks or steps, or a count is negative")
 
 
 def runs_tables(runs: list[RunCount]) -> list[Table]:
@@ -163,7 +184,7 @@ def runs_tables(runs: list[RunCount]) -> list[Table]:
                   count.ghosts_most, number(extra / count.ghosts) if extra and count.ghosts else "-", count.messages,
                   count.messages_most, count.bytes, count.bytes_most,
                   number(run.most_bodies * run.ranks / run.bodies, 4),
-                  number(run.most_pairs * run.ranks / run.pairs, 4), run.steps, run.state_hash)
+                  number(run.most_pairs * run.ranks / run.pairs, 4) if run.pairs else "-", run.steps, run.state_hash)
         if run.ranks > 1:
             settling.add(run.cut, f"{run.margin:g}", run.bodies, run.ranks, run.steps, run.settlements, run.divisions,
                          *_later(run), run.first_migrations, run.first_messages, run.first_bytes)
@@ -173,6 +194,8 @@ def runs_tables(runs: list[RunCount]) -> list[Table]:
     settling.note = ("Settlements: how often bodies were handed out, the first time included. Migrations (of the whole "
                      "run), messages and bytes (of one time) are those after the first, when rank 0 gives out all "
                      "bodies; that is on the right.")
+    for table in (steps, settling):
+        table.origin = f"Counted by polydem, revision {', '.join(dict.fromkeys(run.revision for run in runs))}."
     return [steps, settling]
 
 

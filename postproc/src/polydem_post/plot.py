@@ -73,6 +73,9 @@ def _draw_bodies(axis, frame: Frame, colour: str, norm: Normalize) -> PolyCollec
 def _draw_contacts(axes, trajectory: Trajectory, numbers: list[int], frames: list[Frame]) -> None:
     """Draw each contact as lines from the two centres to its point, as wide as its force is large."""
     tables = [trajectory.contacts(number) for number in numbers]
+    for frame, table in zip(frames, tables):
+        if not np.isin(np.concatenate([table.first, table.second]), frame.id).all():
+            raise ResultError(f"{trajectory.folder}: contacts of step {frame.step} name bodies that are not there")
     forces = [np.hypot(table.force[:, 0], table.force[:, 1]) for table in tables]
     largest = max((force.max() for force in forces if len(force)), default=0.0)
     for axis, frame, table, force in zip(axes, frames, tables, forces):

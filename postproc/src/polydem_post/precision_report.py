@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from .emit import FORMATS, SUFFIXES
+from .precision_samples import ORIGIN
 from .precision_tables import all_tables
 from .trajectory import ResultError
 from .work_precision import read_study
@@ -17,12 +18,13 @@ def write_precision_report(folder: Path, figures: bool = True) -> list[Path]:
     """Write report/ in the folder of a study; return the files, the page last."""
     study = read_study(folder)
     output = Path(folder) / "report"
-    tables = all_tables(study)
+    tables, origin = all_tables(study), origin_of(folder)
     written = []
     try:
         for name in ("tables", "figures"):
             (output / name).mkdir(parents=True, exist_ok=True)
         for table in tables:
+            table.origin = origin
             for form in FORMATS:
                 written.append(output / "tables" / (table.name + SUFFIXES[form]))
                 written[-1].write_text(table.document(form), encoding="utf-8")
@@ -30,11 +32,20 @@ def write_precision_report(folder: Path, figures: bool = True) -> list[Path]:
             written += _write_figures(study, output / "figures")
         page = output / "workprecision.md"
         shown = [table for table in tables if table.name.removeprefix("workprecision_") in ON_THE_PAGE]
-        page.write_text("## Speed against error\n\n" + "\n".join(table.document("markdown") for table in shown),
+        page.write_text(f"## Speed against error\n\n{origin}\n\n" + "\n".join(table.document("markdown") for table in shown),
                         encoding="utf-8")
     except OSError as error:
         raise ResultError(f"{output}: cannot be written ({error})") from error
     return [*written, page]
+
+
+def origin_of(folder: Path) -> str:
+    """Which programs made the samples of a study."""
+    try:
+        lines = (Path(folder) / ORIGIN).read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        lines = []
+    return f"Samples of {'; '.join(lines) or 'a revision that is not recorded'}."
 
 
 def _write_figures(study, folder: Path) -> list[Path]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
+import math
 import os
 import re
 import shutil
@@ -43,6 +44,9 @@ PRECISIONS, REFERENCE = ("double", "single"), "quadruple"
 
 #: A step that takes so many times the median was interrupted by another process
 INTERRUPTED = 10.0
+
+#: File of a study that says which programs made its samples
+ORIGIN = "programs.txt"
 
 #: Exit code of the program for an input that it does not accept
 REFUSED = 2
@@ -103,13 +107,32 @@ def read_samples(folder: Path) -> list[Sample]:
     path = Path(folder) / FILE
     if not path.exists():
         raise ResultError(f"{path}: there is no such file; ./polydem workprecision makes it")
-    text = path.read_text(encoding="utf-8")
-    rows = csv.DictReader(io.StringIO(text[: text.rfind("\n") + 1]))
-    kinds = {"str": str, "int": int, "float": float}
     try:
-        return [Sample(**{each.name: kinds[str(each.type)](row[each.name]) for each in fields(Sample)}) for row in rows]
-    except (KeyError, TypeError, ValueError) as error:
-        raise ResultError(f"{path}: is not a file of ./polydem workprecision ({error})") from error
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultError(f"{path}: cannot be read ({error})") from error
+    samples, kinds = [], {"str": str, "int": int, "float": float}
+    try:
+        for number, row in enumerate(csv.DictReader(io.StringIO(text[: text.rfind("\n") + 1])), 2):
+            samples.append(Sample(**{each.name: kinds[str(each.type)](row[each.name]) for each in fields(Sample)}))
+            _insist(samples[-1], number)
+    except (KeyError, TypeError, ValueError, csv.Error) as error:
+        raise ResultError(f"{path}: is not a file of ./polydem workprecision, or was damaged ({error})") from error
+    return samples
+
+
+def _insist(sample: Sample, line: int) -> None:
+    """ValueError for what no study holds."""
+    if sample.steps < 1 or sample.repeat < 0 or not sample.duration > 0.0 or math.isinf(sample.duration):
+        raise ValueError(f"line {line}: steps, repeat or duration are not what a run has")
+    if sample.status not in ("finished", "stopped", "refused"):
+        raise ValueError(f"line {line}: the status {sample.status!r} is unknown")
+    if sample.status != "finished":
+        return
+    if sample.model.count("/") != 2 or not (sample.seconds > 0.0 and math.isfinite(sample.seconds)):
+        raise ValueError(f"line {line}: model or seconds are not what a finished run has")
+    if sample.repeat == 0:
+        sample.values  # noqa: B018  raises if shape and values do not fit
 
 
 class Study:
@@ -126,6 +149,9 @@ class Study:
         self.versions = {name: _version(path) for name, path in programs.items()}
         self._path = self.folder / FILE
         self.samples = read_samples(self.folder) if self._path.exists() else []
+        (self.folder / ORIGIN).write_text(
+            "".join(f"{name}: {text.splitlines()[0] if text else 'unknown'}\n" for name, text in self.versions.items()),
+            encoding="utf-8")
         self._repair()
 
     def _repair(self) -> None:

@@ -107,7 +107,8 @@ def overall(study: WorkPrecision) -> Table:
     """How often each choice is the fastest, and how far from it otherwise."""
     table = Table(
         "workprecision_overall", "Numerics and precision over all scenes and models",
-        ("error", "numerics", "precision", "reaches it in", "fastest in", "time over the fastest"), texts=3,
+        ("error", "numerics", "precision", "reaches it in", "fastest in",
+         "time over the fastest, geometric mean"), texts=3,
     )
     for error in ERRORS:
         for choice, (ratios, asked) in _ratios(study, error).items():
@@ -126,7 +127,8 @@ def recommendation(study: WorkPrecision) -> Table:
     """For an error, one choice."""
     table = Table(
         "workprecision_recommendation", "Recommendation",
-        ("error", "numerics", "precision", "reaches it in", "time over the fastest", "share of the stable step"),
+        ("error", "numerics", "precision", "reaches it in", "time over the fastest, geometric mean",
+         "share of the stable step"),
         texts=3,
     )
     for error in ERRORS:

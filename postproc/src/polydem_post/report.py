@@ -8,10 +8,14 @@ from .bench import Bench, read_bench
 from .bench_tables import all_tables
 from .claims import claims_document, judge_all, verdict_table
 from .complexity import SOURCES, complexity_tables
-from .emit import FORMATS, SUFFIXES, Table
+from .emit import FORMATS, SUFFIXES, Table, printable
 from .slope_tables import slopes
 from .targets import targets
 from .trajectory import ResultError
+
+
+#: File that says what made the numbers of the tables beside it, since CSV has no room for that
+ORIGIN = "revision.txt"
 
 
 def write_report(folders: list, output: Path | None = None, figures: bool = True) -> list[Path]:
@@ -39,7 +43,10 @@ def tables_of(bench: Bench) -> list[Table]:
 
 def _write_tables(bench: Bench, folder: Path) -> list[Path]:
     written = []
+    written.append(folder / ORIGIN)
+    written[-1].write_text(f"Tables in this folder: {printable(bench.origin)}\n", encoding="utf-8")
     for table in tables_of(bench):
+        table.origin = bench.origin
         for form in FORMATS:
             path = folder / (table.name + SUFFIXES[form])
             path.write_text(table.document(form), encoding="utf-8")

@@ -1,4 +1,7 @@
-"""Chooses from a bench what belongs together: scenes of one kind, one finder over size, two finders side by side."""
+"""Chooses from a bench what belongs together: scenes of one kind, one finder over size, two finders side by side.
+
+What a scene is follows from the settings that its samples record (`scene_kinds.py`), not from its name.
+"""
 
 from __future__ import annotations
 
@@ -9,23 +12,7 @@ import numpy as np
 
 from . import statistics
 from .bench import Bench, Case
-
-#: Kind of scene -> how the names of such scenes begin: drum_2522, gas_0.3, sizes_100, worst_order_5000
-KINDS = {
-    "drum": r"drums?|patch|tile[sd]?",
-    "bed": r"(static_?)?bed",
-    "gas": r"gas",
-    "hopper": r"hopper",
-    "sizes": r"sizes?|ratio",
-    "rods": r"rods?",
-    "soft": r"soft|overlap",
-    "range": r"range|long",
-    "worst": r"worst|order",
-    "column": r"column|tall",
-    "rest": r"rest|one",
-    "line": r"channel|line",
-    "even": r"even",
-}
+from .scene_kinds import family_of, kind_of, number_in
 
 #: Finders that begin anew at every step, or nearly so: what the incremental ones are measured against
 OTHERS = ("linked_cells", "verlet", "hierarchical_grid", "all_pairs")
@@ -37,28 +24,46 @@ TREE, SWEEP = "quadtree", "sort_and_sweep"
 CACHE_WORD = re.compile(r"L(\d)([di]?)\s+(\d+)\s*([KMG])", re.IGNORECASE)
 
 
-def kind(scene: str) -> str:
-    """Kind of a scene by the beginning of its name, or that beginning itself."""
-    for name, pattern in KINDS.items():
-        if re.match(rf"(?:{pattern})(?:[_.-]|\d|$)", scene):
-            return name
-    return re.split(r"[_.-]|\d", scene)[0]
+def kind(case: Case) -> str:
+    """Kind of the scene of a case by what is recorded of it."""
+    return kind_of(case.settings)
 
 
-def parameter(scene: str) -> float:
-    """The last number in the name of a scene: its size, ratio or density; NaN if it has none."""
-    numbers = re.findall(r"\d+(?:\.\d+)?", scene)
-    return float(numbers[-1]) if numbers else np.nan
+def parameter(case: Case, entry: str) -> float:
+    """A number of the settings of the scene of a case: its ratio, its density; NaN if it is not recorded."""
+    return number_in(case.settings, entry, np.nan)
 
 
 def cases_of(bench: Bench, of_kind: str, **wanted) -> list:
     """Cases on scenes of a kind, in order of their size."""
-    return [case for case in bench.select(**wanted) if kind(case.scene) == of_kind]
+    return [case for case in bench.select(**wanted) if kind(case) == of_kind]
+
+
+def records_of(bench: Bench, records: list, of_kind: str) -> list:
+    """Of records that name a scene and its boxes, those on scenes that the samples show to be of a kind."""
+    known = {(case.scene, case.boxes) for case in cases_of(bench, of_kind)}
+    return [record for record in records if (record.scene, record.boxes) in known]
 
 
 def over_size(bench: Bench, finder: str, threads: int = 1, mode: str = "replay", of_kind: str = "drum") -> list:
-    """One finder on the scenes of a kind, of all sizes; one case per number of boxes."""
-    found = {case.boxes: case for case in cases_of(bench, of_kind, finder=finder, threads=threads, mode=mode)}
+    """One finder on scenes of a kind that differ in their size alone; one case per number of boxes.
+
+    Of several such families it is the one of most sizes, in this bench as a whole, so all finders have the same;
+    of two scenes of one size, that of the folder which most sizes come from.
+    """
+    families: dict[tuple, set] = {}
+    for case in cases_of(bench, of_kind, mode=mode):
+        families.setdefault(family_of(case.settings), set()).add(case.boxes)
+    family = max(families, key=lambda each: len(families[each]), default=None)
+    cases = [
+        case
+        for case in cases_of(bench, of_kind, finder=finder, threads=threads, mode=mode)
+        if family_of(case.settings) == family
+    ]
+    folders = [case.samples[0].path.parent for case in cases]
+    found: dict[int, Case] = {}
+    for case in sorted(cases, key=lambda each: -folders.count(each.samples[0].path.parent)):
+        found.setdefault(case.boxes, case)
     return [found[boxes] for boxes in sorted(found)]
 
 
@@ -99,7 +104,17 @@ def ratio(upper: Case, lower: Case, quantity=total_time) -> statistics.Estimate:
 def pairs_of(upper: list, lower: list) -> list:
     """Cases of two finders on the same scene and mode: [(upper, lower)]."""
     found = {(case.scene, case.mode): case for case in lower}
-    return [(case, found[case.scene, case.mode]) for case in upper if (case.scene, case.mode) in found]
+    both = [(case, found[case.scene, case.mode]) for case in upper if (case.scene, case.mode) in found]
+    return [pair for pair in both if same_boxes(*pair)]
+
+
+def same_boxes(one: Case, other: Case) -> bool:
+    """Whether nothing recorded says that two cases are of different boxes."""
+    if one.boxes != other.boxes or one.facts.get("input") != other.facts.get("input"):
+        return False
+    if one.facts.get("steps") != other.facts.get("steps"):
+        return True
+    return one.facts.get("identity") == other.facts.get("identity")
 
 
 def pooled_ratio(pairs: list, quantity=total_time) -> statistics.Estimate:

@@ -6,6 +6,10 @@ computed from each draw. With seven repeats the plain percentile interval of a m
 371, "expanded percentile") proposes, to 98 %. Slopes join many medians and need no widening: theirs cover 98 %, too.
 The tests of this module count the coverage.
 
+A question to an estimate (is it within these bounds, above that one?) has three answers: True if its whole interval is
+inside, False if its whole interval is outside, and None, undecided, if the interval lies on both sides of a bound, or if
+there is none since something was measured once only. So noise can pass no rule and fail none.
+
 The intervals tell how much a measurement would change if it were repeated on this machine. They know nothing of
 other machines, and that of a slope nothing of how well a power law fits.
 """
@@ -43,11 +47,36 @@ class Estimate:
     def __bool__(self) -> bool:
         return math.isfinite(self.value)
 
-    def meets(self, low: float, high: float) -> bool:
-        """Whether the number or a part of its interval lies between two bounds."""
-        lower = self.low if math.isfinite(self.low) else self.value
-        upper = self.high if math.isfinite(self.high) else self.value
-        return bool(self) and lower <= high and upper >= low
+    def within(self, low: float, high: float) -> bool | None:
+        """Whether the number lies between two bounds, these included: True, False, or None if that is undecided."""
+        if not (self and math.isfinite(self.low) and math.isfinite(self.high)):
+            return None
+        if low <= self.low and self.high <= high:
+            return True
+        return False if self.high < low or self.low > high else None
+
+    def at_least(self, bound: float) -> bool | None:
+        """Whether the number is not below a bound."""
+        return self.within(bound, math.inf)
+
+    def at_most(self, bound: float) -> bool | None:
+        """Whether the number is not above a bound."""
+        return self.within(-math.inf, bound)
+
+    def above(self, bound: float) -> bool | None:
+        """Whether the number exceeds a bound."""
+        return negated(self.at_most(bound))
+
+    def below(self, bound: float) -> bool | None:
+        """Whether the number is less than a bound."""
+        return negated(self.at_least(bound))
+
+    def above_that(self, other: Estimate) -> bool | None:
+        """Whether the number exceeds another one: decided if the intervals are apart."""
+        ends = (self.low, self.high, other.low, other.high)
+        if not (self and other and all(map(math.isfinite, ends))):
+            return None
+        return True if self.low > other.high else False if self.high < other.low else None
 
     def text(self, digits: int = 3) -> str:
         """Like 1.02 [0.99, 1.04]."""
@@ -56,6 +85,22 @@ class Estimate:
         if not math.isfinite(self.low):
             return number(self.value, digits)
         return f"{number(self.value, digits)} [{number(self.low, digits)}, {number(self.high, digits)}]"
+
+
+def negated(answer: bool | None) -> bool | None:
+    """The answer to the opposite question."""
+    return None if answer is None else not answer
+
+
+def every(answers) -> bool | None:
+    """Whether all are True: False as soon as one is False, undecided if what is left is."""
+    answers = list(answers)
+    return False if False in answers else None if None in answers else True
+
+
+def some(answers) -> bool | None:
+    """Whether any is True: True as soon as one is, undecided if one of the others is."""
+    return negated(every(negated(answer) for answer in answers))
 
 
 #: Nothing was measured
@@ -112,6 +157,20 @@ def ratio_of_medians(upper, lower) -> Estimate:
     below = np.median(lower[_draws(len(lower), 1)], axis=1)
     few = upper if len(upper) <= len(lower) else lower
     return _estimate(float(np.median(upper) / np.median(lower)), above / below, few, least=math.nan)
+
+
+def ratio_of_means(uppers: list, lowers: list) -> Estimate:
+    """Ratio of two geometric means over scenes that were measured apart: for each scene the values of its repeats."""
+    if not uppers or not lowers or not all(map(len, [*uppers, *lowers])):
+        return NOTHING
+    value, drawn = 0.0, np.zeros(DRAWS)
+    for stream, (upper, lower) in enumerate(zip(uppers, lowers)):
+        for sign, values, which in ((1.0, upper, 0), (-1.0, lower, 1)):
+            values = np.asarray(values, dtype=float)
+            value += sign * math.log(np.median(values)) / len(uppers)
+            drawn += sign * np.log(np.median(values[_draws(len(values), 2 * stream + which)], axis=1)) / len(uppers)
+    fewest = np.asarray(min([*uppers, *lowers], key=len), dtype=float)
+    return _estimate(math.exp(value), np.exp(drawn), fewest, least=math.nan)
 
 
 def slope(sizes, repeats) -> Estimate:

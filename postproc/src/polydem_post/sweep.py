@@ -72,7 +72,11 @@ class Run:
 
     def overrides(self) -> list[str]:
         """The entries that it changes, each group.key=value."""
-        return (self.folder / OVERRIDES).read_text(encoding="utf-8").splitlines()
+        path = self.folder / OVERRIDES
+        try:
+            return path.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeDecodeError) as error:
+            raise ResultError(f"{path}: cannot be read ({error})") from error
 
     def attempts(self) -> list[dict]:
         """What was tried so far: `started` (UTC), `seconds`, `exit_code` and `threads` of each attempt."""
@@ -84,7 +88,7 @@ class Run:
                 return [{"started": row["started"], "seconds": float(row["seconds"]),
                          "exit_code": int(row["exit_code"]), "threads": int(row["threads"])}
                         for row in csv.DictReader(file)]
-        except (KeyError, TypeError, ValueError) as error:
+        except (KeyError, TypeError, ValueError, OSError, csv.Error) as error:
             raise ResultError(f"{path}: is not a list of attempts ({error})") from error
 
 

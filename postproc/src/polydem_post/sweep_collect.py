@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from .sweep import NAME, Run, Sweep
-from .sweep_run import FAILING, FINISHED, describe, last_words, state_of
+from .sweep_run import FAILING, FINISHED, RUNNING, describe, last_words, state_of
 from .trajectory import ResultError, Trajectory
 
 #: Names of the two files in the folder of a sweep
@@ -19,10 +19,10 @@ CSV_FILE, HDF5_FILE = "results.csv", "results.h5"
 
 #: Columns of every run, with unit and meaning
 COLUMNS = {
-    "state": ("1", "finished, failed, stopped (can go on), interrupted, or not run"),
-    "exit_code": ("1", "of the last attempt; negative: the signal that ended it"),
+    "state": ("1", "finished, failed, stopped (can go on), interrupted, running, or not run"),
+    "exit_code": ("1", "of the last attempt that a sweep saw end; negative: the signal that ended it"),
     "attempts": ("1", "how often it was started"),
-    "wall": ("s", "elapsed time of all attempts, start of the program included"),
+    "wall": ("s", "elapsed time of the attempts that a sweep saw end, start of the program included"),
     "threads": ("1", "of the last attempt"),
     "revision": ("1", "commit of the program"),
     "state_hash": ("1", "hash of the bits of the last state"),
@@ -77,10 +77,11 @@ def read_outcome(sweep: Sweep, run: Run) -> Outcome:
     attempts = run.attempts()
     facts = outcome.facts
     facts.update(state=state_of(run), attempts=len(attempts))
-    if not attempts:
+    if facts["state"] == RUNNING or not attempts and facts["state"] != FINISHED:
         return outcome
-    facts.update(exit_code=attempts[-1]["exit_code"], threads=attempts[-1]["threads"],
-                 wall=sum(attempt["seconds"] for attempt in attempts))
+    if attempts:
+        facts.update(exit_code=attempts[-1]["exit_code"], threads=attempts[-1]["threads"],
+                     wall=sum(attempt["seconds"] for attempt in attempts))
     if facts["state"] == FAILING:
         facts["message"] = last_words(run)
     try:

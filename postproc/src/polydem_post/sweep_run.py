@@ -1,10 +1,16 @@
-"""Running a sweep: several runs at once within the cores given, what is finished never again."""
+"""Running a sweep: several runs at once within the cores given, what is finished never again.
+
+While a run is under way its list of attempts is locked, by the sweep and by the run itself, which inherits the lock. So
+a run that outlives its sweep (killed with -9, say) is still known to be running: no call starts it a second time, and
+what it leaves counts.
+"""
 
 from __future__ import annotations
 
 import csv
 import fcntl
 import os
+import platform
 import signal
 import subprocess
 import time
@@ -13,8 +19,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
+from .scene_kinds import settings_of
 from .sweep import ATTEMPTS, INPUT, OUTPUT, Run
-from .trajectory import ResultError
+from .trajectory import ResultError, input_of, status_of
 
 #: Exit code of a run that was asked to end and can go on from a checkpoint
 STOPPED = 75
@@ -24,6 +31,13 @@ FAILED = 1
 
 #: States of a run
 NOT_RUN, FINISHED, FAILING, STOPPED_EARLY, INTERRUPTED = "not run", "finished", "failed", "stopped", "interrupted"
+RUNNING = "running"
+
+#: The lock of a result folder, with the number of the process and the name of the machine that write there
+LOCK = "running.lock"
+
+#: How often, and how long apart [s], a lock is tried: another call may just look whether a run is under way
+TRIES, PAUSE = 5, 0.02
 
 #: Signals that end a sweep; a second one does not wait for checkpoints
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
@@ -33,14 +47,56 @@ INTERVAL = 0.05
 
 
 def state_of(run: Run) -> str:
-    """What became of a run so far."""
+    """What became of a run so far, also of one that outlived its sweep."""
     attempts = run.attempts()
+    if is_running(run):
+        return RUNNING
+    if not attempts or attempts[-1]["exit_code"] != 0:
+        if status_of(run.result) == FINISHED:
+            return FINISHED
     if not attempts:
         return NOT_RUN
     code = attempts[-1]["exit_code"]
     if code < 0:
         return INTERRUPTED
     return {0: FINISHED, STOPPED: STOPPED_EARLY}.get(code, FAILING)
+
+
+def is_running(run: Run) -> bool:
+    """Whether some process is at a run now: this sweep, another one, or a run that outlived its sweep."""
+    try:
+        with (run.folder / ATTEMPTS).open("rb") as record:
+            fcntl.flock(record, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except OSError:
+        pass
+    return bool(lock_holder(run.result))
+
+
+def lock_holder(result: Path) -> str:
+    """Who writes into a result folder, as its lock says: empty if nobody does, or only a process that has ended."""
+    try:
+        words = (result / LOCK).read_text(encoding="utf-8", errors="replace").split()
+    except OSError:
+        return ""
+    if len(words) < 2 or not words[0].isdigit():
+        return ""
+    if words[1] != platform.node():
+        return f"process {words[0]} on {words[1]}"
+    try:
+        os.kill(int(words[0]), 0)
+    except (ProcessLookupError, OverflowError):
+        return ""
+    except PermissionError:
+        pass
+    return f"process {words[0]}"
+
+
+def reads_bodies(result: Path) -> bool:
+    """Whether a result was made of bodies from a file, or from another result."""
+    settings = settings_of(input_of(result))
+    return bool(settings.get("scene.bodies_file") or settings.get("scene.packing"))
 
 
 def last_words(run: Run) -> str:
@@ -100,7 +156,7 @@ class Runner:
             state = state_of(run)
             if state == FAILING and not retry:
                 self.say(f"{describe(run)} (--retry runs it again)")
-            elif state != FINISHED:
+            elif state != FINISHED or self._asks_again(run):
                 due.append((run, known))
         self.say(f"{len(runs)} runs, {len(due)} to do, {len(self.slots)} at once, {self.threads} threads each")
         try:
@@ -112,6 +168,16 @@ class Runner:
             for slot in self.slots:
                 slot.give_up()
         return self._verdict(runs)
+
+    def _asks_again(self, run: Run) -> bool:
+        """Whether the program has to say that a finished run still is.
+
+        So it is if nobody saw the run end, and if it read bodies from a file, which may have changed since.
+        """
+        attempts = run.attempts()
+        if not self.continues:
+            return False
+        return not attempts or attempts[-1]["exit_code"] != 0 or reads_bodies(run.result)
 
     def _turns(self, due: list[tuple[Run, int]]) -> None:
         """Let runs, of which so many attempts are known, take their turns, until all are over or a signal comes."""
@@ -132,7 +198,7 @@ class Runner:
         elif run.result.exists():
             command.append("--force")
         if not slot.start(run, known, command, self.threads):
-            self.say(f"{run.name}: left out, since another call has it")
+            self.say(f"{run.name}: left out, since another call has it, or has left it running")
 
     def _verdict(self, runs: list[Run]) -> int:
         states = [state_of(run) for run in runs]
@@ -203,22 +269,20 @@ class _Slot:
         return self.process is not None
 
     def start(self, run: Run, known: int, command: list[str], threads: int) -> bool:
-        """Start a run, unless another sweep runs it now, or did so since `known` attempts were counted."""
+        """Start a run, unless somebody runs it now, or did so since `known` attempts were counted."""
         self.record = (run.folder / ATTEMPTS).open("a", newline="", encoding="utf-8")
-        try:
-            fcntl.flock(self.record, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            is_free = len(run.attempts()) == known
-        except BlockingIOError:
-            is_free = False
+        is_free = _locked(self.record) and len(run.attempts()) == known and not lock_holder(run.result)
         if not is_free:
             self.record.close()
             return False
         self.run, self.threads, self.began = run, threads, time.monotonic()
         self.started = time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime())
         with (run.folder / OUTPUT).open("ab") as output:
-            # A session of its own: the terminal's Ctrl-C goes to the sweep, which passes it on.
+            # A session of its own: the terminal's Ctrl-C goes to the sweep, which passes it on. The run inherits the
+            # locked list of attempts: if the sweep is killed the lock stays as long as the run goes on.
             self.process = subprocess.Popen(command, env=self.environment, stdin=subprocess.DEVNULL, stdout=output,
-                                            stderr=subprocess.STDOUT, start_new_session=True)
+                                            stderr=subprocess.STDOUT, start_new_session=True,
+                                            pass_fds=(self.record.fileno(),))
         return True
 
     def signal(self, number: int) -> None:
@@ -246,3 +310,14 @@ class _Slot:
         self.record.close()
         run, self.run, self.process = self.run, None, None
         return run
+
+
+def _locked(record: TextIO) -> bool:
+    """Lock a list of attempts; False if somebody has it."""
+    for _ in range(TRIES):
+        try:
+            fcntl.flock(record, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            time.sleep(PAUSE)
+    return False

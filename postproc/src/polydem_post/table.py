@@ -29,7 +29,10 @@ def timing_rows(trajectory: Trajectory) -> list[tuple[str, ...]]:
 
 def timing_table(trajectory: Trajectory, form: str = "text") -> str:
     """The table in one of FORMATS."""
-    return Table("times", "Times of the stages", HEADING, timing_rows(trajectory)).written(form)
+    table = Table("times", "Times of the stages", HEADING)
+    for row in timing_rows(trajectory):
+        table.add(*row)
+    return table.written(form)
 
 
 def _share(part: float, whole: float) -> str:

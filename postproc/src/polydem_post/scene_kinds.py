@@ -1,0 +1,116 @@
+"""What a scene is, from the settings that its samples record: never from its name.
+
+A bench stores with every sample the resolved input of the run that made the boxes. A drum is what was made as a
+rotating drum, whatever it is called; boxes of which nobody recorded how they were made are `unknown`, and no claim
+about drums, gases or beds counts them.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+#: Boxes of which it is not recorded how they were made
+UNKNOWN = "unknown"
+
+#: A scene that is none of the kinds that claims are about
+OTHER = "other"
+
+#: Entries that scenes of one family may differ in: those that set the size, and when and how it was recorded
+SIZE_ENTRIES = re.compile(r"scene\.(boxes|bodies|radius|width)|integrate\.duration|output\..*|checkpoint\..*")
+
+#: A bed whose boxes were recorded so long after the start has settled [s]
+SETTLED = 0.5
+
+#: A range of at least so many long axes of a grain is long; `boxes.margin` is half the range
+LONG_RANGE = 1.0
+
+#: Length over width of slender grains, and height over width of a column
+SLENDER, TALL = 10.0, 3.0
+
+#: Share of a settled bed that grains cover, for the height of a column
+COVERED = 0.8
+
+
+def settings_of(text: str) -> dict[str, str]:
+    """'group.key' -> value of a resolved input; strings without their quotes."""
+    settings, group = {}, ""
+    for line in text.splitlines():
+        words = line.strip()
+        if words.startswith("&"):
+            group = words[1:].strip()
+        key, equals, value = words.partition("=")
+        if group and equals:
+            settings[f"{group}.{key.strip()}"] = value.strip().strip("'")
+    return settings
+
+
+def number_in(settings: dict, entry: str, default: float = 0.0) -> float:
+    """A number of the settings; the default if it is not there or no number."""
+    try:
+        value = float(settings[entry].lower().replace("d", "e"))
+    except (KeyError, ValueError):
+        return default
+    return value if math.isfinite(value) else default
+
+
+def kind_of(settings: dict) -> str:
+    """Kind of a scene: drum, bed, column, hopper, line, gas, sizes, rods, soft, range, worst, rest; OTHER; UNKNOWN."""
+    name = settings.get("scene.name", "")
+    if not name:
+        return UNKNOWN
+    if number_in(settings, "boxes.margin") > 0.0:
+        long = 2.0 * number_in(settings, "boxes.margin") >= LONG_RANGE * number_in(settings, "scene.long_axis_max")
+        return "range" if name == "gas" and long else OTHER
+    if name in ("hopper", "channel"):
+        return {"hopper": "hopper", "channel": "line"}[name]
+    if name == "gas":
+        return _kind_of_gas(settings)
+    if settings.get("scene.order", "natural") != "natural":
+        return OTHER
+    if name == "drum":
+        turns = settings.get("scene.motion") == "rotation" and number_in(settings, "scene.motion_rate") != 0.0
+        return "drum" if turns else OTHER
+    if name == "bed":
+        return _kind_of_bed(settings)
+    return OTHER
+
+
+def family_of(settings: dict) -> tuple:
+    """What scenes have in common that differ in their size alone."""
+    return tuple(sorted((entry, value) for entry, value in settings.items() if not SIZE_ENTRIES.fullmatch(entry)))
+
+
+def _kind_of_gas(settings: dict) -> str:
+    if settings.get("scene.order", "natural") == "descending":
+        return "worst"
+    if number_in(settings, "scene.movers") > 0.0:
+        return "rest"
+    slender = number_in(settings, "scene.long_axis_min") >= SLENDER * number_in(settings, "scene.short_axis", math.inf)
+    if slender:
+        return "rods"
+    if settings.get("scene.overlap", "").lower() in (".true.", "t"):
+        return "soft" if number_in(settings, "scene.fraction") >= 1.0 else OTHER
+    if number_in(settings, "scene.size_ratio", 1.0) > 1.0:
+        return "sizes"
+    weightless = not any(float_or_one(word) for word in settings.get("forces.gravity", "0").split(","))
+    return "gas" if weightless and number_in(settings, "scene.speed") > 0.0 else OTHER
+
+
+def float_or_one(word: str) -> float:
+    """A number, or 1 for what is none: something that is not known to be 0."""
+    try:
+        return float(word)
+    except ValueError:
+        return 1.0
+
+
+def _kind_of_bed(settings: dict) -> str:
+    if number_in(settings, "scene.size_ratio", 1.0) > 1.0 or settings.get("scene.motion", "none") != "none":
+        return OTHER
+    if number_in(settings, "output.trace_start") < SETTLED:
+        return OTHER
+    width = number_in(settings, "scene.width")
+    axes = [number_in(settings, f"scene.{name}") for name in ("short_axis", "long_axis_min", "long_axis_max")]
+    area = number_in(settings, "scene.bodies") * 0.25 * math.pi * axes[0] * 0.5 * (axes[1] + axes[2]) / COVERED
+    return "column" if width > 0.0 and area > TALL * width**2 else "bed"
