@@ -256,7 +256,7 @@ def process_cases():
     yield generated("ranks/exact-friction-2", {**SCENES["drum"], **often, "forces.friction": "exact"}, ranks=2)
     yield generated("ranks/morton-3", {**SIZES, **often, "exchange.cut": "morton"}, ranks=3)
     for name, scene in (("drum", SCENES["drum"]), ("sizes", SIZES), ("gas", SCENES["gas"])):
-        longer = 30 * float(scene["integrate.duration"]) * 80 / float(scene["scene.bodies"])
+        longer = 10 * float(scene["integrate.duration"]) * 80 / float(scene["scene.bodies"])
         settings = {**scene, **harder[name], **often, "integrate.duration": f"{longer:.6g}", "checkpoint.steps": "100",
                     "forces.gravity": "0, -20"}
         for attempts, ranks in ATTEMPTS.items():
