@@ -77,6 +77,8 @@ def read_targets(build):
         if not match or not re.search(r"\.f90$", entry["file"], re.IGNORECASE):
             continue
         target = targets[match.group(1)]
+        if not os.path.exists(entry["file"]):
+            sys.exit(f"{entry['file']} is missing: build all of {build} first")
         with open(entry["file"], encoding="utf-8") as file:
             text = file.read()
         target.defined.update(name.lower() for name in MODULE.findall(text))
