@@ -1,13 +1,14 @@
 # polydem_layer(NAME SOURCES a.f90 ... [USES polydem::other ...])
 #
-# One folder of src is one library with its own folder of module files. A layer sees the modules of the
-# layers it names in USES (and of theirs), so a `use` against the order of the rooms does not compile.
+# One folder of src is one library with its own folder of module files. A layer sees the modules of the layers that it
+# names in USES and no others, not even those of theirs: the links are PRIVATE, so what a layer uses is linked into a
+# program but not shown to it. The test `rooms` tries every pair that is not named.
 function(polydem_layer name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;USES")
   add_library(polydem_${name} STATIC ${arg_SOURCES})
   add_library(polydem::${name} ALIAS polydem_${name})
   set(modules "${PROJECT_BINARY_DIR}/modules/${name}")
   set_target_properties(polydem_${name} PROPERTIES Fortran_MODULE_DIRECTORY "${modules}")
-  target_include_directories(polydem_${name} PUBLIC "${modules}")
-  target_link_libraries(polydem_${name} PUBLIC ${arg_USES} PRIVATE polydem::flags)
+  target_include_directories(polydem_${name} INTERFACE "${modules}")
+  target_link_libraries(polydem_${name} PRIVATE ${arg_USES} polydem::flags)
 endfunction()

@@ -1,0 +1,269 @@
+"""The runs that the guard compares, in the names of the base revision.
+
+What there is to choose is read from the table of namelist entries in inputs/README.md of the base revision, so that no
+entry and no choice is left out: one that needs a value of its own and has none in VARIED is an error.
+"""
+
+import itertools
+import re
+from dataclasses import dataclass
+
+#: Small scenes with contacts from the start to the end, by the word of scene.name; bodies are soft, so steps are large
+SOFT = {"forces.gravity": "0, -80", "forces.stiffness": "2e5"}
+SCENES = {
+    "drum": {**SOFT, "scene.name": "drum", "scene.bodies": "80", "scene.speed": "1.0", "scene.motion": "rotation",
+             "scene.motion_rate": "2", "integrate.duration": "0.03"},
+    "hopper": {**SOFT, "scene.name": "hopper", "scene.bodies": "60", "scene.opening": "0.04", "scene.slope": "60",
+               "scene.speed": "1.0", "integrate.duration": "0.03"},
+    "gas": {**SOFT, "scene.name": "gas", "scene.bodies": "80", "scene.fraction": "0.35", "scene.speed": "1.0",
+            "scene.spin": "50", "integrate.duration": "0.02"},
+    "bed": {**SOFT, "scene.name": "bed", "scene.bodies": "80", "scene.speed": "2.0", "integrate.duration": "0.03"},
+    "heap": {**SOFT, "scene.name": "heap", "scene.bodies": "60", "scene.speed": "1.0", "integrate.duration": "0.03"},
+    "channel": {**SOFT, "scene.name": "channel", "scene.bodies": "60", "scene.fraction": "0.3", "scene.speed": "1.0",
+                "integrate.duration": "0.03"},
+    "incline": {**SOFT, "scene.name": "incline", "scene.width": "0.02", "scene.height": "0.01", "scene.slope": "30",
+                "scene.speed": "0.1", "integrate.duration": "0.03"},
+    "stack": {**SOFT, "scene.name": "stack", "scene.bodies": "6", "scene.width": "0.01", "scene.height": "0.01",
+              "integrate.duration": "0.03"},
+    "file": {**SOFT, "scene.name": "file", "scene.bodies_file": "results/workprecision/bodies/stack.h5",
+             "integrate.duration": "0.01"},
+}
+#: Grains of many sizes under a shaking wall: every finder, several processes
+SIZES = {**SCENES["bed"], "scene.bodies": "200", "scene.size_ratio": "10", "scene.motion": "oscillation",
+         "scene.motion_amplitude": "1e-3, 2e-3", "scene.motion_frequency": "100"}
+#: Frames with everything in them, some to a segment; nothing that depends on the time that something takes
+OUTPUT = {"output.contacts": ".true.", "output.frames_per_segment": "4", "exchange.balance": "counted"}
+N_FRAMES = 10
+
+#: Coefficients of order one for each damping
+COEFFICIENTS = {"rate": "0.1", "hunt_crossley": "5", "book": "0.1", "none": None}
+#: Switches of models beside law, damping, friction and scheme
+SWITCHES = {
+    "touch": {"forces.damping_from_touch": ".true."},
+    "restitution": {"forces.restitution": "0.5"},
+    "tilt": {"forces.tilt_damping": "0.5"},
+    "midstep": {"forces.midstep_slip": ".true."},
+    "compensated": {"integrate.accumulation": "compensated"},
+    "all": {"forces.damping_from_touch": ".true.", "forces.tilt_damping": "0.5", "forces.midstep_slip": ".true."},
+}
+#: Runs that warn, that a guard stops or that begin otherwise
+GUARDS = {
+    "displacement_stops": {"forces.gravity": "0, -5e5"},
+    "displacement_warns": {"guards.displacement": "warn", "guards.displacement_limit": "1e-3"},
+    "step_stops": {"integrate.dt": "1e-2"},
+    "step_warns": {"guards.step": "warn", "integrate.fraction": "0.6"},
+    "overlap_stops": {"guards.overlap": "stop", "guards.overlap_limit": "1e-3"},
+    "overlap_warns": {"guards.overlap": "warn", "guards.overlap_limit": "1e-3"},
+    "energy_stops": {"guards.energy": "stop", "guards.energy_limit": "1e-9", "forces.damping": "none"},
+    "energy_warns": {"guards.energy": "warn", "guards.energy_limit": "1e-9", "forces.damping": "none"},
+    "relaxed": {**SCENES["gas"], "scene.overlap": ".true.", "guards.relaxed_depth": "0.05"},
+    "listed": {**SCENES["gas"], "scene.overlap": ".true.", "guards.listed_depth": "1e-4", "guards.step": "warn",
+               "guards.displacement": "off"},
+}
+#: A value other than the default for each entry that is neither a word nor logical; by entry, or entry@scene
+VARIED = {
+    "scene.seed": "7", "scene.boxes": "150", "scene.bodies": "50", "scene.packing": None, "scene.corners_min": "3",
+    "scene.corners_max": "20", "scene.short_axis": "6e-3", "scene.long_axis_min": "9e-3",
+    "scene.long_axis_max": "15e-3", "scene.size_ratio": "5", "scene.density": "1000", "scene.radius": "0.08",
+    "scene.width": "0.15",
+    "scene.width@heap": "1.0", "scene.width@incline": "0.03", "scene.width@stack": "0.02", "scene.height": "0.015",
+    "scene.opening": "0.05", "scene.slope": "40", "scene.fraction": "0.25", "scene.speed": "1.5", "scene.spin": "20",
+    "scene.movers": "5", "scene.motion_pivot": "0.01, 0.02", "scene.motion_rate": "1",
+    "scene.motion_velocity": "0.1, 0.2",
+    "scene.motion_amplitude": "1e-3, 0", "scene.motion_frequency": "50", "scene.motion_start": "0.005",
+    "scene.motion_ramp": "0.01", "scene.motion_bodies": "82, 84", "scene.bodies_file": None,
+    "boxes.largest_ratio": "2", "boxes.margin": "1e-4", "neighbours.skin": "1e-3",
+    "forces.gravity": "10, -40", "forces.stiffness": "1e6", "forces.damping_coefficient": "0.2",
+    "forces.restitution": "0.3",
+    "forces.tilt_damping": "1", "forces.friction_coefficient": "0.6", "forces.tangential_stiffness": "0.5",
+    "forces.tangential_damping": "0.5", "forces.friction_tolerance": "1e-6",
+    "guards.displacement_limit": "0.2", "guards.overlap_limit": "0.5", "guards.energy_limit": "0.5",
+    "guards.listed_depth": "1e-4", "guards.relaxed_depth": "1e-3",
+    "integrate.dt": "5e-5", "integrate.fraction": "0.1", "integrate.duration": "0.025",
+    "exchange.margin": "1e-3", "exchange.imbalance": "2",
+    "output.folder": None, "output.frame_interval": "0.002", "output.frames_per_segment": "3",
+    "output.log_interval": "1e-3",
+    "output.trace_steps": "20", "output.trace_start": "0.01",
+    "checkpoint.steps": "50", "checkpoint.interval": "0.01", "checkpoint.elapsed": None,
+}
+#: What an entry needs beside it to have an effect
+BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_limit": {"guards.energy": "warn"}}
+#: Why entries have None above: where else they are tried
+ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
+             "checkpoint.elapsed": "nowhere: what it does depends on the time that steps take"}
+
+#: Numbers of ranks of the program with MPI
+RANKS = (1, 2, 3)
+#: Ranks of the attempts of a run that is interrupted twice; None: the program without MPI
+ATTEMPTS = {"serial": (None, None, None), "3-2-serial": (3, 2, None), "serial-2-3": (None, 2, 3), "2-3-1": (2, 3, 1)}
+
+
+@dataclass
+class Case:
+    """One comparison."""
+
+    name: str
+    #: Entries, group.key -> value; beside a namelist they override it
+    settings: dict
+    #: A namelist below inputs, without its suffix; None: `settings` is all
+    source: str | None = None
+    ranks: int | None = None
+    threads: int = 1
+    #: Ranks of each attempt, if the run is interrupted
+    attempts: tuple = ()
+    #: Whether everything is compared, or only what does not depend on how long steps take
+    whole: bool = True
+    #: Finder of a replay of what the run recorded
+    replay: str | None = None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A row of the table of namelist entries."""
+
+    name: str
+    type: str
+    choices: tuple
+    default: str
+    #: What it is used with: an entry and words of it, or nothing
+    condition: tuple
+
+
+def read_entries(manual):
+    """The table of namelist entries in the text of inputs/README.md."""
+    rows = re.findall(r"^\| &(\w+) \| `(\w+)` \|(.*)\|$", manual, re.MULTILINE)
+    entries = []
+    for group, key, rest in rows:
+        kind, _, default, allowed, used, _ = re.split(r"\s*\|\s*", rest.strip(), maxsplit=5)
+        condition = ()
+        if used:
+            needed, _, words = used.rpartition(" = ")
+            condition = (f"{group}.{needed or 'name'}", tuple(words.split(", ")))
+        choices = tuple(allowed.split(", ")) if kind == "word" else (".true.", ".false.") if kind == "logical" else ()
+        entries.append(Entry(f"{group}.{key}", kind, choices, default.strip("`'"), condition))
+    if len(entries) < 50:
+        raise ValueError("inputs/README.md: the table of namelist entries was not understood")
+    return entries
+
+
+def choices(entries, name):
+    """All words of an entry."""
+    return next(entry.choices for entry in entries if entry.name == name)
+
+
+def generated(name, settings, **others):
+    """A case without a namelist file, with frames."""
+    interval = float(settings["integrate.duration"]) / N_FRAMES
+    settings = {**OUTPUT, "output.frame_interval": f"{interval:.6g}", **settings}
+    return Case(name, {key: value for key, value in settings.items() if value is not None}, **others)
+
+
+def model_cases(entries):
+    """Every elastic law with every damping, friction and integrator, and with every switch."""
+    laws, dampings, frictions, schemes = (choices(entries, name) for name in (
+        "forces.law", "forces.damping", "forces.friction", "integrate.scheme"))
+    for law, damping, friction, scheme in itertools.product(laws, dampings, frictions, schemes):
+        yield generated(f"models/{law}-{damping}-{friction}-{scheme}", {
+            **SCENES["drum"], "forces.law": law, "forces.damping": damping, "forces.friction": friction,
+            "forces.damping_coefficient": COEFFICIENTS.get(damping, "0.1"), "integrate.scheme": scheme})
+    for (switch, added), law, scheme in itertools.product(SWITCHES.items(), laws, schemes):
+        yield generated(f"switches/{switch}-{law}-{scheme}",
+                        {**SCENES["drum"], "forces.law": law, "integrate.scheme": scheme, **added})
+    for name, added in GUARDS.items():
+        yield generated(f"guards/{name}", {**SCENES["drum"], **added})
+
+
+def entry_cases(entries):
+    """Each entry with each of its words, or another value than its default."""
+    turn = itertools.count()
+    for entry in entries:
+        if entry.name.startswith("bench."):
+            continue
+        condition, words = entry.condition or ("", ())
+        scene = words[next(turn) % len(words)] if condition == "scene.name" else "drum"
+        base = dict(SCENES[scene])
+        if condition and condition != "scene.name" and OUTPUT.get(condition) not in words:
+            base[condition] = words[0]
+            base = {key: value for key, value in base.items() if fits(key, base, entries)}
+        if entry.name == "scene.motion":
+            base = {key: value for key, value in base.items() if not key.startswith("scene.motion")}
+        for value in values_of(entry, scene):
+            settings = {**base, **BESIDE.get(entry.name, {}), entry.name: value}
+            if entry.name == "scene.name":
+                settings = dict(SCENES[value])
+            settings.update(companions(settings, entry.name, entries))
+            if entry.name == "scene.boxes":
+                settings.pop("scene.bodies")
+            name = f"entries/{entry.name}={value.replace(', ', ',')}" + f"@{scene}" * (scene != "drum")
+            yield generated(name, settings, ranks=3 if entry.name.startswith("exchange.") else None)
+
+
+def fits(key, settings, entries):
+    """Whether an entry is in force: of its rows one has its condition met."""
+    rows = [entry for entry in entries if entry.name == key]
+    return any(not row.condition or settings.get(row.condition[0], default_of(row.condition[0], entries))
+               in row.condition[1] for row in rows)
+
+
+def default_of(name, entries):
+    """The default of an entry."""
+    return next(entry.default for entry in entries if entry.name == name)
+
+
+def companions(settings, name, entries):
+    """Entries that are required with these settings and not given."""
+    return {entry.name: VARIED[entry.name] for entry in entries
+            if entry.default == "required" and entry.name not in settings and entry.name != name
+            and entry.name.startswith("scene.motion_") and settings.get("scene.motion", "none") in entry.condition[1]}
+
+
+def values_of(entry, scene):
+    """Values to try of an entry."""
+    if entry.choices:
+        return [value for value in entry.choices if value != OUTPUT.get(entry.name, entry.default)]
+    key = f"{entry.name}@{scene}" if f"{entry.name}@{scene}" in VARIED else entry.name
+    if key not in VARIED:
+        raise ValueError(f"{entry.name} is a namelist entry without a value in VARIED of guard_cases.py: add one")
+    if VARIED[key] is None and entry.name not in ELSEWHERE:
+        raise ValueError(f"{entry.name} has no value in VARIED of guard_cases.py, and ELSEWHERE does not say why")
+    return [] if VARIED[key] is None else [VARIED[key]]
+
+
+def finder_cases(entries):
+    """Every finder on one scene, on one and two threads; and on what that scene recorded."""
+    for finder, threads in itertools.product(choices(entries, "neighbours.finder"), (1, 2)):
+        yield generated(f"finders/{finder}-{threads}", {
+            **SIZES, "neighbours.finder": finder, "output.trace_steps": "50", "output.step_profile": ".true."},
+            threads=threads)
+        yield generated(f"replay/{finder}-{threads}", {**SIZES, "output.trace_steps": "50"},
+                        threads=threads, replay=finder)
+
+
+def process_cases():
+    """Several processes and threads, and runs that are interrupted and go on."""
+    several = {**{name: SCENES[name] for name in ("drum", "gas", "hopper", "stack")}, "sizes": SIZES}
+    harder = {"drum": {}, "gas": {"forces.law": "conservative", "forces.damping": "hunt_crossley"},
+              "hopper": {"integrate.scheme": "gear", "forces.midstep_slip": ".true."},
+              "stack": {"forces.friction": "none", "forces.tilt_damping": "0.5"},
+              "sizes": {"integrate.accumulation": "compensated", "forces.damping_from_touch": ".true."}}
+    often = {"exchange.margin": "1e-4", "exchange.imbalance": "1"}
+    for name, scene in several.items():
+        settings = {**scene, **harder[name], **often}
+        yield generated(f"threads/{name}-2", settings, threads=2)
+        for ranks in RANKS:
+            yield generated(f"ranks/{name}-{ranks}", settings, ranks=ranks, threads=1 + (ranks == 2))
+    yield generated("ranks/measured-3", {**SIZES, **often, "exchange.balance": "measured"}, ranks=3, whole=False)
+    yield generated("ranks/exact-friction-2", {**SCENES["drum"], **often, "forces.friction": "exact"}, ranks=2)
+    yield generated("ranks/morton-3", {**SIZES, **often, "exchange.cut": "morton"}, ranks=3)
+    for name, scene in (("drum", SCENES["drum"]), ("sizes", SIZES), ("gas", SCENES["gas"])):
+        longer = 10 * float(scene["integrate.duration"]) * 80 / float(scene["scene.bodies"])
+        settings = {**scene, **harder[name], **often, "integrate.duration": f"{longer:.6g}", "checkpoint.steps": "100",
+                    "forces.gravity": "0, -20"}
+        for attempts, ranks in ATTEMPTS.items():
+            yield generated(f"continued/{name}-{attempts}", settings, attempts=ranks)
+
+
+def generated_cases(manual):
+    """All cases that need no namelist file."""
+    entries = read_entries(manual)
+    return [*model_cases(entries), *entry_cases(entries), *finder_cases(entries), *process_cases()]

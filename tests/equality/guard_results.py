@@ -1,0 +1,127 @@
+"""What a run leaves, under the names of the base revision, and how two of them differ."""
+
+import re
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+#: Data that are no results: where they come from, times, memory
+IGNORED = re.compile(r"\w+/provenance/.*|profile/(profile/.*|status)|steps/steps/(stage|phase)(_name)?|"
+                     r"sample/steps/(elapsed|processor|(phase|stage)(_name)?)|"
+                     r"sample/case/(trace|load|clock_cost|time_utc)")
+#: Data of a trajectory that do not grow from frame to frame
+STANDING = re.compile(r"trajectory/(bodies/.*|walls/id)")
+
+
+def read_file(path, kind, names):
+    """All data sets of one file, by kind/path."""
+    found = {}
+
+    def take(path_, entry):
+        name = names.old_data(kind, path_)
+        if isinstance(entry, h5py.Dataset) and not IGNORED.fullmatch(name):
+            found[name] = np.asarray(entry.asstr()[()] if h5py.check_string_dtype(entry.dtype) else entry[()])
+
+    with h5py.File(path, "r") as file:
+        file.visititems(take)
+    spread_counters(found, names)
+    return found
+
+
+def spread_counters(found, names):
+    """Replace arrays of counters by one value, or column, per name."""
+    for labels, values in (("profile/counters/name", "profile/counters/value"),
+                           ("steps/steps/count_name", "steps/steps/count"),
+                           ("sample/steps/count_name", "sample/steps/count")):
+        if labels in found and values in found:
+            counted = zip(found.pop(labels), np.moveaxis(found.pop(values), -1, 0))
+            for label, value in counted:
+                found[f"counter {values.split('/')[0]} {names.old_counter(str(label))}"] = np.asarray(value)
+
+
+def read_trajectory(folder, names):
+    """All frames of a result, wherever its segments begin."""
+    parts = []
+    for path in sorted(Path(folder).glob(names.file("trajectory"))):
+        part = read_file(path, "trajectory", names)
+        start = part.pop("trajectory/contacts/start", None)
+        if start is not None:
+            part["trajectory/contacts/per frame"] = np.diff(start)
+        parts.append(part)
+    if not parts:
+        return {}
+    return {name: value if STANDING.fullmatch(name) else np.concatenate([part[name] for part in parts])
+            for name, value in parts[0].items()}
+
+
+def read_result(folder, names, whole=True):
+    """What a run left, by name; not `whole`: only what does not depend on where it was interrupted."""
+    found = read_trajectory(folder, names)
+    if whole:
+        segments = [path.name for path in Path(folder).glob(names.file("trajectory"))]
+        found["trajectory/segments"] = np.asarray(len(segments))
+        overlaps = Path(folder) / names.file("overlaps")
+        if overlaps.exists():
+            lines = overlaps.read_text(encoding="utf-8").splitlines()
+            found["overlaps/rows"] = np.asarray([line for line in lines if re.match(r"\s*[-+.\d]", line)])
+    for kind in ("profile", "trace", "steps") if whole else ("profile",):
+        path = Path(folder) / names.file(kind)
+        if path.exists():
+            found.update(read_file(path, kind, names))
+    if not whole:
+        kept = ("counter profile steps", "counter profile contacts", "counter profile bodies")
+        found = {name: value for name, value in found.items() if not name.startswith("counter") or name in kept}
+    return found
+
+
+def read_samples(folder, names):
+    """What the first, counted pass of a replay left: lists of pairs and counts, no times."""
+    found = {}
+    for path in sorted(Path(folder).rglob(names.file("sample"))):
+        sample = read_file(path, "sample", names)
+        if sample["sample/case/repeat"] == 0:
+            found.update(sample)
+    return found
+
+
+def differences(expected, found, names):
+    """Two lists of sentences: what differs, and what else is to be known; `expected` is that of the base."""
+    wrong, notes = [], []
+    missing = [name for name in expected if name not in found]
+    added = [name for name in found if name not in expected]
+    for name in missing:
+        if names.is_removed(name):
+            notes.append(f"{name} was removed")
+        else:
+            hint = f"; new are {', '.join(added[:4])}: if it is one of them, name it in guard_names.py" if added else ""
+            wrong.append(f"{name} is missing{hint}")
+    notes += [f"{name} is new" for name in added]
+    for name in expected:
+        if name in found and not same_bits(expected[name], found[name]):
+            wrong.append(f"{name}: {describe(expected[name], found[name])}")
+    return wrong, notes
+
+
+def same_bits(one, other):
+    """Whether two arrays have the same type, shape and bits."""
+    if one.dtype.kind in "OU":
+        return one.shape == other.shape and one.tolist() == other.tolist()
+    return one.dtype == other.dtype and one.shape == other.shape and one.tobytes() == other.tobytes()
+
+
+def describe(one, other):
+    """Where two arrays differ first."""
+    if one.shape != other.shape or one.dtype.kind != other.dtype.kind:
+        return f"{one.dtype} {one.shape} became {other.dtype} {other.shape}"
+    if one.dtype != other.dtype:
+        return f"{one.dtype} became {other.dtype}"
+    if one.dtype.kind in "OU":
+        places = np.argwhere(one != other)
+    else:
+        size = one.dtype.itemsize
+        bits = [np.frombuffer(array.tobytes(), dtype=np.uint8).reshape(*array.shape, size) for array in (one, other)]
+        places = np.argwhere((bits[0] != bits[1]).any(axis=-1))
+    first = tuple(places[0])
+    place = f" at [{', '.join(map(str, first))}]" if first else ""
+    return f"{one[first]!r} became {other[first]!r}{place}, {len(places)} of {one.size} values"
