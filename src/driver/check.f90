@@ -4,7 +4,7 @@ module polydem_check
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t
    use polydem_guards, only: check_motion
-   use polydem_kinds, only: lp
+   use polydem_kinds, only: lp, wp
    use polydem_log, only: log_t
    use polydem_machine, only: resident_memory
    use polydem_run_output, only: count_frames
@@ -47,7 +47,8 @@ contains
                           ' KiB for the scene, its boxes, pairs and contacts')
       frames = count_frames(simulation)
       call log%write_line('frames     '//to_text(frames)//' of '//to_text(frame_size(simulation)/1024_lp + 1_lp)// &
-                          ' KiB each, '//to_text(frames*frame_size(simulation)/1048576_lp + 1_lp)//' MiB in all')
+                          ' KiB each, '// &
+                          to_text(real(frames, wp)*real(frame_size(simulation), wp)/1048576.0_wp, 3)//' MiB in all')
       call warn_at_start(simulation, log, error)
       call log%close(error)
    end subroutine check_simulation
