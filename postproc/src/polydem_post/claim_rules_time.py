@@ -174,7 +174,7 @@ def memory(bench: Bench) -> Finding:
         raise Missing("the same bench on a second machine, and give both folders")
     times = {
         machine: {
-            (case.boxes, str(case.facts.get("input"))): of_one_bench(case.time())
+            (case.boxes, case.making): of_one_bench(case.time())
             for case in series.over_size(bench.on(machine), TREE)
             if case.time()
         }
