@@ -4,7 +4,8 @@
 !> for fixed ones; and may hold `npairs` (steps) and `pair_hash` (steps), the exact number of pairs and the sum
 !> of their hashes; `body` (boxes), the body of each box, from 1, ascending; `reach` (boxes), the greatest half
 !> side of each box at any angle; or the polygons `vertices` (n, 2) and `vertex_offset` (boxes + 1), from which
-!> it follows; the attribute `dt`; and `provenance/resolved_input`, the settings of the run that made it. Steps and boxes count from 0 in messages, as in the file.
+!> it follows; the attribute `dt`; and `provenance/resolved_input`, the settings of the run that made it. Steps and
+!> boxes count from 0 in messages, as in the file.
 module polydem_trace
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_boxes, only: boxes_t, far

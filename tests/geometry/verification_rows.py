@@ -44,7 +44,8 @@ def print_row(row):
 
 def revision():
     """The revision of the sources, with -dirty if they have changed since."""
-    command = ["git", "-C", os.path.dirname(os.path.abspath(__file__)), "describe", "--always", "--dirty", "--exclude=*"]
+    here = os.path.dirname(os.path.abspath(__file__))
+    command = ["git", "-C", here, "describe", "--always", "--dirty", "--exclude=*"]
     asked = subprocess.run(command, capture_output=True, text=True, check=False)
     return f"revision {asked.stdout.strip()}" if asked.returncode == 0 else "an unknown revision"
 
@@ -57,7 +58,8 @@ def write_rows(rows, folder, behind):
     markdown = [f"| {' | '.join(row)} |" for row in cells]
     if not behind:
         csv.insert(0, ",".join(HEADINGS))
-        markdown = ["# Verification", "", f"Sources of {revision()}.", "", "| " + " | ".join(HEADINGS).replace("seconds", "s") + " |",
+        markdown = ["# Verification", "", f"Sources of {revision()}.", "",
+                    "| " + " | ".join(HEADINGS).replace("seconds", "s") + " |",
                     "|---|---|--:|--:|--:|--:|--:|---|", *markdown]
     for name, lines in (("table.csv", csv), ("table.md", markdown)):
         with open(os.path.join(folder, name), "a" if behind else "w", encoding="utf-8") as file:

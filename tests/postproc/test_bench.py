@@ -173,6 +173,18 @@ def test_drums_of_another_rate_do_not_join_a_series(tmp_path):
     assert [case.boxes for case in cases] == [1000, 2000, 4000]
 
 
+def test_benches_in_other_folders_have_the_same_scenes(tmp_path):
+    for part in ("a", "b"):
+        made_by = input_of("drum", 1000).replace("drum_1000", f"results/{part}/traces/drum_1000")
+        write_sample(tmp_path / part, "drum_1000", "quadtree", TRUTH, 1000, made_by=made_by)
+    (case,) = read_bench([tmp_path / "a", tmp_path / "b"]).cases
+    assert len(case.samples) == 2
+    other = input_of("drum", 1000).replace("motion_rate = 0.25", "motion_rate = 2.0")
+    write_sample(tmp_path / "c", "drum_1000", "quadtree", TRUTH, 1000, made_by=other)
+    with pytest.raises(ResultError, match="that were made with different settings"):
+        read_bench([tmp_path / "a", tmp_path / "c"])
+
+
 def test_finders_on_different_boxes_of_one_name_are_not_compared(tmp_path):
     write_sample(tmp_path / "a", "drum_1000", "quadtree", TRUTH, 1000)
     other = input_of("drum", 1000).replace("motion_rate = 0.25", "motion_rate = 2.0")

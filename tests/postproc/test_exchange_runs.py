@@ -110,7 +110,7 @@ def test_what_is_saved_is_read_again_and_nothing_else_is(shared, alone, tmp_path
     assert read_runs(tmp_path / "other.csv") == []
     damaged = (tmp_path / "runs.csv").read_text(encoding="utf-8").replace(",morton,", ",morton,x", 1)
     (tmp_path / "runs.csv").write_text(damaged, encoding="utf-8")
-    with pytest.raises(ResultError, match="runs.csv: is not a file of ./polydem scale --save, or was damaged: line 2: margin"):
+    with pytest.raises(ResultError, match="runs.csv: is not a file of .*, or was damaged: line 2: margin is 'x"):
         read_runs(tmp_path / "runs.csv")
     with pytest.raises(ResultError, match="none.csv: there is no such file"):
         read_runs(tmp_path / "none.csv")

@@ -130,7 +130,8 @@ DAMAGES = {
         "does not belong|missing"),
     "one comes from elsewhere": (
         lambda folder: shutil.copyfile(folder / NAMES[2], folder / "trajectory_0004.h5"), "do not ascend"),
-    "one is there twice": (lambda folder: shutil.copyfile(folder / NAMES[0], folder / NAMES[1]), "ascend|exchanged|cut"),
+    "one is there twice": (
+        lambda folder: shutil.copyfile(folder / NAMES[0], folder / NAMES[1]), "ascend|exchanged|cut"),
     "a foreign open one": (
         lambda folder: shutil.copyfile(folder / NAMES[2], folder / "trajectory_0009.h5.open"), "segment is missing"),
     "profile.h5 is changed": (lambda folder: flip(folder / "profile.h5", -9, 3), "profile.h5"),

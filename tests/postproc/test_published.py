@@ -21,8 +21,14 @@ PAGES = [
     "tests/verification/results.md",
 ]
 
-#: Pages whose tables hold no measured numbers of one run: manuals, lists of cases with the tests that check their numbers
-OTHERS = {"src/README.md", "tests/README.md", "tests/faults.md", "tests/hard_cases.md", "tests/verification/reference/README.md"}
+#: Pages whose tables hold no measured numbers of one run: manuals, and lists of cases with the tests that check them
+OTHERS = {
+    "src/README.md",
+    "tests/README.md",
+    "tests/faults.md",
+    "tests/hard_cases.md",
+    "tests/verification/reference/README.md",
+}
 
 REVISION = re.compile(r"(?:revision|git|with|polydem [\d.]+ \(revision)[:\s]+([0-9a-f]{7,40})\b", re.IGNORECASE)
 
@@ -42,5 +48,6 @@ def test_a_page_with_measured_tables_names_a_revision_of_this_repository(page):
 def test_no_page_with_tables_is_forgotten():
     folders = [ROOT / name for name in ("inputs", "postproc/verdicts", "src", "tests")]
     pages = [ROOT / "README.md", *(page for folder in folders for page in folder.rglob("*.md"))]
-    with_tables = {str(page.relative_to(ROOT)) for page in pages if re.search(r"^\|[ :-]*---", page.read_text(), re.MULTILINE)}
+    pages = [page for page in pages if re.search(r"^\|[ :-]*---", page.read_text(encoding="utf-8"), re.MULTILINE)]
+    with_tables = {str(page.relative_to(ROOT)) for page in pages}
     assert with_tables == {page for page in PAGES if page.endswith(".md")} | OTHERS

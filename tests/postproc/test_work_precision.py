@@ -129,7 +129,8 @@ def test_the_report_is_written_and_the_same_every_time(tmp_path):
     assert len(read_samples(tmp_path)) == len(made_up())
     page = write_precision_report(tmp_path)[-1]
     first = page.read_text(encoding="utf-8")
-    assert first.startswith("## Speed against error\n\nSamples of a revision that is not recorded.\n\n### Recommendation\n")
+    origin = "Samples of a revision that is not recorded."
+    assert first.startswith(f"## Speed against error\n\n{origin}\n\n### Recommendation\n")
     assert (tmp_path / "report" / "figures" / "workprecision_flat_impact.svg").exists()
     write_precision_report(tmp_path, figures=False)
     assert page.read_text(encoding="utf-8") == first

@@ -42,7 +42,8 @@ def main(arguments: list[str] | None = None) -> int:
         if os.environ.get(TRACEBACK):
             raise
         words = " ".join(str(error).split())
-        print(f"error: {options.verb} cannot go on: {type(error).__name__}: {printable(words)[:300]}. A file may be damaged; "
+        print(f"error: {options.verb} cannot go on: {type(error).__name__}: {printable(words)[:300]}. A file may be "
+              f"damaged; "
               f"{TRACEBACK}=1 shows where", file=sys.stderr)
         return UNFORESEEN
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .scene_kinds import settings_of
+from .scene_kinds import making_of, settings_of
 from .trajectory import UNREADABLE, ResultError, open_file
 
 #: What the root of a sample says it is
@@ -83,6 +83,11 @@ class Case:
     def settings(self) -> dict:
         """Settings of the run that made its scene, 'group.key' -> text; empty if they are not recorded."""
         return _settings(str(self.facts.get("input", "")))
+
+    @property
+    def making(self) -> tuple:
+        """What decides over the boxes of its scene, as far as it is recorded."""
+        return making_of(self.settings)
 
     @property
     def boxes(self) -> int:
@@ -277,7 +282,7 @@ def build_label(provenance: dict) -> str:
 
 def _check_case(case: Case) -> None:
     """All samples of a case must have seen the same boxes and have found the same pairs."""
-    for name in ("boxes", "pairs_total", "pair_hash", "input"):
+    for name in ("boxes", "pairs_total", "pair_hash"):
         values = {
             str(sample.case.get(name)) for sample in case.samples if sample.case.get("steps") == case.facts["steps"]
         }
@@ -286,6 +291,11 @@ def _check_case(case: Case) -> None:
                 f"{case.samples[0].path}: samples of {case.finder} on {case.scene} differ in {name}: "
                 f"{', '.join(sorted(values))}; they are of different scenes and cannot be merged"
             )
+    if len({making_of(_settings(str(sample.case.get("input", "")))) for sample in case.samples}) > 1:
+        raise ResultError(
+            f"{case.samples[0].path}: samples of {case.finder} on {case.scene} are of boxes that were made with "
+            "different settings (case/input) and cannot be merged"
+        )
 
 
 def _per_box(sample: Sample, seconds: np.ndarray) -> float:

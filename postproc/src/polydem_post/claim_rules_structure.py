@@ -18,7 +18,8 @@ from .statistics import number
     "no numbers",
     "elapsed time on the most threads of which there are processors: partitioned_sweep not faster than "
     "sort_and_sweep on one "
-    "thread; sort_and_sweep (two threads) and quadtree at least 1.2 times as fast as themselves on one; intervals included",
+    "thread; sort_and_sweep (two threads) and quadtree at least 1.2 times as fast as themselves on one; intervals "
+    "included",
     "speed_up",
 )
 def parallel(bench: Bench) -> Finding:

@@ -38,7 +38,8 @@ def _pairs(bench: Bench, upper: str = TREE, lower: str = SWEEP, mode: str = "rep
     "C1",
     "Both algorithms are O(N) per step",
     "slopes 0.992 (sweep), 0.994 (tree)",
-    "both slopes within 1.00 +- 0.05, intervals included; if not, the exponents of the counted operations say whether work or memory grows",
+    "both slopes within 1.00 +- 0.05, intervals included; if not, "
+    "the exponents of the counted operations say whether work or memory grows",
     "figure_09_total, finders_over_size",
 )
 def linear(bench: Bench) -> Finding:
@@ -118,7 +119,8 @@ def update_ratio(bench: Bench) -> Finding:
     "C4",
     "Most of the time of the tree goes into the list of pairs",
     "about 80 %",
-    "share of search, filter, order and merge within 0.7 to 0.9, interval included, geometric mean over the drums of the "
+    "share of search, filter, order and merge within 0.7 to 0.9, interval included, geometric mean over the drums "
+    "of the "
     "paper's sizes",
     "phases",
 )
@@ -172,7 +174,7 @@ def memory(bench: Bench) -> Finding:
         raise Missing("the same bench on a second machine, and give both folders")
     times = {
         machine: {
-            (case.boxes, str(case.facts.get("input"))): of_one_bench(case.time())
+            (case.boxes, case.making): of_one_bench(case.time())
             for case in series.over_size(bench.on(machine), TREE)
             if case.time()
         }
@@ -198,7 +200,8 @@ def memory(bench: Bench) -> Finding:
     ratios = [ratio_of_means(*([times[each][drum] for drum in shared] for each in pair)) for pair in pairs]
     wins = [ratio.below(1.0) for ratio in ratios]
     told = ", ".join(f"{a} / {b} {ratio.text()}" for (a, b), ratio in zip(pairs, ratios))
-    return Finding(of_parts(wins), ours, f"The lower clock won in {wins.count(True)} of {len(pairs)} comparisons: {told}.")
+    won = f"{wins.count(True)} of {len(pairs)}"
+    return Finding(of_parts(wins), ours, f"The lower clock won in {won} comparisons: {told}.")
 
 
 @claim(
@@ -226,7 +229,8 @@ def caches(bench: Bench) -> Finding:
         rise = ratio_of_medians(above, below)
         rises.append(rise.at_least(1.1))
         found.append(
-            f"{name}: {inside[-1].boxes} boxes {median(below).text()}, {beyond[-1].boxes} boxes {median(above).text()} ns "
+            f"{name}: {inside[-1].boxes} boxes {median(below).text()}, {beyond[-1].boxes} boxes "
+            f"{median(above).text()} ns "
             f"per test, ratio {rise.text()}"
         )
     if not found:

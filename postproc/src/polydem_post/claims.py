@@ -137,7 +137,8 @@ def claims_document(bench: Bench) -> str:
         f"Verdicts are of {'; '.join(main.named('machine'))}, build {'; '.join(main.named('build'))}, if a rule "
         "does not "
         "compare machines or builds. Intervals: 95 %, over repeats on this machine. Confirmed: the whole interval is "
-        "within the rule; contradicted: all of it is outside; else undecided. Of several parts: confirmed or contradicted "
+        "within the rule; contradicted: all of it is outside; else undecided. Of several parts: confirmed or "
+        "contradicted "
         "if all parts are, confirmed in part if some are confirmed and some contradicted, undecided if undecided parts "
         "could change the verdict. What a scene is follows from the settings recorded with its samples"
         + _left_out(main),

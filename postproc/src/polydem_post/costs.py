@@ -226,7 +226,8 @@ def read_samples(path: Path) -> list[Sample]:
         if each.kind not in ("time", "memory", "count") or each.model not in {model.name for model in MODELS}:
             raise ResultError(f"{path}: line {number_of_line}: there is no model {each.model!r} or kind {each.kind!r}")
         if min(each.bodies, each.steps, each.threads) < 1 or each.step <= 0.0:
-            raise ResultError(f"{path}: line {number_of_line}: bodies, steps, threads and time of a step must be above 0")
+            raise ResultError(f"{path}: line {number_of_line}: bodies, steps, threads and time of a step must be "
+                              f"above 0")
     return samples
 
 

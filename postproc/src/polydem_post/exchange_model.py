@@ -145,10 +145,10 @@ def read_counts(paths) -> list[Count]:
     for path in map(Path, paths):
         counts += read_records(path, Count, "count_exchange")
         for count in counts:
-            numbers = (count.margin, count.grains_most, count.ghosts, count.ghosts_most, count.messages, count.messages_most,
-                       count.bytes, count.bytes_most, count.rectangles)
+            numbers = [value for value in vars(count).values() if not isinstance(value, str)]
             if count.grains < 1 or count.ranks < 1 or min(numbers) < 0:
-                raise ResultError(f"{path}: is not a file of count_exchange, or was damaged: a count is negative, or there "
+                raise ResultError(f"{path}: is not a file of count_exchange, or was damaged: a count is negative, "
+                                  f"or there "
                                   "are no grains or ranks")
     if not counts:
         raise ResultError("there are no counts: give runs of several ranks or files of count_exchange")

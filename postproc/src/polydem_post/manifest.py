@@ -74,7 +74,8 @@ def read_manifest(folder: Path) -> Manifest | None:
         text, _, stated = line.rpartition(b" ")
         previous = line_hash(previous, text)
         if stated != f"{previous:016x}".encode():
-            raise ManifestError(f"line {number} of {MANIFEST} is not what was written: it was changed or lines are missing")
+            raise ManifestError(f"line {number} of {MANIFEST} is not what was written: it was changed or lines are "
+                                f"missing")
         _apply(manifest, text.decode("utf-8", errors="replace"), number)
     return manifest
 
@@ -83,7 +84,8 @@ def _apply(manifest: Manifest, text: str, number: int) -> None:
     """Enter a line."""
     if number == 1:
         if text != HEADING:
-            raise ManifestError(f"{MANIFEST} begins with {text!r}, not {HEADING!r}; a newer version may have written it")
+            raise ManifestError(f"{MANIFEST} begins with {text!r}, not {HEADING!r}; a newer version may have "
+                                f"written it")
         return
     words = text.split(" ")
     known = re.fullmatch(r"owns \S+|removed \S+|closed \S+ \d+ [0-9a-f]{16}( \d+ -?\d+ -?\d+)?", text)
@@ -108,7 +110,8 @@ def check_bytes(folder: Path, names: list, manifest: Manifest) -> None:
             raise ManifestError(f"{name} is missing, but {MANIFEST} has it ({error.strerror})") from error
         expected = manifest.closed[name].bytes
         if size != expected:
-            raise ManifestError(f"{name} has {size} bytes, but had {expected} when it was closed: it was cut, extended or "
+            raise ManifestError(f"{name} has {size} bytes, but had {expected} when it was closed: it was cut, "
+                                f"extended or "
                                 "exchanged")
 
 

@@ -32,8 +32,8 @@ def write_precision_report(folder: Path, figures: bool = True) -> list[Path]:
             written += _write_figures(study, output / "figures")
         page = output / "workprecision.md"
         shown = [table for table in tables if table.name.removeprefix("workprecision_") in ON_THE_PAGE]
-        page.write_text(f"## Speed against error\n\n{origin}\n\n" + "\n".join(table.document("markdown") for table in shown),
-                        encoding="utf-8")
+        documents = "\n".join(table.document("markdown") for table in shown)
+        page.write_text(f"## Speed against error\n\n{origin}\n\n{documents}", encoding="utf-8")
     except OSError as error:
         raise ResultError(f"{output}: cannot be written ({error})") from error
     return [*written, page]

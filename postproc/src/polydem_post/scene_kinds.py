@@ -19,6 +19,9 @@ OTHER = "other"
 #: Entries that scenes of one family may differ in: those that set the size, and when and how it was recorded
 SIZE_ENTRIES = re.compile(r"scene\.(boxes|bodies|radius|width)|integrate\.duration|output\..*|checkpoint\..*")
 
+#: Entries that decide neither over the boxes nor over when they are recorded
+REST_OF_ENTRIES = re.compile(r"integrate\.duration|output\.(?!trace_start$).*|checkpoint\..*")
+
 #: A bed whose boxes were recorded so long after the start has settled [s]
 SETTLED = 0.5
 
@@ -79,6 +82,11 @@ def kind_of(settings: dict) -> str:
 def family_of(settings: dict) -> tuple:
     """What scenes have in common that differ in their size alone."""
     return tuple(sorted((entry, value) for entry, value in settings.items() if not SIZE_ENTRIES.fullmatch(entry)))
+
+
+def making_of(settings: dict) -> tuple:
+    """What decides over the boxes of a scene: all settings but where its result lies and how long it runs."""
+    return tuple(sorted((entry, value) for entry, value in settings.items() if not REST_OF_ENTRIES.fullmatch(entry)))
 
 
 def _kind_of_gas(settings: dict) -> str:

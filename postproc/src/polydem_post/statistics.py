@@ -7,8 +7,8 @@ computed from each draw. With seven repeats the plain percentile interval of a m
 The tests of this module count the coverage.
 
 A question to an estimate (is it within these bounds, above that one?) has three answers: True if its whole interval is
-inside, False if its whole interval is outside, and None, undecided, if the interval lies on both sides of a bound, or if
-there is none since something was measured once only. So noise can pass no rule and fail none.
+inside, False if its whole interval is outside, and None, undecided, if the interval lies on both sides of a bound, or
+if there is none since something was measured once only. So noise can pass no rule and fail none.
 
 The intervals tell how much a measurement would change if it were repeated on this machine. They know nothing of
 other machines, and that of a slope nothing of how well a power law fits.

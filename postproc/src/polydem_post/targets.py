@@ -53,5 +53,7 @@ def targets(bench: Bench) -> Table:
             word(law.exponent.within(1.0 - TOLERANCE, 1.0 + TOLERANCE)),
             "-",
         )
-    table.note = "Reached: yes if the whole interval is within the target, no if it is outside altogether, else undecided."
+    table.note = (
+        "Reached: yes if the whole interval is within the target, no if it is outside altogether, else undecided."
+    )
     return table

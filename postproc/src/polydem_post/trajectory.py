@@ -24,7 +24,17 @@ SEGMENT_NAME = re.compile(r"trajectory_(\d{4,})\.h5(\.open)?")
 OPEN_SUFFIX = ".open"
 
 #: What h5py and numpy raise for files that are incomplete or not what they should be
-UNREADABLE = (OSError, KeyError, RuntimeError, ValueError, TypeError, IndexError, AttributeError, OverflowError, MemoryError)
+UNREADABLE = (
+    OSError,
+    KeyError,
+    RuntimeError,
+    ValueError,
+    TypeError,
+    IndexError,
+    AttributeError,
+    OverflowError,
+    MemoryError,
+)
 
 #: Segments are compared with their hashes as they are needed, with those that follow up to so many bytes: many at once
 #: take hardly longer than one
@@ -129,8 +139,9 @@ class Trajectory:
     """The frames of a run, joined from the segments in a folder, or those of one segment.
 
     `times` and `steps` hold one entry per frame; frames are numbered from 0, negative numbers count from the end.
-    Names, sizes, numbers and steps of the segments are compared with the manifest of the result at once, all their bytes
-    when a segment is first used; `check=False` leaves that out. A result without a manifest is read with a warning.
+    Names, sizes, numbers and steps of the segments are compared with the manifest of the result at once, all their
+    bytes when a segment is first used; `check=False` leaves that out. A result without a manifest is read with a
+    warning.
     """
 
     def __init__(self, path, check: bool = True):
@@ -157,7 +168,8 @@ class Trajectory:
         try:
             self._manifest = read_manifest(self.folder)
             if self._manifest is None:
-                warnings.warn(f"{self.folder}: has no {MANIFEST}, since an older version made it; whether its files are "
+                warnings.warn(f"{self.folder}: has no {MANIFEST}, since an older version made it; whether its files "
+                              f"are "
                               "what was written is not known", NoManifest, stacklevel=3)
                 return
             _check_names(self._segments, self._manifest, whole)
@@ -168,7 +180,8 @@ class Trajectory:
             for segment in self._segments:
                 _check_steps(segment, self._manifest.closed.get(segment.name))
         except ManifestError as error:
-            raise ResultError(f"{self.folder}: {error}. The result is not what the run wrote: take it from a copy or run it "
+            raise ResultError(f"{self.folder}: {error}. The result is not what the run wrote: take it from a copy "
+                              f"or run it "
                               "again; Trajectory(..., check=False) reads it as it is") from error
         sizes = {segment.name: self._manifest.closed[segment.name].bytes
                  for segment in self._segments if segment.name in self._manifest.closed}
@@ -280,8 +293,8 @@ class Trajectory:
             profile = {name: group[name][:] for name in ("calls", "total", "least", "most")}
             profile["stage"] = [str(name) for name in group["stage"].asstr()[:]]
             n = len(profile["stage"])
-            _insist(self._profile_path, "profile", {name: profile[name] for name in ("calls", "total", "least", "most")},
-                    dict.fromkeys(("calls", "total", "least", "most"), (n,)), finite=False)
+            columns = {name: profile[name] for name in ("calls", "total", "least", "most")}
+            _insist(self._profile_path, "profile", columns, dict.fromkeys(columns, (n,)), finite=False)
             profile["seconds"] = float(group["seconds"][()])
             if "memory" in group:
                 profile["memory"] = int(group["memory"][()])
@@ -392,7 +405,8 @@ def _check_order(folder: Path, segments: list) -> None:
     for segment in segments:
         steps = segment.steps
         if len(steps) and (np.any(np.diff(steps) <= 0) or (last is not None and steps[0] <= last)):
-            raise ResultError(f"{segment.path}: its steps do not ascend from those of the segment before it; the segments "
+            raise ResultError(f"{segment.path}: its steps do not ascend from those of the segment before it; the "
+                              f"segments "
                               "are of different runs, or were exchanged")
         last = steps[-1] if len(steps) else last
 
@@ -412,8 +426,8 @@ def _insist(path: Path, group: str, arrays: dict, shapes: dict, finite: bool = T
 def _sound_frame(path: Path, frame: Frame) -> Frame:
     """The frame, if its arrays fit together."""
     n, vertices = len(np.atleast_1d(frame.id)), len(np.atleast_1d(frame.shape))
-    arrays = {name: getattr(frame, name) for name in ("id", "fixed", "position", "angle", "velocity", "angular_velocity",
-                                                      "shape", "vertex_start")}
+    names = ("id", "fixed", "position", "angle", "velocity", "angular_velocity", "shape", "vertex_start")
+    arrays = {name: getattr(frame, name) for name in names}
     shapes = {"position": (n, 2), "velocity": (n, 2), "shape": (vertices, 2), "vertex_start": (n + 1,)}
     _insist(path, "frame", arrays, {name: shapes.get(name, (n,)) for name in arrays})
     start = frame.vertex_start
@@ -543,7 +557,8 @@ def insist_on_own_data(path: Path, file: h5py.File) -> None:
             if isinstance(entry, h5py.Group):
                 waiting.append((entry, f"{place}/{name}", depth + 1))
             elif isinstance(entry, h5py.Dataset) and (entry.is_virtual or entry.external):
-                raise ResultError(f"{path}: the data of {place}/{name} lie in other files; polydem writes no such files")
+                raise ResultError(f"{path}: the data of {place}/{name} lie in other files; polydem writes no such "
+                                  f"files")
 
 
 def _open_hdf5(path: Path) -> h5py.File:
