@@ -16,7 +16,6 @@ module polydem_run
       n_checkpoints
    use polydem_recorder, only: check_recording
    use polydem_resume, only: clear_surplus, find_finished, go_on, look_back
-   use polydem_run_lock, only: lock_result, unlock_result
    use polydem_share_scene, only: check_team, share_scene, sharer_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: advance, new_simulation
@@ -44,7 +43,6 @@ contains
       !> Processes that run it, of which only the leader writes anything but shared files; this one alone if absent
       class(team_t), intent(in), optional :: team
       type(run_t) :: run
-      logical :: is_locked
       integer(lp) :: finished(1)
       character(len=:), allocatable :: last_state
 
@@ -63,32 +61,28 @@ contains
          if (run%team%leads()) call tell_finished(run%folder, last_state)
          return
       end if
-      is_locked = .false.
       call check_team(settings, run%team, error)
-      if (run%team%leads() .and. .not. allocated(error)) call begin(settings, force, run, is_locked, error)
+      if (run%team%leads() .and. .not. allocated(error)) call begin(settings, force, run, error)
       call run%team%agree(error)
+      if (.not. (run%team%leads() .or. allocated(error))) call run%lock%join(run%folder)
       if (.not. allocated(error)) call join(settings, run, error)
       if (.not. allocated(error)) call go(run, error)
-      if (is_locked) call unlock_result(run%folder)
+      call run%lock%release()
    end subroutine run_simulation
 
    !> What the leader does alone: the scene, the folder, and what former attempts left there.
-   subroutine begin(settings, force, run, is_locked, error)
+   subroutine begin(settings, force, run, error)
       type(settings_t), intent(in) :: settings
       logical, intent(in) :: force
       type(run_t), intent(inout) :: run
-      !> Whether the folder is locked
-      logical, intent(inout) :: is_locked
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: note
 
       call check_free(run, force, error)
       if (.not. allocated(error)) call new_simulation(settings, run%simulation, error)
       if (.not. allocated(error)) call make_folder(run%folder, error)
-      if (.not. allocated(error)) call lock_result(run%folder, note, error)
-      if (allocated(error)) return
-      is_locked = .true.
-      call prepare(settings, force, note, run, error)
+      if (.not. allocated(error)) call run%lock%acquire(run%folder, note, error, run%team%size > 1_ip)
+      if (.not. allocated(error)) call prepare(settings, force, note, run, error)
    end subroutine begin
 
    !> Let all processes know what the leader knows, and open what they write together.
@@ -163,17 +157,22 @@ contains
       !> Whether a checkpoint is due, and whether the run must end after it
       logical, intent(out) :: is_due, must_stop
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp) :: flags(3)
+      integer(lp) :: flags(4)
 
       is_due = .false.
-      if (run%team%leads()) call run%checkpoints%look(run%simulation%step, is_due, run%reason)
+      if (run%team%leads()) then
+         call run%checkpoints%look(run%simulation%step, is_due, run%reason)
+         call run%lock%check(run%has_lost_folder, error)
+      end if
       must_stop = allocated(run%reason)
       if (run%team%size == 1_ip) return
-      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), run%simulation%guard%warning%count]
+      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), run%simulation%guard%warning%count, &
+               merge(1_lp, 0_lp, run%has_lost_folder)]
       call run%team%agree(error, flags)
       is_due = flags(1) == 1_lp
       must_stop = flags(2) == 1_lp
       run%simulation%guard%warning%count = flags(3)
+      run%has_lost_folder = flags(4) == 1_lp
       call run%simulation%timers%lap(stage_exchange)
    end subroutine agree_on_step
 

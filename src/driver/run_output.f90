@@ -18,6 +18,7 @@ module polydem_run_output
    use polydem_provenance, only: provenance_t
    use polydem_recorder, only: recorder_t
    use polydem_resume, only: past_t
+   use polydem_run_lock, only: run_lock_t
    use polydem_simulation, only: report_counters, simulation_t, time_of
    use polydem_strings, only: to_text
    use polydem_team, only: team_t
@@ -72,6 +73,10 @@ module polydem_run_output
       type(balance_t) :: balance
       !> Folder of the result
       character(len=:), allocatable :: folder
+      !> Its lock, which the leader holds
+      type(run_lock_t) :: lock
+      !> Whether another run has taken the folder over; the same on all processes
+      logical :: has_lost_folder = .false.
       !> Steps between two frames, 0 for none
       integer(lp) :: frame_steps = 0_lp
       !> Steps between two lines of the log
@@ -152,7 +157,8 @@ contains
       call write_frame(run, error)
    end subroutine write_last_frame
 
-   !> Close the trajectory, write the profile and the end of the log, also after a failure.
+   !> Close the trajectory, write the profile and the end of the log, also after a failure; nothing if the folder
+   !> belongs to another run now.
    subroutine finish(run, seconds, error)
       !> The run
       type(run_t), intent(inout) :: run
@@ -165,6 +171,7 @@ contains
       character(len=:), allocatable :: status
       integer(lp) :: hash, memory
 
+      if (run%has_lost_folder) return
       memory = resident_memory()
       status = 'finished'
       if (allocated(error)) status = error%message
