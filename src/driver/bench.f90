@@ -23,7 +23,7 @@ module polydem_bench
    use polydem_reference_file, only: read_reference, write_reference
    use polydem_replay, only: sample_path
    use polydem_result_folder, only: default_folder
-   use polydem_run_lock, only: lock_result, unlock_result
+   use polydem_run_lock, only: run_lock_t
    use polydem_sample_file, only: sample_t, write_sample
    use polydem_strings, only: to_text
    use polydem_work, only: count_names, phase_names
@@ -40,6 +40,8 @@ module polydem_bench
       type(bench_settings_t) :: settings
       !> Folder of traces, expected lists and samples
       character(len=:), allocatable :: folder
+      !> Lock of the folder
+      type(run_lock_t) :: lock
       !> Screen
       type(log_t) :: log
       !> Threads for all that is not timed
@@ -67,13 +69,13 @@ contains
       bench%n_samples = size(settings%scenes)*size(settings%finders)*size(settings%threads)*(settings%repeats + 1)
       call read_scenes(bench, scenes, first_runs, error)
       if (.not. allocated(error)) call make_folder(bench%folder, error)
-      if (.not. allocated(error)) call lock_result(bench%folder, note, error)
+      if (.not. allocated(error)) call bench%lock%acquire(bench%folder, note, error)
       if (allocated(error)) return
       call bench%log%open('', error)
       if (allocated(note)) call bench%log%write_line(note)
       call write_warnings(bench)
       call measure_all(bench, scenes, first_runs, error)
-      call unlock_result(bench%folder)
+      call bench%lock%release()
       call bench%log%close(error)
    end subroutine run_bench
 
@@ -211,6 +213,7 @@ contains
       type(sample_t) :: sample
       type(provenance_t) :: provenance
       character(len=:), allocatable :: path
+      logical :: is_lost
 
       sample%case = subject%case
       call omp_set_num_threads(int(sample%case%threads))
@@ -222,6 +225,7 @@ contains
          return
       end if
       call take_sample(subject, reference, sample, error)
+      call bench%lock%check(is_lost, error)
       if (allocated(error)) return
       call write_sample(path, sample, phase_names, count_names, provenance, error)
       if (allocated(error)) return

@@ -21,7 +21,6 @@ module polydem_run
    use polydem_result_folder, only: checkpoint_path, default_folder, n_checkpoints, name_in, overlaps_path, profile_path
    use polydem_recorder, only: check_recording
    use polydem_resume, only: clear_surplus, find_finished, go_on, look_back
-   use polydem_run_lock, only: lock_result, unlock_result
    use polydem_share_scene, only: check_team, share_scene, sharer_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: advance, new_simulation
@@ -49,7 +48,6 @@ contains
       !> Processes that run it, of which only the leader writes anything but shared files; this one alone if absent
       class(team_t), intent(in), optional :: team
       type(run_t) :: run
-      logical :: is_locked
       character(len=:), allocatable :: last_state
 
       run%began = wall_seconds()
@@ -57,23 +55,23 @@ contains
       if (present(team)) allocate (run%team, source=team)
       if (.not. allocated(run%team)) allocate (lone_team_t :: run%team)
       run%folder = result_folder(settings)
-      is_locked = .false.
       if (run%team%leads() .and. run%attempt%continues) call look_for_end(settings, run, last_state, error)
       if (is_over(run, last_state)) return
       run%crowding = crowding(run%team)
       call check_team(settings, run%team, error)
-      if (run%team%leads() .and. .not. allocated(error)) call begin(settings, force, run, is_locked, last_state, error)
+      if (run%team%leads() .and. .not. allocated(error)) call begin(settings, force, run, last_state, error)
       call run%team%agree(error)
       if (.not. allocated(error)) then
          if (is_over(run, last_state)) then
-            if (is_locked) call unlock_result(run%folder)
+            call run%lock%release()
             return
          end if
+         if (.not. run%team%leads()) call run%lock%join(run%folder)
       end if
       if (.not. allocated(error)) call join(settings, run, error)
       if (.not. allocated(error)) call go(run, error)
-      if (is_locked .and. allocated(error)) call undo_replacement(run%folder)
-      if (is_locked) call unlock_result(run%folder)
+      if (run%lock%is_held() .and. allocated(error) .and. .not. run%has_lost_folder) call undo_replacement(run%folder)
+      call run%lock%release()
    end subroutine run_simulation
 
    !> Look whether there is nothing left to do, without changing anything.
@@ -121,12 +119,10 @@ contains
    end function is_over
 
    !> What the leader does alone: the scene, the folder, and what former attempts left there.
-   subroutine begin(settings, force, run, is_locked, last_state, error)
+   subroutine begin(settings, force, run, last_state, error)
       type(settings_t), intent(in) :: settings
       logical, intent(in) :: force
       type(run_t), intent(inout) :: run
-      !> Whether the folder is locked
-      logical, intent(inout) :: is_locked
       !> Hash of the last state, if it turns out that the run is finished
       character(len=:), allocatable, intent(inout) :: last_state
       type(error_t), allocatable, intent(inout) :: error
@@ -135,10 +131,9 @@ contains
       call check_wanted(run, force, error)
       if (.not. allocated(error)) call build_scene(settings, run, error)
       if (.not. allocated(error)) call make_folder(run%folder, error)
-      if (.not. allocated(error)) call lock_result(run%folder, note, error)
+      if (.not. allocated(error)) call run%lock%acquire(run%folder, note, error, run%team%size > 1_ip)
+      if (.not. allocated(error)) call recover(run%folder, restored, error)
       if (allocated(error)) return
-      is_locked = .true.
-      call recover(run%folder, restored, error)
       if (allocated(restored)) call say(restored)
       if (allocated(restored) .and. run%attempt%continues) call look_for_end(settings, run, last_state, error)
       if (.not. allocated(last_state) .and. .not. allocated(error)) call prepare(settings, force, note, run, error)
@@ -219,17 +214,22 @@ contains
       !> Whether a checkpoint is due, and whether the run must end after it
       logical, intent(out) :: is_due, must_stop
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp) :: flags(5)
+      integer(lp) :: flags(6)
 
       is_due = .false.
-      if (run%team%leads()) call run%checkpoints%look(run%simulation%step, is_due, run%reason)
+      if (run%team%leads()) then
+         call run%checkpoints%look(run%simulation%step, is_due, run%reason)
+         call run%lock%check(run%has_lost_folder, error)
+      end if
       must_stop = allocated(run%reason)
       if (run%team%size == 1_ip) return
-      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), warning_counts(run%watch, run%simulation)]
+      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), merge(1_lp, 0_lp, run%has_lost_folder), &
+               warning_counts(run%watch, run%simulation)]
       call run%team%agree(error, flags)
       is_due = flags(1) == 1_lp
       must_stop = flags(2) == 1_lp
-      call set_warning_counts(run%watch, run%simulation, flags(3:))
+      run%has_lost_folder = flags(3) == 1_lp
+      call set_warning_counts(run%watch, run%simulation, flags(4:))
       call run%simulation%timers%lap(stage_exchange)
    end subroutine agree_on_step
 

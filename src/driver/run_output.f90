@@ -20,6 +20,7 @@ module polydem_run_output
    use polydem_recorder, only: recorder_t
    use polydem_result_folder, only: profile_path
    use polydem_resume, only: past_t
+   use polydem_run_lock, only: run_lock_t
    use polydem_simulation, only: report_counters, simulation_t, time_of
    use polydem_strings, only: to_text
    use polydem_team, only: team_t
@@ -78,6 +79,10 @@ module polydem_run_output
       character(len=:), allocatable :: folder
       !> List of its files, kept by the leader
       type(manifest_t) :: manifest
+      !> Its lock, which the leader holds
+      type(run_lock_t) :: lock
+      !> Whether another run has taken the folder over; the same on all processes
+      logical :: has_lost_folder = .false.
       !> Steps between two frames, 0 for none
       integer(lp) :: frame_steps = 0_lp
       !> Steps between two lines of the log
@@ -161,7 +166,8 @@ contains
       call write_frame(run, error)
    end subroutine write_last_frame
 
-   !> Close the trajectory, write the profile and the end of the log, also after a failure.
+   !> Close the trajectory, write the profile and the end of the log, also after a failure; nothing if the folder
+   !> belongs to another run now.
    subroutine finish(run, seconds, error)
       !> The run
       type(run_t), intent(inout) :: run
@@ -174,6 +180,7 @@ contains
       character(len=:), allocatable :: status
       integer(lp) :: hash, memory
 
+      if (run%has_lost_folder) return
       memory = resident_memory()
       status = 'finished'
       if (allocated(error)) status = error%message

@@ -68,8 +68,9 @@ contains
       if (.not. allocated(error)) call read_polygons(path, file, trace, error)
       if (.not. allocated(error)) call file%read_real_attribute('/', 'dt', trace%dt, error)
       trace%input = ''
-      if (.not. allocated(error) .and. file%has('/provenance/resolved_input')) call file%read( &
-         '/provenance/resolved_input', trace%input, error)
+      if (.not. allocated(error)) then
+         if (file%has('/provenance/resolved_input')) call file%read('/provenance/resolved_input', trace%input, error)
+      end if
       if (.not. ieee_is_finite(trace%dt) .or. trace%dt < 0.0_dp) call raise(error, input_error, path// &
          ': the attribute dt must be finite and not negative')
       if (allocated(error)) then

@@ -5,7 +5,7 @@ module polydem_machine
    implicit none
    private
    public :: host_name, processor_name, processor_clock, cache_sizes, memory_size, frequency_governor
-   public :: kernel_release, cores_online
+   public :: kernel_release, boot_identity, cores_online
    public :: load_average, environment, utc_now, terminal_watches, resident_memory
 
    interface
@@ -170,6 +170,14 @@ contains
       text = trim(first_line('/proc/sys/kernel/osrelease'))
       if (text == '') text = unknown
    end function kernel_release
+
+   !> Identity of the running kernel, another one after each start; '-' if unknown. Containers of a machine share it.
+   function boot_identity() result(text)
+      character(len=:), allocatable :: text
+
+      text = trim(first_line('/proc/sys/kernel/random/boot_id'))
+      if (text == '') text = '-'
+   end function boot_identity
 
    !> Processors that are switched on
    integer(ip) function cores_online()

@@ -97,19 +97,9 @@ def checkpoints_that_may_only_be_read_are_replaced(case, _):
     case.finish("protected")
 
 
-def a_run_that_ended_but_was_not_waited_for_holds_no_folder(case, _):
-    case.interrupt("zombie")
-    with subprocess.Popen(["true"]) as ended:
-        os.waitid(os.P_PID, ended.pid, os.WEXITED | os.WNOWAIT)
-        with open("zombie/running.lock", "w", encoding="utf-8") as file:
-            file.write(f"{ended.pid} {os.uname().nodename}\n")
-        output = case.finish("zombie")
-        assert f"of process {ended.pid}, which has ended" in output, output
-
-
 TESTS = (a_date_that_goes_back_changes_nothing, where_nothing_can_be_locked_the_way_out_is_told,
          a_file_that_another_program_holds_is_named_and_stays, a_folder_that_may_only_be_read_stays_as_it_is,
-         checkpoints_that_may_only_be_read_are_replaced, a_run_that_ended_but_was_not_waited_for_holds_no_folder)
+         checkpoints_that_may_only_be_read_are_replaced)
 
 
 def main():

@@ -111,6 +111,38 @@ def test_a_killed_rank_ends_the_run_which_goes_on_from_its_last_checkpoint(whole
             finish(whole, folder, chance.choice((None, 1, 2, 3)))
 
 
+def test_ranks_that_outlive_their_leader_keep_others_out(whole, tmp_path):
+    folder = tmp_path / "result"
+    process = start(whole / "scene.nml", folder, 3, 1, ("--continue", *OPTIONS))
+    wait_for(lambda: newest(folder) > 0, process)
+    leader = int(folder.joinpath("running.lock").read_text(encoding="utf-8").split()[0])
+    assert leader in ranks_of(process)
+    # Nobody ends the other ranks as long as mpirun stands still.
+    process.send_signal(signal.SIGSTOP)
+    try:
+        os.kill(leader, signal.SIGKILL)
+        words = [SERIAL, "run", str(whole / "scene.nml"), "--set", f"output.folder={folder}", "--continue", *OPTIONS]
+        end = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+        assert end.returncode == BAD_INPUT and f"another run (process {leader})" in end.stderr, end
+    finally:
+        process.send_signal(signal.SIGCONT)
+    process.communicate(timeout=60)
+    assert f"took over {folder}/running.lock of process {leader}, which has ended" in finish(whole, folder, None)
+
+
+def test_ranks_whose_folder_was_taken_over_end_and_write_nothing_more(whole, tmp_path):
+    folder = tmp_path / "result"
+    options = ("integrate.duration=1000", "checkpoint.steps=0", "output.frame_interval=0", "output.log_interval=900")
+    process = start(whole / "scene.nml", folder, 2, 1, [word for option in options for word in ("--set", option)])
+    wait_for(lambda: folder.joinpath("log.txt").exists() and "done" in folder.joinpath("log.txt").read_text(), process)
+    folder.joinpath("running.lock").unlink()
+    folder.joinpath("running.lock").write_text("1 far.away\nkey 0123456789abcdef\n", encoding="utf-8")
+    before = {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix != ".open"}
+    _, message = process.communicate(timeout=60)
+    assert process.returncode == NO_FILE and message.count("is gone or belongs to another run") == 1, message
+    assert {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix != ".open"} == before
+
+
 @pytest.mark.parametrize("number", (signal.SIGKILL, signal.SIGTERM))
 def test_without_mpirun_the_ranks_end_and_leave_a_good_checkpoint(number, whole, tmp_path):
     folder = tmp_path / "result"
