@@ -54,8 +54,8 @@ contains
       if (.not. allocated(error)) call file%join(path, error)
    end subroutine share_file
 
-   !> Reserve room for what processes are going to write together; collective. A process that finds the disk full would
-   !> return from HDF5 with an error, while the others wait for it there for ever.
+   !> Reserve room for what processes are going to write together; collective. So a full disk is found before, and the
+   !> run ends in order; a process that finds it full while all write can only end all at once.
    subroutine keep_room(team, path, bytes, error)
       !> Processes; if there is one only, nothing happens
       class(team_t), intent(inout) :: team
