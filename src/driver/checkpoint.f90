@@ -19,6 +19,7 @@ module polydem_checkpoint
    use polydem_simulation, only: collect_counts, simulation_t
    use polydem_strings, only: to_text
    use polydem_team, only: team_t
+   use polydem_time_limit, only: time_limit_t
    use polydem_wall_forces, only: complete_wall_forces
    use polydem_watch, only: watch_t
    implicit none
@@ -127,15 +128,18 @@ contains
       !> Why it could not be written; the last two are as they were
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
+      type(time_limit_t) :: limit
       real(dp) :: began
 
       began = wall_seconds()
+      if (team%size > 1_ip) call limit%set(checkpoint_path(folder, self%next), team%rank, room_for(simulation))
       call file%create(checkpoint_path(folder, self%next), provenance, team, room_for(simulation))
       if (.not. allocated(file%error)) call lay_out_rows(team, simulation, file)
       call complete_wall_forces(team, simulation%bodies, simulation%contacts)
       call collect_counts(simulation)
       call keep_run(file, simulation, history, watch)
       call file%complete(error)
+      call limit%lift()
       if (allocated(error)) return
       self%last_step = simulation%step
       self%next = modulo(self%next, n_checkpoints) + 1_ip

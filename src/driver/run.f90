@@ -208,7 +208,7 @@ contains
       call finish(run, run%history%seconds + (wall_seconds() - run%began), error)
    end subroutine go
 
-   !> Let all processes know how the step went, and what the clock and the signals of the leader say.
+   !> Let all processes know how the step went, and what the clock, the signals and the log of the leader say.
    subroutine agree_on_step(run, is_due, must_stop, error)
       type(run_t), intent(inout) :: run
       !> Whether a checkpoint is due, and whether the run must end after it
@@ -222,6 +222,7 @@ contains
          call run%lock%check(run%has_lost_folder, error)
       end if
       must_stop = allocated(run%reason)
+      call run%log%check(error)
       if (run%team%size == 1_ip) return
       flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), merge(1_lp, 0_lp, run%has_lost_folder), &
                warning_counts(run%watch, run%simulation)]

@@ -4,12 +4,12 @@ module polydem_hdf5_handle
       h5fflush_f, h5fis_hdf5_f, h5fopen_f, h5p_file_access_f, h5p_file_create_f, h5pclose_f, h5pcreate_f, &
       h5pset_userblock_f, hid_t, hsize_t
    use polydem_errors, only: error_t, input_error, io_error, raise
-   use polydem_hdf5_access, only: access_together, fails_anywhere
+   use polydem_hdf5_access, only: access_together, await_all, give_up
    use polydem_hdf5_claim, only: believable_shape
    use polydem_hdf5_dataset, only: has_link, start_library
    use polydem_hdf5_place, only: place_t
    use polydem_kinds, only: ip, lp
-   use polydem_paths, only: disk_hint, exists, is_folder
+   use polydem_paths, only: check_access, disk_hint, exists, is_folder
    implicit none
    private
    public :: hdf5_handle_t
@@ -35,7 +35,7 @@ module polydem_hdf5_handle
       procedure :: has
       procedure :: shape_of
       procedure :: place_of
-      procedure, private :: fails
+      procedure, private :: check
    end type hdf5_handle_t
 
    !> What to try if a file cannot be opened although it is there
@@ -75,7 +75,7 @@ contains
    end subroutine create
 
    !> Open a file that one process created and closed, so that all processes of the run write to it. Until it is closed,
-   !> all must make the same calls in the same order; of a failure all know.
+   !> all must make the same calls in the same order. A process that fails ends them all.
    subroutine join(self, path, error)
       class(hdf5_handle_t), intent(inout) :: self
       !> Path of the file
@@ -87,17 +87,16 @@ contains
 
       call start_library(error)
       if (allocated(error)) return
+      ! Open MPI waits for ever for a process that cannot open the file.
+      call check_access(path, error)
+      if (allocated(error)) call give_up(error%message//'; all ranks must see the same folder')
       self%path = path
       self%together = .true.
       call h5pcreate_f(h5p_file_access_f, properties, status)
-      if (status >= 0) call access_together(properties, status)
+      if (status >= 0) call access_together(properties, path, status)
       if (status >= 0) call h5fopen_f(path, h5f_acc_rdwr_f, self%id, status, access_prp=properties)
       call h5pclose_f(properties, ignored)
-      if (fails_anywhere(status < 0)) then
-         self%id = -1_hid_t
-         call raise(error, io_error, path//': cannot be opened by all processes; do all see the same folder?'// &
-                    locking_hint)
-      end if
+      call self%check(status, 'cannot be opened by all processes, which must see the same folder'//locking_hint, error)
    end subroutine join
 
    !> Open a file for reading.
@@ -141,7 +140,7 @@ contains
       integer :: status
 
       call h5fflush_f(self%id, h5f_scope_global_f, status)
-      if (self%fails(status)) call raise(error, io_error, self%path//': cannot be flushed')
+      call self%check(status, 'cannot be flushed', error)
    end subroutine flush_file
 
    !> Close the file; nothing happens if it is closed. A file that cannot be closed is given up.
@@ -149,26 +148,36 @@ contains
       class(hdf5_handle_t), intent(inout) :: self
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: failure
       integer :: status
 
       if (self%id < 0_hid_t) return
+      ! MPI-IO does not tell if a file cannot be closed, but it does if a process cannot bring to disk what it wrote.
+      if (self%together) call self%flush(failure)
       call h5fclose_f(self%id, status)
-      if (self%fails(status)) then
-         call raise(error, io_error, self%path//': cannot be closed')
-         call self%abandon(error)
+      call self%check(status, 'cannot be closed', failure)
+      if (self%together) call await_all()
+      if (allocated(failure)) then
+         call self%abandon(failure)
+         if (.not. allocated(error)) call move_alloc(failure, error)
       end if
       self%id = -1_hid_t
    end subroutine close_file
 
-   !> Whether a call of HDF5 failed; if the file is written together, on any process
-   logical function fails(self, status)
+   !> Turn a failed status of HDF5 into an error; if the file is written together, end all processes.
+   subroutine check(self, status, problem, error)
       class(hdf5_handle_t), intent(in) :: self
       !> Status of the call on this process
       integer, intent(in) :: status
+      !> What is wrong if it is negative
+      character(len=*), intent(in) :: problem
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
 
-      fails = status < 0
-      if (self%together) fails = fails_anywhere(fails)
-   end function fails
+      if (status >= 0) return
+      if (self%together) call give_up(self%path//': '//problem)
+      call raise(error, io_error, self%path//': '//problem)
+   end subroutine check
 
    !> Give up a file that could not be written, and say in the message what to do. The file is not closed, since HDF5
    !> would try to write it again, and might crash; the operating system closes it when the program ends.

@@ -2,6 +2,7 @@
 module polydem_hdf5_place
    use hdf5, only: hid_t
    use polydem_errors, only: error_t, io_error, raise
+   use polydem_hdf5_access, only: give_up
    implicit none
    private
    public :: place_t, expect
@@ -22,8 +23,9 @@ module polydem_hdf5_place
 
 contains
 
-   !> Turn a failed status of HDF5 into an error that names file and data set.
-   pure subroutine expect(status, action, place, error)
+   !> Turn a failed status of HDF5 into an error that names file and data set. If all processes write the file together,
+   !> it ends them all: the others may wait for this one.
+   subroutine expect(status, action, place, error)
       !> Status of an HDF5 call, negative on failure
       integer, intent(in) :: status
       !> What was tried, like 'write'
@@ -34,6 +36,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (status >= 0) return
+      if (place%together) call give_up(place%path//': cannot '//action//' '//place%name)
       call raise(error, io_error, place%path//': cannot '//action//' '//place%name)
    end subroutine expect
 

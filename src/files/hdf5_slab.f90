@@ -7,7 +7,7 @@ module polydem_hdf5_slab
    use hdf5, only: h5dget_space_f, h5dread_f, h5dwrite_f, h5p_dataset_xfer_f, h5pclose_f, h5pcreate_f, &
       h5s_select_set_f, h5sclose_f, h5screate_simple_f, h5sselect_hyperslab_f, h5sselect_none_f, hid_t, hsize_t
    use polydem_errors, only: error_t
-   use polydem_hdf5_access, only: fails_anywhere, transfer_together, writes_shared
+   use polydem_hdf5_access, only: transfer_together, writes_shared
    use polydem_hdf5_place, only: expect, place_t
    use polydem_kinds, only: lp
    implicit none
@@ -73,7 +73,7 @@ contains
       type(place_t), intent(in) :: place
       !> What to write, and where to
       type(slab_t), intent(in) :: slab
-      !> Allocated on failure on any process
+      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: file_space, memory_space, properties
       integer :: status, ignored
@@ -83,7 +83,6 @@ contains
       if (status >= 0 .and. place%together) call transfer_together(properties, status)
       if (status >= 0) call h5dwrite_f(dataset, kind_in_memory, slab%address, status, memory_space, file_space, &
                                        properties)
-      if (place%together) status = merge(-1, 0, fails_anywhere(status < 0))
       call expect(status, 'write', place, error)
       call h5pclose_f(properties, ignored)
       call h5sclose_f(file_space, ignored)

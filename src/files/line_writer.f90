@@ -26,6 +26,7 @@ module polydem_line_writer
       procedure :: open_errors
       procedure :: put
       procedure :: put_line
+      procedure :: check
       procedure :: close => close_writer
       procedure, private :: is_screen
    end type line_writer_t
@@ -157,6 +158,15 @@ contains
       call self%put(text//c_new_line)
    end subroutine put_line
 
+   !> Tell of a failed write while the file is open.
+   subroutine check(self, error)
+      class(line_writer_t), intent(in) :: self
+      !> Allocated if a text could not be written
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(self%failure)) call raise(error, io_error, self%name//': cannot be written: '//self%failure)
+   end subroutine check
+
    !> End the file; the screen stays open.
    subroutine close_writer(self, error)
       class(line_writer_t), intent(inout) :: self
@@ -168,7 +178,7 @@ contains
          if (c_close(self%descriptor) /= 0_c_int .and. .not. allocated(self%failure)) self%failure = last_failure()
       end if
       self%descriptor = -1_c_int
-      if (allocated(self%failure)) call raise(error, io_error, self%name//': cannot be written: '//self%failure)
+      call self%check(error)
    end subroutine close_writer
 
    !> Whether standard output or error is written to

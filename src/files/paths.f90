@@ -1,12 +1,12 @@
 !> Folders and files of the operating system (POSIX): make, rename, remove, reserve room, bring to disk.
 module polydem_paths
-   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_int64_t, c_null_char, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_int64_t, c_loc, c_null_char, c_ptr, c_size_t
    use polydem_errors, only: error_t, io_error, raise
    use polydem_kinds, only: lp
    implicit none
    private
-   public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_room, sync_file
-   public :: last_failure, failure_text, disk_hint
+   public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_room, sync_file, write_start
+   public :: check_access, last_failure, failure_text, disk_hint
 
    !> What to do if a file cannot be written
    character(len=*), parameter :: disk_hint = &
@@ -19,14 +19,14 @@ module polydem_paths
    integer(c_int), parameter :: may_read = 4_c_int
    !> O_RDONLY of open(2)
    integer(c_int), parameter :: read_only = 0_c_int
-   !> O_WRONLY of open(2)
-   integer(c_int), parameter :: write_only = 1_c_int
+   !> O_WRONLY and O_RDWR of open(2)
+   integer(c_int), parameter :: write_only = 1_c_int, read_and_write = 2_c_int
    !> FALLOC_FL_KEEP_SIZE of fallocate(2): the file does not get longer
    integer(c_int), parameter :: keep_size = 1_c_int
    !> SEEK_END of lseek(2)
    integer(c_int), parameter :: to_end = 2_c_int
-   !> ENOSPC and EDQUOT of errno on Linux: no room on the disk, or none of the share of the user
-   integer(c_int), parameter :: no_room(2) = [28_c_int, 122_c_int]
+   !> EIO, ENOSPC and EDQUOT of errno on Linux: a fault of the disk, no room on it, or none of the share of the user
+   integer(c_int), parameter :: no_room(3) = [5_c_int, 28_c_int, 122_c_int]
    !> Permissions of a new folder before umask: rwxrwxrwx
    integer(c_int), parameter :: all_permissions = int(o'777', c_int)
    !> Those of them that are the owner's
@@ -78,6 +78,14 @@ module polydem_paths
          character(kind=c_char), intent(in) :: path(*)
          integer(c_int), value :: flags
       end function c_open
+
+      !> POSIX write(2), whose ssize_t is as wide as size_t
+      integer(c_size_t) function c_write(descriptor, bytes, length) bind(C, name='write')
+         import :: c_int, c_ptr, c_size_t
+         integer(c_int), value :: descriptor
+         type(c_ptr), value :: bytes
+         integer(c_size_t), value :: length
+      end function c_write
 
       !> POSIX fsync(2)
       integer(c_int) function c_fsync(descriptor) bind(C, name='fsync')
@@ -233,7 +241,7 @@ contains
       integer(lp), intent(in) :: bytes
       !> Allocated if there is no room
       type(error_t), allocatable, intent(inout) :: error
-      integer(c_int) :: descriptor, ignored
+      integer(c_int) :: descriptor
       integer(c_int), pointer :: number
 
       descriptor = c_open(path//c_null_char, write_only)
@@ -246,8 +254,58 @@ contains
                       c_lseek(descriptor, 0_c_int64_t, to_end) + int(bytes, c_int64_t)) /= 0_c_int) then
          if (any(no_room == number)) call raise(error, io_error, path//': '//last_failure()//disk_hint)
       end if
-      ignored = c_close(descriptor)
+      if (c_close(descriptor) /= 0_c_int) call raise(error, io_error, path//': '//last_failure()//disk_hint)
    end subroutine reserve_room
+
+   !> See to it that a file can be opened to read and write.
+   subroutine check_access(path, error)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Allocated if it cannot
+      type(error_t), allocatable, intent(inout) :: error
+      integer(c_int) :: descriptor
+
+      descriptor = c_open(path//c_null_char, read_and_write)
+      if (descriptor >= 0_c_int) then
+         if (c_close(descriptor) == 0_c_int) return
+      end if
+      call raise(error, io_error, path//': cannot be opened: '//last_failure())
+   end subroutine check_access
+
+   !> Write a text over the first bytes of a file, and wait until it is on the disk. Every call is checked; Fortran
+   !> would not tell if what it wrote cannot be flushed.
+   subroutine write_start(path, text, error)
+      !> Path of the file, which must be there
+      character(len=*), intent(in) :: path
+      !> The text
+      character(len=*), intent(in) :: text
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      character(kind=c_char), target :: bytes(len(text))
+      character(len=:), allocatable :: reason
+      integer(c_int) :: descriptor
+      integer(c_size_t) :: written
+      integer :: k, n
+
+      do k = 1, len(text)
+         bytes(k) = text(k:k)
+      end do
+      descriptor = c_open(path//c_null_char, write_only)
+      if (descriptor < 0_c_int) reason = last_failure()
+      n = 0
+      do while (n < len(text) .and. .not. allocated(reason))
+         written = c_write(descriptor, c_loc(bytes(n + 1)), int(len(text) - n, c_size_t))
+         if (written <= 0_c_size_t) reason = last_failure()
+         n = n + int(written)
+      end do
+      if (.not. allocated(reason)) then
+         if (c_fsync(descriptor) /= 0_c_int) reason = last_failure()
+      end if
+      if (descriptor >= 0_c_int) then
+         if (c_close(descriptor) /= 0_c_int .and. .not. allocated(reason)) reason = last_failure()
+      end if
+      if (allocated(reason)) call raise(error, io_error, path//': cannot be written: '//reason//disk_hint)
+   end subroutine write_start
 
    !> Wait until a closed file, or the list of names in a folder, is on the disk.
    subroutine sync_file(path, error)

@@ -11,6 +11,7 @@ module polydem_sealed_file
    use polydem_errors, only: error_t, io_error, raise
    use polydem_hash, only: hexadecimal, mix_word
    use polydem_kinds, only: bp, ip, lp
+   use polydem_paths, only: write_start
    use polydem_strings, only: to_text
    implicit none
    private
@@ -25,24 +26,31 @@ module polydem_sealed_file
 
 contains
 
-   !> Write the seal into the first bytes of a closed file.
+   !> Write the seal into the first bytes of a closed file, bring it to disk, and compare it with what is read back.
    subroutine seal_file(path, error)
       !> Path of the file, whose first `seal_length` bytes are free for the seal
       character(len=*), intent(in) :: path
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       character(len=256) :: reason
+      character(len=:), allocatable :: problem
       character(len=seal_length) :: seal
       integer :: unit, status
 
-      open (newunit=unit, file=path, access='stream', form='unformatted', action='readwrite', status='old', &
+      open (newunit=unit, file=path, access='stream', form='unformatted', action='read', status='old', &
             iostat=status, iomsg=reason)
       if (status == 0) then
          call make_seal(unit, seal, status, reason)
-         if (status == 0) write (unit, pos=1, iostat=status, iomsg=reason) seal
          close (unit)
       end if
-      if (status /= 0) call raise(error, io_error, path//': cannot be sealed: '//trim(reason))
+      if (status /= 0) then
+         call raise(error, io_error, path//': cannot be sealed: '//trim(reason))
+         return
+      end if
+      call write_start(path, seal, error)
+      if (allocated(error)) return
+      call check_seal(path, problem)
+      if (allocated(problem)) call raise(error, io_error, path//': was sealed, but when it was read back '//problem)
    end subroutine seal_file
 
    !> Compare a file with its seal.

@@ -12,7 +12,7 @@ module polydem_complete_file
    use polydem_team, only: team_t
    implicit none
    private
-   public :: begin_file, share_file, keep_room, complete_file, discard_file
+   public :: begin_file, share_file, keep_room, complete_file, discard_file, check_whole
 
 contains
 
@@ -54,8 +54,8 @@ contains
       if (.not. allocated(error)) call file%join(path, error)
    end subroutine share_file
 
-   !> Reserve room for what processes are going to write together; collective. A process that finds the disk full would
-   !> return from HDF5 with an error, while the others wait for it there for ever.
+   !> Reserve room for what processes are going to write together; collective. So a full disk is found before, and the
+   !> run ends in order; a process that finds it full while all write can only end all at once.
    subroutine keep_room(team, path, bytes, error)
       !> Processes; if there is one only, nothing happens
       class(team_t), intent(inout) :: team
@@ -104,10 +104,23 @@ contains
          if (sealed) call seal_file(path//unfinished, error)
       end if
       if (.not. allocated(error)) call sync_file(path//unfinished, error)
+      if (.not. allocated(error)) call check_whole(path//unfinished, error)
       if (.not. allocated(error)) call rename_file(path//unfinished, path, error)
       if (.not. allocated(error)) call sync_file(folder_of(path), error)
       if (exists(path//unfinished)) call remove_file(path//unfinished, ignored)
    end subroutine name_file
+
+   !> See to it that a closed file is as long as HDF5 made it, before it replaces one that is.
+   subroutine check_whole(path, error)
+      !> Its present name
+      character(len=*), intent(in) :: path
+      !> Allocated if HDF5 cannot open it, as if it is shorter
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+
+      call file%open(path, error)
+      call file%close(error)
+   end subroutine check_whole
 
    !> Close the file and remove it.
    subroutine discard_file(file, path, error)

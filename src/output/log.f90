@@ -41,6 +41,7 @@ module polydem_log
       procedure :: write_line
       procedure :: write_interval
       procedure :: show_progress
+      procedure :: check => check_log
       procedure :: close => close_log
    end type log_t
 
@@ -144,6 +145,15 @@ contains
       call write_live(self, trim(text))
       self%live_moment = now
    end subroutine show_progress
+
+   !> Tell if a line could not be written to the file, so that the run can end soon.
+   subroutine check_log(self, error)
+      class(log_t), intent(in) :: self
+      !> Allocated if so
+      type(error_t), allocatable, intent(inout) :: error
+
+      call self%file%check(error)
+   end subroutine check_log
 
    !> End the log.
    subroutine close_log(self, error)

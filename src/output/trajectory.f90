@@ -8,7 +8,7 @@
 !> before, all must know.
 module polydem_trajectory
    use polydem_bodies, only: bodies_t
-   use polydem_complete_file, only: keep_room, share_file
+   use polydem_complete_file, only: check_whole, keep_room, share_file
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t
@@ -21,6 +21,7 @@ module polydem_trajectory
    use polydem_result_folder, only: open_suffix, segment_path
    use polydem_segment, only: add_contacts, add_frame, add_ledger, add_walls, start_segment, write_bodies
    use polydem_team, only: team_t
+   use polydem_time_limit, only: time_limit_t
    implicit none
    private
    public :: trajectory_t
@@ -107,7 +108,12 @@ contains
       type(ledger_row_t), intent(in), optional :: row
       !> List of the files of the result, to which segments are added; that of the leader counts
       type(manifest_t), intent(inout), optional :: manifest
+      type(time_limit_t) :: limit
+      integer(ip) :: number
 
+      number = merge(self%number, self%number + 1_ip, self%is_open)
+      if (self%team%size > 1_ip) call limit%set(segment_path(self%folder, number)//open_suffix, self%team%rank, &
+                                                room_for(bodies))
       if (self%is_open) then
          call keep_room(self%team, segment_path(self%folder, self%number)//open_suffix, room_for(bodies), error)
       else
@@ -117,12 +123,13 @@ contains
       if (allocated(error)) then
          call self%file%abandon(error)
          self%is_open = .false.
-         return
+      else
+         if (self%n_frames == 0_ip) self%steps(1) = step
+         self%steps(2) = step
+         self%n_frames = self%n_frames + 1_ip
+         if (self%n_frames == self%capacity) call close_segment(self, error, manifest)
       end if
-      if (self%n_frames == 0_ip) self%steps(1) = step
-      self%steps(2) = step
-      self%n_frames = self%n_frames + 1_ip
-      if (self%n_frames == self%capacity) call close_segment(self, error, manifest)
+      call limit%lift()
    end subroutine write_frame
 
    subroutine fill_frame(self, step, time, bodies, error, contacts, row)
@@ -157,8 +164,13 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> List of the files of the result, as for `write_frame`
       type(manifest_t), intent(inout), optional :: manifest
+      type(time_limit_t) :: limit
 
-      if (self%is_open) call close_segment(self, error, manifest)
+      if (.not. self%is_open) return
+      if (self%team%size > 1_ip) call limit%set(segment_path(self%folder, self%number)//open_suffix, self%team%rank, &
+                                                0_lp)
+      call close_segment(self, error, manifest)
+      call limit%lift()
    end subroutine close_trajectory
 
    subroutine open_segment(self, bodies, error, manifest)
@@ -202,6 +214,7 @@ contains
       call self%file%close(error)
       if (self%team%leads()) then
          if (.not. allocated(error)) call sync_file(path//open_suffix, error)
+         if (.not. allocated(error)) call check_whole(path//open_suffix, error)
          if (.not. allocated(error)) call rename_file(path//open_suffix, path, error)
          if (.not. allocated(error)) call sync_file(self%folder, error)
          if (present(manifest)) call manifest%close_file(path, error, [int(self%n_frames, lp), self%steps])

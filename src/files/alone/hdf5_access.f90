@@ -5,18 +5,20 @@ module polydem_hdf5_access
    use hdf5, only: hid_t
    implicit none
    private
-   public :: access_together, transfer_together, writes_shared, fails_anywhere
+   public :: access_together, transfer_together, writes_shared, give_up, await_all
 
 contains
 
    !> Let a file be opened by all processes: nothing is to be done.
-   subroutine access_together(properties, status)
+   subroutine access_together(properties, path, status)
       !> HDF5's properties of access to the file
       integer(hid_t), intent(in) :: properties
+      !> Path of the file
+      character(len=*), intent(in) :: path
       !> Always 0
       integer, intent(out) :: status
 
-      associate (same => properties)
+      associate (same => properties, place => path)
       end associate
       status = 0
    end subroutine access_together
@@ -38,12 +40,17 @@ contains
       writes_shared = .true.
    end function writes_shared
 
-   !> Whether something failed on any process
-   logical function fails_anywhere(fails)
-      !> Whether it failed on this one
-      logical, intent(in) :: fails
+   !> End all processes: there are no files of several processes, and so nothing is to be done.
+   pure subroutine give_up(reason)
+      !> What is wrong
+      character(len=*), intent(in) :: reason
 
-      fails_anywhere = fails
-   end function fails_anywhere
+      associate (same => reason)
+      end associate
+   end subroutine give_up
+
+   !> Wait until all processes have come here: there is only one.
+   subroutine await_all()
+   end subroutine await_all
 
 end module polydem_hdf5_access
