@@ -69,7 +69,9 @@ contains
 
       its = status_of(process)
       own = status_of(own_process())
-      has_own_program = its == '' .or. its(index(its, '('):index(its, ')', back=.true.)) == &
+      has_own_program = .true.
+      if (its == '' .or. own == '') return
+      has_own_program = its(index(its, '('):index(its, ')', back=.true.)) == &
                         own(index(own, '('):index(own, ')', back=.true.))
    end function has_own_program
 
