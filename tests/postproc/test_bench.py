@@ -1,5 +1,9 @@
 """Reading bench folders: what counts, and how folders of several machines become one."""
 
+import os
+import subprocess
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
@@ -210,3 +214,31 @@ def test_the_caches_of_a_machine_are_those_for_data():
 def test_all_finders_of_the_fixture_have_positive_shares():
     for truth in truths().values():
         assert sum(truth.shares[:5]) == pytest.approx(1.0)
+
+
+#: Namelists in inputs/bench and what they make
+SCENES_OF_BENCHES = {
+    "bed_static": "bed",
+    "channel": "line",
+    "column": "column",
+    "drum": "drum",
+    "gas": "gas",
+    "hopper": "hopper",
+    "one_mover": "rest",
+    "patch": OTHER,
+    "range": "range",
+    "rods": "rods",
+    "sizes": "sizes",
+    "soft": "soft",
+    "worst_order": "worst",
+}
+
+
+@pytest.mark.parametrize("name, kind", SCENES_OF_BENCHES.items())
+def test_the_scenes_of_the_benches_are_of_their_kinds(name, kind):
+    program, root = os.environ["POLYDEM_PROGRAM"], Path(os.environ["POLYDEM_SOURCE_DIR"])
+    scene = root / "inputs" / "bench" / f"{name}.nml"
+    command = [program, "check", str(scene)] + (["--set", "scene.packing=''"] if name in ("column", "drum") else [])
+    told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert kind_of(settings_of(told)) == kind
+    assert sorted(path.stem for path in scene.parent.glob("*.nml")) == sorted(SCENES_OF_BENCHES)
