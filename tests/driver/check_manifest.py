@@ -24,6 +24,8 @@ SCENE = """\
 &guards listed_depth = 1e-9 /
 &checkpoint steps = 5 /
 """
+#: Enough grains to pack another scene with
+BED = "&scene name = 'bed' bodies = 700 / &integrate duration = 5e-4 /\n"
 #: Boxes and steps are recorded, too
 RECORDED = ("--set", "output.trace_steps=3", "--set", "output.step_profile=.true.")
 #: Another run, so that its files are others
@@ -43,6 +45,8 @@ class Program:
     def __init__(self, path, library):
         self.path = path
         self.library = library
+        write("scene.nml", SCENE.encode())
+        write("bed.nml", BED.encode())
         code, output, message = self.run("whole", *RECORDED)
         assert code == 0, message
         self.hash = output.splitlines()[-1]
@@ -219,7 +223,6 @@ def a_result_without_a_manifest_is_left_alone(program):
 
 
 def force_does_not_replace_its_own_input(program):
-    write("bed.nml", b"&scene name = 'bed' bodies = 700 / &integrate duration = 5e-4 /\n")
     code, _, message = program.run("packed", scene="bed.nml")
     assert code == 0, message
     os.symlink("packed", "link")
@@ -323,7 +326,6 @@ def main():
     thoroughly = sys.argv[3:] == ["all"]
     with tempfile.TemporaryDirectory() as work:
         os.chdir(work)
-        write("scene.nml", SCENE.encode())
         program = Program(program_path, library)
         tests = (every_file_is_listed_with_its_checksum, flipped_bits_are_found,
                  missing_cut_and_exchanged_files_are_found, files_of_somebody_else_stay,

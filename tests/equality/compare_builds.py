@@ -6,6 +6,7 @@ usage: compare_builds.py SOURCES FOLDER CMAKE PROGRAM
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 
@@ -34,7 +35,9 @@ def build(sources, folder, cmake, options):
 
 def state_hash(program, sources, scene, overrides, result, threads):
     """Run a scene and read the last line of its log."""
-    command = [str(program), "run", str(sources / "inputs" / scene), "--force", "--threads", str(threads)]
+    # What an older revision left there has no manifest and would be in the way.
+    shutil.rmtree(result, ignore_errors=True)
+    command = [str(program), "run", str(sources / "inputs" / scene), "--threads", str(threads)]
     for override in [*overrides, f"output.folder={result}", "output.frame_interval=0"]:
         command += ["--set", override]
     done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, "OMP_WAIT_POLICY": "passive"},
