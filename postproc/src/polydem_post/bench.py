@@ -264,7 +264,9 @@ def _sound(sample: Sample) -> Sample:
         if column.min() < 0:
             raise ResultError(f"{sample.path}: {name} has a negative entry")
         if name == "depth" and column.max() > DEEPEST_TREE:
-            raise ResultError(f"{sample.path}: depth is {column.max():.0f}; no tree has more than {DEEPEST_TREE} levels")
+            raise ResultError(
+                f"{sample.path}: depth is {column.max():.0f}, but no tree has more than {DEEPEST_TREE} levels"
+            )
     return sample
 
 
