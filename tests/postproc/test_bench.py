@@ -206,6 +206,12 @@ def test_the_slope_of_a_series_and_its_counts_are_those_of_the_truth(tmp_path):
     assert series.count_slope(cases, "tests", "swaps") == pytest.approx(1.0, abs=1e-3)
 
 
+def test_a_tree_that_is_deeper_than_any_is_refused_and_not_reckoned_with(tmp_path):
+    write_sample(tmp_path, "drum_1000", "quadtree", Truth(40.0, counts={"depth": 65}), 1000, repeat=0)
+    with pytest.raises(ResultError, match="no tree has more than 64 levels"):
+        read_bench([tmp_path])
+
+
 def test_the_caches_of_a_machine_are_those_for_data():
     levels = series.cache_levels({"caches": "L1d 32K, L1i 64K, L2 1024K, L3 32M"})
     assert levels == [("L1", 2**15), ("L2", 2**20), ("L3", 2**25)]

@@ -339,3 +339,12 @@ def test_tables_hold_nothing_that_steers_a_terminal():
     table.add("x\x1b[31m\x07\x9b1m\u202e\ud800y")
     for form in ("text", "markdown", "csv"):
         assert r"x\x1b[31m\x07\x9b1m\u202e\ud800y" in table.written(form)
+
+
+@pytest.mark.parametrize("verb, name", [("plot", "result/trajectory_0003.h5"), ("table", "result/profile.h5"),
+                                        ("tables", "bench/samples/drum_100-quadtree-1-1.h5"),
+                                        ("cache", "bench/traces/drum_100/trace.h5")])
+def test_a_data_set_that_claims_more_than_the_file_can_hold_is_not_read(place, capfd, verb, name):
+    with h5py.File(place / name, "r+") as file:
+        file.create_dataset("frames/own" if "frames" in file else "own", (2**40,), dtype="f8", chunks=(1024,))
+    assert run(VERBS[verb][0], capfd) == 2

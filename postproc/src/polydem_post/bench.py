@@ -238,6 +238,9 @@ def read_sample(path: Path) -> Sample:
             raise ResultError(f"{path}: cannot be read ({error})") from error
 
 
+#: Levels of a tree, one for each bit of a coordinate at most
+DEEPEST_TREE = 64
+
 #: Facts of a sample without which it cannot be used, and whether they are numbers above a bound
 NEEDED = {"scene": None, "mode": None, "finder": None, "threads": 1, "repeat": 0, "boxes": 1, "steps": 1}
 
@@ -260,6 +263,10 @@ def _sound(sample: Sample) -> Sample:
             raise ResultError(f"{sample.path}: {name} is not one finite number for each of {steps} steps")
         if column.min() < 0:
             raise ResultError(f"{sample.path}: {name} has a negative entry")
+        if name == "depth" and column.max() > DEEPEST_TREE:
+            raise ResultError(
+                f"{sample.path}: depth is {column.max():.0f}, but no tree has more than {DEEPEST_TREE} levels"
+            )
     return sample
 
 

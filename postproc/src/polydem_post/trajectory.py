@@ -40,6 +40,9 @@ UNREADABLE = (
 #: take hardly longer than one
 CHECKED_AT_ONCE = 2**26
 
+#: Bytes that one byte of a file can stand for at most: deflate makes a thousand zeros one byte
+MOST_COMPRESSED = 1100
+
 #: Deepest nesting of groups, and most objects, of a file of polydem
 DEEPEST, MOST_OBJECTS = 8, 10000
 
@@ -544,6 +547,7 @@ def _reason(error: Exception) -> str:
 def insist_on_own_data(path: Path, file: h5py.File) -> None:
     """Refuse a file whose data lie in other files: what it shows would depend on what is there, or belong to others."""
     waiting, seen = [(file, "", 0)], 0
+    most_bytes = MOST_COMPRESSED * Path(file.filename).stat().st_size + 2**20
     while waiting:
         group, place, depth = waiting.pop()
         for name in group:
@@ -556,6 +560,9 @@ def insist_on_own_data(path: Path, file: h5py.File) -> None:
             entry = group[name]
             if isinstance(entry, h5py.Group):
                 waiting.append((entry, f"{place}/{name}", depth + 1))
+            elif isinstance(entry, h5py.Dataset) and entry.nbytes > most_bytes:
+                raise ResultError(f"{path}: {place}/{name} claims {entry.nbytes} bytes, more than the file can hold; it is "
+                                  "damaged")
             elif isinstance(entry, h5py.Dataset) and (entry.is_virtual or entry.external):
                 raise ResultError(f"{path}: the data of {place}/{name} lie in other files; polydem writes no such "
                                   f"files")
