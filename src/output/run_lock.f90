@@ -217,6 +217,7 @@ contains
       !> Whether this process holds the lock now
       logical, intent(out) :: is_held
       type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: ignored
       logical :: is_written
 
       is_held = .false.
@@ -224,6 +225,8 @@ contains
       call self%file%write(text_of(self%key, answer == is_granted), 0, is_written)
       if (.not. is_written) then
          call raise(error, io_error, lock_path(folder)//': cannot be written: '//last_failure())
+         ! Nobody else can have it: this process made it and has locked it since.
+         if (vigil%has_made .and. answer == is_granted) call remove_file(lock_path(folder), ignored)
          call self%file%close()
          return
       end if

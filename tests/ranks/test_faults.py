@@ -132,7 +132,8 @@ def test_ranks_that_outlive_their_leader_keep_others_out(whole, tmp_path):
 
 def test_ranks_whose_folder_was_taken_over_end_and_write_nothing_more(whole, tmp_path):
     folder = tmp_path / "result"
-    options = ("integrate.duration=1000", "checkpoint.steps=0", "output.frame_interval=0", "output.log_interval=900")
+    options = ("integrate.duration=1000", "checkpoint.steps=0", "output.frame_interval=0", "output.log_interval=900",
+               "guards.overlap=off", "guards.passing=off")
     process = start(whole / "scene.nml", folder, 2, 1, [word for option in options for word in ("--set", option)])
     wait_for(lambda: folder.joinpath("log.txt").exists() and "done" in folder.joinpath("log.txt").read_text(), process)
     folder.joinpath("running.lock").unlink()
@@ -269,7 +270,8 @@ def test_warnings_and_their_counts_do_not_depend_on_ranks_or_checkpoints(whole, 
     told = {}
     for ranks in (None, 2, 3, 4):
         output, _ = run(whole / "scene.nml", tmp_path / f"of_{ranks}", ranks, 1, options)
-        told[ranks] = (re.findall(r"^warning: .*$", output, re.MULTILINE),
+        # How many processors there are for the ranks is not the same for all.
+        told[ranks] = ([text for text in re.findall(r"^warning: .*$", output, re.MULTILINE) if "processors" not in text],
                        re.findall(r"^warnings: .*$", output, re.MULTILINE), state_hash(output))
     assert [any(each in text for text in told[None][0]) for each in
             (" may move more than ", " overlap by ", " is inside body ", " of the stable step")] == [True] * 4, told
