@@ -561,8 +561,8 @@ def insist_on_own_data(path: Path, file: h5py.File) -> None:
             if isinstance(entry, h5py.Group):
                 waiting.append((entry, f"{place}/{name}", depth + 1))
             elif isinstance(entry, h5py.Dataset) and entry.nbytes > most_bytes:
-                raise ResultError(f"{path}: {place}/{name} claims {entry.nbytes} bytes, more than the file can hold; it is "
-                                  "damaged")
+                raise ResultError(f"{path}: {place}/{name} claims {entry.nbytes} bytes, more than the file can hold; "
+                                  "it is damaged")
             elif isinstance(entry, h5py.Dataset) and (entry.is_virtual or entry.external):
                 raise ResultError(f"{path}: the data of {place}/{name} lie in other files; polydem writes no such "
                                   f"files")
