@@ -7,8 +7,8 @@ PROGRAM is the one without MPI, LIBRARY that of failing_writes.c. With --ranks, 
 R processes of the program that POLYDEM_MPI_PROGRAM names, and it happens to each rank in turn; without that variable
 nothing is tried (code 77). A run in which nothing fails tells how many calls there are. After a failed one
 
-* the run has ended, within a minute or two on a busy machine, with code 3 and a message that names a file of its folder, and the rank if several
-  processes write that file; or the call did not matter, and the result is whole;
+* the run has ended, within a minute or two on a busy machine, with code 3 and a message that names a file of its
+  folder, and the rank if several processes write that file; or the call did not matter, and the result is whole;
 * every checkpoint that has its final name is good;
 * --continue ends with the hash, frames and contacts of a run that nobody disturbed, and leaves nothing unfinished.
 
@@ -40,7 +40,7 @@ SCENE = """\
 &scene name = 'stack' bodies = 9 width = 0.01 height = 0.01 /
 &forces stiffness = 1e5 midstep_slip = .true. tilt_damping = 0.5 /
 &integrate dt = 1e-5 duration = {duration} /
-&output frame_interval = 1e-5 frames_per_segment = 2 contacts = .true. ledger = .false. /
+&output frame_interval = 1e-5 frames_per_segment = 2 contacts = .true. /
 &checkpoint steps = 1 /
 """
 #: Exit codes: of a test that is skipped, and of a run that could not write a file
@@ -51,10 +51,11 @@ PATIENCE = 100.0
 WAITING = "5"
 #: Steps: without ranks, so many that the oldest checkpoint is replaced
 STEPS, STEPS_OF_RANKS = 4, 3
-#: Calls whose failure may be of no consequence: nothing is lost by them that was not brought to disk before
-HARMLESS = {"close", "unlink", "link", "symlink", "open", "fallocate"}
+#: Calls whose failure may be of no consequence: nothing is lost by them that was not brought to disk before, or HDF5 or
+#: another rank does the same again. The result is compared all the same.
+HARMLESS = {"close", "unlink", "link", "symlink", "open", "fallocate", "ftruncate"}
 #: Calls that are tried first
-FIRST = {name: k for k, name in enumerate(("pwrite", "ftruncate", "fsync", "write", "rename"))}
+FIRST = {name: k for k, name in enumerate(("ftruncate", "pwrite", "fsync", "write", "rename"))}
 
 
 class Broken(Exception):
@@ -103,8 +104,8 @@ class Case:
 
     def count(self, rank):
         """All calls of a rank in a run in which none fails."""
-        shutil.rmtree("counted", ignore_errors=True)
-        (code, output, message, _), calls = self.watched("counted", rank)
+        shutil.rmtree("failed", ignore_errors=True)
+        (code, output, message, _), calls = self.watched("failed", rank)
         if code != 0 or hash_of(output) != self.hash or not calls:
             raise Broken(f"the run in which nothing fails: code {code}, {len(calls)} calls\n{message}")
         seen = Counter()
@@ -120,11 +121,11 @@ class Case:
             "failed", call.rank, POLYDEM_FAIL_CALL=str(call.number), POLYDEM_FAIL_HOW=self.how,
             POLYDEM_FAIL_ERROR=str(self.error), POLYDEM_PATIENCE=WAITING)
         met = [other for other in calls if other.number == call.number]
-        if not met:
-            raise Broken("it is not reached")
         said = f"code {code}\n{message}"
+        if not met and (code != 0 or call.number <= len(calls)):
+            raise Broken(f"it is not reached: {said}")
         if code == 0:
-            if self.how != "short" and met[0].name not in HARMLESS:
+            if met and self.how != "short" and met[0].name not in HARMLESS:
                 raise Broken(f"it goes unnoticed: {said}")
             if hash_of(output) != self.hash or frames("failed") != self.frames:
                 raise Broken(f"the result is wrong, without a word: {said}")
@@ -138,10 +139,13 @@ class Case:
             raise Broken(f"cannot be continued, code {again}:\n{late}\nafter {said}")
         if hash_of(output) != self.hash or frames("failed") != self.frames:
             raise Broken(f"the continued result is wrong, after {said}")
-        rest = [name for name in os.listdir("failed") if name.endswith((".open", ".unfinished", ".lock"))]
+        # If nothing could be removed any more, the lock of the dead run stays where a finished result needs none.
+        rest = [name for name in os.listdir("failed") if name.endswith((".open", ".unfinished"))
+                or name.endswith(".lock") and self.how != "on"]
         if rest and code != 0:
             raise Broken(f"{rest} are left after {said}")
-        return ("harmless" if code == 0 else "told"), seconds
+        # Runs differ by a few lines of the log.
+        return ("told" if code != 0 else "harmless" if met else "not reached"), seconds
 
     def go_on(self):
         """Continue a run; mpirun may end a moment before its ranks."""
@@ -150,6 +154,11 @@ class Case:
             if "another run (process" not in message:
                 break
             time.sleep(0.1)
+        unsigned = re.search(r"If there is no such run, remove '(\S+)'", message)
+        if unsigned and self.how == "on":
+            # The lock could neither be signed nor removed: the message says what to do.
+            os.remove(unsigned.group(1))
+            code, output, message, _ = self.run("failed", "--continue")
         return code, output, message
 
     def check_message(self, code, message, call):
