@@ -99,7 +99,11 @@ def differences(expected, found, names):
     notes += [f"{name} is new" for name in added]
     for name in expected:
         if name in found and not same_bits(expected[name], found[name]):
-            wrong.append(f"{name}: {describe(expected[name], found[name])}")
+            sentence = f"{name}: {describe(expected[name], found[name])}"
+            if names.is_removed(name):
+                notes.append(f"on purpose, {sentence}")
+            else:
+                wrong.append(sentence)
     return wrong, notes
 
 
