@@ -1,63 +1,63 @@
-!> The command line: verbs, options and what each verb takes, from one table.
+!> The command line: tables of verbs and options, their parser and the usage text.
 !>
-!> Parsing is pure and works on an array of arguments; only `read_command_line` asks the system.
+!> Parsing is pure and works on an array of arguments. Only `read_command_line` queries the system.
 module polydem_command_line
    use polydem_errors, only: error_t, input_error, raise
    use polydem_namelist_entries, only: choices_of
-   use polydem_strings, only: join
-   use polydem_words, only: quoted, split_words, suggestion
+   use polydem_strings, only: join, quoted, split_words, suggestion
    implicit none
    private
    public :: command_t, parse_command, read_command_line, usage
 
-   !> What the user asks for
+   !> A parsed command line
    type :: command_t
-      !> run, check, info, replay or bench; empty if only help or the version is wanted
+      !> run, check, info, replay or bench; empty if only help or version is requested
       character(len=:), allocatable :: verb
-      !> Namelist, result or trace; empty if none is given
+      !> Path of the namelist, result or trace; empty if none is given
       character(len=:), allocatable :: file
       !> Overrides 'group.key=value' in the order given
       character(len=:), allocatable :: overrides(:)
-      !> Number of threads; 0: as many as the system offers
+      !> Number of threads; 0: default of the system
       integer :: threads = 0
       !> Whether results may be overwritten
       logical :: force = .false.
-      !> Whether an interrupted run goes on from its last checkpoint
+      !> Whether an interrupted run is restarted from its last checkpoint
       logical :: continues = .false.
-      !> Whether it may do so with other settings
+      !> Whether a restart is allowed with changed settings
       logical :: may_change = .false.
-      !> Elapsed time after which a run must have ended [s]; 0: none
+      !> Limit of the elapsed time of a run [s]; 0: no limit
       integer :: limit = 0
       !> Neighbour finder of a replay
       character(len=:), allocatable :: finder
-      !> How often a replay is repeated
+      !> Number of repetitions of a replay
       integer :: repeat = 1
-      !> Steps of a replay; 0: all of the trace
+      !> Number of steps of a replay; 0: all steps of the trace
       integer :: steps = 0
-      !> Folder for the samples of a replay; empty: none
+      !> Folder for the samples of a replay; empty: no samples
       character(len=:), allocatable :: samples
-      !> Whether a replay compares every list with that of all pairs
+      !> Whether a replay compares every pair list with that of finder all_pairs
       logical :: oracle = .false.
       !> Whether the files of a result are compared with their checksums
       logical :: checks = .false.
-      !> Whether help is wanted, on the verb or on all
+      !> Whether help is requested, for the verb or for all verbs
       logical :: help = .false.
-      !> Whether the version is wanted
+      !> Whether the version is requested
       logical :: version = .false.
    end type command_t
 
-   !> One verb
+   !> A verb
    type :: verb_t
-      !> As it is typed
+      !> Name on the command line
       character(len=8) :: name
-      !> What it takes, in the usage
+      !> Name of its file argument in the usage text
       character(len=16) :: file
-      !> Whether the file may be left out
+      !> Whether the file argument is optional
       logical :: file_is_optional
-      !> What it does
+      !> Help text
       character(len=88) :: meaning
    end type verb_t
 
+   !> Table of verbs
    type(verb_t), parameter :: verbs(*) = [ &
       verb_t('run', 'FILE.nml', .false., 'run the simulation that a namelist file describes'), &
       verb_t('check', 'FILE.nml', .false., &
@@ -68,20 +68,22 @@ module polydem_command_line
       verb_t('bench', 'FILE.nml', .false., &
       'measure neighbour finders on the scenes of a namelist file; if interrupted, go on')]
 
-   !> One option
+   !> An option
    type :: option_t
-      !> As it is typed
+      !> Name on the command line
       character(len=12) :: name
-      !> Name of its value; blank if it takes none
+      !> Name of its value in the usage text; blank if it takes none
       character(len=16) :: value
-      !> Verbs that take it
+      !> Verbs that accept the option, separated by blanks
       character(len=32) :: verbs
-      !> What it does
+      !> Help text
       character(len=88) :: meaning
    end type option_t
 
+   !> Names of all verbs
    character(len=*), parameter :: all_verbs = 'run check info replay bench'
 
+   !> Table of options
    type(option_t), parameter :: options(*) = [ &
       option_t('--set', 'GROUP.KEY=VALUE', 'run check bench', &
       'override an entry of the namelist; may be repeated'), &
@@ -107,11 +109,11 @@ module polydem_command_line
 
 contains
 
-   !> Understand how the program was called.
+   !> Read and parse the command line of the program.
    subroutine read_command_line(command, error)
-      !> What the user asks for
+      !> The parsed command line
       type(command_t), intent(out) :: command
-      !> A verb or option that is unknown, misplaced or incomplete
+      !> Names a verb or an option that is unknown, misplaced or incomplete
       type(error_t), allocatable, intent(inout) :: error
       integer :: k, length, longest
 
@@ -123,7 +125,7 @@ contains
       call parse_arguments(command_argument_count(), longest, command, error)
    end subroutine read_command_line
 
-   !> Collect n arguments of at most the given length and understand them.
+   !> Collect n arguments of at most the given length and parse them.
    subroutine parse_arguments(n, length, command, error)
       integer, intent(in) :: n, length
       type(command_t), intent(out) :: command
@@ -137,13 +139,13 @@ contains
       call parse_command(arguments, command, error)
    end subroutine parse_arguments
 
-   !> Understand the arguments.
+   !> Parse the arguments.
    pure subroutine parse_command(arguments, command, error)
       !> Arguments of the program, blank-padded
       character(len=*), intent(in) :: arguments(:)
-      !> What the user asks for
+      !> The parsed command line
       type(command_t), intent(out) :: command
-      !> A verb or option that is unknown, misplaced or incomplete
+      !> Names a verb or an option that is unknown, misplaced or incomplete
       type(error_t), allocatable, intent(inout) :: error
       character(len=len(arguments)) :: overrides(size(arguments))
       character(len=:), allocatable :: value
@@ -182,7 +184,7 @@ contains
       call check_command(command, used, error)
    end subroutine parse_command
 
-   !> The first word is the verb, the second the file.
+   !> Store a word that is not an option. The first word is the verb, the second is the file.
    pure subroutine take_word(word, command, error)
       character(len=*), intent(in) :: word
       type(command_t), intent(inout) :: command
@@ -202,7 +204,7 @@ contains
       end if
    end subroutine take_word
 
-   !> Take the option at place k, with its value behind '=' or in the next argument, and step on.
+   !> Parse the option at position k, with its value after '=' or in the next argument. Advance k.
    pure subroutine take_option(arguments, verb, k, which, value, error)
       character(len=*), intent(in) :: arguments(:), verb
       integer, intent(inout) :: k
@@ -236,7 +238,7 @@ contains
       k = k + 1
    end subroutine take_option
 
-   !> Whether a verb takes an option; any option if there is no verb yet
+   !> Whether a verb accepts an option; true for an empty verb
    elemental logical function takes(option, verb)
       type(option_t), intent(in) :: option
       character(len=*), intent(in) :: verb
@@ -245,7 +247,7 @@ contains
       if (.not. takes) takes = any(split_words(option%verbs) == verb)
    end function takes
 
-   !> Row of an option; 0 if there is none
+   !> Index of an option in the table; 0 if unknown
    pure integer function option_at(name)
       character(len=*), intent(in) :: name
 
@@ -255,6 +257,7 @@ contains
       option_at = 0
    end function option_at
 
+   !> Store the value of an option, except `--set`.
    pure subroutine set_option(which, value, command, error)
       integer, intent(in) :: which
       character(len=*), intent(in) :: value
@@ -277,8 +280,8 @@ contains
          call read_duration('--walltime', value, command%limit, error)
       case ('--finder')
          command%finder = value
-         if (all(choices_of('neighbours', 'finder') /= value)) call raise(error, input_error, '--finder '// &
-            value//': there is no such finder'//suggestion(value, choices_of('neighbours', 'finder')))
+         if (all(choices_of('bench', 'finders') /= value)) call raise(error, input_error, '--finder '// &
+            value//': there is no such finder'//suggestion(value, choices_of('bench', 'finders')))
       case ('--repeat')
          call read_count('--repeat', value, command%repeat, error)
       case ('--steps')
@@ -296,7 +299,7 @@ contains
       end select
    end subroutine set_option
 
-   !> A whole number from 1 to 999999
+   !> Read an integer from 1 to 999999.
    pure subroutine read_count(name, text, number, error)
       character(len=*), intent(in) :: name, text
       integer, intent(inout) :: number
@@ -312,7 +315,7 @@ contains
       end if
    end subroutine read_count
 
-   !> Hours, minutes and seconds as seconds
+   !> Read a duration HH:MM:SS as seconds.
    pure subroutine read_duration(name, text, seconds, error)
       character(len=*), intent(in) :: name, text
       integer, intent(inout) :: seconds
@@ -335,7 +338,7 @@ contains
          'as in 23:30:00')
    end subroutine read_duration
 
-   !> The verb must be there with its file, and take every option used.
+   !> Check that the verb and its file are given, and that the verb accepts all options used.
    pure subroutine check_command(command, used, error)
       type(command_t), intent(in) :: command
       logical, intent(in) :: used(:)
@@ -367,9 +370,9 @@ contains
       end do
    end subroutine check_command
 
-   !> How to call the program, one line to a verb or option
+   !> Usage text, with one line per verb and per option
    pure function usage(verb) result(text)
-      !> A verb, or an empty text for all of them
+      !> A verb, or an empty text for all verbs
       character(len=*), intent(in) :: verb
       character(len=:), allocatable :: text
       character(len=*), parameter :: line_end = new_line('a')

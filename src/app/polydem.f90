@@ -1,4 +1,5 @@
-!> The program: understands the command line, does what it says, and is the only place that stops.
+!> The main program. It reads the command line, executes the verb and sets the exit code. No other module stops the
+!> program.
 program polydem
    use, intrinsic :: iso_c_binding, only: c_int
    use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_get_thread_limit, omp_set_num_threads
@@ -8,27 +9,28 @@ program polydem
    use polydem_check, only: check_simulation
    use polydem_check_result, only: check_result
    use polydem_command_line, only: command_t, read_command_line, usage
-   use polydem_crowding, only: crowding, crowding_text
+   use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: start_library
-   use polydem_info, only: describe_program, describe_result
-   use polydem_join_team, only: join_team
    use polydem_kinds, only: dp, ip
    use polydem_line_writer, only: line_writer_t
+   use polydem_oversubscription, only: oversubscription, oversubscription_text
    use polydem_process_limits, only: check_stack, check_threads
    use polydem_read_bench, only: read_bench
    use polydem_read_settings, only: read_settings
    use polydem_replay, only: replay_trace
-   use polydem_run, only: attempt_t, run_simulation
+   use polydem_result_info, only: describe_program, describe_result
+   use polydem_run, only: attempt_t
+   use polydem_run_simulation, only: run_simulation
    use polydem_settings, only: settings_t
-   use polydem_signals, only: survive_failed_writes
-   use polydem_standard_streams, only: secure_streams
+   use polydem_signals, only: ignore_write_signals
+   use polydem_standard_streams, only: open_closed_streams
    use polydem_strings, only: printable
-   use polydem_team, only: team_t
+   use polydem_world_communicator, only: create_world
    implicit none
 
    interface
-      !> C exit: ends the program with a code and without a word
+      !> C function exit: ends the program with an exit code and without output
       subroutine c_exit(code) bind(C, name='exit')
          import :: c_int
          integer(c_int), value :: code
@@ -37,27 +39,27 @@ program polydem
 
    type(command_t) :: command
    type(error_t), allocatable :: error
-   class(team_t), allocatable :: team
+   class(communicator_t), allocatable :: comm
 
-   call secure_streams()
-   call survive_failed_writes()
+   call open_closed_streams()
+   call ignore_write_signals()
    call check_stack(1_ip, error)
    if (allocated(error)) then
       call warn(error%message)
       call c_exit(int(error%code, c_int))
    end if
-   ! HDF5 must outlive MPI, so it comes first.
+   ! HDF5 must outlive MPI and is therefore started first.
    call start_library(error)
-   call join_team(team, error)
+   call create_world(comm, error)
    if (.not. allocated(error)) call read_command_line(command, error)
    if (.not. allocated(error)) call obey(command, error)
-   if (allocated(error) .and. team%leads()) call warn(error%message)
-   call team%leave()
+   if (allocated(error) .and. comm%is_root()) call warn(error%message)
+   call comm%finalize()
    if (allocated(error)) call c_exit(int(error%code, c_int))
 
 contains
 
-   !> Do what the command line says.
+   !> Execute the command line.
    subroutine obey(command, error)
       type(command_t), intent(in) :: command
       type(error_t), allocatable, intent(inout) :: error
@@ -75,21 +77,21 @@ contains
       call choose_threads(command, error)
       if (command%verb == 'run') then
          if (.not. allocated(error)) call read_settings(command%file, command%overrides, settings, error)
-         call team%agree(error)
+         call comm%all_reduce_error(error)
          if (.not. allocated(error)) call run_simulation(settings, command%force, error, attempt_t( &
-            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp)), team)
+            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp)), comm)
          return
       end if
       crowd = ''
-      if (command%verb == 'check') crowd = crowding(team)
-      ! The other verbs are those of one process.
-      if (allocated(error) .or. .not. team%leads()) return
+      if (command%verb == 'check') crowd = oversubscription(comm)
+      ! The root rank alone executes the other verbs.
+      if (allocated(error) .or. .not. comm%is_root()) return
       select case (command%verb)
       case ('check')
          call read_settings(command%file, command%overrides, settings, error)
          if (.not. allocated(error)) call check_simulation(settings, error, crowd)
       case ('replay')
-         call warn(crowding_text(int(max(1, command%threads), ip), int(omp_get_num_procs(), ip)))
+         call warn(oversubscription_text(int(max(1, command%threads), ip), int(omp_get_num_procs(), ip)))
          call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error, &
                            int(command%steps, ip), command%samples, command%oracle)
       case ('bench')
@@ -106,7 +108,8 @@ contains
       end select
    end subroutine obey
 
-   !> As many threads as the command line says, or else OpenMP, and no more than there can be.
+   !> Set the number of OpenMP threads: from the command line, otherwise the OpenMP default. Check it against system
+   !> limits.
    subroutine choose_threads(command, error)
       type(command_t), intent(in) :: command
       type(error_t), allocatable, intent(inout) :: error
@@ -121,19 +124,19 @@ contains
       end if
    end subroutine choose_threads
 
-   !> Write a line, or several, on the screen of the leader.
+   !> Write one or several lines to the standard output of the root rank.
    subroutine print_line(text, error)
       character(len=*), intent(in) :: text
       type(error_t), allocatable, intent(inout) :: error
       type(line_writer_t) :: screen
 
-      if (.not. team%leads()) return
+      if (.not. comm%is_root()) return
       call screen%open_screen()
       call screen%put_line(text)
       call screen%close(error)
    end subroutine print_line
 
-   !> Write a message to standard error; nothing happens if it is empty.
+   !> Write a message to standard error. A no-op if the message is empty.
    subroutine warn(message)
       character(len=*), intent(in) :: message
       type(line_writer_t) :: screen

@@ -1,4 +1,4 @@
-!> Clocks: elapsed time of the machine and processor time of the calling thread.
+!> Clocks: elapsed (wall) time, and processor time of the calling thread.
 module polydem_clock
    use, intrinsic :: iso_c_binding, only: c_int, c_long
    use polydem_kinds, only: dp, lp
@@ -10,7 +10,7 @@ module polydem_clock
    type, bind(C) :: timespec_t
       !> Whole seconds
       integer(c_long) :: seconds
-      !> Nanoseconds below a second
+      !> Nanoseconds within the second
       integer(c_long) :: nanoseconds
    end type timespec_t
 
@@ -21,9 +21,9 @@ module polydem_clock
       !> POSIX clock_gettime
       integer(c_int) function clock_gettime(clock, time) bind(C, name='clock_gettime')
          import :: c_int, timespec_t
-         !> Which clock
+         !> Identifier of the clock
          integer(c_int), value :: clock
-         !> Its time
+         !> Time of that clock
          type(timespec_t), intent(out) :: time
       end function clock_gettime
    end interface

@@ -1,14 +1,14 @@
-!> Named exact counts (pairs, contacts, swaps, nodes, ...) that the parts of a run report.
+!> Named integer counters (pairs, contacts, swaps, nodes, ...) that the stages of a run report.
 !>
-!> Parts count in their own integers while they work and hand the sums over here when asked, so that
-!> counting costs an addition and no look-up.
+!> Each stage counts in integers of its own and copies the sums into `counters_t` on request. Counting therefore costs
+!> one addition and no search by name.
 module polydem_counters
    use polydem_kinds, only: lp
    implicit none
    private
    public :: counters_t, counter_name_length
 
-   !> Longest name of a counter
+   !> Maximum length of the name of a counter
    integer, parameter :: counter_name_length = 32
 
    !> A list of names and values, in the order in which they were set
@@ -24,12 +24,12 @@ module polydem_counters
 
 contains
 
-   !> Set a counter, appending it if it is new.
+   !> Set a counter. A new name is appended.
    subroutine set(self, name, value)
       class(counters_t), intent(inout) :: self
-      !> Its name, at most counter_name_length characters
+      !> Name of the counter, at most counter_name_length characters
       character(len=*), intent(in) :: name
-      !> Its value
+      !> Value of the counter
       integer(lp), intent(in) :: value
       character(len=counter_name_length) :: padded
       integer :: k
@@ -46,10 +46,10 @@ contains
       self%value = [self%value, value]
    end subroutine set
 
-   !> Value of a counter, zero if it was never set
+   !> Value of a counter; zero if it was never set
    integer(lp) function get(self, name)
       class(counters_t), intent(in) :: self
-      !> Its name
+      !> Name of the counter
       character(len=*), intent(in) :: name
       integer :: k
 

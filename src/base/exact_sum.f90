@@ -1,13 +1,15 @@
-!> Sums of real numbers without rounding, which therefore do not depend on the order of adding or on who adds what.
+!> Sums of real numbers without rounding errors. The result does not depend on the order of the terms or on their
+!> distribution over threads and ranks.
 !>
-!> The sum is a whole number of units of 2^-1074, the least double precision number, and is kept in digits of 32 bits
-!> within words of 64 (U. Kulisch, Computer Arithmetic and Validity, de Gruyter 2013; the layout is the small
-!> superaccumulator of R. M. Neal, arXiv:1505.05571, 2015). A number touches two digits only, and carries wait until the
-!> spare bits are nearly used up. Sums of parts are combined by adding the digits element by element, after `carry`.
+!> The sum is an integer multiple of 2^-1074, the smallest double precision number. It is stored in digits of 32 bits
+!> within words of 64 bits (U. Kulisch, Computer Arithmetic and Validity, de Gruyter 2013; the layout is the small
+!> superaccumulator of R. M. Neal, arXiv:1505.05571, 2015). Adding a number changes only two digits. Carries are
+!> deferred until the spare bits are nearly used up. Partial sums are combined by adding their digits element by
+!> element, after `carry` of each.
 !>
-!> In single and double precision sums are exact. A number of quadruple precision is taken apart into three of double
-!> precision, which keeps all its bits as long as it is smaller than 2^1024, and its bits are not below 2^-1074: what is
-!> below is cut off, and what is above counts as infinite.
+!> Sums are exact in single and double precision. A number of quadruple precision is split into three numbers of double
+!> precision. The split is exact if the number is smaller than 2^1024 and has no bits below 2^-1074. Lower bits are
+!> dropped, and larger numbers count as infinite.
 module polydem_exact_sum
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_negative_inf, ieee_positive_inf, &
       ieee_quiet_nan, ieee_value
@@ -18,28 +20,28 @@ module polydem_exact_sum
 
    !> Bits of a digit
    integer, parameter :: base_bits = 32
-   !> Digits; the highest has a sign, and there is room for 2^63 numbers
+   !> Number of digits. The highest digit has a sign. There is room for 2^63 numbers
    integer, parameter :: n_digits = 68
-   !> Places that count what is not finite: infinities of either sign, and not-a-numbers
-   integer, parameter :: plus_place = n_digits + 1, minus_place = n_digits + 2, nan_place = n_digits + 3
-   !> Words of a sum
+   !> Indices of the words that count non-finite terms: +infinity, -infinity and NaN
+   integer, parameter :: plus_index = n_digits + 1, minus_index = n_digits + 2, nan_index = n_digits + 3
+   !> Number of words of a sum
    integer, parameter :: n_words = n_digits + 3
-   !> Numbers that may be added without carrying: each adds less than 2^52 to a digit
-   integer, parameter :: most_waiting = 1024
-   !> The unit is 2^unit_exponent
+   !> Maximum number of additions between two carries: each adds less than 2^52 to a digit
+   integer, parameter :: max_deferred = 1024
+   !> Bit 0 of the sum has the value 2^unit_exponent
    integer, parameter :: unit_exponent = -1074
-   !> Place of the last bit that a number of the working precision can have, in units
-   integer, parameter :: last_place = max(0, minexponent(1.0_wp) - digits(1.0_wp) - unit_exponent)
-   !> All bits of a digit
+   !> Position of the lowest bit that a number of the working precision can have
+   integer, parameter :: lowest_bit = max(0, minexponent(1.0_wp) - digits(1.0_wp) - unit_exponent)
+   !> Mask of all bits of a digit
    integer(lp), parameter :: digit_mask = 2_lp**base_bits - 1_lp
 
-   !> A sum; zero at first
+   !> A sum, initially zero
    type :: exact_sum_t
-      !> Digits from low to high, then the numbers of infinities above and below and of not-a-numbers, (n_words). Sums
-      !> of parts may be added element by element when `carry` has been called for each
+      !> Digits from low to high, then the counts of +infinity, -infinity and NaN, (n_words). Partial sums may be added
+      !> element by element after `carry` has been called for each of them
       integer(lp) :: digit(n_words) = 0_lp
-      !> Numbers added since carries were last made
-      integer, private :: waiting = 0
+      !> Number of additions since the last `carry`
+      integer, private :: n_deferred = 0
    contains
       !> Add a number, or another sum
       generic :: add => add_number, add_sum
@@ -82,7 +84,7 @@ contains
       call self%carry()
    end subroutine add_sum
 
-   !> Make carries, so that every digit but the highest is from 0 to 2^32 - 1: equal sums then have equal digits.
+   !> Propagate carries. Afterwards every digit but the highest is in [0, 2^32 - 1], and equal sums have equal digits.
    pure subroutine carry(self)
       class(exact_sum_t), intent(inout) :: self
       integer(lp) :: carried
@@ -93,20 +95,20 @@ contains
          self%digit(k) = iand(self%digit(k), digit_mask)
          self%digit(k + 1) = self%digit(k + 1) + carried
       end do
-      self%waiting = 0
+      self%n_deferred = 0
    end subroutine carry
 
-   !> The sum, rounded once, to the nearest number of the working precision; of two, to the even one.
+   !> The sum, rounded once to the nearest number of the working precision; ties go to the even number
    elemental real(wp) function rounded(self)
       class(exact_sum_t), intent(in) :: self
       type(exact_sum_t) :: amount
       logical :: is_negative
 
-      if (self%digit(nan_place) > 0_lp .or. all(self%digit(plus_place:minus_place) > 0_lp)) then
+      if (self%digit(nan_index) > 0_lp .or. all(self%digit(plus_index:minus_index) > 0_lp)) then
          rounded = ieee_value(rounded, ieee_quiet_nan)
-      else if (self%digit(plus_place) > 0_lp) then
+      else if (self%digit(plus_index) > 0_lp) then
          rounded = ieee_value(rounded, ieee_positive_inf)
-      else if (self%digit(minus_place) > 0_lp) then
+      else if (self%digit(minus_index) > 0_lp) then
          rounded = ieee_value(rounded, ieee_negative_inf)
       else
          amount%digit = self%digit
@@ -122,6 +124,7 @@ contains
       end if
    end function rounded
 
+   !> Add a double precision number.
    pure subroutine add_double(self, number)
       class(exact_sum_t), intent(inout) :: self
       real(dp), intent(in) :: number
@@ -150,33 +153,34 @@ contains
       end if
       self%digit(k) = self%digit(k) + low
       self%digit(k + 1) = self%digit(k + 1) + high
-      self%waiting = self%waiting + 1
-      if (self%waiting == most_waiting) call self%carry()
+      self%n_deferred = self%n_deferred + 1
+      if (self%n_deferred == max_deferred) call self%carry()
    end subroutine add_double
 
+   !> Count a non-finite number.
    pure subroutine add_infinite(self, mantissa, bits)
       class(exact_sum_t), intent(inout) :: self
-      !> Nought for infinities
+      !> Zero for infinities, else the number is NaN
       integer(lp), intent(in) :: mantissa
-      !> Negative for that below
+      !> Bits of the number; negative for -infinity
       integer(lp), intent(in) :: bits
       integer :: place
 
-      place = nan_place
-      if (mantissa == 0_lp) place = merge(minus_place, plus_place, bits < 0_lp)
+      place = nan_index
+      if (mantissa == 0_lp) place = merge(minus_index, plus_index, bits < 0_lp)
       self%digit(place) = self%digit(place) + 1_lp
    end subroutine add_infinite
 
-   !> Round a positive amount to as many bits as the working precision has.
+   !> Round a positive sum to the number of bits of the working precision.
    pure subroutine round_digits(amount)
       type(exact_sum_t), intent(inout) :: amount
       integer(lp) :: below
       integer :: last, k, shift
       logical :: up
 
-      last = max(leading_place(amount) - digits(1.0_wp) + 1, last_place)
+      last = max(highest_bit(amount) - digits(1.0_wp) + 1, lowest_bit)
       if (last <= 0) return
-      ! The first bit that goes decides, with those behind it, or that before it if there are none.
+      ! The highest dropped bit decides. In a tie (no lower bit is set), the lowest kept bit decides.
       k = (last - 1)/base_bits + 1
       shift = mod(last - 1, base_bits)
       up = btest(amount%digit(k), shift)
@@ -190,13 +194,13 @@ contains
       call amount%carry()
    end subroutine round_digits
 
-   !> An amount without a bit too many as a real number
+   !> A positive sum, already rounded, as a real number
    pure real(wp) function real_of(amount)
       type(exact_sum_t), intent(in) :: amount
       integer :: k
 
       real_of = 0.0_wp
-      if (leading_place(amount) + unit_exponent >= maxexponent(1.0_wp)) then
+      if (highest_bit(amount) + unit_exponent >= maxexponent(1.0_wp)) then
          real_of = ieee_value(real_of, ieee_positive_inf)
          return
       end if
@@ -206,8 +210,8 @@ contains
       end do
    end function real_of
 
-   !> Place of the highest bit of a positive amount, from 0; -1 for nought
-   pure integer function leading_place(amount) result(place)
+   !> Position of the highest bit of a positive sum, counted from 0; -1 if the sum is zero
+   pure integer function highest_bit(amount) result(place)
       type(exact_sum_t), intent(in) :: amount
       integer :: k
 
@@ -217,9 +221,9 @@ contains
          place = base_bits*(k - 1) + digits(0_lp) - leadz(amount%digit(k))
          return
       end do
-   end function leading_place
+   end function highest_bit
 
-   !> Whether an amount has the bit of a place
+   !> Whether the bit at a position is set
    pure logical function has_bit(amount, place)
       type(exact_sum_t), intent(in) :: amount
       integer, intent(in) :: place

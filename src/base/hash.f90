@@ -1,7 +1,7 @@
-!> 64-bit hashes: of a set of pairs (independent of their order) and of a sequence of numbers.
+!> 64-bit hashes of a set of pairs (independent of their order) and of a sequence of integers.
 !>
-!> Arithmetic is modulo 2^64 on signed integers; products are made from halves, since a signed overflow is
-!> undefined. The mixing function is the 64-bit finaliser of MurmurHash3 (A. Appleby, public domain).
+!> Arithmetic is modulo 2^64 on signed integers. Products are computed from 32-bit halves because signed overflow is
+!> undefined in Fortran. The mixing function is the 64-bit finaliser of MurmurHash3 (A. Appleby, public domain).
 module polydem_hash
    use polydem_kinds, only: ip, lp
    implicit none
@@ -16,17 +16,17 @@ module polydem_hash
 
 contains
 
-   !> Hash of one pair; the hash of a set of pairs is the sum modulo 2^64 of those of its members.
+   !> Hash of one pair. The hash of a set of pairs is the sum modulo 2^64 of the hashes of its pairs.
    pure integer(lp) function pair_hash(i, j)
-      !> Lower number of the pair, counted from 0
+      !> Smaller index of the pair, counted from 0
       integer(ip), intent(in) :: i
-      !> Higher number of the pair, counted from 0
+      !> Larger index of the pair, counted from 0
       integer(ip), intent(in) :: j
 
       pair_hash = finalise(ior(shiftl(int(i, lp), 32), int(j, lp)))
    end function pair_hash
 
-   !> Hash of a sequence, one more word at a time, starting from any value.
+   !> Hash of a sequence extended by one word. The start value of a sequence is arbitrary.
    pure integer(lp) function mix_word(hash, word)
       !> Hash of the words so far
       integer(lp), intent(in) :: hash
@@ -50,7 +50,7 @@ contains
       add_modulo = ior(shiftl(high, 32), iand(low, low_mask))
    end function add_modulo
 
-   !> Sixteen hexadecimal digits
+   !> A hash as sixteen hexadecimal digits
    pure function hexadecimal(hash) result(text)
       !> Any 64 bits
       integer(lp), intent(in) :: hash
@@ -64,6 +64,7 @@ contains
       end do
    end function hexadecimal
 
+   !> Mixing function: the 64-bit finaliser of MurmurHash3
    pure integer(lp) function finalise(word)
       integer(lp), intent(in) :: word
 
@@ -74,7 +75,7 @@ contains
       finalise = ieor(finalise, shiftr(finalise, 33))
    end function finalise
 
-   !> Product modulo 2^64 of `a` and the number with the given halves
+   !> Product modulo 2^64 of `a` and the integer 2^32 high + low
    pure integer(lp) function multiply(a, high, low)
       integer(lp), intent(in) :: a, high, low
       integer(lp) :: a_low, a_high, cross
@@ -85,7 +86,7 @@ contains
       multiply = add_modulo(half_product(a_low, low), shiftl(cross, 32))
    end function multiply
 
-   !> Product modulo 2^64 of two numbers below 2^32, which may exceed 2^63
+   !> Product modulo 2^64 of two integers below 2^32; the product may exceed 2^63
    pure integer(lp) function half_product(a, b)
       integer(lp), intent(in) :: a, b
       integer(lp) :: low, high

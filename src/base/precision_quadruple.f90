@@ -1,4 +1,4 @@
-!> Working precision of this build: quadruple (chosen by the CMake option POLYDEM_PRECISION).
+!> Working precision of this build: quadruple. The CMake option POLYDEM_PRECISION selects it.
 module polydem_precision
    use, intrinsic :: iso_fortran_env, only: real128
    implicit none
@@ -7,6 +7,6 @@ module polydem_precision
 
    !> Kind of every real number in the physics
    integer, parameter :: wp = real128
-   !> Its name, for logs and provenance
+   !> Name of the working precision, for logs and provenance
    character(len=*), parameter :: precision_name = 'quadruple'
 end module polydem_precision

@@ -1,7 +1,7 @@
 !> Reproducible random numbers: the combined multiple recursive generator MRG32k3a.
 !>
-!> P. L'Ecuyer, Operations Research 47 (1999) 159, Fig. I. Exact in 64-bit integers, so the same seed gives
-!> the same numbers with every compiler, and every scene can be made again from its namelist.
+!> P. L'Ecuyer, Operations Research 47 (1999) 159, Fig. I. The arithmetic is exact in 64-bit integers. The same seed
+!> therefore gives the same numbers with every compiler, and a namelist reproduces its scene.
 module polydem_random
    use polydem_kinds, only: ip, lp, wp
    implicit none
@@ -29,7 +29,7 @@ module polydem_random
 
 contains
 
-   !> A stream that depends on the seed alone; neighbouring seeds give unrelated streams.
+   !> A stream that depends on the seed only. Neighbouring seeds give unrelated streams.
    function new_random(seed) result(stream)
       !> Any integer
       integer(ip), intent(in) :: seed
@@ -70,12 +70,12 @@ contains
       between = low + (high - low)*self%uniform()
    end function between
 
-   !> A whole number from low to high, both included
+   !> A uniformly distributed integer from low to high, both included
    integer(ip) function whole(self, low, high)
       class(random_t), intent(inout) :: self
-      !> Least value
+      !> Smallest value
       integer(ip), intent(in) :: low
-      !> Greatest value
+      !> Largest value
       integer(ip), intent(in) :: high
 
       whole = min(high, low + int(self%uniform()*real(high - low + 1_ip, wp), ip))

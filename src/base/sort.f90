@@ -1,4 +1,4 @@
-!> Sorting of 64-bit keys: bottom-up merge sort, stable, O(n log n) in the worst case, no recursion.
+!> Sorting of 64-bit keys: a stable bottom-up merge sort without recursion, O(n log n) in the worst case.
 module polydem_sort
    use polydem_kinds, only: ip, lp
    implicit none
@@ -7,17 +7,17 @@ module polydem_sort
 
 contains
 
-   !> Sort keys in ascending order and carry an integer with each.
+   !> Sort keys in ascending order, and permute one integer per key in the same way.
    pure subroutine sort_keys(n, keys, carried, spare_keys, spare_carried)
       !> Number of entries
       integer(ip), intent(in) :: n
       !> Keys, (n) or longer
       integer(lp), intent(inout) :: keys(:)
-      !> What goes with each key, (n) or longer
+      !> Integers that are permuted with the keys, (n) or longer
       integer(ip), intent(inout) :: carried(:)
-      !> Work space, (n) or longer
+      !> Workspace, (n) or longer
       integer(lp), intent(inout) :: spare_keys(:)
-      !> Work space, (n) or longer
+      !> Workspace, (n) or longer
       integer(ip), intent(inout) :: spare_carried(:)
       integer(ip) :: width, low, middle, high
       integer(ip), parameter :: run = 16_ip

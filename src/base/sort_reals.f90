@@ -1,4 +1,4 @@
-!> Ranking of real numbers.
+!> Sorting permutation of real numbers.
 module polydem_sort_reals
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_sort, only: sort_keys
@@ -8,12 +8,11 @@ module polydem_sort_reals
 
 contains
 
-   !> Indices of real numbers in ascending order, equal numbers in the order in which they stand.
-   !> The numbers are compared in double precision.
+   !> Indices of real numbers in ascending order of the numbers. The sort is stable and compares in double precision.
    pure subroutine sort_reals(numbers, ranked)
-      !> Numbers to rank
+      !> The numbers, (n)
       real(wp), intent(in) :: numbers(:)
-      !> Index of the least number first, same size
+      !> Indices into `numbers`, that of the smallest number first, (n)
       integer(ip), intent(out) :: ranked(:)
       integer(lp), allocatable :: keys(:), spare_keys(:)
       integer(ip), allocatable :: spare_ranked(:)
@@ -28,15 +27,15 @@ contains
       call sort_keys(n, keys, ranked, spare_keys, spare_ranked)
    end subroutine sort_reals
 
-   !> An integer that ascends with the number, in double precision.
+   !> A 64-bit integer that increases with the number (in double precision).
    !>
-   !> Read as integers, the bits of IEEE numbers ascend with positive numbers and, with all but the sign reversed, with
-   !> negative ones.
+   !> The bits of positive IEEE numbers, read as integers, have the order of the numbers. For negative numbers all bits
+   !> but the sign are inverted.
    elemental integer(lp) function ordered_bits(number) result(bits)
       !> Any number
       real(wp), intent(in) :: number
 
-      ! adding zero turns -0 into +0
+      ! Adding zero turns -0 into +0.
       bits = transfer(real(number, dp) + 0.0_dp, 0_lp)
       if (bits < 0_lp) bits = ieor(bits, huge(0_lp))
    end function ordered_bits

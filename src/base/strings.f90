@@ -1,15 +1,21 @@
-!> Numbers as text, and foreign texts without harm, for messages and logs.
+!> Text for messages and logs: numbers as text, safe display of untrusted text, lists of words, suggestions.
 module polydem_strings
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_kinds, only: ip, lp, wp
    implicit none
    private
-   public :: to_text, join, printable
+   public :: to_text, join, printable, text_t, lower_case, quoted, count_words, split_words, suggestion
 
-   !> Shortest sensible text of a number
+   !> Text of a number without blanks
    interface to_text
       module procedure text_ip, text_lp, text_wp
    end interface to_text
+
+   !> A text of any length, for arrays of texts of different lengths
+   type :: text_t
+      !> The text
+      character(len=:), allocatable :: text
+   end type text_t
 
 contains
 
@@ -55,11 +61,11 @@ contains
       text = trim(adjustl(buffer))
    end function text_wp
 
-   !> Words with a separator between them
+   !> Words joined by a separator
    pure function join(words, separator) result(text)
       !> Words; trailing blanks are dropped
       character(len=*), intent(in) :: words(:)
-      !> What goes between two words
+      !> Text between two words
       character(len=*), intent(in) :: separator
       character(len=:), allocatable :: text
       integer :: k
@@ -71,13 +77,13 @@ contains
       end do
    end function join
 
-   !> A text as it may be shown on a terminal: characters of UTF-8 stay, but control characters, and bytes that belong
-   !> to no character, become \n, \r, \t or like \x1b, with two hexadecimal digits for each byte. So no text from a file
-   !> can move the cursor, change a title, or turn the direction of what follows.
+   !> A text that is safe to show on a terminal. Printable UTF-8 characters are unchanged. Control characters and bytes
+   !> that are not valid UTF-8 become \n, \r, \t or an escape like \x1b, with two hexadecimal digits per byte. Text from
+   !> a file can therefore not move the cursor, change the window title or reverse the direction of writing.
    pure function printable(text, keeps_lines) result(shown)
-      !> Text from anywhere
+      !> Untrusted text
       character(len=*), intent(in) :: text
-      !> Whether ends of lines stay as they are; no if absent
+      !> Whether line feeds are unchanged; false if absent
       logical, intent(in), optional :: keeps_lines
       character(len=:), allocatable :: shown
       character(len=:), allocatable :: buffer
@@ -90,7 +96,7 @@ contains
       n = 0
       k = 1
       do while (k <= len(text))
-         length = harmless_bytes(text(k:))
+         length = safe_bytes(text(k:))
          if (has_lines .and. text(k:k) == new_line('a')) length = 1
          if (length > 0) then
             buffer(n + 1:n + length) = text(k:k + length - 1)
@@ -106,8 +112,8 @@ contains
       shown = buffer(:n)
    end function printable
 
-   !> Bytes of the first character of a text if it may be shown as it is, else 0 (The Unicode Standard 15, table 3-7)
-   pure integer function harmless_bytes(text) result(length)
+   !> Number of bytes of the first character if it is safe to show, else 0 (The Unicode Standard 15, table 3-7)
+   pure integer function safe_bytes(text) result(length)
       character(len=*), intent(in) :: text
       integer :: first, least, most, k, code
 
@@ -120,7 +126,7 @@ contains
       if (first >= 240) length = 4
       least = 128
       most = 191
-      ! No longer forms than needed, no halves of pairs, nothing beyond the last character.
+      ! Excluded: overlong forms, surrogates, and code points beyond U+10FFFF.
       if (first == 224) least = 160
       if (first == 237) most = 159
       if (first == 240) least = 144
@@ -138,9 +144,9 @@ contains
          most = 191
       end do
       if (is_control(code)) length = 0
-   end function harmless_bytes
+   end function safe_bytes
 
-   !> Whether a character beyond ASCII controls how others are shown: C1, ends of lines, directions of writing
+   !> Whether a non-ASCII code point is a control: C1 controls, line separators, or directions of writing
    pure logical function is_control(code)
       integer, intent(in) :: code
 
@@ -148,7 +154,7 @@ contains
          (code >= 8232 .and. code <= 8238) .or. (code >= 8294 .and. code <= 8297)
    end function is_control
 
-   !> A byte in visible letters
+   !> A byte as a visible escape sequence
    pure function escaped(byte) result(text)
       character(len=1), intent(in) :: byte
       character(len=:), allocatable :: text
@@ -167,5 +173,134 @@ contains
          text = '\x'//digits(code/16 + 1:code/16 + 1)//digits(mod(code, 16) + 1:mod(code, 16) + 1)
       end select
    end function escaped
+
+   !> The text with the letters A to Z in lower case
+   pure function lower_case(text) result(small)
+      !> Text of any length
+      character(len=*), intent(in) :: text
+      character(len=len(text)) :: small
+      integer, parameter :: shift = iachar('a') - iachar('A')
+      integer :: k
+
+      small = text
+      do k = 1, len(text)
+         if (text(k:k) >= 'A' .and. text(k:k) <= 'Z') small(k:k) = achar(iachar(text(k:k)) + shift)
+      end do
+   end function lower_case
+
+   !> The text in single quotes, as in a namelist; quotes inside are doubled
+   pure function quoted(text) result(literal)
+      !> Text of any length
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: literal
+      integer :: k, n
+
+      allocate (character(len=2*len(text) + 2) :: literal)
+      literal(1:1) = "'"
+      n = 1
+      do k = 1, len(text)
+         if (text(k:k) == "'") then
+            n = n + 1
+            literal(n:n) = "'"
+         end if
+         n = n + 1
+         literal(n:n) = text(k:k)
+      end do
+      literal = literal(:n)//"'"
+   end function quoted
+
+   !> Number of words in a text; blanks and commas separate words
+   pure integer function count_words(text)
+      !> Text of any length
+      character(len=*), intent(in) :: text
+      integer :: k
+
+      count_words = 0
+      do k = 1, len(text)
+         if (scan(text(k:k), ' ,') > 0) cycle
+         if (scan(text(k + 1:)//' ', ' ,') == 1) count_words = count_words + 1
+      end do
+   end function count_words
+
+   !> The words of a text; blanks and commas separate words
+   pure function split_words(text) result(words)
+      !> Text of any length
+      character(len=*), intent(in) :: text
+      character(len=len(text)) :: words(count_words(text))
+      integer :: first, k, last
+
+      last = 0
+      do k = 1, size(words)
+         first = last + verify(text(last + 1:), ' ,')
+         last = scan(text(first:)//' ', ' ,') + first - 2
+         words(k) = text(first:last)
+      end do
+   end function split_words
+
+   !> End of a message about an unknown word: the most similar candidate, or all candidates if none is similar.
+   !>
+   !> A candidate is similar if it contains the word, or if its edit distance is at most a third of the length of the
+   !> word, rounded up. A letter that is missing, added or changed, or two swapped neighbours, count one.
+   pure function suggestion(word, candidates) result(text)
+      !> The unknown word
+      character(len=*), intent(in) :: word
+      !> The valid words
+      character(len=*), intent(in) :: candidates(:)
+      character(len=:), allocatable :: text
+      character(len=len_trim(word)) :: small
+      integer :: best, distance, k, near
+
+      small = lower_case(trim(word))
+      near = (len(small) + 2)/3 + 1
+      best = 0
+      do k = 1, size(candidates)
+         ! The distance is at least the difference of the lengths. This test avoids large tables.
+         distance = abs(len(small) - len_trim(candidates(k)))
+         if (distance < near) distance = edit_distance(small, trim(candidates(k)))
+         if (len(small) > 2 .and. index(candidates(k), small) > 0) distance = min(distance, 1)
+         if (distance < near) then
+            near = distance
+            best = k
+         end if
+      end do
+      if (best > 0) then
+         text = '; did you mean '//quoted(trim(candidates(best)))//'?'
+      else
+         text = '; choose from '//listed(candidates)
+      end if
+   end function suggestion
+
+   !> Words separated by commas
+   pure function listed(words) result(text)
+      character(len=*), intent(in) :: words(:)
+      character(len=:), allocatable :: text
+      integer :: k
+
+      text = ''
+      do k = 1, size(words)
+         if (k > 1) text = text//', '
+         text = text//trim(words(k))
+      end do
+   end function listed
+
+   !> Smallest number of single-letter changes and swaps of neighbours that turn one word into the other
+   pure integer function edit_distance(a, b)
+      character(len=*), intent(in) :: a, b
+      integer :: d(-1:len(a), -1:len(b)), i, j
+
+      d = len(a) + len(b)
+      d(0:, 0) = [(i, i=0, len(a))]
+      d(0, 0:) = [(j, j=0, len(b))]
+      do j = 1, len(b)
+         do i = 1, len(a)
+            d(i, j) = min(d(i - 1, j) + 1, d(i, j - 1) + 1, &
+               d(i - 1, j - 1) + merge(0, 1, a(i:i) == b(j:j)))
+            if (i > 1 .and. j > 1) then
+               if (a(i - 1:i) == b(j:j)//b(j - 1:j - 1)) d(i, j) = min(d(i, j), d(i - 2, j - 2) + 1)
+            end if
+         end do
+      end do
+      edit_distance = d(len(a), len(b))
+   end function edit_distance
 
 end module polydem_strings

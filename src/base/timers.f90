@@ -1,6 +1,6 @@
-!> Seconds per stage of the time step.
+!> Elapsed time per stage of the time step.
 !>
-!> The same words name the folders of src, the namelist groups, the timers and `/profile/stage` in results.
+!> Each stage has the same name as its timer, its namelist group and its entry in `/profile/stage` of results.
 module polydem_timers
    use polydem_clock, only: wall_seconds
    use polydem_kinds, only: dp, lp
@@ -9,6 +9,7 @@ module polydem_timers
    public :: timers_t, n_stages, stage_names
    public :: stage_boxes, stage_neighbours, stage_overlap, stage_forces, stage_integrate, stage_exchange, stage_output
 
+   !> Indices of the stages
    integer, parameter :: stage_boxes = 1
    integer, parameter :: stage_neighbours = 2
    integer, parameter :: stage_overlap = 3
@@ -22,37 +23,37 @@ module polydem_timers
    character(len=*), parameter :: stage_names(n_stages) = &
       [character(len=10) :: 'boxes', 'neighbours', 'overlap', 'forces', 'integrate', 'exchange', 'output']
 
-   !> Stop watches, one per stage; a stage that does not run costs nothing
+   !> Stopwatches, one per stage; a stage that does not run is not timed
    type :: timers_t
       !> Number of steps in which each stage ran
       integer(lp) :: calls(n_stages) = 0_lp
       !> Seconds spent in each stage
       real(dp) :: total(n_stages) = 0.0_dp
-      !> Least time of each stage in one step [s]
+      !> Shortest time of each stage in one step [s]
       real(dp) :: least(n_stages) = huge(1.0_dp)
-      !> Greatest time of each stage in one step [s]
+      !> Longest time of each stage in one step [s]
       real(dp) :: most(n_stages) = 0.0_dp
-      !> Time of each stage in the step under way [s]; negative: it did not run
+      !> Time of each stage in the current step [s]; negative if it has not run
       real(dp), private :: current(n_stages) = -1.0_dp
-      !> When the running stage began [s]
+      !> Start of the current lap [s]
       real(dp), private :: began = 0.0_dp
    contains
       procedure :: start
       procedure :: lap
       procedure :: end_step
-      procedure :: add_rest
+      procedure :: add_to_total
    end type timers_t
 
 contains
 
-   !> Begin to time.
+   !> Start the first lap.
    subroutine start(self)
       class(timers_t), intent(inout) :: self
 
       self%began = wall_seconds()
    end subroutine start
 
-   !> Book the time since `start` or the last `lap` under a stage; a stage may have several laps in a step.
+   !> Add the time since `start` or the last `lap` to a stage. A stage may have several laps in a step.
    subroutine lap(self, stage)
       class(timers_t), intent(inout) :: self
       !> stage_boxes, ..., stage_output
@@ -64,7 +65,7 @@ contains
       self%began = now
    end subroutine lap
 
-   !> Close the step: sums, least and greatest times are taken over steps.
+   !> End the step: add its times to the totals, and update the shortest and longest times per step.
    subroutine end_step(self)
       class(timers_t), intent(inout) :: self
       integer :: k
@@ -79,9 +80,9 @@ contains
       end do
    end subroutine end_step
 
-   !> Book the time since `start` or the last `lap` under a stage of a step that is closed. It counts in the total
-   !> alone: it is for what is done now and then, and must itself have the times of the step.
-   subroutine add_rest(self, stage)
+   !> Add the time since `start` or the last `lap` to the total of a stage after the step has ended. The number of calls
+   !> and the times per step do not change. This is for occasional work that itself needs the times of the step.
+   subroutine add_to_total(self, stage)
       class(timers_t), intent(inout) :: self
       !> stage_boxes, ..., stage_output
       integer, intent(in) :: stage
@@ -90,6 +91,6 @@ contains
       now = wall_seconds()
       self%total(stage) = self%total(stage) + (now - self%began)
       self%began = now
-   end subroutine add_rest
+   end subroutine add_to_total
 
 end module polydem_timers

@@ -1,14 +1,11 @@
-!> Axis-aligned bounding boxes, the only thing that neighbour finders see.
+!> Axis-aligned bounding boxes: the only input of neighbour finders.
 module polydem_boxes
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: boxes_t, far
+   public :: boxes_t
 
-   !> Greatest coordinate and greatest half side: what finders make of two boxes is then finite [m]
-   real(wp), parameter :: far = 0.25_wp*huge(1.0_wp)
-
-   !> Boxes 1..n. A body of particle size has one box; a large one is cut into several that overlap a little.
+   !> Boxes 1..n. A body of common size has one box. A large body has several boxes, which overlap slightly.
    type :: boxes_t
       !> Number of boxes
       integer(ip) :: n = 0_ip
@@ -16,15 +13,15 @@ module polydem_boxes
       integer(ip) :: n_bodies = 0_ip
       !> Whether box k belongs to body k for every k (no body is cut)
       logical :: one_to_one = .true.
-      !> xmin, ymin, xmax, ymax of each box, (4, box), closed [m]; a box is half a cache line
+      !> xmin, ymin, xmax, ymax of each closed box, (4, box) [m]; half a cache line per box
       real(wp), allocatable :: bounds(:, :)
-      !> Slot of the body that a box belongs to; ascending
+      !> Slot of the body of each box, ascending
       integer(ip), allocatable :: body(:)
       !> Whether that body is fixed
       logical, allocatable :: fixed(:)
-      !> Whether it is fixed, or moved by another process: two passive bodies never make a pair
+      !> Whether that body is passive: fixed, or moved by another rank. Two passive bodies never form a pair
       logical, allocatable :: passive(:)
-      !> Greatest half side that a box can have at any angle of its body [m]
+      !> Upper bound of the half sides of a box at any angle of its body [m]
       real(wp), allocatable :: reach(:)
    end type boxes_t
 

@@ -1,22 +1,22 @@
-!> What differs between the settings of two runs, in words.
+!> Comparison of the settings of two runs: a text that lists the entries that differ.
 module polydem_changed_entries
-   use polydem_words, only: text_t
+   use polydem_strings, only: text_t
    implicit none
    private
    public :: changed_entries
 
-   !> Entries that do not touch the result; it was found where it is
+   !> Entries that do not affect the computed result
    character(len=*), parameter :: harmless(*) = [character(len=19) :: 'output.folder', 'checkpoint.steps', &
                                                  'checkpoint.interval', 'checkpoint.elapsed', 'exchange.cut', &
                                                  'exchange.margin', 'exchange.balance', 'exchange.imbalance']
 
 contains
 
-   !> The entries that differ, like 'forces.stiffness was 1.0e7 and is 2.0e7; ...'; empty if none does.
+   !> List of the entries that differ, such as 'forces.stiffness was 1.0e7 and is 2.0e7; ...'; empty if none differs.
    pure function changed_entries(former, present) result(text)
-      !> Resolved settings of the former run, one entry per line, as in `settings_t`
+      !> Resolved settings of the earlier run, one entry per line, as in `settings_t`
       character(len=*), intent(in) :: former
-      !> Those of the present one
+      !> Resolved settings of the present run, likewise
       character(len=*), intent(in) :: present
       character(len=:), allocatable :: text
       type(text_t), allocatable :: old_name(:), old_value(:), new_name(:), new_value(:)
@@ -28,17 +28,18 @@ contains
       do k = 1, size(old_name)
          j = place_of(old_name(k)%text, new_name)
          if (j == 0) then
-            call add(old_name(k)%text//' was '//old_value(k)%text//' and is not in force', text)
+            call add(old_name(k)%text//' was '//old_value(k)%text//' and is not used now', text)
          else if (new_value(j)%text /= old_value(k)%text) then
             call add(old_name(k)%text//' was '//old_value(k)%text//' and is '//new_value(j)%text, text)
          end if
       end do
       do k = 1, size(new_name)
          if (place_of(new_name(k)%text, old_name) > 0) cycle
-         call add(new_name(k)%text//' was not in force and is '//new_value(k)%text, text)
+         call add(new_name(k)%text//' was not used and is '//new_value(k)%text, text)
       end do
    end function changed_entries
 
+   !> Append a sentence; '; ' separates sentences.
    pure subroutine add(sentence, text)
       character(len=*), intent(in) :: sentence
       character(len=:), allocatable, intent(inout) :: text
@@ -47,7 +48,7 @@ contains
       text = text//sentence
    end subroutine add
 
-   !> Split resolved settings into names 'group.key' and values; harmless entries are left out.
+   !> Split resolved settings into names 'group.key' and values, without the entries that do not affect the result.
    pure subroutine list_entries(settings, names, values)
       character(len=*), intent(in) :: settings
       type(text_t), allocatable, intent(out) :: names(:), values(:)
@@ -73,7 +74,7 @@ contains
       end do
    end subroutine list_entries
 
-   !> Place of a name in a list; 0 if it is not there
+   !> Index of a name in a list; 0 if the list does not contain it
    pure integer function place_of(name, names)
       character(len=*), intent(in) :: name
       type(text_t), intent(in) :: names(:)

@@ -1,4 +1,4 @@
-!> Checks across entries, which a single row of the table cannot make.
+!> Checks that involve two or more entries. The table of entries holds the checks of single entries.
 module polydem_check_settings
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: wp
@@ -9,15 +9,17 @@ module polydem_check_settings
    private
    public :: check_settings
 
-   !> Greatest speed of a wall, as in the table [m/s]
+   !> Upper limit of the speed of a wall, as in the table of entries [m/s]
    real(wp), parameter :: speed_limit = 1.0e6_wp
-   !> Greatest length of a container in grains; more are neither counted nor boxed in a reasonable time
+   !> Upper limit of the length of a container in long axes of a grain. Longer containers need too much time to fill
    real(wp), parameter :: length_limit = 1.0e5_wp
+   !> Angle of a full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586_wp
-   !> Least restitution; below, the stable step falls like its root, and a step that resolves the impact with it
+   !> Lower limit of the restitution. Below it, the stable time step is proportional to the square root of the
+   !> restitution, and so is a time step that resolves the impact
    real(wp), parameter :: least_restitution = 0.01_wp
 
-   !> Scenes of grains in a container whose width is not that of a block
+   !> Scenes in which `width` is the width of the container; in other scenes it is the width of a block
    character(len=*), parameter :: grain_scenes(4) = [character(len=6) :: 'hopper', 'gas', 'bed', 'heap']
 
 contains
@@ -26,9 +28,9 @@ contains
    pure subroutine check_settings(settings, values, error)
       !> Settings with all entries filled in
       type(settings_t), intent(in) :: settings
-      !> Values they come from, (rows of the table), for the places
+      !> Values of all entries, (row of the table); they contain the places for messages
       type(value_t), intent(in) :: values(:)
-      !> The first contradiction
+      !> First pair of contradictory entries
       type(error_t), allocatable, intent(inout) :: error
 
       associate (scene => settings%scene)
@@ -43,34 +45,34 @@ contains
          if (any(scene%name == grain_scenes)) call check_container(scene%width, 'width', scene, values, error)
          call require(scene%movers <= scene%bodies, 'must not exceed', 'movers', 'bodies', values, error)
          call require(scene%size_ratio <= 1.0_wp .or. scene%packing == '', &
-            'above 1 does not go with', 'size_ratio', 'packing', values, error)
+            'above 1 cannot be combined with', 'size_ratio', 'packing', values, error)
          call require(scene%size_ratio <= 1.0_wp .or. .not. scene%overlap, &
-            'above 1 does not go with', 'size_ratio', 'overlap', values, error)
+            'above 1 cannot be combined with', 'size_ratio', 'overlap', values, error)
          associate (fastest => two_pi*scene%motion_frequency*maxval(abs(scene%motion_amplitude)))
             call require(scene%motion /= 'oscillation' .or. fastest < speed_limit, &
-               'gives a speed of 1e6 m/s or more with', 'motion_amplitude', 'motion_frequency', values, error)
+               'gives a speed of 1e6 m/s or more together with', 'motion_amplitude', 'motion_frequency', values, error)
          end associate
          if (scene%name == 'drum') then
             call require(scene%boxes > 0 .or. scene%bodies > 0, &
-               'must be given, or else', 'boxes', 'bodies', values, error)
+               'is 0; give it, or give', 'boxes', 'bodies', values, error)
             call require(scene%boxes == 0 .or. scene%bodies == 0, &
-               'must be 0, or else', 'boxes', 'bodies', values, error)
+               'cannot be combined with', 'boxes', 'bodies', values, error)
          end if
       end associate
       associate (given => values(first_row('forces', 'restitution')))
          if (given%in_force .and. settings%forces%restitution < least_restitution) then
-            call raise(error, input_error, given%place//': ''restitution'' in &forces cannot be less than 0.01, '// &
-               'since no dashpot reaches 0 and the step falls with it; leave it out for ''damping_coefficient''')
+            call raise(error, input_error, given%place//': ''restitution'' in &forces must be at least 0.01, '// &
+               'because a smaller value needs a very small time step; omit it to use ''damping_coefficient''')
          end if
       end associate
       if (settings%guards%energy /= 'off' .and. .not. settings%output%ledger) then
          call raise(error, input_error, values(first_row('guards', 'energy'))%place// &
-            ': ''energy'' in &guards needs ''ledger'' in &output')
+            ': ''energy'' in &guards needs ''ledger'' = .true. in &output')
       end if
       call check_friction(settings, values, error)
    end subroutine check_settings
 
-   !> Refuse exact friction with schemes that know no velocity in the middle of a step.
+   !> Reject exact friction with schemes that have no velocity at mid-step.
    pure subroutine check_friction(settings, values, error)
       type(settings_t), intent(in) :: settings
       type(value_t), intent(in) :: values(:)
@@ -78,10 +80,10 @@ contains
 
       if (settings%forces%friction /= 'exact' .or. settings%integrate%scheme == 'velocity_verlet') return
       call raise(error, input_error, values(first_row('integrate', 'scheme'))%place//': ''scheme'' in &integrate '// &
-                 'must be velocity_verlet, since ''friction'' in &forces is exact')
+                 'must be velocity_verlet, because ''friction'' in &forces is exact')
    end subroutine check_friction
 
-   !> Refuse containers that are too large for the grains; lengths that are not in force are 0.
+   !> Reject containers that are too large for the grains. The length is 0 if its entry is not in use.
    pure subroutine check_container(length, key, scene, values, error)
       real(wp), intent(in) :: length
       character(len=*), intent(in) :: key
@@ -93,18 +95,19 @@ contains
          values, error)
    end subroutine check_container
 
-   !> Refuse two entries of &scene that do not go together.
+   !> Raise an error about two entries of &scene if their relation does not hold. The error names the place of `key` if
+   !> this entry is given, otherwise the place of `other`.
    pure subroutine require(holds, relation, key, other, values, error)
       logical, intent(in) :: holds
       character(len=*), intent(in) :: relation, key, other
       type(value_t), intent(in) :: values(:)
       type(error_t), allocatable, intent(inout) :: error
-      integer :: blamed
+      integer :: row
 
       if (holds) return
-      blamed = first_row('scene', other)
-      if (values(first_row('scene', key))%is_given) blamed = first_row('scene', key)
-      call raise(error, input_error, values(blamed)%place//': '''//key//''' in &scene '//relation// &
+      row = first_row('scene', other)
+      if (values(first_row('scene', key))%is_given) row = first_row('scene', key)
+      call raise(error, input_error, values(row)%place//': '''//key//''' in &scene '//relation// &
          ' '''//other//'''')
    end subroutine require
 

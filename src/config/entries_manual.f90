@@ -1,9 +1,8 @@
-!> The manual of the namelist entries: the table as Markdown.
+!> Manual of the namelist entries: the table of entries as a Markdown table.
 module polydem_entries_manual
    use polydem_namelist_entries, only: entries, entry_t, required
    use polydem_namelist_values, only: is_text
-   use polydem_strings, only: join, to_text
-   use polydem_words, only: quoted, split_words
+   use polydem_strings, only: join, to_text, quoted, split_words
    implicit none
    private
    public :: entries_as_markdown
@@ -12,7 +11,7 @@ module polydem_entries_manual
 
 contains
 
-   !> One Markdown table with a row for every row of the table of entries
+   !> Markdown table with one row for each row of the table of entries
    pure function entries_as_markdown() result(text)
       character(len=:), allocatable :: text
       integer :: k
@@ -28,6 +27,7 @@ contains
       end do
    end function entries_as_markdown
 
+   !> One cell with its closing bar
    pure function cell(content) result(text)
       character(len=*), intent(in) :: content
       character(len=:), allocatable :: text
@@ -36,6 +36,7 @@ contains
       if (content == '') text = ' |'
    end function cell
 
+   !> Type and number of values
    pure function type_of(entry) result(text)
       type(entry_t), intent(in) :: entry
       character(len=:), allocatable :: text
@@ -45,6 +46,7 @@ contains
       if (entry%count > 1) text = to_text(entry%count)//' '//text//'s'
    end function type_of
 
+   !> Default; texts are in quotes and backticks
    pure function default_of(entry) result(text)
       type(entry_t), intent(in) :: entry
       character(len=:), allocatable :: text
@@ -58,6 +60,7 @@ contains
       end if
    end function default_of
 
+   !> Bounds of a number, or choices of a word separated by commas
    pure function range_of(entry) result(text)
       type(entry_t), intent(in) :: entry
       character(len=:), allocatable :: text
@@ -66,7 +69,7 @@ contains
       if (entry%type == 'word') text = join(split_words(entry%allowed), ', ')
    end function range_of
 
-   !> 'drum, gas' for scenes, 'motion = rotation' for the rest
+   !> Condition under which the entry is used: 'drum, gas' for scenes, 'motion = rotation' for other entries
    pure function use_of(entry) result(text)
       type(entry_t), intent(in) :: entry
       character(len=:), allocatable :: text

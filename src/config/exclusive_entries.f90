@@ -1,4 +1,4 @@
-!> Two entries that say the same thing in different ways: at most one of them is given.
+!> Pairs of entries that set the same quantity in different ways. At most one entry of a pair may be given.
 module polydem_exclusive_entries
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: wp
@@ -6,40 +6,41 @@ module polydem_exclusive_entries
    use polydem_namelist_values, only: label, value_t
    implicit none
    private
-   public :: settle_exclusive_entries
+   public :: resolve_exclusive_entries
 
 contains
 
-   !> Leave one entry of each couple in force, so that the resolved text can be read again.
-   pure subroutine settle_exclusive_entries(values, error)
-      !> Values, (rows of the table)
+   !> Leave one entry of each pair in use. The resolved text can then be read again.
+   pure subroutine resolve_exclusive_entries(values, error)
+      !> Values, (row of the table)
       type(value_t), intent(inout) :: values(:)
-      !> Both are given
+      !> Both entries of a pair are given
       type(error_t), allocatable, intent(inout) :: error
 
-      call settle(first_row('forces', 'restitution'), first_row('forces', 'damping_coefficient'), values, error)
-   end subroutine settle_exclusive_entries
+      call choose_entry(first_row('forces', 'restitution'), first_row('forces', 'damping_coefficient'), values, error)
+   end subroutine resolve_exclusive_entries
 
-   !> Of a number that replaces another if it is given, and that other, keep one; what the command line gives wins.
-   pure subroutine settle(special, usual, values, error)
+   !> Choose between a special entry, which replaces the usual one if it is given, and the usual entry. An entry of the
+   !> command line takes precedence over one of the file.
+   pure subroutine choose_entry(special, usual, values, error)
       integer, intent(in) :: special, usual
       type(value_t), intent(inout) :: values(:)
       type(error_t), allocatable, intent(inout) :: error
-      logical :: wins
+      logical :: use_special
 
       if (.not. values(special)%in_force) return
-      wins = values(special)%is_given
-      if (wins .and. values(usual)%is_given) then
+      use_special = values(special)%is_given
+      if (use_special .and. values(usual)%is_given) then
          if (values(special)%is_override .eqv. values(usual)%is_override) then
             call raise(error, input_error, values(special)%place//': '//label(entries(special))// &
-               ' does not go with '//label(entries(usual))//'; give one of them')
+               ' cannot be combined with '//label(entries(usual))//'; give only one of them')
             return
          end if
-         wins = values(special)%is_override
+         use_special = values(special)%is_override
       end if
-      values(special)%in_force = wins
-      values(usual)%in_force = .not. wins
-      if (.not. wins) values(special)%reals = 0.0_wp
-   end subroutine settle
+      values(special)%in_force = use_special
+      values(usual)%in_force = .not. use_special
+      if (.not. use_special) values(special)%reals = 0.0_wp
+   end subroutine choose_entry
 
 end module polydem_exclusive_entries

@@ -1,27 +1,27 @@
-!> From the values of the table to the typed settings.
+!> Copies the values of the table of entries to the components of the settings types.
 module polydem_fill_settings
    use polydem_bench_settings, only: bench_settings_t
    use polydem_kinds, only: ip, wp
    use polydem_namelist_entries, only: entries, first_row
    use polydem_namelist_values, only: value_t
    use polydem_settings, only: settings_t
-   use polydem_words, only: text_t
+   use polydem_strings, only: text_t
    implicit none
    private
    public :: fill_settings, fill_bench
 
-   !> Take the value of an entry, given as 'group.key'.
+   !> Copy the value of an entry, named 'group.key', to a component.
    interface take
       module procedure take_real, take_reals, take_integer, take_integers, take_logical, take_text, take_texts
    end interface take
 
 contains
 
-   !> Fill every component from the entry of its name.
+   !> Fill every component from the entry of the same name.
    pure subroutine fill_settings(values, settings)
-      !> Values, (rows of the table)
+      !> Values, (row of the table)
       type(value_t), intent(in) :: values(:)
-      !> Settings to fill; `file`, `text` and `resolved` stay
+      !> Settings to fill; `file`, `text` and `resolved` are not changed
       type(settings_t), intent(inout) :: settings
 
       call fill_scene(values, settings)
@@ -70,11 +70,11 @@ contains
       call take(values, 'checkpoint.elapsed', settings%checkpoint%elapsed)
    end subroutine fill_settings
 
-   !> Fill every component of a bench from the entry of its name.
+   !> Fill every component of the settings of a bench from the entry of the same name.
    pure subroutine fill_bench(values, bench)
-      !> Values, (rows of the table)
+      !> Values, (row of the table)
       type(value_t), intent(in) :: values(:)
-      !> Settings to fill; `file`, `text` and `resolved` stay
+      !> Settings to fill; `file`, `text` and `resolved` are not changed
       type(bench_settings_t), intent(inout) :: bench
 
       call take(values, 'bench.scenes', bench%scenes)
@@ -86,10 +86,11 @@ contains
       call take(values, 'bench.mode', bench%mode)
       call take(values, 'bench.steps', bench%steps)
       call take(values, 'bench.folder', bench%folder)
-      bench%place_of_scenes = values(row_of(values, 'bench.scenes'))%place
-      bench%place_of_prepare = values(row_of(values, 'bench.prepare'))%place
+      bench%scenes_place = values(row_of(values, 'bench.scenes'))%place
+      bench%prepare_place = values(row_of(values, 'bench.prepare'))%place
    end subroutine fill_bench
 
+   !> Fill the components of group &scene.
    pure subroutine fill_scene(values, settings)
       type(value_t), intent(in) :: values(:)
       type(settings_t), intent(inout) :: settings
@@ -131,6 +132,7 @@ contains
       end associate
    end subroutine fill_scene
 
+   !> Fill the components of group &guards.
    pure subroutine fill_guards(values, settings)
       type(value_t), intent(in) :: values(:)
       type(settings_t), intent(inout) :: settings
@@ -205,7 +207,7 @@ contains
       component = values(row_of(values, name))%texts
    end subroutine take_texts
 
-   !> Row of an entry that is in force, or else its first row
+   !> Row of the entry that is in use; the first row of the entry if none is in use
    pure integer function row_of(values, name) result(row)
       type(value_t), intent(in) :: values(:)
       character(len=*), intent(in) :: name

@@ -1,45 +1,46 @@
-!> Namelist text as a list of statements: `&group` opens, `key = value, value` gives.
+!> Parser of namelist text. Its result is a list of statements: `&group` opens a group, `key = value, value` sets an
+!> entry.
 !>
-!> Only the syntax is checked here; what groups and keys there are is the business of `resolve_entries`.
+!> This module checks only the syntax. `resolve_entries` checks the names of groups and keys.
 module polydem_namelist_statements
    use polydem_errors, only: error_t, input_error, raise
    use polydem_namelist_tokens, only: source_t, token_t, split_tokens, &
       group_token, end_token, equals_token, comma_token, bare_token, quoted_token
-   use polydem_words, only: lower_case, quoted
+   use polydem_strings, only: lower_case, quoted
    implicit none
    private
    public :: literal_t, statement_t, read_statements
 
-   !> A value as it was written
+   !> A value as written in the source text
    type :: literal_t
-      !> Its text, without the quotes around it
+      !> Text of the value without the enclosing quotes
       character(len=:), allocatable :: text
-      !> Whether there were quotes
+      !> Whether the value is in quotes
       logical :: has_quotes = .false.
    contains
-      !> The value as it was written, for messages
+      !> The value as written, for messages
       procedure :: as_written
    end type literal_t
 
    !> The opening of a group, or a key with its values
    type :: statement_t
-      !> Group in small letters
+      !> Group in lower case
       character(len=:), allocatable :: group
-      !> Key in small letters; empty if the statement opens the group
+      !> Key in lower case; empty if the statement opens a group
       character(len=:), allocatable :: key
-      !> Values, none if the statement opens a group
+      !> Values, (value); none if the statement opens a group
       type(literal_t), allocatable :: values(:)
-      !> Where it stands, for the beginning of a message
+      !> Place (file:line) of the statement, for the start of a message
       character(len=:), allocatable :: place
-      !> Line, from 1
+      !> Line number, from 1
       integer :: line = 0
-      !> Whether it comes from the command line
+      !> Whether the statement comes from the command line
       logical :: is_override = .false.
    end type statement_t
 
 contains
 
-   !> The value as it was written
+   !> The value as written in the source text
    pure function as_written(self) result(text)
       class(literal_t), intent(in) :: self
       character(len=:), allocatable :: text
@@ -50,11 +51,11 @@ contains
 
    !> Read all statements of a namelist text.
    pure subroutine read_statements(source, statements, error)
-      !> The text
+      !> Namelist text
       type(source_t), intent(in) :: source
-      !> Its statements in order
+      !> Statements in the order of the text
       type(statement_t), allocatable, intent(out) :: statements(:)
-      !> The first offence against the syntax
+      !> First syntax error
       type(error_t), allocatable, intent(inout) :: error
       type(token_t), allocatable :: tokens(:)
       integer :: n, next, opening
@@ -89,10 +90,11 @@ contains
             statements(n)%group//' is not closed by ''/''')
       else if (next <= size(tokens)) then
          call raise(error, input_error, source%place(tokens(next)%line)//': '// &
-            text_of(source, tokens(next))//' stands outside a group; &name opens one and / closes it')
+            text_of(source, tokens(next))//' is outside a group; &name opens a group and / closes it')
       end if
    end subroutine read_statements
 
+   !> Make the statement that opens a group.
    pure subroutine open_group(source, token, statement)
       type(source_t), intent(in) :: source
       type(token_t), intent(in) :: token
@@ -105,7 +107,7 @@ contains
       statement%place = source%place(token%line)
    end subroutine open_group
 
-   !> Read `key = values` of the group that the last statement belongs to.
+   !> Read `key = values` in the group of the last statement.
    pure subroutine read_assignment(source, tokens, next, statements, n, error)
       type(source_t), intent(in) :: source
       type(token_t), intent(in) :: tokens(:)
@@ -120,13 +122,13 @@ contains
       key = text_of(source, tokens(next))
       if (scan(key, '(%') > 0) then
          call raise(error, input_error, &
-            place//': parts of an entry ('//key//') cannot be given; give all its values')
+            place//': '//key//' is a part of an entry; give all values of the entry')
       else if (tokens(next)%kind /= bare_token) then
-         call raise(error, input_error, place//': a key was expected in &'//statements(n)%group//', but '// &
-            key//' is there')
+         call raise(error, input_error, place//': a key is expected in &'//statements(n)%group//', but '// &
+            key//' is found')
       else if (kind_at(tokens, next + 1) /= equals_token) then
          call raise(error, input_error, &
-            place//': ''='' was expected after '//key//' in &'//statements(n)%group)
+            place//': ''='' is expected after '//key//' in &'//statements(n)%group)
       end if
       if (allocated(error)) return
 
@@ -140,7 +142,7 @@ contains
       next = last + 1
    end subroutine read_assignment
 
-   !> Last token of a list of values: up to the next key, group or end
+   !> Index of the last token of a list of values. The list ends before the next key, group or end token.
    pure integer function last_of_values(tokens, first) result(last)
       type(token_t), intent(in) :: tokens(:)
       integer, intent(in) :: first
@@ -159,6 +161,7 @@ contains
       end do
    end function last_of_values
 
+   !> Kind of the token with an index; 0 behind the last token
    pure integer function kind_at(tokens, place)
       type(token_t), intent(in) :: tokens(:)
       integer, intent(in) :: place
@@ -167,7 +170,7 @@ contains
       if (place <= size(tokens)) kind_at = tokens(place)%kind
    end function kind_at
 
-   !> Values with a comma or blanks between them; a comma may stand after the last.
+   !> Read values separated by a comma or blanks. A comma may follow the last value.
    pure subroutine read_values(source, tokens, statement, error)
       type(source_t), intent(in) :: source
       type(token_t), intent(in) :: tokens(:)
@@ -194,7 +197,7 @@ contains
          statement%key//''' in &'//statement%group//' is missing')
    end subroutine read_values
 
-   !> A value without its quotes
+   !> Read one value and remove its quotes.
    pure subroutine read_literal(source, token, literal)
       type(source_t), intent(in) :: source
       type(token_t), intent(in) :: token
@@ -217,6 +220,7 @@ contains
       literal%text = literal%text(:n)
    end subroutine read_literal
 
+   !> Text of a token
    pure function text_of(source, token) result(text)
       type(source_t), intent(in) :: source
       type(token_t), intent(in) :: token

@@ -1,54 +1,54 @@
-!> Namelist text cut into tokens: group names, keys and values, quoted texts, signs.
+!> Splits namelist text into tokens: group names, keys and values, quoted texts, `=`, `,` and `/`.
 !>
-!> Syntax: the common ground of Fortran compilers and f90nml. Comments run from `!` to the end of the line;
-!> blanks, tabs and line ends (also CR LF) separate; a quoted text stays on its line, its quotes doubled
-!> inside.
+!> The syntax is the part that Fortran compilers and f90nml have in common. A comment runs from `!` to the end of the
+!> line. Blanks, tabs and line ends (also CR LF) separate tokens. A quoted text ends on the line on which it begins;
+!> quotes inside it are doubled.
 module polydem_namelist_tokens
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_strings, only: to_text
-   use polydem_words, only: lower_case
+   use polydem_strings, only: to_text, lower_case
    implicit none
    private
    public :: source_t, token_t, split_tokens
    public :: group_token, end_token, equals_token, comma_token, bare_token, quoted_token
 
-   !> Kinds of tokens: `&name`; `/` or `&end`; `=`; `,`; anything without quotes; a text in quotes
+   !> Kinds of tokens: `&name`; `/` or `&end`; `=`; `,`; text without quotes; text in quotes
    integer, parameter :: group_token = 1, end_token = 2, equals_token = 3
    integer, parameter :: comma_token = 4, bare_token = 5, quoted_token = 6
 
    character(len=*), parameter :: tab = achar(9), line_feed = achar(10), carriage_return = achar(13)
-   !> What ends a token without quotes
+   !> Characters that end a token without quotes
    character(len=*), parameter :: separators = ' '//tab//line_feed//carriage_return//'=,/!&''"'
 
-   !> Where namelist text comes from
+   !> Namelist text and its origin
    type :: source_t
       !> Path of the file, or the command-line option
       character(len=:), allocatable :: name
-      !> The text
+      !> Namelist text
       character(len=:), allocatable :: text
-      !> Whether messages name the line
+      !> Whether messages contain the line number
       logical :: has_lines = .true.
    contains
-      !> Where a line is, for the beginning of a message
+      !> Place (file:line) of a line, for the start of a message
       procedure :: place
    end type source_t
 
    !> A token
    type :: token_t
-      !> One of the kinds above
+      !> One of the kinds of tokens above
       integer :: kind = 0
-      !> First and last place in the text; of a group without `&`, of a quoted text with its quotes
+      !> Position of the first and of the last character in the text. They exclude the `&` of a group and include the
+      !> quotes of a quoted text
       integer :: first = 0, last = 0
-      !> Line, from 1
+      !> Line number, from 1
       integer :: line = 0
    end type token_t
 
 contains
 
-   !> `file:line`, or the name alone
+   !> `file:line`, or only the name if messages contain no line numbers
    pure function place(self, line) result(text)
       class(source_t), intent(in) :: self
-      !> Line, from 1
+      !> Line number, from 1
       integer, intent(in) :: line
       character(len=:), allocatable :: text
 
@@ -56,13 +56,13 @@ contains
       if (self%has_lines) text = text//':'//to_text(line)
    end function place
 
-   !> Cut the text into tokens.
+   !> Split the text into tokens.
    pure subroutine split_tokens(source, tokens, error)
-      !> Text to cut
+      !> Text to split
       type(source_t), intent(in) :: source
-      !> All tokens in order
+      !> All tokens in the order of the text
       type(token_t), allocatable, intent(out) :: tokens(:)
-      !> An open quote or a character that has no place in a namelist
+      !> A quote without end, or a character that a namelist cannot contain
       type(error_t), allocatable, intent(inout) :: error
       type(token_t) :: token
       integer :: length, line, n, next
@@ -92,7 +92,7 @@ contains
       tokens = tokens(:n)
    end subroutine split_tokens
 
-   !> The token that begins at a place
+   !> Read the token that begins at a position.
    pure subroutine read_token(source, first, line, token, error)
       type(source_t), intent(in) :: source
       integer, intent(in) :: first, line
@@ -126,7 +126,7 @@ contains
       end if
    end subroutine read_token
 
-   !> Last place of a token without quotes; one before `first` if it is empty
+   !> Position of the last character of a token without quotes; first - 1 if the token is empty
    pure integer function end_of_bare(text, first)
       character(len=*), intent(in) :: text
       integer, intent(in) :: first
@@ -134,7 +134,7 @@ contains
       end_of_bare = place_of_any(text, first, separators) - 1
    end function end_of_bare
 
-   !> First place from `first` on where one of some letters stands; one behind the text if there is none
+   !> Position of the first of the given letters, searched from `first`; len(text) + 1 if there is none
    pure integer function place_of_any(text, first, letters)
       character(len=*), intent(in) :: text, letters
       integer, intent(in) :: first
@@ -143,7 +143,7 @@ contains
       if (place_of_any < first) place_of_any = len(text) + 1
    end function place_of_any
 
-   !> Place of the quote that closes the one at `first`; 0 if there is none on the line
+   !> Position of the quote that closes the quote at `first`; 0 if the line has no closing quote
    pure integer function end_of_quote(text, first)
       character(len=*), intent(in) :: text
       integer, intent(in) :: first
@@ -165,7 +165,7 @@ contains
       if (k <= len(text)) end_of_quote = k
    end function end_of_quote
 
-   !> Control characters have no place in values, and letters beyond ASCII none outside quotes.
+   !> Reject control characters in a token, and characters beyond ASCII outside quotes.
    pure subroutine refuse_characters(source, token, error)
       type(source_t), intent(in) :: source
       type(token_t), intent(in) :: token
@@ -177,7 +177,7 @@ contains
          if ((code < 32 .and. source%text(k:k) /= tab) .or. code == 127 &
             .or. (token%kind /= quoted_token .and. code > 127)) then
             call raise(error, input_error, source%place(token%line)// &
-               ': the character with code '//to_text(code)//' cannot stand here; is this a namelist file?')
+               ': the character with code '//to_text(code)//' is not allowed here; is this a namelist file?')
             return
          end if
       end do

@@ -1,26 +1,26 @@
-!> Values of namelist entries: from what was written to numbers, with the checks of the table, and back.
+!> Values of namelist entries: conversion from text with the checks of the table of entries, and conversion to text.
 module polydem_namelist_values
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
    use polydem_namelist_entries, only: entry_t, required
    use polydem_namelist_statements, only: literal_t, statement_t
-   use polydem_strings, only: to_text
-   use polydem_words, only: count_words, lower_case, quoted, split_words, suggestion, text_t
+   use polydem_strings, only: to_text, count_words, lower_case, quoted, split_words, suggestion, text_t
    implicit none
    private
    public :: value_t, read_value, value_text, label, is_text
 
+   !> Decimal digits
    character(len=*), parameter :: digits = '0123456789'
 
    !> The value of an entry
    type :: value_t
-      !> Where it was given, for the beginning of a message; the file alone for a default
+      !> Place (file:line) of the value, for the start of a message; only the file for a default
       character(len=:), allocatable :: place
-      !> Whether it is no default but was written down
+      !> Whether the value is given in the file or on the command line and is not the default
       logical :: is_given = .false.
-      !> Whether it comes from the command line
+      !> Whether the value comes from the command line
       logical :: is_override = .false.
-      !> Whether the chosen scene and options use it
+      !> Whether the entry is in use: the chosen scene and options need it
       logical :: in_force = .false.
       !> Values of a real entry, (count)
       real(wp), allocatable :: reals(:)
@@ -30,7 +30,7 @@ module polydem_namelist_values
       logical :: flag = .false.
       !> Value of a word or path entry
       character(len=:), allocatable :: text
-      !> Values of a list of words or paths, (count)
+      !> Values of a word or path entry or of a list of them, (count)
       type(text_t), allocatable :: texts(:)
    end type value_t
 
@@ -40,11 +40,11 @@ contains
    pure subroutine read_value(entry, statement, value, error)
       !> Row of the entry
       type(entry_t), intent(in) :: entry
-      !> What was written
+      !> Statement that gives the values
       type(statement_t), intent(in) :: statement
       !> Checked value
       type(value_t), intent(inout) :: value
-      !> Number of values, type, finiteness, bounds or choice
+      !> Wrong number of values, wrong type, not finite, out of bounds, or no valid choice
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: problem
       integer :: k, n
@@ -72,9 +72,9 @@ contains
       end do
    end subroutine read_value
 
-   !> An entry in messages
+   !> Name of an entry in messages
    pure function label(entry) result(text)
-      !> Its row
+      !> Row of the entry
       type(entry_t), intent(in) :: entry
       character(len=:), allocatable :: text
 
@@ -83,12 +83,13 @@ contains
 
    !> Whether the values of an entry are words or paths
    pure logical function is_text(entry)
-      !> Its row
+      !> Row of the entry
       type(entry_t), intent(in) :: entry
 
       is_text = entry%type == 'word' .or. entry%type == 'path'
    end function is_text
 
+   !> Number of values as text, such as '2 values'
    pure function counted(n) result(text)
       integer, intent(in) :: n
       character(len=:), allocatable :: text
@@ -97,7 +98,7 @@ contains
       if (n /= 1) text = text//'s'
    end function counted
 
-   !> Read value number k.
+   !> Read value k of an entry.
    pure subroutine read_one(entry, literal, k, value, problem)
       type(entry_t), intent(in) :: entry
       type(literal_t), intent(in) :: literal
@@ -121,6 +122,7 @@ contains
       end select
    end subroutine read_one
 
+   !> Read a real number; `problem` is allocated if it is not one, not finite or out of range.
    pure subroutine read_real(literal, number, problem)
       type(literal_t), intent(in) :: literal
       real(wp), intent(out) :: number
@@ -134,12 +136,13 @@ contains
       else if (is_not_finite(text)) then
          problem = 'must be finite, but '//literal%text//' is given'
       else if (abs(magnitude(text)) > range(number)) then
-         problem = 'must fit into a number of this precision, but '//literal%text//' is given'
+         problem = 'must be within the range of this precision, but '//literal%text//' is given'
       else
          read (text, *) number
       end if
    end subroutine read_real
 
+   !> Whether a text in lower case is nan, inf or infinity, with or without a sign
    pure logical function is_not_finite(text)
       character(len=*), intent(in) :: text
       integer :: first
@@ -148,8 +151,8 @@ contains
       is_not_finite = any(text(first:) == [character(len=8) :: 'nan', 'inf', 'infinity'])
    end function is_not_finite
 
-   !> Whether a text in small letters is [sign] digits [. digits] [e or d [sign] digits]; digits may lack on
-   !> one side of the point.
+   !> Whether a text in lower case has the form [sign] digits [. digits] [e or d [sign] digits]. The digits on one side
+   !> of the point may be absent.
    pure logical function is_number(text)
       character(len=*), intent(in) :: text
       integer :: k, n
@@ -174,12 +177,14 @@ contains
       is_number = is_number .and. k == len(text) + 1
    end function is_number
 
+   !> Number of digits at the start of a text
    pure integer function run_of_digits(text)
       character(len=*), intent(in) :: text
 
       run_of_digits = verify(text//'.', digits) - 1
    end function run_of_digits
 
+   !> Character at a position; blank behind the end of the text
    pure character(len=1) function text_at(text, place)
       character(len=*), intent(in) :: text
       integer, intent(in) :: place
@@ -188,7 +193,7 @@ contains
       if (place <= len(text)) text_at = text(place:place)
    end function text_at
 
-   !> Power of ten of the leading digit of a number; 0 for zero
+   !> Decimal exponent of the leading digit of a number; 0 for zero
    pure integer function magnitude(text)
       character(len=*), intent(in) :: text
       integer :: exponent_mark, leading, point
@@ -202,6 +207,7 @@ contains
       magnitude = magnitude + point - leading - merge(1, 0, point > leading)
    end function magnitude
 
+   !> Read an integer; `problem` is allocated if it is not one or too large.
    pure subroutine read_integer(literal, number, problem)
       type(literal_t), intent(in) :: literal
       integer(ip), intent(out) :: number
@@ -220,10 +226,11 @@ contains
       if (abs(wide) <= huge(number)) then
          number = int(wide, ip)
       else
-         problem = 'must be at most '//to_text(huge(number))//' in size, but '//text//' is given'
+         problem = 'must be at most '//to_text(huge(number))//' in magnitude, but '//text//' is given'
       end if
    end subroutine read_integer
 
+   !> Read a logical value; `problem` is allocated if it is not one.
    pure subroutine read_logical(literal, flag, problem)
       type(literal_t), intent(in) :: literal
       logical, intent(out) :: flag
@@ -250,7 +257,7 @@ contains
       character(len=:), allocatable, intent(inout) :: problem
       character(len=len(entry%allowed)) :: words(count_words(entry%allowed))
       real(wp) :: bound
-      logical :: kept
+      logical :: holds
       integer :: k
 
       words = split_words(entry%allowed)
@@ -258,27 +265,27 @@ contains
          read (words(k + 1), *) bound
          select case (words(k))
          case ('>')
-            kept = number > bound
+            holds = number > bound
          case ('>=')
-            kept = number >= bound
+            holds = number >= bound
          case ('<')
-            kept = number < bound
+            holds = number < bound
          case default
-            kept = number <= bound
+            holds = number <= bound
          end select
-         if (.not. kept) problem = 'must be '//trim(words(k))//' '//trim(words(k + 1))//', but '// &
+         if (.not. holds) problem = 'must be '//trim(words(k))//' '//trim(words(k + 1))//', but '// &
             literal%text//' is given'
       end do
    end subroutine check_bounds
 
-   !> A word must be one of the choices, a required path must not be empty.
+   !> Check that a text is in quotes, that a word is one of the choices, and that a required path is not empty.
    pure subroutine check_text(entry, literal, problem)
       type(entry_t), intent(in) :: entry
       type(literal_t), intent(in) :: literal
       character(len=:), allocatable, intent(inout) :: problem
 
       if (.not. literal%has_quotes) then
-         problem = 'must stand in quotes: write '//quoted(literal%text)
+         problem = 'must be in quotes: write '//quoted(literal%text)
       else if (entry%type == 'path') then
          if (literal%text == '' .and. entry%default == required) problem = 'must not be empty'
       else if (all(split_words(entry%allowed) /= literal%text)) then
@@ -286,11 +293,11 @@ contains
       end if
    end subroutine check_text
 
-   !> A value as a namelist has it; reading it again gives the same bits
+   !> A value in namelist syntax. Reading this text gives the same bits
    pure function value_text(entry, value) result(text)
       !> Row of the entry
       type(entry_t), intent(in) :: entry
-      !> Its value
+      !> Value of the entry
       type(value_t), intent(in) :: value
       character(len=:), allocatable :: text
       type(text_t), allocatable :: words(:)
@@ -319,7 +326,7 @@ contains
       text = listed(words)
    end function value_text
 
-   !> Words with commas between them, in a time that grows with their number
+   !> Words separated by commas; the cost is linear in their number
    pure function listed(words) result(text)
       type(text_t), intent(in) :: words(:)
       character(len=:), allocatable :: text
@@ -339,7 +346,7 @@ contains
       end do
    end function listed
 
-   !> Fewest digits that give a number back bit for bit
+   !> Shortest decimal text of a number that reads back to the same bits
    pure function real_text(number) result(text)
       real(wp), intent(in) :: number
       character(len=:), allocatable :: text

@@ -1,11 +1,12 @@
-!> Settings from a namelist file: one table says what there is, one path checks file and command line.
+!> Reads the settings of a run from a namelist file and the overrides of the command line. Both pass the same checks,
+!> which are based on the table of entries.
 !>
-!> The reader is our own because the namelist input of compilers neither names the line of a mistake nor
-!> notices keys given twice, and reports most mistakes as 'end of file'.
+!> polydem has its own namelist parser because the namelist input of compilers does not name the line of an error, does
+!> not detect keys given twice, and reports most errors as 'end of file'.
 module polydem_read_settings
    use polydem_check_settings, only: check_settings
    use polydem_errors, only: error_t
-   use polydem_exclusive_entries, only: settle_exclusive_entries
+   use polydem_exclusive_entries, only: resolve_exclusive_entries
    use polydem_fill_settings, only: fill_settings
    use polydem_namelist_tokens, only: source_t
    use polydem_namelist_values, only: value_t
@@ -14,7 +15,7 @@ module polydem_read_settings
    use polydem_text_file, only: read_text_file
    implicit none
    private
-   public :: read_settings, read_settings_text, with_plain_line_ends
+   public :: read_settings, read_settings_text, normalise_line_ends
 
 contains
 
@@ -22,11 +23,11 @@ contains
    subroutine read_settings(file, overrides, settings, error)
       !> Path of the namelist file
       character(len=*), intent(in) :: file
-      !> Overrides of the command line, each 'group.key=value'; the last one of an entry counts
+      !> Overrides of the command line, each 'group.key=value'; the last override of an entry applies
       character(len=*), intent(in) :: overrides(:)
       !> Complete, checked settings
       type(settings_t), intent(out) :: settings
-      !> What is wrong with the file or an override, with file:line or --set group.key=value in front
+      !> Error in the file or an override; its message starts with file:line or --set group.key=value
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
 
@@ -37,15 +38,15 @@ contains
 
    !> Read the settings of a run from a text.
    pure subroutine read_settings_text(file_name, text, overrides, settings, error)
-      !> Name in messages
+      !> Name of the source in messages
       character(len=*), intent(in) :: file_name
-      !> Namelist groups
+      !> Text with the namelist groups
       character(len=*), intent(in) :: text
-      !> Overrides of the command line, each 'group.key=value'; the last one of an entry counts
+      !> Overrides of the command line, each 'group.key=value'; the last override of an entry applies
       character(len=*), intent(in) :: overrides(:)
       !> Complete, checked settings
       type(settings_t), intent(out) :: settings
-      !> What is wrong with the text or an override
+      !> Error in the text or an override
       type(error_t), allocatable, intent(inout) :: error
       type(source_t) :: source
       type(value_t), allocatable :: values(:)
@@ -54,17 +55,17 @@ contains
       source%text = text
       call resolve_entries(source, .false., overrides, values, error)
       if (allocated(error)) return
-      call settle_exclusive_entries(values, error)
+      call resolve_exclusive_entries(values, error)
       if (allocated(error)) return
       settings%file = trim(file_name)
-      settings%text = with_plain_line_ends(text)
+      settings%text = normalise_line_ends(text)
       settings%resolved = resolved_text(values)
       call fill_settings(values, settings)
       call check_settings(settings, values, error)
    end subroutine read_settings_text
 
-   !> The text without carriage returns and with a line end after the last line
-   pure function with_plain_line_ends(text) result(plain)
+   !> Text without carriage returns and with a line end after the last line
+   pure function normalise_line_ends(text) result(plain)
       !> Text of any length
       character(len=*), intent(in) :: text
       character(len=:), allocatable :: plain
@@ -83,6 +84,6 @@ contains
          plain(n:n) = line_feed
       end if
       plain = plain(:n)
-   end function with_plain_line_ends
+   end function normalise_line_ends
 
 end module polydem_read_settings

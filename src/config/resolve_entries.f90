@@ -1,8 +1,9 @@
-!> From statements to the values in force: what is written must be known, unique, used and right.
+!> Finds the value of every entry from the statements of the namelist. Each statement must name a known entry, be
+!> unique, be used by the chosen options and hold a valid value.
 !>
-!> Overrides of the command line replace what the file says. An entry of the file that such an override leaves
-!> without use (friction_coefficient after --set forces.friction=none) is dropped; otherwise an entry without
-!> use is an error.
+!> Overrides of the command line replace statements of the file. An override can make an entry of the file unused
+!> (friction_coefficient after --set forces.friction=none); such an entry is ignored. Any other unused entry is an
+!> error.
 module polydem_resolve_entries
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, wp
@@ -10,13 +11,12 @@ module polydem_resolve_entries
    use polydem_namelist_statements, only: read_statements, statement_t
    use polydem_namelist_tokens, only: source_t
    use polydem_namelist_values, only: is_text, label, read_value, value_t, value_text
-   use polydem_strings, only: join, to_text
-   use polydem_words, only: count_words, quoted, split_words, suggestion
+   use polydem_strings, only: join, to_text, count_words, quoted, split_words, suggestion
    implicit none
    private
    public :: resolve_entries, resolved_text
 
-   !> More letters of an override are not shown in messages
+   !> Greatest number of characters of an override in a message
    integer, parameter :: longest_name = 200
 
 contains
@@ -25,13 +25,13 @@ contains
    pure subroutine resolve_entries(source, of_bench, overrides, values, error)
       !> Namelist text
       type(source_t), intent(in) :: source
-      !> Whether it describes a bench, by its only group, or a run, by all others
+      !> Whether the text describes a bench (group &bench) or a run (all other groups)
       logical, intent(in) :: of_bench
-      !> Overrides 'group.key=value'; the last one of an entry counts
+      !> Overrides 'group.key=value'; the last override of an entry applies
       character(len=*), intent(in) :: overrides(:)
-      !> Values, (rows of the table)
+      !> Values, (row of the table)
       type(value_t), allocatable, intent(out) :: values(:)
-      !> The first offence
+      !> First error found
       type(error_t), allocatable, intent(inout) :: error
       type(statement_t), allocatable :: statements(:)
       type(statement_t) :: given(size(entries))
@@ -40,7 +40,7 @@ contains
       call read_statements(source, statements, error)
       if (allocated(error)) return
       if (size(statements) == 0) then
-         call raise(error, input_error, source%name//': holds no namelist group; it needs '// &
+         call raise(error, input_error, source%name//': the file contains no namelist group; it needs '// &
             trim(merge('&bench               ', '&scene and &integrate', of_bench)))
          return
       end if
@@ -60,7 +60,7 @@ contains
       end do
    end subroutine resolve_entries
 
-   !> Sort the statements of the file by the first rows of their entries.
+   !> Store each statement of the file under the first row of its entry.
    pure subroutine collect_statements(statements, of_bench, given, error)
       type(statement_t), intent(in) :: statements(:)
       logical, intent(in) :: of_bench
@@ -75,7 +75,7 @@ contains
             if (statements(earlier)%group /= statements(k)%group) cycle
             if (statements(earlier)%key /= statements(k)%key) cycle
             call raise(error, input_error, statements(k)%place//': '//name_of(statements(k))// &
-               ' is given twice (first in line '//to_text(statements(earlier)%line)//')')
+               ' is given twice (first on line '//to_text(statements(earlier)%line)//')')
             return
          end do
          row = first_row(statements(k)%group, statements(k)%key)
@@ -83,6 +83,7 @@ contains
       end do
    end subroutine collect_statements
 
+   !> Name of a group or entry in messages
    pure function name_of(statement) result(text)
       type(statement_t), intent(in) :: statement
       character(len=:), allocatable :: text
@@ -91,7 +92,7 @@ contains
       if (statement%key /= '') text = quoted(statement%key)//' in &'//statement%group
    end function name_of
 
-   !> The group and the key must be in the table, and belong to a bench or a run.
+   !> Check that the table contains the group and the key, and that the group fits a bench or a run.
    pure subroutine check_names(statement, of_bench, error)
       type(statement_t), intent(in) :: statement
       logical, intent(in) :: of_bench
@@ -102,16 +103,17 @@ contains
             suggestion(statement%group, pack(groups(), (groups() == bench_group) .eqv. of_bench)))
       else if (of_bench .and. statement%group /= bench_group) then
          call raise(error, input_error, statement%place//': group &'//statement%group//' belongs to a run; a bench '// &
-            'has the group &bench only')
+            'has only the group &bench')
       else if (statement%group == bench_group .and. .not. of_bench) then
-         call raise(error, input_error, statement%place//': group &bench belongs to a bench: polydem bench FILE.nml')
+         call raise(error, input_error, statement%place// &
+            ': group &bench belongs to a bench; use polydem bench FILE.nml')
       else if (statement%key /= '' .and. first_row(statement%group, statement%key) == 0) then
          call raise(error, input_error, statement%place//': unknown key '//quoted(statement%key)//' in &'// &
             statement%group//suggestion(statement%key, keys_of(statement%group)))
       end if
    end subroutine check_names
 
-   !> Let the command line replace what the file says.
+   !> Replace statements of the file by the overrides of the command line.
    pure subroutine collect_overrides(overrides, of_bench, given, error)
       character(len=*), intent(in) :: overrides(:)
       logical, intent(in) :: of_bench
@@ -127,7 +129,7 @@ contains
       end do
    end subroutine collect_overrides
 
-   !> Read 'group.key=value' as the statement '&group key = value'; words and paths need no quotes.
+   !> Read 'group.key=value' as the statement '&group key = value'. Words and paths need no quotes.
    pure subroutine read_override(override, of_bench, statement, error)
       character(len=*), intent(in) :: override
       logical, intent(in) :: of_bench
@@ -138,14 +140,14 @@ contains
       character(len=*), parameter :: line_end = new_line('a')
       integer :: dot, equals
 
-      ! Every statement carries the name: a long override is not repeated in each.
+      ! Every statement stores the name, so long overrides are shortened.
       source%name = '--set '//override(:min(len(override), longest_name))
       if (len(override) > longest_name) source%name = source%name//' ...'
       source%has_lines = .false.
       equals = index(override, '=')
       dot = index(override(:max(0, equals - 1)), '.')
       if (dot < 2 .or. equals < dot + 2) then
-         call raise(error, input_error, source%name//': group.key=value was expected')
+         call raise(error, input_error, source%name//': group.key=value is expected')
          return
       end if
       associate (group => override(:dot - 1), key => override(dot + 1:equals - 1), &
@@ -155,7 +157,7 @@ contains
       call read_statements(source, statements, error)
       if (allocated(error)) return
       if (size(statements) /= 2) then
-         call raise(error, input_error, source%name//': one entry was expected, group.key=value')
+         call raise(error, input_error, source%name//': exactly one entry, group.key=value, is expected')
          return
       end if
       statement = statements(2)
@@ -163,7 +165,7 @@ contains
       call check_names(statement, of_bench, error)
    end subroutine read_override
 
-   !> The value, in quotes if the entry is a text and has none
+   !> Value of an override; quotes are added if the entry is a text without quotes
    pure function value_of_override(group, key, given) result(text)
       character(len=*), intent(in) :: group, key, given
       character(len=:), allocatable :: text
@@ -177,7 +179,7 @@ contains
       text = quoted(trim(adjustl(given)))
    end function value_of_override
 
-   !> The value of a row: what is given, or the default.
+   !> Find the value of a row: the given value, or the default.
    pure subroutine resolve_row(source, of_bench, given, row, values, error)
       type(source_t), intent(in) :: source
       logical, intent(in) :: of_bench
@@ -199,12 +201,12 @@ contains
             call raise(error, input_error, source%name//': '//label(entry)//' is required'// &
                reason(entry, values)//expected(entry))
          else
-            call read_nothing(source, entry, values(row))
+            call set_unused(source, entry, values(row))
          end if
       end associate
    end subroutine resolve_row
 
-   !> Whether an entry is in force, given the values of the rows above
+   !> Whether an entry is in use, from the values of earlier rows
    pure logical function is_needed(entry, values)
       type(entry_t), intent(in) :: entry
       type(value_t), intent(in) :: values(:)
@@ -217,7 +219,7 @@ contains
       if (values(row)%in_force) is_needed = any(split_words(entry%needs(colon + 1:)) == values(row)%text)
    end function is_needed
 
-   !> The default of a row as if it had been written
+   !> Default of a row in the form of a statement
    pure function default_statement(source, entry) result(statement)
       type(source_t), intent(in) :: source
       type(entry_t), intent(in) :: entry
@@ -239,8 +241,8 @@ contains
       end if
    end function default_statement
 
-   !> Zeros and an empty text for an entry without default that is not in force
-   pure subroutine read_nothing(source, entry, value)
+   !> Set zeros and an empty text for an entry without default that is not in use.
+   pure subroutine set_unused(source, entry, value)
       type(source_t), intent(in) :: source
       type(entry_t), intent(in) :: entry
       type(value_t), intent(inout) :: value
@@ -251,9 +253,9 @@ contains
       value%reals = [(0.0_wp, k=1, merge(entry%count, 0, entry%type == 'real'))]
       value%integers = [(0_ip, k=1, merge(entry%count, 0, entry%type == 'integer'))]
       allocate (value%texts(0))
-   end subroutine read_nothing
+   end subroutine set_unused
 
-   !> ' with name = 'hopper'' for an entry that is required only then
+   !> Condition under which an entry is required, such as ' with name = 'hopper''; empty if it is always required
    pure function reason(entry, values) result(text)
       type(entry_t), intent(in) :: entry
       type(value_t), intent(in) :: values(:)
@@ -265,7 +267,7 @@ contains
       text = ' with '//key//' = '//quoted(values(first_row(entry%group, key))%text)
    end function reason
 
-   !> What a required entry looks like, as the end of a message
+   !> Description of a required entry: choices, or meaning, bounds and unit; for the end of a message
    pure function expected(entry) result(text)
       type(entry_t), intent(in) :: entry
       character(len=:), allocatable :: text
@@ -281,7 +283,7 @@ contains
       end select
    end function expected
 
-   !> What the file gives must be in force, unless an override is why it is not.
+   !> Check that a given entry is in use. An entry of the file may be unused because of an override.
    pure subroutine check_use(given, home, values, error)
       type(statement_t), intent(in) :: given
       integer, intent(in) :: home
@@ -304,9 +306,9 @@ contains
          ' = '//join(split_words(needs), ' or ')//', not with '//values(decider)%text)
    end subroutine check_use
 
-   !> All values in force as a namelist that can be read again, one entry to a line; empty lists and groups are left out
+   !> All entries in use as namelist text that can be read again, one entry per line, without empty lists and groups
    pure function resolved_text(values) result(text)
-      !> Values, (rows of the table)
+      !> Values, (row of the table)
       type(value_t), intent(in) :: values(:)
       character(len=:), allocatable :: text
       character(len=*), parameter :: line_end = new_line('a')
@@ -327,7 +329,7 @@ contains
       text = text//'/'//line_end
    end function resolved_text
 
-   !> The line of an entry; none for an empty list
+   !> Line of an entry; empty for an empty list
    pure function line_of(entry, value) result(line)
       type(entry_t), intent(in) :: entry
       character(len=*), intent(in) :: value

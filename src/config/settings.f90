@@ -1,6 +1,6 @@
-!> The settings of a run: one type per namelist group, immutable once read.
+!> Settings of a run: one type per namelist group. They do not change after reading.
 !>
-!> Defaults are not stated here but in `namelist_entries`, once.
+!> The defaults are in `namelist_entries`.
 module polydem_settings
    use polydem_kinds, only: ip, wp
    implicit none
@@ -9,33 +9,33 @@ module polydem_settings
    public :: exchange_settings_t
    public :: forces_settings_t, integrate_settings_t, guards_settings_t, output_settings_t, checkpoint_settings_t
 
-   !> Group &scene: what there is at the start
+   !> Group &scene: bodies, walls and motions at the start
    type :: scene_settings_t
       !> Name of the generator, or 'file'
       character(len=:), allocatable :: name
-      !> Bodies file (HDF5) of the scene 'file'
+      !> Path of the bodies file (HDF5) of the scene 'file'
       character(len=:), allocatable :: bodies_file
-      !> Seed of the random generator
+      !> Seed of the random number generator
       integer(ip) :: seed
-      !> Number of boxes, walls included (drum); 0: use `bodies`
+      !> Number of boxes including those of walls (drum); 0: use `bodies`
       integer(ip) :: boxes
       !> Number of free bodies
       integer(ip) :: bodies
-      !> Result folder, segment or bodies file of a settled bed to fill the container with; empty: loose grains
+      !> Result folder, segment or bodies file of a settled bed; copies of it fill the container. Empty: loose grains
       character(len=:), allocatable :: packing
-      !> Least number of corners of a grain
+      !> Smallest number of corners of a grain
       integer(ip) :: corners_min
-      !> Greatest number of corners of a grain
+      !> Largest number of corners of a grain
       integer(ip) :: corners_max
-      !> Full short axis of the ellipse around a grain [m]
+      !> Short axis (full length) of the ellipse around a grain [m]
       real(wp) :: short_axis
-      !> Least full long axis of the ellipse around a grain [m]
+      !> Smallest long axis (full length) of the ellipse around a grain [m]
       real(wp) :: long_axis_min
-      !> Greatest full long axis of the ellipse around a grain [m]
+      !> Largest long axis (full length) of the ellipse around a grain [m]
       real(wp) :: long_axis_max
-      !> Factor of both axes of the largest grain; 1: all alike
+      !> Size factor (both axes) of the largest grain; the smallest grain has factor 1
       real(wp) :: size_ratio
-      !> Order of the identifiers of the grains: 'natural' or 'descending'
+      !> Order of the identifiers of the grains: 'natural' (as generated) or 'descending' (from right to left)
       character(len=:), allocatable :: order
       !> Density of the grains [kg/m2 per metre of depth, that is kg/m3]
       real(wp) :: density
@@ -49,7 +49,7 @@ module polydem_settings
       real(wp) :: opening
       !> Slope of the incline or of the hopper walls [degree]
       real(wp) :: slope
-      !> Share of the area covered by grains (gas, channel)
+      !> Fraction of the area that grains cover (gas, channel)
       real(wp) :: fraction
       !> Whether grains may overlap each other at the start (gas)
       logical :: overlap
@@ -59,31 +59,31 @@ module polydem_settings
       real(wp) :: spin
       !> Number of grains that get a speed at the start (gas, channel); 0: all
       integer(ip) :: movers
-      !> Prescribed motion of walls: none, rotation, translation or oscillation
+      !> Prescribed motion of walls: 'none', 'rotation', 'translation' or 'oscillation'
       character(len=:), allocatable :: motion
-      !> Identifiers of the fixed bodies that move; empty: all fixed bodies
+      !> Identifiers of the fixed bodies that move, (body); empty: all fixed bodies
       integer(ip), allocatable :: motion_bodies(:)
-      !> Pivot of a rotation [m]
+      !> Pivot of a rotation, (2) [m]
       real(wp) :: motion_pivot(2)
       !> Rate of a rotation, anticlockwise [1/s, revolutions per second]
       real(wp) :: motion_rate
-      !> Velocity of a translation [m/s]
+      !> Velocity of a translation, (2) [m/s]
       real(wp) :: motion_velocity(2)
-      !> Amplitude of an oscillation [m]
+      !> Amplitude of an oscillation, (2) [m]
       real(wp) :: motion_amplitude(2)
       !> Frequency of an oscillation [Hz]
       real(wp) :: motion_frequency
       !> Time at which the motion starts [s]
       real(wp) :: motion_start
-      !> Time over which the motion gets to full speed [s]
+      !> Time in which the motion reaches full speed [s]
       real(wp) :: motion_ramp
    end type scene_settings_t
 
    !> Group &boxes
    type :: boxes_settings_t
-      !> A body longer than this many median grain diameters is cut into several boxes
+      !> Ratio of length to median diameter above which a body has several boxes
       real(wp) :: largest_ratio
-      !> By how much every box is larger on each side [m]
+      !> Enlargement of every box on each side [m]
       real(wp) :: margin
    end type boxes_settings_t
 
@@ -97,7 +97,7 @@ module polydem_settings
 
    !> Group &overlap
    type :: overlap_settings_t
-      !> What to do with a contact that has no direction: 'push' along the line of centres, or 'stop'
+      !> Treatment of a contact without direction: 'push' along the line of centres, or 'stop' the run
       character(len=:), allocatable :: degenerate
    end type overlap_settings_t
 
@@ -113,101 +113,103 @@ module polydem_settings
       character(len=:), allocatable :: damping
       !> Dimensionless damping coefficient gamma
       real(wp) :: damping_coefficient
-      !> Whether damping begins at the touch, not with the step in which it is first seen
+      !> Whether damping starts at the time of first touch within the step, not at the start of that step
       logical :: damping_from_touch = .false.
       !> Restitution of a flat contact, in place of the damping coefficient; 0: not given
       real(wp) :: restitution
-      !> Damping of tilts as a share of sqrt(k I_eff)
+      !> Damping of tilting in units of sqrt(k I_eff)
       real(wp) :: tilt_damping = 0.0_wp
       !> Friction: 'cundall_strack', 'exact' or 'none'
       character(len=:), allocatable :: friction
       !> Friction coefficient mu
       real(wp) :: friction_coefficient
-      !> Tangential stiffness as a share of E
+      !> Tangential stiffness in units of E
       real(wp) :: tangential_stiffness
-      !> Tangential damping as a share of sqrt(k_t m_t)
+      !> Tangential damping in units of sqrt(k_t m_t)
       real(wp) :: tangential_damping
-      !> Whether the slip velocity in the middle of the step extends the tangential spring, not that at its end
+      !> Whether the tangential spring uses the slip velocity at mid-step, not that at the end of the step
       logical :: midstep_slip = .false.
-      !> Slip that exact friction may leave, as a share of the greatest slip velocity it takes from a contact in a step
+      !> Slip velocity that exact friction may leave at sticking contacts, relative to the largest slip velocity that
+      !> friction removes from a contact in a step
       real(wp) :: friction_tolerance
    end type forces_settings_t
 
    !> Group &integrate
    type :: integrate_settings_t
-      !> 'velocity_verlet', 'gear' or 'gear_3_20'
+      !> Integration scheme: 'velocity_verlet', 'gear' or 'gear_3_20'
       character(len=:), allocatable :: scheme
-      !> Sums of velocity Verlet over steps: 'plain' or 'compensated'
+      !> Summation of velocity Verlet over the steps: 'plain' or 'compensated'
       character(len=:), allocatable :: accumulation
-      !> Time step [s]; 0: `fraction` of the stable step
+      !> Time step [s]; 0: `fraction` times the stable time step
       real(wp) :: dt
-      !> Share of the stable step that is taken if dt is 0
+      !> Time step over stable time step if dt is 0
       real(wp) :: fraction
       !> Simulated time [s]
       real(wp) :: duration
    end type integrate_settings_t
 
-   !> Group &guards: what is watched, and whether it stops the run, warns or is 'off'
+   !> Group &guards: monitors of a run. Each one stops the run ('stop'), warns ('warn') or is 'off'
    type :: guards_settings_t
-      !> Move of a body in a step: 'stop', 'warn' or 'off'
+      !> Monitor of the displacement of a body in a step: 'stop', 'warn' or 'off'
       character(len=:), allocatable :: displacement
-      !> Greatest move in a step as a share of the thinnest body
+      !> Largest allowed displacement in a step relative to the thickness of the thinnest body
       real(wp) :: displacement_limit
-      !> Time step against the stable one of the contacts: 'stop', 'warn' or 'off'
+      !> Monitor of the time step relative to the stable time step of the contacts: 'stop', 'warn' or 'off'
       character(len=:), allocatable :: step
-      !> Depth of contacts: 'stop', 'warn' or 'off'
+      !> Monitor of the depth of contacts: 'stop', 'warn' or 'off'
       character(len=:), allocatable :: overlap
-      !> Greatest depth as a share of the thinner body
+      !> Largest allowed depth relative to the thickness of the thinner body
       real(wp) :: overlap_limit
-      !> Centres inside other bodies, contacts that turn round: 'stop', 'warn' or 'off'
+      !> Monitor of centres inside other bodies and of contacts whose direction reverses: 'stop', 'warn' or 'off'
       character(len=:), allocatable :: passing
-      !> Energy that neither gravity nor walls gave: 'stop', 'warn' or 'off'
+      !> Monitor of unexplained energy gain (not from gravity or walls): 'stop', 'warn' or 'off'
       character(len=:), allocatable :: energy
-      !> Greatest such energy as a share of the energy turned over
+      !> Largest allowed unexplained energy gain relative to the largest kinetic energy or work so far
       real(wp) :: energy_limit
-      !> Contacts at the start deeper than this share of the thinner body are listed
+      !> Depth above which contacts at the start are listed, relative to the thickness of the thinner body
       real(wp) :: listed_depth
-      !> Contacts at the start are pushed apart to this share of the thinner body; 0: not
+      !> Depth to which contacts at the start are pushed apart, relative to the thickness of the thinner body; 0: not
+      !> pushed apart
       real(wp) :: relaxed_depth
    end type guards_settings_t
 
    !> Group &output
    type :: output_settings_t
-      !> Folder of the result; empty: results/<name of the input file>
+      !> Result folder; empty: results/<name of the namelist file>
       character(len=:), allocatable :: folder
-      !> Simulated time between two frames [s]; 0: none but the first and last
+      !> Simulated time between two frames [s]; 0: only the first and the last frame
       real(wp) :: frame_interval
-      !> Frames per trajectory segment
+      !> Number of frames of a trajectory segment
       integer(ip) :: frames_per_segment
       !> Simulated time between two lines of the log [s]; 0: twenty lines
       real(wp) :: log_interval
-      !> Whether frames hold the contacts
+      !> Whether frames contain the contacts
       logical :: contacts
-      !> Whether energy and momentum are booked
+      !> Whether the energy and momentum balance is computed
       logical :: ledger
-      !> Steps whose boxes are recorded; 0: none
+      !> Number of steps whose boxes are recorded; 0: none
       integer(ip) :: trace_steps
       !> Simulated time at which the recording starts [s]
       real(wp) :: trace_start
-      !> Whether times and counts of every step are kept
+      !> Whether the times and counts of every step are written
       logical :: step_profile
    end type output_settings_t
 
-   !> Group &exchange: how processes share the bodies; without effect on results
+   !> Group &exchange: distribution of the bodies over ranks. It does not affect results
    type :: exchange_settings_t
-      !> How space is divided: 'bisection' or 'morton'
+      !> Partition of space: 'bisection' or 'morton'
       character(len=:), allocatable :: cut
-      !> How far bodies may move until neighbours are found anew [m]; 0: automatic
+      !> Distance that bodies may move before ranks search for neighbouring ranks again [m]; 0: automatic
       real(wp) :: margin
-      !> What is shared evenly: 'measured' or 'counted' work, or nothing after the start: 'off'
+      !> Load that is balanced: 'measured' or 'counted' work; 'off': no balancing after the start
       character(len=:), allocatable :: balance
-      !> Greatest work over the mean at which space is divided anew
+      !> Ratio of the largest to the mean load of a rank above which space is partitioned again
       real(wp) :: imbalance
    end type exchange_settings_t
 
-   !> Group &checkpoint; whichever of the intervals has passed first makes the next checkpoint
+   !> Group &checkpoint. The next checkpoint is written when the first of the intervals has passed
    type :: checkpoint_settings_t
-      !> Steps between two checkpoints; 0: not by steps
+      !> Number of steps between two checkpoints; 0: not by steps
       integer(ip) :: steps
       !> Simulated time between two checkpoints [s]; 0: not by simulated time
       real(wp) :: interval
@@ -219,9 +221,9 @@ module polydem_settings
    type :: settings_t
       !> Path of the namelist file, for messages
       character(len=:), allocatable :: file
-      !> The namelist as it was read, with a line end after each line
+      !> Text of the namelist file, with a line end after each line
       character(len=:), allocatable :: text
-      !> Every group with every entry as it is in force, one per line
+      !> Every entry in use with its value, one per line, as namelist text
       character(len=:), allocatable :: resolved
       !> Group &scene
       type(scene_settings_t) :: scene

@@ -1,22 +1,22 @@
-!> A text file as one string.
+!> Reads a text file into one string.
 module polydem_text_file
    use polydem_errors, only: error_t, input_error, io_error, raise
    implicit none
    private
    public :: read_text_file
 
-   !> Longer files are no namelists [bytes]
+   !> Upper limit of the size of a namelist file [B]
    integer, parameter :: greatest_size = 1048576
 
 contains
 
-   !> Read a whole file.
+   !> Read all bytes of a file.
    subroutine read_text_file(file, text, error)
       !> Path of the file
       character(len=*), intent(in) :: file
-      !> Its bytes
+      !> Bytes of the file
       character(len=:), allocatable, intent(out) :: text
-      !> File is missing, empty, a folder, a device or too long (input_error), or unreadable
+      !> input_error: the file is missing, empty, a folder, a device or too long; io_error: it cannot be read
       type(error_t), allocatable, intent(inout) :: error
       character(len=256) :: reason
       integer :: bytes, status, unit
@@ -32,11 +32,11 @@ contains
          call raise(error, input_error, trim(file)//': no such file')
       else if (bytes < 0 .or. bytes > greatest_size) then
          call raise(error, input_error, &
-            trim(file)//': is not a namelist file (longer than 1 MiB, or no plain file)')
+            trim(file)//': is not a namelist file (longer than 1 MiB, or not a regular file)')
       else if (bytes == 0) then
-         ! To open a pipe would wait for somebody to write to it.
-         call raise(error, input_error, trim(file)//': is empty or no plain file (a pipe, a device); '// &
-            'a namelist file was expected')
+         ! Opening a pipe would wait until another process writes to it.
+         call raise(error, input_error, trim(file)//': is empty, or is not a regular file (a pipe or a device); '// &
+            'a namelist file is expected')
       end if
       if (allocated(error)) return
 

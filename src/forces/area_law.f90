@@ -5,9 +5,10 @@
 !> centres of mass, so that two equal squares face to face have the stiffness E.
 module polydem_area_law
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t, is_degenerate
+   use polydem_contact_history, only: contact_memory_t
+   use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_force_part, only: force_part_t
-   use polydem_kinds, only: ip, wp, worth_threads
+   use polydem_kinds, only: ip, wp, min_parallel_size
    implicit none
    private
    public :: area_law_t
@@ -43,7 +44,7 @@ contains
       associate (unused_bodies => bodies, unused_dt => dt, unused_memory => memory)
       end associate
       contacts%energy_is_quadratic = .false.
-      !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, contacts) private(c, r1, r2, length, force)
       do c = 1_ip, contacts%n
          r1 = sqrt(contacts%arm_first(1, c)**2 + contacts%arm_first(2, c)**2)

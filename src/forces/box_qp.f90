@@ -18,7 +18,7 @@
 !> Sums run over fixed blocks, and then over blocks in order: the same bits for any number of threads.
 module polydem_box_qp
    use omp_lib, only: omp_get_max_threads
-   use polydem_assemble, only: incidence_t
+   use polydem_contact_incidence, only: incidence_t
    use polydem_friction_network, only: avoidable_slip, friction_network_t, measure_slip, push_bodies, &
       slip_of_contacts, sweep_contacts, within, worth_sharing
    use polydem_kinds, only: ip, lp, wp

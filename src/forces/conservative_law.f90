@@ -21,9 +21,10 @@
 !> degenerate = 'stop' in &overlap.
 module polydem_conservative_law
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contact_history, only: contact_memory_t
+   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: force_part_t
-   use polydem_kinds, only: ip, wp, worth_threads
+   use polydem_kinds, only: ip, wp, min_parallel_size
    implicit none
    private
    public :: conservative_law_t, new_conservative_law
@@ -88,7 +89,7 @@ contains
       associate (unused_bodies => bodies, unused_dt => dt, unused_memory => memory)
       end associate
       contacts%energy_is_quadratic = .true.
-      !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, contacts) private(c, p, q, force)
       do c = 1_ip, contacts%n
          p = self%inverse_size(contacts%first(c))

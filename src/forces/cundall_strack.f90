@@ -9,9 +9,10 @@
 !> of a spring tied to the positions: of second order, and stable to w dt = 2 with velocity Verlet.
 module polydem_cundall_strack
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: at_tangential, contact_memory_t, contacts_t
+   use polydem_contact_history, only: at_tangential, contact_memory_t
+   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: force_part_t
-   use polydem_kinds, only: ip, wp, worth_threads
+   use polydem_kinds, only: ip, wp, min_parallel_size
    implicit none
    private
    public :: cundall_strack_t
@@ -46,7 +47,7 @@ contains
       real(wp) :: slip, mean, limit, spring
       integer(ip) :: c
 
-      !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, bodies, dt, contacts, memory) &
       !$omp    private(c, slip, mean, limit, spring)
       do c = 1_ip, contacts%n

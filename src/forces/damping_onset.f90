@@ -8,9 +8,10 @@
 !> begins without a jump and needs no weight; theirs, between 1/2 and 1, does not change the order.)
 module polydem_damping_onset
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: at_area, contact_memory_t, contacts_t
+   use polydem_contact_history, only: at_area, contact_memory_t
+   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: force_part_t
-   use polydem_kinds, only: ip, wp, worth_threads
+   use polydem_kinds, only: ip, wp, min_parallel_size
    implicit none
    private
    public :: damping_onset_t
@@ -39,7 +40,7 @@ contains
 
       associate (unused_self => self, unused_bodies => bodies)
       end associate
-      !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(dt, contacts, memory) private(c, growth, damping)
       do c = 1_ip, contacts%n
          growth = contacts%rate(c)*dt

@@ -28,10 +28,11 @@
 !> first order in h; and a wall moves with its velocity at the start of the step, which shifts what it
 !> carries by h/2 times the change of its velocity, but does not add up.
 module polydem_exact_friction
-   use polydem_assemble, only: incidence_t
    use polydem_bodies, only: bodies_t
    use polydem_box_qp, only: box_qp_t, reserve_box_qp, solve_box_qp
-   use polydem_contacts, only: at_tangential, contact_memory_t, contacts_t
+   use polydem_contact_history, only: at_tangential, contact_memory_t
+   use polydem_contact_incidence, only: incidence_t
+   use polydem_contacts, only: contacts_t
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t, raise, run_error
    use polydem_friction_network, only: build_network, free_velocities, friction_network_t, within

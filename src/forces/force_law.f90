@@ -6,15 +6,16 @@
 module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
-   use polydem_book_damping, only: book_damping_t
    use polydem_conservative_law, only: conservative_law_t, new_conservative_law
-   use polydem_contacts, only: at_area, at_tangential, contact_memory_t, contacts_t, memory_kinds
+   use polydem_contact_history, only: at_area, at_tangential, contact_memory_t, memory_kinds
+   use polydem_contacts, only: contacts_t
    use polydem_cundall_strack, only: cundall_strack_t
    use polydem_damping_onset, only: damping_onset_t
    use polydem_exact_friction, only: exact_friction_t
    use polydem_force_part, only: force_part_t
    use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
+   use polydem_matuttis_chen_damping, only: book_damping_t
    use polydem_rate_damping, only: rate_damping_t
    use polydem_restitution_damping, only: damping_ratio_of, restitution_damping_t
    use polydem_settings, only: forces_settings_t

@@ -6,7 +6,8 @@
 !> remember lies in the columns of `contact_memory_t` that ride on the pair list.
 module polydem_force_part
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contact_history, only: contact_memory_t
+   use polydem_contacts, only: contacts_t
    use polydem_kinds, only: wp
    implicit none
    private

@@ -11,10 +11,10 @@
 !> free body in common. A contact gets the first colour that is free, in the order of the table, which is that of
 !> identifiers; those that find all colours taken come last. So the order does not depend on threads.
 module polydem_friction_network
-   use polydem_assemble, only: incidence_t
    use polydem_bodies, only: bodies_t
+   use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t, is_degenerate
-   use polydem_kinds, only: ip, lp, wp, worth_threads
+   use polydem_kinds, only: ip, lp, wp, min_parallel_size
    implicit none
    private
    public :: friction_network_t, build_network, free_velocities, push_bodies, sweep_contacts, slip_of_contacts
@@ -165,7 +165,7 @@ contains
       integer(ip) :: s
 
       h = 0.5_wp*dt
-      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(bodies, velocity, dt, h) private(s)
       do s = 1_ip, bodies%n
          velocity(1, s) = bodies%velocity(1, s)

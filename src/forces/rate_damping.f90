@@ -5,9 +5,10 @@
 !> normal forces is not allowed to become attractive.
 module polydem_rate_damping
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contact_history, only: contact_memory_t
+   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: force_part_t
-   use polydem_kinds, only: ip, wp, worth_threads
+   use polydem_kinds, only: ip, wp, min_parallel_size
    implicit none
    private
    public :: rate_damping_t
@@ -40,7 +41,7 @@ contains
 
       associate (unused_dt => dt, unused_memory => memory)
       end associate
-      !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, bodies, contacts) private(c, mobility, force)
       do c = 1_ip, contacts%n
          mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))

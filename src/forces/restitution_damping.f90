@@ -14,9 +14,10 @@
 !> central impact; eccentric ones lose more.
 module polydem_restitution_damping
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contact_history, only: contact_memory_t
+   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: force_part_t
-   use polydem_kinds, only: ip, wp, worth_threads
+   use polydem_kinds, only: ip, wp, min_parallel_size
    implicit none
    private
    public :: restitution_damping_t, restitution_of, damping_ratio_of
@@ -49,7 +50,7 @@ contains
 
       associate (unused_dt => dt, unused_memory => memory)
       end associate
-      !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, bodies, contacts) private(c, mobility, reach, force)
       do c = 1_ip, contacts%n
          mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))

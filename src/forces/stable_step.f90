@@ -13,24 +13,17 @@
 !> is at most 3/2 of that value. That law also resists tilts, like a face: K = K_n L^2/12. (No bound for rotations, but
 !> of 2600 random contacts of all kinds none had a frequency more than 8 % above.)
 module polydem_stable_step
-   use polydem_assemble, only: incidence_t
    use polydem_bodies, only: bodies_t
+   use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
    use polydem_restitution_damping, only: damping_ratio_of
    use polydem_settings, only: forces_settings_t
+   use polydem_stability_limit, only: stability_table_t, limit_at
    use polydem_tilt_damping, only: tilt_stiffness
    implicit none
    private
-   public :: stability_table_t, contact_numbers, stable_step_of_contacts, stable_step_of_shapes
-
-   !> Greatest stable product of frequency and step against the damping ratio, piecewise linear
-   type :: stability_table_t
-      !> Damping ratios, ascending from 0
-      real(wp), allocatable :: damping_ratio(:)
-      !> Greatest stable product at each of them; beyond the last it falls like 1/ratio
-      real(wp), allocatable :: limit(:)
-   end type stability_table_t
+   public :: contact_numbers, stable_step_of_contacts, stable_step_of_shapes
 
    !> Contacts per pair of bodies assumed before there are any: two equal bodies with four each
    real(wp), parameter :: assumed_contacts = 8.0_wp
@@ -231,24 +224,6 @@ contains
          dashpot = settings%damping_coefficient*sqrt(mass*settings%stiffness)*ratio
       end if
    end function dashpot
-
-   pure real(wp) function limit_at(table, ratio)
-      type(stability_table_t), intent(in) :: table
-      real(wp), intent(in) :: ratio
-      integer :: k, n
-      real(wp) :: share
-
-      n = size(table%limit)
-      if (ratio >= table%damping_ratio(n)) then
-         limit_at = table%limit(n)*table%damping_ratio(n)/ratio
-         return
-      end if
-      do k = 2, n - 1
-         if (ratio < table%damping_ratio(k)) exit
-      end do
-      share = (ratio - table%damping_ratio(k - 1))/(table%damping_ratio(k) - table%damping_ratio(k - 1))
-      limit_at = table%limit(k - 1) + share*(table%limit(k) - table%limit(k - 1))
-   end function limit_at
 
    !> Greatest ratio L/l of an edge to the length of the law, and the square of the greatest radius.
    pure subroutine shape_of_body(law, bodies, s, ratio, square)

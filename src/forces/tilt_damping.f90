@@ -9,9 +9,10 @@
 !> The torque never moves the normal force beyond half of L from its line: the pressures it stands for do not pull.
 module polydem_tilt_damping
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contact_history, only: contact_memory_t
+   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: force_part_t
-   use polydem_kinds, only: ip, wp, worth_threads
+   use polydem_kinds, only: ip, wp, min_parallel_size
    implicit none
    private
    public :: tilt_damping_t, tilt_stiffness
@@ -44,7 +45,7 @@ contains
 
       associate (unused_dt => dt, unused_memory => memory)
       end associate
-      !$omp parallel do if (contacts%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, bodies, contacts) private(c, mobility, limit, torque)
       do c = 1_ip, contacts%n
          associate (i => contacts%first(c), j => contacts%second(c))

@@ -4,9 +4,10 @@
 !> after the parts of the force law, when all other forces on the bodies are known, and adds to the
 !> forces of contacts. What it remembers lies in the columns of `contact_memory_t`; what it needs to work is its own.
 module polydem_velocity_constraint
-   use polydem_assemble, only: incidence_t
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_incidence, only: incidence_t
+   use polydem_contacts, only: contacts_t
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp

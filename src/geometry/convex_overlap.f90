@@ -1,16 +1,18 @@
-!> The overlap of two convex polygons: area, centroid, and the integrals over the outline that forces need.
+!> Overlap of two convex polygons: area, centroid, and the integrals over its outline that the forces need.
 !>
 !> One polygon, the *subject*, is clipped by the half-planes of the edges of the other, the *clipper*
-!> (Sutherland & Hodgman, Commun. ACM 17 (1974) 32). Every edge of the result remembers whose outline it lies
-!> on. The result is a closed loop by construction, so vertices on edges, common edges, containment and any
-!> number of crossings need no case of their own, and nothing is counted twice or left out.
+!> (Sutherland & Hodgman, Commun. ACM 17 (1974) 32). Each edge of the result has a flag: it lies on the outline
+!> of the clipper, or on that of the subject. The result is a closed loop by construction. Vertices on edges,
+!> common edges, containment and any number of crossings therefore need no special case, and no part of the
+!> outline is counted twice or left out.
 !>
-!> Accuracy. The subject is the smaller body, and coordinates are relative to its centre, so that errors scale
-!> with its size even against a wall a thousand times as long. A vertex within `roundoff` times that size of a
-!> clip line lies on it, and an edge on the clip line belongs to the clipper. Hence bodies that touch up to
-!> rounding do not overlap, and a body inside another is pushed out through an edge that they share.
+!> Accuracy. The subject is the smaller body, and coordinates are relative to its centre. Errors therefore scale
+!> with its size, even against a wall a thousand times as long. A vertex lies on a clip line if its distance is
+!> at most `roundoff` times that size. An edge on the clip line belongs to the clipper. Hence bodies that touch
+!> up to rounding do not overlap, and a body inside another is pushed out through an edge that they share.
 !>
-!> The remembered edge saves time and changes no result: whatever it decides, the full search decides too.
+!> The edge that separated the bodies last is tried first. This saves time and changes no result: if it still
+!> separates them, the full search finds no overlap either.
 module polydem_convex_overlap
    use polydem_effective_area, only: weigh_by_shape
    use polydem_exact_cross, only: exact_cross
@@ -20,21 +22,20 @@ module polydem_convex_overlap
    private
    public :: overlap_t, overlap_polygons
 
-   !> Share of the size of the smaller body within which a vertex lies on a line
+   !> Tolerance: a vertex this close to a line lies on the line, as a fraction of the size of the smaller body
    real(wp), parameter :: roundoff = 4.0_wp*epsilon(1.0_wp)
-   !> Beyond this multiple of that size, line equations are formed without rounding
+   !> Line equations are formed without rounding for points farther away than this multiple of that size
    real(wp), parameter :: far = 8.0_wp
-   !> Share of the square of that size above which an overlap is too large for an edge to count as separating
-   real(wp), parameter :: sure = 64.0_wp*epsilon(1.0_wp)
-   !> Two polygons with no more vertices than this together need no work array of their own
+   !> Greatest area of an overlap that an edge can still separate, as a fraction of the square of that size
+   real(wp), parameter :: separable_area = 64.0_wp*epsilon(1.0_wp)
+   !> Capacity of the work arrays of fixed size, in vertices of both polygons together
    integer(ip), parameter :: usual_corners = 48_ip
 
 contains
 
    !> Overlap of two convex polygons.
    !>
-   !> Costs of the order of the product of the numbers of vertices at worst, and of the vertices of one body
-   !> if the remembered edge still separates them.
+   !> Complexity: O(n m) at worst for n and m vertices; O(n) or O(m) if `separating_edge` still separates them.
    pure subroutine overlap_polygons(a, b, offset, separating_edge, overlap, effective)
       !> Vertices of the first polygon, anticlockwise, relative to its centre, which is inside, (2, n) [m]
       real(wp), intent(in), contiguous :: a(:, :)
@@ -46,7 +47,7 @@ contains
       integer(ip), intent(in) :: separating_edge
       !> The overlap
       type(overlap_t), intent(out) :: overlap
-      !> Whether area, normal and moments are those of the effective area (see `effective_area`; no)
+      !> Whether area, normal and moments are those of the effective area (see `polydem_effective_area`); default: no
       logical, intent(in), optional :: effective
       real(wp) :: reach_a, reach_b, scale
       integer(ip) :: edge
@@ -77,13 +78,13 @@ contains
       end if
 
       overlap%separating_edge = 0_ip
-      if (overlap%area > sure*scale*scale) return
+      if (overlap%area > separable_area*scale*scale) return
       edge = first_separating(a, b, offset, reach_b, scale)
       if (edge == 0_ip) edge = -first_separating(b, a, -offset, reach_a, scale)
       if (edge /= 0_ip .or. .not. overlap%area > 0.0_wp) overlap = overlap_t(separating_edge=edge)
    end subroutine overlap_polygons
 
-   !> Size of a polygon: no vertex is farther from its centre [m]
+   !> Size of a polygon: an upper bound of the distance of its vertices from its centre [m]
    pure real(wp) function reach(vertices)
       real(wp), intent(in), contiguous :: vertices(:, :)
       integer(ip) :: k
@@ -110,7 +111,7 @@ contains
       first_separating = 0_ip
    end function first_separating
 
-   !> Whether no vertex of the other polygon lies on the inner side of an edge
+   !> Whether an edge separates the polygons: no vertex of the other polygon lies on its inner side
    pure logical function separates(polygon, k, other, offset, reach_other, scale)
       real(wp), intent(in), contiguous :: polygon(:, :)
       integer(ip), intent(in) :: k
@@ -127,7 +128,7 @@ contains
       tolerance = roundoff*scale*(abs(edge(1)) + abs(edge(2)))
       level = depth_of(offset, start, end, scale)
       separates = .false.
-      ! The centre lies in the other polygon, so a centre on the inner side settles it.
+      ! The other polygon contains its centre. If the centre is on the inner side, the edge does not separate.
       if (level > tolerance) return
       depth = level
       if (reach_other <= far*scale) then
@@ -142,7 +143,7 @@ contains
       separates = depth <= tolerance
    end function separates
 
-   !> Depth of a point below the line of an edge, that is on its inner side, times the length of the edge [m2]
+   !> Depth of a point below the line of an edge, positive on its inner side, times the length of the edge [m2]
    pure real(wp) function depth_of(point, start, end, scale)
       real(wp), intent(in) :: point(2)
       real(wp), intent(in) :: start(2)
@@ -158,7 +159,7 @@ contains
       end if
    end function depth_of
 
-   !> Clip the subject by all edges of the clipper, and integrate over what is left.
+   !> Clip the subject by all edges of the clipper, and integrate over the remaining loop.
    !>
    !> The normal and the moments are those of the clipper's outline inside the subject; `moment_a` is about
    !> the subject's centre, `moment_b` about the clipper's.
@@ -169,14 +170,14 @@ contains
       real(wp), intent(in) :: offset(2)
       !> Size of the subject
       real(wp), intent(in) :: scale
-      !> Whether the effective area is wanted
+      !> Whether to compute the effective area
       logical, intent(in) :: by_shape
       type(overlap_t), intent(inout) :: overlap
       real(wp) :: vertex(usual_corners, 2, 2), depth(usual_corners), level(usual_corners)
       logical :: on_clipper(usual_corners, 2)
       integer(ip) :: corners
 
-      ! Each edge of the clipper adds one vertex at most.
+      ! Each edge of the clipper adds at most one vertex.
       corners = size(subject, 2, kind=ip) + size(clipper, 2, kind=ip)
       if (corners <= usual_corners) then
          call clip_in(subject, clipper, offset, scale, by_shape, usual_corners, vertex, on_clipper, depth, &
@@ -186,7 +187,7 @@ contains
       end if
    end subroutine clip
 
-   !> The same with work arrays made to measure
+   !> As `clip`, with work arrays for `corners` vertices
    pure subroutine clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
       real(wp), intent(in), contiguous :: subject(:, :)
       real(wp), intent(in), contiguous :: clipper(:, :)
@@ -201,7 +202,7 @@ contains
       call clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, depth, level, overlap)
    end subroutine clip_many
 
-   !> The same in given work arrays, whose last index tells the loop before a cut from the loop after it
+   !> As `clip`, in given work arrays; their last index selects the loop before or after a cut
    pure subroutine clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, depth, &
                            level, overlap)
       real(wp), intent(in), contiguous :: subject(:, :)
@@ -209,7 +210,7 @@ contains
       real(wp), intent(in) :: offset(2)
       real(wp), intent(in) :: scale
       logical, intent(in) :: by_shape
-      !> Room for vertices
+      !> Capacity of the arrays, in vertices
       integer(ip), intent(in) :: corners
       !> Vertices (corner, x or y, loop)
       real(wp), intent(inout) :: vertex(corners, 2, 2)
@@ -217,7 +218,7 @@ contains
       logical, intent(inout) :: on_clipper(corners, 2)
       !> Depth of each vertex below the clip line, times the length of the edge
       real(wp), intent(inout) :: depth(corners)
-      !> Depth of the subject's centre below each clip line, likewise
+      !> Depth of the subject's centre below each clip line, times the length of the edge
       real(wp), intent(inout) :: level(corners)
       type(overlap_t), intent(inout) :: overlap
       integer(ip) :: i, k, m, n, now
@@ -242,7 +243,7 @@ contains
                         vertex(:, :, 3_ip - now), on_clipper(:, 3_ip - now))
                now = 3_ip - now
             else if (.not. lowest > 0.0_wp) then
-               call claim(n, depth, on_clipper(:, now))
+               call mark_edges_on_line(n, depth, on_clipper(:, now))
             end if
          end if
          k = merge(1_ip, k + 1_ip, k == m)
@@ -258,7 +259,7 @@ contains
       real(wp), intent(in) :: offset(2)
       real(wp), intent(in) :: scale
       real(wp), intent(inout) :: level(:)
-      !> Edge of the least of them; to begin with it leaves little of the subject for the others
+      !> Edge with the least depth; the cuts start with it because it removes most of the subject
       integer(ip), intent(out) :: lowest
       real(wp) :: least
       integer(ip) :: k, m
@@ -279,7 +280,7 @@ contains
       integer(ip), intent(in) :: corners
       real(wp), intent(in) :: vertex(corners, 2)
       real(wp), intent(in) :: edge(2)
-      !> Depth of the origin
+      !> Depth of the origin, times the length of the edge
       real(wp), intent(in) :: level
       real(wp), intent(in) :: scale
       real(wp), intent(inout) :: depth(n)
@@ -301,8 +302,8 @@ contains
       end do
    end subroutine measure
 
-   !> Give edges that lie on the clip line to the clipper.
-   pure subroutine claim(n, depth, on_clipper)
+   !> Mark the edges that lie on the clip line as edges of the clipper.
+   pure subroutine mark_edges_on_line(n, depth, on_clipper)
       integer(ip), intent(in) :: n
       real(wp), intent(in) :: depth(n)
       logical, intent(inout) :: on_clipper(n)
@@ -311,12 +312,12 @@ contains
       do i = 1_ip, n
          if (max(depth(i), depth(merge(1_ip, i + 1_ip, i == n))) <= 0.0_wp) on_clipper(i) = .true.
       end do
-   end subroutine claim
+   end subroutine mark_edges_on_line
 
    !> Keep the vertices around the deepest one up to the clip line, and close the loop along that line.
    !>
-   !> The vertices kept are consecutive, whatever rounding does to a convex loop, so that a cut adds two
-   !> vertices and drops one at least.
+   !> The remaining vertices are consecutive even if rounding has made the loop slightly concave. A cut therefore
+   !> adds at most two vertices and drops at least one.
    pure subroutine cut(n, corners, vertex, on_clipper, depth, vertex_cut, on_clipper_cut)
       !> Number of vertices before and after
       integer(ip), intent(inout) :: n
@@ -357,7 +358,7 @@ contains
 
    contains
 
-      !> Where the edge from a vertex below the line to one above it crosses the line
+      !> Intersection of the line with the edge from a vertex below it to a vertex above it
       pure function crossing(below, above) result(point)
          integer(ip), intent(in) :: below
          integer(ip), intent(in) :: above

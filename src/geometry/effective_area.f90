@@ -1,32 +1,35 @@
-!> The effective area G of an overlap, that of the parallelogram with the same determinant of second moments:
+!> Effective area G of an overlap: the area of the parallelogram with the same determinant of second moments.
 !>
 !>     G^2 = 12 sqrt(det S),     S = integral of (x - c)(x - c)^T dA over the overlap, c its centroid
 !>
-!> Like the area A it scales with the determinant of any linear map of the plane, so that G/A is one number each for
-!> all parallelograms, 1, for all triangles, 1.0746, and for all ellipses, 0.9772; no convex figure is outside the last
-!> two ((G/A)^2 is 12 times the square of the isotropy constant of convex geometry). Unlike A it feels tilts: a strip of
-!> length w whose depth grows from d (1 - e) to d (1 + e) has
+!> Like the area A, G scales with the determinant of any linear map of the plane. G/A is therefore a constant of the
+!> figure: 1 for all parallelograms, 1.0746 for all triangles, 0.9772 for all ellipses. Every convex figure lies between
+!> the last two ((G/A)^2 is 12 times the square of the isotropy constant of convex geometry). Unlike A, G depends on
+!> tilts: a strip of length w whose depth grows from d (1 - e) to d (1 + e) has
 !>
 !>     G = w d ((1 + e^2)(1 - e^2/3))^(1/4),     G^2 = w^2 d^2 (1 + e^2/3) + O(e^4)
 !>
-!> and the second form is w^2 times the mean square depth, as the energy of a bed of springs is.
+!> The second form is w^2 times the mean square depth, which is also the form of the energy of a bed of springs.
 !>
-!> Where the outline moves outwards with speed u, S changes by the integral of (x - c)(x - c)^T u ds (the motion of c
-!> does not matter), so that with G'/G = tr(S^-1 S')/4
+!> If the outline moves outwards with speed u, S changes at the rate integral of (x - c)(x - c)^T u ds; the motion of c
+!> has no influence. With G'/G = tr(S^-1 S')/4 follows
 !>
 !>     dG/dt = integral of (G/4) q u ds,     q(x) = (x - c)^T S^-1 (x - c)
 !>
-!> As for the area, the first polygon's outline G_a inside the second gives the gradient, with q G/4 as weight:
+!> As for the area, the gradient is an integral over G_a, the part of the first polygon's outline inside the second,
+!> here with the weight q G/4:
 !>
 !>     N = integral over G_a of (G/4) q n ds,     M_X = integral over G_a of (G/4) q (r - c_X) x n ds
 !>     dG/dt = N . (v_a - v_b) + M_a w_a - M_b w_b
 !>
-!> Over the closed outline these integrals vanish, being those of 2 S^-1 (x - c) and 2 (x - c) x S^-1 (x - c) over the
-!> inside: the two bodies feel opposite forces. The weight is never negative, and continuous when corners come and go.
-!> Along an edge the integrands are polynomials of second and third degree, for which Simpson's rule is exact.
+!> Over the closed outline these integrals vanish: by the divergence theorem they equal the integrals of 2 S^-1 (x - c)
+!> and 2 (x - c) x S^-1 (x - c) over the interior. The forces on the two bodies are therefore opposite. The weight is
+!> never negative, and it stays continuous when corners appear or vanish. Along an edge the integrands are polynomials
+!> of second and third degree, for which Simpson's rule is exact.
 !>
-!> Overlaps are slivers, of depth d and length b. In coordinates at an angle to them det S would lose (d/b)^2 of its
-!> digits; along them, and scaled to about 1 by 1, nothing is lost beyond what the vertices have lost.
+!> Overlaps are slivers of depth d and length b. In coordinates at an angle to the sliver, det S would lose a factor
+!> (d/b)^2 of its precision. In coordinates along the sliver, scaled to about 1 by 1, only the rounding errors of the
+!> vertices remain.
 module polydem_effective_area
    use polydem_kinds, only: ip, wp
    use polydem_overlap_integrals, only: overlap_t
@@ -36,13 +39,14 @@ module polydem_effective_area
 
 contains
 
-   !> Replace area, normal and moments of an overlap by the effective area and its own.
+   !> Replace area, normal and moments of an overlap by those of the effective area.
    !>
-   !> `moment_a` is about the origin, `moment_b` about the clipper's centre. A loop lost in rounding leaves none.
+   !> `moment_a` is about the origin, `moment_b` about the clipper's centre. If rounding leaves the loop no area, the
+   !> overlap becomes zero.
    pure subroutine weigh_by_shape(n, corners, vertex, on_clipper, offset, place, overlap)
       !> Number of vertices
       integer(ip), intent(in) :: n
-      !> Room for vertices
+      !> Capacity of the arrays, in vertices
       integer(ip), intent(in) :: corners
       !> Vertices, anticlockwise, (corner, x or y) [m]
       real(wp), intent(in) :: vertex(corners, 2)
@@ -52,7 +56,7 @@ contains
       real(wp), intent(in) :: offset(2)
       !> Work space: scaled coordinates, (corner, along or across)
       real(wp), intent(inout) :: place(corners, 2)
-      !> The overlap, as for the area
+      !> The overlap with the true area; afterwards with the effective area
       type(overlap_t), intent(inout) :: overlap
       real(wp) :: unit_area, moments(3), determinant, root, unit, moment, weight(3), along(2)
       real(wp) :: c(2), p(2), step(2)
@@ -76,7 +80,7 @@ contains
          j = merge(1_ip, i + 1_ip, i == n)
          p = vertex(i, :) - c
          step = vertex(j, :) - vertex(i, :)
-         ! Simpson's weights at both ends and, fourfold, in the middle
+         ! Terms of Simpson's rule at both ends and in the middle (the latter four times as large)
          weight(1) = unit*level(place(i, 1), place(i, 2))
          weight(2) = unit*level(place(j, 1), place(j, 2))
          weight(3) = unit*level(place(i, 1) + place(j, 1), place(i, 2) + place(j, 2))
@@ -91,7 +95,7 @@ contains
 
    contains
 
-      !> The form q at a place, times the determinant; at twice a place four times as much
+      !> The quadratic form q at a point, times the determinant
       pure real(wp) function level(x, y)
          real(wp), intent(in) :: x, y
 
@@ -100,7 +104,7 @@ contains
 
    end subroutine weigh_by_shape
 
-   !> Coordinates of a loop along and across the line from its first vertex to the farthest from it, scaled to about 1.
+   !> Coordinates of a loop along and across the line from its first vertex to the farthest one, scaled to about 1.
    pure subroutine straighten(n, corners, vertex, place, unit_area)
       integer(ip), intent(in) :: n
       integer(ip), intent(in) :: corners
@@ -136,7 +140,8 @@ contains
       end do
    end subroutine straighten
 
-   !> Second moments (xx, xy, yy) of a loop about its centroid, 0 if it has no area; places become relative to that.
+   !> Second moments (xx, xy, yy) of a loop about its centroid, 0 if it has no area. `place` becomes relative to the
+   !> centroid.
    pure subroutine measure(n, corners, place, moments)
       integer(ip), intent(in) :: n
       integer(ip), intent(in) :: corners

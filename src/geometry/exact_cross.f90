@@ -1,4 +1,4 @@
-!> A cross product that keeps its digits where plain arithmetic would lose them.
+!> Cross product in about twice the working precision, for differences that would cancel in plain arithmetic.
 module polydem_exact_cross
    use polydem_kinds, only: wp
    implicit none
@@ -7,18 +7,18 @@ module polydem_exact_cross
 
 contains
 
-   !> (end - start) x (offset + vertex - start), rounded about once.
+   !> (end - start) x (offset + vertex - start), accurate to about one rounding error.
    !>
    !> Differences and products are split into a rounded value and its error (T. J. Dekker, Numer. Math. 18
    !> (1971) 224; D. E. Knuth, The Art of Computer Programming, vol. 2).
    pure real(wp) function exact_cross(start, end, offset, vertex)
-      !> Where the first vector starts
+      !> Start of the first vector [m]
       real(wp), intent(in) :: start(2)
-      !> Where it ends
+      !> End of the first vector [m]
       real(wp), intent(in) :: end(2)
-      !> One part of the point to which the second vector goes from `start`
+      !> First summand of the end of the second vector, which starts at `start` too [m]
       real(wp), intent(in) :: offset(2)
-      !> The other part
+      !> Second summand of the end of the second vector [m]
       real(wp), intent(in) :: vertex(2)
       real(wp) :: edge(2), edge_error(2), arm(2), arm_error(2), from(2), from_error(2)
       real(wp) :: plus, plus_error, minus, minus_error

@@ -1,23 +1,24 @@
-!> What forces need to know of the overlap of two polygons, from the closed loop around it.
+!> Area, centroid and outline integrals of the overlap of two polygons, from the closed loop around it.
 !>
-!> With G the part of the outline of a inside b, n its outward normal and c_X the centre of X = a, b:
+!> G is the part of the outline of a inside b, n its outward normal, and c_X the centre of X = a, b:
 !>
 !>     N   = integral over G of n ds               = sum over the edges in G of (dy, -dx)
 !>     M_X = integral over G of (r - c_X) x n ds   = -sum of (e - s) . ((e + s)/2 - c_X), edges from s to e
 !>     dA/dt = N . (v_a - v_b) + M_a w_a - M_b w_b
 !>
-!> N points from a to b; for two crossings it is the chord turned by a right angle. (Volume-based contact:
-!> Y. T. Feng, Comput. Methods Appl. Mech. Eng. 373 (2021).) The loop is closed, so the integrals over the
-!> part of b inside a are the negatives. Those over the clipper's part are taken: containment gives exactly 0.
+!> N points from a to b. If the outlines cross twice, N is the chord between the crossings turned by a right angle.
+!> (Volume-based contact: Y. T. Feng, Comput. Methods Appl. Mech. Eng. 373 (2021).) The loop is closed, and the
+!> integrals over the part of b inside a therefore have the opposite sign. The code integrates over the clipper's
+!> part: if the clipper contains the subject, the result is exactly 0.
 module polydem_overlap_integrals
    use polydem_kinds, only: ip, wp
    implicit none
    private
    public :: overlap_t, integrate_loop
 
-   !> Where two polygons overlap, and how
+   !> Overlap of two polygons a and b
    type :: overlap_t
-      !> Area, 0 if they are apart or touch; or the effective area where asked for [m2]
+      !> Area, 0 if the polygons are apart or touch; on request the effective area [m2]
       real(wp) :: area = 0.0_wp
       !> Centroid relative to the centre of a [m]
       real(wp) :: centroid(2) = 0.0_wp
@@ -27,7 +28,7 @@ module polydem_overlap_integrals
       real(wp) :: moment_a = 0.0_wp
       !> Moment of that integral about the centre of b [m2]
       real(wp) :: moment_b = 0.0_wp
-      !> Edge whose line separates them: +k of a, -k of b; 0 if none is known or they overlap
+      !> Edge whose line separates the polygons: +k of a, -k of b; 0 if none is known or they overlap
       integer(ip) :: separating_edge = 0_ip
    end type overlap_t
 
@@ -39,7 +40,7 @@ contains
    pure subroutine integrate_loop(n, corners, vertex, on_clipper, offset, overlap)
       !> Number of vertices
       integer(ip), intent(in) :: n
-      !> Room for vertices
+      !> Capacity of the arrays, in vertices
       integer(ip), intent(in) :: corners
       !> Vertices, anticlockwise, (corner, x or y) [m]
       real(wp), intent(in) :: vertex(corners, 2)
@@ -47,7 +48,7 @@ contains
       logical, intent(in) :: on_clipper(corners)
       !> Centre of the clipper [m]
       real(wp), intent(in) :: offset(2)
-      !> The overlap, zero before
+      !> The overlap; must be zero on entry
       type(overlap_t), intent(inout) :: overlap
       real(wp) :: twice_area, part, weighted(2), p(2), q(2), step(2), middle(2)
       integer(ip) :: i, j

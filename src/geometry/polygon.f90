@@ -1,7 +1,7 @@
 !> Single polygons: checking and cleaning of input, mass properties, size, clipping.
 !>
-!> Nothing here has a length of its own: every tolerance is a share of the size of the polygon, or of the
-!> spacing of the numbers in which its vertices were given.
+!> There is no absolute length in this module: every tolerance is a fraction of the size of the polygon, or of the
+!> spacing of floating-point numbers at its coordinates.
 module polydem_polygon
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_kinds, only: ip, wp
@@ -10,23 +10,23 @@ module polydem_polygon
    private
    public :: clean_polygon, mass_properties, diameter, clip_half_plane
 
-   !> Vertices closer together, or closer to the line of their neighbours, than this share of the size are
-   !> dropped: far above the digits lost in a text file, far below anything that changes a result.
-   real(wp), parameter :: idle_share = 1.0e-9_wp
+   !> A vertex is dropped if it is closer to its neighbour, or to the line of its neighbours, than this fraction of
+   !> the size: far above the rounding errors of a text file, far below any effect on a result.
+   real(wp), parameter :: redundant_share = 1.0e-9_wp
 
 contains
 
-   !> Bring a polygon into standard form, or say why that cannot be done.
+   !> Bring a polygon into standard form, or report why this is impossible.
    !>
    !> Standard form is strictly convex and anticlockwise, without repeated vertices and without vertices on
-   !> the line of their neighbours. The vertices that stay keep their bits and their cyclic order, which is
-   !> reversed if the input is clockwise.
+   !> the line of their neighbours. The remaining vertices have the bits and the cyclic order of the input; the
+   !> order is reversed if the input is clockwise.
    pure subroutine clean_polygon(vertices, cleaned, problem)
-      !> Vertices in order, either way round, (2, n) [m]
+      !> Vertices in order, clockwise or anticlockwise, (2, n) [m]
       real(wp), intent(in) :: vertices(:, :)
       !> Vertices in standard form, (2, m) [m]; not allocated if rejected
       real(wp), allocatable, intent(out) :: cleaned(:, :)
-      !> What is wrong, to be read after the name of the body; not allocated if all is well
+      !> Predicate of an error message, such as 'has no area'; not allocated if the polygon is valid
       character(len=:), allocatable, intent(out) :: problem
       integer(ip), allocatable :: kept(:)
       integer(ip) :: n, m, k
@@ -45,10 +45,10 @@ contains
       end if
 
       extent = diameter(vertices)
-      tolerance = idle_share*extent + 16.0_wp*epsilon(1.0_wp)*maxval(abs(vertices))
+      tolerance = redundant_share*extent + 16.0_wp*epsilon(1.0_wp)*maxval(abs(vertices))
       area = signed_area(vertices)
       if (abs(area) <= tolerance*extent) then
-         problem = 'has no area, or crosses itself so that its parts cancel'
+         problem = 'has no area, or crosses itself and its parts cancel'
          return
       end if
       allocate (kept(n))
@@ -57,29 +57,29 @@ contains
       end do
 
       m = n
-      call drop_idle(vertices, tolerance, kept, m)
+      call drop_redundant(vertices, tolerance, kept, m)
       call check_convex(vertices, kept(1:m), problem)
       if (allocated(problem)) return
       cleaned = vertices(:, kept(1:m))
    end subroutine clean_polygon
 
    !> Drop vertices that repeat a neighbour or lie between their neighbours on one line.
-   pure subroutine drop_idle(vertices, tolerance, kept, m)
+   pure subroutine drop_redundant(vertices, tolerance, kept, m)
       real(wp), intent(in) :: vertices(:, :)
       real(wp), intent(in) :: tolerance
       integer(ip), intent(inout) :: kept(:)
       integer(ip), intent(inout) :: m
       integer(ip) :: k, in_order
-      logical :: idle
+      logical :: redundant
 
       k = 1_ip
       in_order = 0_ip
       do while (in_order < m .and. m > 2_ip)
          associate (before => vertices(:, kept(1_ip + modulo(k - 2_ip, m))), here => vertices(:, kept(k)), &
                     after => vertices(:, kept(1_ip + modulo(k, m))))
-            idle = is_idle(here - before, after - here, tolerance)
+            redundant = is_redundant(here - before, after - here, tolerance)
          end associate
-         if (idle) then
+         if (redundant) then
             kept(k:m - 1_ip) = kept(k + 1_ip:m)
             m = m - 1_ip
             in_order = 0_ip
@@ -89,24 +89,25 @@ contains
             k = 1_ip + modulo(k, m)
          end if
       end do
-   end subroutine drop_idle
+   end subroutine drop_redundant
 
-   !> Whether a vertex adds nothing to the outline; the tip of a spike, where it turns back, does
-   pure logical function is_idle(arriving, leaving, tolerance)
+   !> Whether a vertex is redundant: it repeats a neighbour or lies between its neighbours. The tip of a spike, where
+   !> the outline turns back, is not redundant.
+   pure logical function is_redundant(arriving, leaving, tolerance)
       real(wp), intent(in) :: arriving(2)
       real(wp), intent(in) :: leaving(2)
       real(wp), intent(in) :: tolerance
 
       if (hypot(leaving(1), leaving(2)) <= tolerance) then
-         is_idle = .true.
+         is_redundant = .true.
       else
-         is_idle = abs(cross(arriving, leaving)) <= &
+         is_redundant = abs(cross(arriving, leaving)) <= &
                    tolerance*hypot(arriving(1) + leaving(1), arriving(2) + leaving(2)) .and. &
                    arriving(1)*leaving(1) + arriving(2)*leaving(2) > 0.0_wp
       end if
-   end function is_idle
+   end function is_redundant
 
-   !> Complain unless the outline always turns left and goes round once.
+   !> Set `problem` unless the outline turns left at every vertex and goes round once.
    pure subroutine check_convex(vertices, kept, problem)
       real(wp), intent(in) :: vertices(:, :)
       integer(ip), intent(in) :: kept(:)
@@ -132,7 +133,7 @@ contains
       if (rounds /= 1_ip) problem = 'crosses itself: its outline goes round '//to_text(rounds)//' times'
    end subroutine check_convex
 
-   !> Whether a direction lies in the half turn from pi (inclusive) to 2 pi
+   !> Whether the angle of a direction lies in [pi, 2 pi)
    pure logical function points_down(direction)
       real(wp), intent(in) :: direction(2)
 
@@ -141,8 +142,8 @@ contains
 
    !> Area, centroid and second moment of area of an anticlockwise polygon.
    !>
-   !> Sums over the triangles of a fan from the first vertex: all have a positive area if it is convex, and
-   !> coordinates are differences of vertices, so no digits cancel, however far from the origin it lies.
+   !> Sums over the triangles of a fan from the first vertex. All triangles of a convex polygon have a positive area,
+   !> and coordinates are differences of vertices: no digits cancel, even far from the origin.
    pure subroutine mass_properties(vertices, area, centroid, second_moment)
       !> Vertices, anticlockwise, (2, n) [m]
       real(wp), intent(in) :: vertices(:, :)
@@ -177,7 +178,7 @@ contains
       end do
    end subroutine mass_properties
 
-   !> Greatest distance of two vertices [m]
+   !> Greatest distance between two vertices [m]
    pure real(wp) function diameter(vertices)
       !> Vertices in any order, (2, n) [m]
       real(wp), intent(in) :: vertices(:, :)
@@ -191,7 +192,7 @@ contains
       end do
    end function diameter
 
-   !> The part of a convex polygon on one side of a line: where (r - point) . normal <= 0.
+   !> The part of a convex polygon on one side of a line: (r - point) . normal <= 0.
    !>
    !> I. E. Sutherland and G. W. Hodgman, Commun. ACM 17 (1974) 32.
    pure subroutine clip_half_plane(vertices, point, normal, clipped)
@@ -199,9 +200,9 @@ contains
       real(wp), intent(in) :: vertices(:, :)
       !> A point on the line [m]
       real(wp), intent(in) :: point(2)
-      !> Normal of the line, of any length, towards the part that is cut away
+      !> Normal of the line, of any length, towards the part that is removed
       real(wp), intent(in) :: normal(2)
-      !> What is left, (2, m) [m]; m = 0 if that has no area
+      !> The remaining polygon, (2, m) [m]; m = 0 if it has no area
       real(wp), allocatable, intent(out) :: clipped(:, :)
       real(wp) :: outside(size(vertices, 2)), work(2, 2*size(vertices, 2)), share
       integer(ip) :: j, k, n, m

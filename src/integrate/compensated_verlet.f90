@@ -1,13 +1,14 @@
-!> Velocity Verlet whose sums over steps do not drift: position and velocity are carried as two numbers each.
+!> Velocity Verlet with compensated sums: positions and velocities have two parts, a rounded value and its rounding
+!> error.
 !>
-!> Every addition to a position or velocity is split without error into its rounded sum and what rounding cost
-!> (D.E. Knuth, The Art of Computer Programming 2, Sec. 4.2.2, Theorem B); the cost enters the next addition
-!> (W. Kahan, Commun. ACM 8 (1965) 40). So millions of steps lose no more than one. The larger part of each number
-!> is what everybody else sees. It takes a compiler that leaves sums as they stand (no -ffast-math).
+!> Every addition to a position or velocity is split without error into the rounded sum and its rounding error
+!> (D.E. Knuth, The Art of Computer Programming 2, Sec. 4.2.2, Theorem B). The error enters the next addition
+!> (W. Kahan, Commun. ACM 8 (1965) 40). The rounding error of millions of steps is therefore no greater than that of
+!> one. Only the rounded value is visible to other modules. The compiler must not reorder sums (no -ffast-math).
 module polydem_compensated_verlet
-   use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t
-   use polydem_kinds, only: ip, wp, worth_threads
+   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_serializer, only: serializer_t
    use polydem_velocity_verlet, only: velocity_verlet_t
    implicit none
    private
@@ -16,20 +17,21 @@ module polydem_compensated_verlet
    !> Velocity Verlet with compensated sums; its stability is that of the plain scheme
    type, extends(velocity_verlet_t) :: compensated_verlet_t
       private
-      !> What rounding took from positions and angle, (3, slot) [m, m, rad]
+      !> Rounding errors of positions and angle, to be added, (3, slot) [m, m, rad]
       real(wp), allocatable :: lost_place(:, :)
-      !> The same of velocities, at the end of a step or half a step back like `half`, (3, slot) [m/s, m/s, rad/s]
+      !> Rounding errors of velocities, to be added: at the end of a step, or half a step earlier together with `half`,
+      !> (3, slot) [m/s, m/s, rad/s]
       real(wp), allocatable :: lost_speed(:, :)
    contains
       procedure :: start
       procedure :: predict
       procedure :: correct
-      procedure :: keep
+      procedure :: serialize
    end type compensated_verlet_t
 
 contains
 
-   !> Start from positions and velocities that are exact.
+   !> Start with rounding errors of zero.
    subroutine start(self, bodies)
       class(compensated_verlet_t), intent(inout) :: self
       !> Bodies at the start
@@ -45,13 +47,13 @@ contains
    !> Move to the end of the step and predict the velocities there.
    subroutine predict(self, dt, bodies)
       class(compensated_verlet_t), intent(inout) :: self
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
       !> Bodies; position, angle and velocities of the free ones change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: k, s
 
-      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, bodies, dt) private(k, s)
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
@@ -68,7 +70,7 @@ contains
    !> Final velocities and accelerations from the forces at the end of the step.
    subroutine correct(self, dt, bodies)
       class(compensated_verlet_t), intent(inout) :: self
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
       !> Bodies; velocities and accelerations of the free ones change
       type(bodies_t), intent(inout) :: bodies
@@ -76,7 +78,7 @@ contains
       real(wp) :: h
 
       h = 0.5_wp*dt
-      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, bodies, h) private(k, s)
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
@@ -92,17 +94,17 @@ contains
       !$omp end parallel do
    end subroutine correct
 
-   !> Keep what rounding took.
-   subroutine keep(self, archive)
+   !> Serialize the rounding errors.
+   subroutine serialize(self, serializer)
       class(compensated_verlet_t), intent(inout) :: self
-      !> Archive
-      class(archive_t), intent(inout) :: archive
+      !> Serializer
+      class(serializer_t), intent(inout) :: serializer
 
-      call archive%keep('/bodies/lost_place', self%lost_place, 'm, rad', 'what rounding took from x, y and angle')
-      call archive%keep('/bodies/lost_speed', self%lost_speed, 'm/s, rad/s', 'what it took from their velocities')
-   end subroutine keep
+      call serializer%field('/bodies/lost_place', self%lost_place, 'm, rad', 'rounding errors of x, y and angle')
+      call serializer%field('/bodies/lost_speed', self%lost_speed, 'm/s, rad/s', 'rounding errors of their velocities')
+   end subroutine serialize
 
-   !> One coordinate: its velocity in the middle of the step, its place at the end, its velocity predicted there.
+   !> Predict one coordinate: its velocity in the middle of the step, its position and velocity at the end.
    pure subroutine move(dt, acceleration, place, velocity, half, lost_place, lost_speed)
       real(wp), intent(in) :: dt, acceleration
       real(wp), intent(inout) :: place, velocity, half, lost_place, lost_speed
@@ -115,7 +117,7 @@ contains
       velocity = half + gain
    end subroutine move
 
-   !> Add a number and what was lost so far to a total; what the rounding of the total costs is lost from now on.
+   !> Add a number and the previous rounding error to a total; `lost` becomes the rounding error of the new total.
    pure subroutine add(number, total, lost)
       real(wp), intent(in) :: number
       real(wp), intent(inout) :: total, lost

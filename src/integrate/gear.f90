@@ -1,28 +1,28 @@
-!> Gear's predictor-corrector with six values, as used in the book.
+!> Gear's predictor-corrector scheme with six values, as used by Matuttis & Chen (2014).
 !>
-!> C.W. Gear, Numerical Initial Value Problems in Ordinary Differential Equations (1971); Matuttis & Chen 2014: scaled
-!> derivatives r_k = x^(k) dt^k/k!, predicted by the Pascal triangle and corrected by c_k times the difference of r_2,
-!> c = 3/16, 251/360, 1, 11/18, 1/6, 1/60 (forces that depend on velocities; 3/20 instead of 3/16 is meant for
-!> those that do not). One evaluation per step, at the predicted state. The scheme starts from gravity alone, with
-!> zero higher derivatives.
+!> C.W. Gear, Numerical Initial Value Problems in Ordinary Differential Equations (1971). The values are the scaled
+!> derivatives r_k = x^(k) dt^k/k!. The Pascal triangle predicts them; the correction is c_k times the difference of
+!> r_2, with c = 3/16, 251/360, 1, 11/18, 1/6, 1/60 for forces that depend on velocities. For other forces 3/20
+!> replaces 3/16. There is one force evaluation per step, at the predicted state. The scheme starts from gravity
+!> alone, with zero higher derivatives.
 module polydem_gear
-   use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t
    use polydem_integrator, only: integrator_t
-   use polydem_kinds, only: ip, wp, worth_threads
-   use polydem_stable_step, only: stability_table_t
+   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_serializer, only: serializer_t
+   use polydem_stability_limit, only: stability_table_t
    implicit none
    private
    public :: gear_t, for_velocities, for_positions
 
-   !> First corrector for forces that depend on velocities
+   !> Corrector c_0 for forces that depend on velocities
    real(wp), parameter :: for_velocities = 3.0_wp/16.0_wp
-   !> First corrector for forces that depend on positions alone
+   !> Corrector c_0 for forces that depend on positions alone
    real(wp), parameter :: for_positions = 3.0_wp/20.0_wp
 
    !> Gear's scheme of fifth order
    type, extends(integrator_t) :: gear_t
-      !> First corrector, of the position
+      !> Corrector c_0, that of the position
       real(wp) :: c0 = for_velocities
       !> Scaled third to fifth derivatives of x, y and angle, (3..5, 3, slot)
       real(wp), allocatable, private :: higher(:, :, :)
@@ -31,9 +31,10 @@ module polydem_gear
       procedure :: predict
       procedure :: correct
       procedure :: stability
-      procedure :: keep
+      procedure :: serialize
    end type gear_t
 
+   !> Corrector c_1, and those of the third to fifth derivatives
    real(wp), parameter :: c1 = 251.0_wp/360.0_wp
    real(wp), parameter :: c_higher(3:5) = [11.0_wp/18.0_wp, 1.0_wp/6.0_wp, 1.0_wp/60.0_wp]
 
@@ -50,16 +51,16 @@ contains
       self%higher = 0.0_wp
    end subroutine start
 
-   !> Taylor expansion to the end of the step.
+   !> Predict by a Taylor expansion to the end of the step.
    subroutine predict(self, dt, bodies)
       class(gear_t), intent(inout) :: self
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
       !> Bodies; position, angle, velocities and accelerations of the free ones change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: k, s
 
-      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, bodies, dt) private(k, s)
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
@@ -74,13 +75,13 @@ contains
    !> Correct all derivatives by the difference between computed and predicted acceleration.
    subroutine correct(self, dt, bodies)
       class(gear_t), intent(inout) :: self
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
       !> Bodies; position, angle, velocities and accelerations of the free ones change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: k, s
 
-      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, bodies, dt) private(k, s)
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
@@ -94,16 +95,17 @@ contains
       !$omp end parallel do
    end subroutine correct
 
-   !> Keep the derivatives above the second.
-   subroutine keep(self, archive)
+   !> Serialize the derivatives above the second.
+   subroutine serialize(self, serializer)
       class(gear_t), intent(inout) :: self
-      !> Archive
-      class(archive_t), intent(inout) :: archive
+      !> Serializer
+      class(serializer_t), intent(inout) :: serializer
 
-      call archive%keep('/bodies/gear_higher', self%higher, 'm, rad', &
+      call serializer%field('/bodies/gear_higher', self%higher, 'm, rad', &
                         'third to fifth derivatives of x, y and angle times dt^k/k!')
-   end subroutine keep
+   end subroutine serialize
 
+   !> Taylor expansion of one coordinate: the Pascal triangle applied to its scaled derivatives.
    pure subroutine expand(dt, x, v, a, r)
       real(wp), intent(in) :: dt
       real(wp), intent(inout) :: x, v, a, r(3:5)
@@ -120,6 +122,7 @@ contains
       a = 2.0_wp*r2/(dt*dt)
    end subroutine expand
 
+   !> Correct one coordinate by the difference between computed and predicted acceleration.
    pure subroutine adjust(c0, dt, computed, x, v, a, r)
       real(wp), intent(in) :: c0, dt, computed
       real(wp), intent(inout) :: x, v, a, r(3:5)
@@ -132,9 +135,11 @@ contains
       r = r + c_higher*difference
    end subroutine adjust
 
-   !> Limits for x'' + 2 z w x' + w^2 x = 0 with one evaluation per step: where the spectral radius leaves 1.
+   !> Stability limits for x'' + 2 z w x' + w^2 x = 0 with one force evaluation per step: beyond them the spectral
+   !> radius exceeds 1.
    !>
-   !> With 3/20 an undamped oscillation grows at any step: by 1e-6 per step at the limit given here, by 1e-9 at 0.1.
+   !> With c_0 = 3/20 an undamped oscillation grows at any time step: by 1e-6 per step at the limit given here, by 1e-9
+   !> per step at w dt = 0.1.
    function stability(self) result(table)
       class(gear_t), intent(in) :: self
       type(stability_table_t) :: table

@@ -1,33 +1,33 @@
-!> What every integrator promises.
+!> Interface of all integration schemes.
 !>
-!> A step is predict, forces, correct: `predict` brings positions, angles and velocities of the free bodies to the end
-!> of the step as far as the past allows; forces are computed there once; `correct` makes the final
-!> state of them. While forces are computed, velocity - dt/2 acceleration is the velocity in the middle of the step, to
-!> second order. Turned vertices and fixed bodies are not its business.
+!> A time step has three parts. `predict` extrapolates positions, angles and velocities of the free bodies to the end of
+!> the step. The forces are computed there, once. `correct` computes the final state from the forces. While the forces
+!> are computed, velocity - dt/2 acceleration is the velocity in the middle of the step to second order. An integration
+!> scheme changes neither turned vertices nor fixed bodies.
 module polydem_integrator
-   use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t
    use polydem_kinds, only: wp
-   use polydem_stable_step, only: stability_table_t
+   use polydem_serializer, only: serializer_t
+   use polydem_stability_limit, only: stability_table_t
    implicit none
    private
    public :: integrator_t
 
-   !> A time integration scheme with what it remembers
+   !> An integration scheme and its state
    type, abstract :: integrator_t
-      !> Whether the scheme starts from the forces at time 0; else it starts from gravity alone
+      !> Whether the scheme starts from the forces at time 0; otherwise it starts from gravity alone
       logical :: starts_from_forces = .true.
    contains
       !> Prepare for bodies whose accelerations are known
       procedure(start), deferred :: start
-      !> Bring the free bodies to the end of the step
+      !> Predict the free bodies at the end of the step
       procedure(advance), deferred :: predict
-      !> Make the final state from the forces
+      !> Compute the final state from the forces
       procedure(advance), deferred :: correct
-      !> Products of frequency and step that the scheme stands
+      !> Greatest stable products of angular frequency and time step
       procedure(stability), deferred :: stability
-      procedure :: keep
-      procedure :: carry
+      procedure :: serialize
+      procedure :: serialize_step
    end type integrator_t
 
    abstract interface
@@ -39,17 +39,17 @@ module polydem_integrator
          type(bodies_t), intent(in) :: bodies
       end subroutine start
 
-      !> One half of a step.
+      !> Predict or correct.
       subroutine advance(self, dt, bodies)
          import :: bodies_t, integrator_t, wp
          class(integrator_t), intent(inout) :: self
-         !> Step [s]
+         !> Time step [s]
          real(wp), intent(in) :: dt
          !> Bodies; only the free ones change
          type(bodies_t), intent(inout) :: bodies
       end subroutine advance
 
-      !> Greatest stable product of frequency and step against the damping ratio.
+      !> Greatest stable product of angular frequency and time step against the damping ratio.
       function stability(self) result(table)
          import :: integrator_t, stability_table_t
          class(integrator_t), intent(in) :: self
@@ -59,24 +59,24 @@ module polydem_integrator
 
 contains
 
-   !> Keep in an archive what the scheme remembers from step to step; to be replaced by schemes that remember anything.
-   subroutine keep(self, archive)
+   !> Serialize the state of the scheme between steps. Schemes with such a state override this.
+   subroutine serialize(self, serializer)
       class(integrator_t), intent(inout) :: self
-      !> Archive, which takes or gives back columns over /bodies
-      class(archive_t), intent(inout) :: archive
+      !> Serializer, which reads or writes columns over /bodies
+      class(serializer_t), intent(inout) :: serializer
 
-      associate (no_memory => self, unused => archive)
+      associate (no_state => self, unused => serializer)
       end associate
-   end subroutine keep
+   end subroutine serialize
 
-   !> Let an archive take along, in the middle of a step, what `keep` keeps and what lasts from predict to correct; to
-   !> be replaced by schemes that have such a thing.
-   subroutine carry(self, archive)
+   !> Serialize the state of the scheme in the middle of a step: that of `serialize`, and values that last from predict
+   !> to correct. Schemes with such values override this.
+   subroutine serialize_step(self, serializer)
       class(integrator_t), intent(inout) :: self
-      !> Archive, which takes or gives back columns over /bodies
-      class(archive_t), intent(inout) :: archive
+      !> Serializer, which reads or writes columns over /bodies
+      class(serializer_t), intent(inout) :: serializer
 
-      call self%keep(archive)
-   end subroutine carry
+      call self%serialize(serializer)
+   end subroutine serialize_step
 
 end module polydem_integrator

@@ -1,4 +1,4 @@
-!> Integrators by name. The only file that knows all of them.
+!> Factory of integration schemes: the only module that uses all of them.
 module polydem_integrator_factory
    use polydem_compensated_verlet, only: compensated_verlet_t
    use polydem_gear, only: for_positions, gear_t
@@ -11,11 +11,11 @@ module polydem_integrator_factory
 
 contains
 
-   !> Make the integrator that the settings name (the reader has checked the name).
+   !> Make the integration scheme of the settings. Names are valid: the reader of the namelist has checked them.
    subroutine new_integrator(settings, integrator)
       !> Group &integrate
       type(integrate_settings_t), intent(in) :: settings
-      !> The integrator
+      !> The integration scheme
       class(integrator_t), allocatable, intent(out) :: integrator
 
       select case (settings%scheme)

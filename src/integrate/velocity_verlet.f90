@@ -1,27 +1,27 @@
 !> Velocity Verlet: second order, symplectic, one force evaluation per step.
 !>
-!> x' = x + dt v + dt^2/2 a, forces at x' with the velocity v + dt a, v' = v + dt/2 (a + a')
+!> x' = x + dt v + dt^2/2 a; forces at x' with the velocity v + dt a; v' = v + dt/2 (a + a')
 !> (W.C. Swope, H.C. Andersen, P.H. Berens & K.R. Wilson, J. Chem. Phys. 76 (1982) 637).
 module polydem_velocity_verlet
-   use polydem_archive, only: archive_t
    use polydem_bodies, only: bodies_t
    use polydem_integrator, only: integrator_t
-   use polydem_kinds, only: ip, wp, worth_threads
-   use polydem_stable_step, only: stability_table_t
+   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_serializer, only: serializer_t
+   use polydem_stability_limit, only: stability_table_t
    implicit none
    private
    public :: velocity_verlet_t
 
    !> Velocity Verlet
    type, extends(integrator_t) :: velocity_verlet_t
-      !> Velocity and angular velocity half a step back, (3, slot) [m/s, m/s, rad/s]
+      !> Velocity and angular velocity in the middle of the step, (3, slot) [m/s, m/s, rad/s]
       real(wp), allocatable :: half(:, :)
    contains
       procedure :: start
       procedure :: predict
       procedure :: correct
       procedure :: stability
-      procedure :: carry
+      procedure :: serialize_step
    end type velocity_verlet_t
 
 contains
@@ -36,10 +36,10 @@ contains
       allocate (self%half(3, bodies%n))
    end subroutine start
 
-   !> Move to the end of the step and predict the velocities there.
+   !> Move the bodies to the end of the step and predict the velocities there.
    subroutine predict(self, dt, bodies)
       class(velocity_verlet_t), intent(inout) :: self
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
       !> Bodies; position, angle and velocities of the free ones change
       type(bodies_t), intent(inout) :: bodies
@@ -47,7 +47,7 @@ contains
       real(wp) :: h, half(3)
 
       h = 0.5_wp*dt
-      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, bodies, dt, h) private(k, s, half)
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
@@ -65,10 +65,10 @@ contains
       !$omp end parallel do
    end subroutine predict
 
-   !> Final velocities and accelerations from the forces at the end of the step.
+   !> Compute final velocities and accelerations from the forces at the end of the step.
    subroutine correct(self, dt, bodies)
       class(velocity_verlet_t), intent(inout) :: self
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
       !> Bodies; velocities and accelerations of the free ones change
       type(bodies_t), intent(inout) :: bodies
@@ -76,7 +76,7 @@ contains
       real(wp) :: h
 
       h = 0.5_wp*dt
-      !$omp parallel do if (bodies%n > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, bodies, h) private(k, s)
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
@@ -90,18 +90,18 @@ contains
       !$omp end parallel do
    end subroutine correct
 
-   !> Let an archive take along the velocities in the middle of the step.
-   subroutine carry(self, archive)
+   !> Serialize the velocities in the middle of the step.
+   subroutine serialize_step(self, serializer)
       class(velocity_verlet_t), intent(inout) :: self
-      !> Archive
-      class(archive_t), intent(inout) :: archive
+      !> Serializer
+      class(serializer_t), intent(inout) :: serializer
 
-      call self%keep(archive)
-      call archive%keep('/bodies/half_velocity', self%half, 'm/s, rad/s', 'velocities in the middle of the step')
-   end subroutine carry
+      call self%serialize(serializer)
+      call serializer%field('/bodies/half_velocity', self%half, 'm/s, rad/s', 'velocities in the middle of the step')
+   end subroutine serialize_step
 
-   !> Limits for x'' + 2 z w x' + w^2 x = 0 with the force taken at the predicted velocity: where the spectral
-   !> radius of the step leaves 1.
+   !> Stability limits for x'' + 2 z w x' + w^2 x = 0 with the force at the predicted velocity: beyond them the spectral
+   !> radius exceeds 1.
    function stability(self) result(table)
       class(velocity_verlet_t), intent(in) :: self
       type(stability_table_t) :: table

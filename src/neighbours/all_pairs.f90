@@ -1,35 +1,36 @@
-!> The oracle: every box is compared with every other at every step.
+!> Reference finder: it compares every box with every other box at every step, with O(n^2) comparisons.
 !>
-!> The list of overlapping boxes comes out in ascending order; its differences to the list of the step
-!> before are the changes. Nothing is assumed, nothing is kept but that list.
+!> The result is the list of overlapping boxes in ascending order. Its differences from the list of the previous step
+!> are the changes. The finder makes no assumptions and stores nothing but that list.
 !>
-!> Threads compare strips of boxes, dealt out in turn, with all later boxes, block by block, so that the
-!> block stays in the cache while it is compared with the whole strip. The boxes above one box are found by one
-!> thread in ascending order; so joining what they found by the lower box gives the ordered list.
+!> Each thread compares strips of boxes with all later boxes, block by block; strips are distributed cyclically over
+!> threads. A block stays in the cache while it is compared with the whole strip. A single thread finds all partners of
+!> a box, in ascending order, so gathering the pairs by their lower box gives the ordered list.
 module polydem_all_pairs
    use omp_lib, only: omp_get_max_threads
-   use polydem_box_pairs, only: box_pairs_t, found_t, record_differences
+   use polydem_box_pairs, only: box_pairs_t, found_pairs_t, record_differences
    use polydem_boxes, only: boxes_t
    use polydem_finder, only: finder_t
-   use polydem_kinds, only: ip, lp, wp, worth_threads
+   use polydem_finder_statistics, only: count_bytes, count_candidates, count_tests, phase_filter, phase_search
+   use polydem_kinds, only: ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
-   use polydem_work, only: count_bytes, count_candidates, count_tests, phase_filter, phase_search
    implicit none
    private
    public :: all_pairs_t
 
-   !> Boxes of a strip, and boxes with which it is compared in one go
+   !> Number of boxes of a strip, and of a block with which it is compared at once
    integer(ip), parameter :: strip_size = 64_ip, block_size = 128_ip
 
-   !> Finder that compares all
+   !> Finder that compares all pairs of boxes
    type, extends(finder_t) :: all_pairs_t
       private
-      !> Overlapping boxes of this step and of the step before; which is which alternates
+      !> Overlapping boxes of this step and of the previous step, in alternating order
       type(box_pairs_t) :: list(2)
-      !> Place of this step in `list`
+      !> Index of this step in `list`
       integer :: now = 1
-      !> Pairs that each thread found, not in order
-      type(found_t), allocatable :: found(:)
+      !> Unordered pairs of each thread, (thread)
+      type(found_pairs_t), allocatable :: found(:)
+      !> Bounds of the boxes, one array for each side, (box) [m]
       real(wp), allocatable :: xmin(:), ymin(:), xmax(:), ymax(:)
    contains
       procedure :: find
@@ -38,7 +39,7 @@ module polydem_all_pairs
 
 contains
 
-   !> Record the differences between the pairs of this step and those of the step before.
+   !> Record the differences between the pairs of this step and those of the previous step.
    subroutine find(self, boxes, changes)
       class(all_pairs_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -57,7 +58,8 @@ contains
       self%ymax = boxes%bounds(4, 1:boxes%n)
       if (allocated(self%found)) deallocate (self%found)
       allocate (self%found(omp_get_max_threads()))
-      !$omp parallel do if (boxes%n > worth_threads) schedule(static, 1) default(none) shared(self, boxes) private(w)
+      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) shared(self, boxes) &
+      !$omp    private(w)
       do w = 1, size(self%found)
          call search_strips(self, boxes, int(w, ip), size(self%found, kind=ip), self%found(w))
       end do
@@ -69,16 +71,16 @@ contains
       call self%work%lap(phase_filter)
    end subroutine find
 
-   !> Find the pairs of the boxes of every m-th strip, from strip w on, with all later boxes.
+   !> Find all pairs of a box in strip w, w + m, w + 2m, ... and a later box.
    subroutine search_strips(self, boxes, w, m, found)
       type(all_pairs_t), intent(in) :: self
       type(boxes_t), intent(in) :: boxes
       integer(ip), intent(in) :: w, m
-      type(found_t), intent(inout) :: found
-      type(found_t) :: mine
+      type(found_pairs_t), intent(inout) :: found
+      type(found_pairs_t) :: mine
       integer(ip) :: first, last, low, i
 
-      ! What is written often stands on the stack of the thread; that of other threads is near in memory.
+      ! The local variable is on the stack of the thread. Those of other threads would be on the same cache lines.
       call mine%reserve(block_size)
       do first = (w - 1_ip)*strip_size + 1_ip, boxes%n, m*strip_size
          last = min(first + strip_size - 1_ip, boxes%n)
@@ -88,17 +90,18 @@ contains
             end do
          end do
       end do
-      call mine%keep_valid(boxes%body, boxes%passive)
+      call mine%remove_invalid_pairs(boxes%body, boxes%passive)
       call move_alloc(mine%box, found%box)
       found%n = mine%n
    end subroutine search_strips
 
-   !> Compare box i with boxes low to high, at most a block. The sign of a difference is exact, so boxes overlap if and
-   !> only if the greatest of the four gaps between their sides is not positive.
+   !> Compare box i with boxes low to high, at most a block. Boxes overlap if and only if the largest of the four gaps
+   !> between their sides is not positive. Rounding does not matter because the sign of a floating-point difference is
+   !> exact.
    subroutine compare(self, i, low, high, found)
       type(all_pairs_t), intent(in) :: self
       integer(ip), intent(in) :: i, low, high
-      type(found_t), intent(inout) :: found
+      type(found_pairs_t), intent(inout) :: found
       integer(ip) :: j
       real(wp) :: xmin, ymin, xmax, ymax, gap(block_size), least
 
@@ -121,7 +124,7 @@ contains
       end do
    end subroutine compare
 
-   !> Pairs kept from step to step, and memory.
+   !> Set the counters: pairs stored between steps, and memory [B].
    subroutine survey(self)
       class(all_pairs_t), intent(inout) :: self
       integer(lp) :: bytes

@@ -1,39 +1,40 @@
-!> The overlapping boxes of a step in ascending order, and how two such lists differ.
+!> List of the overlapping boxes of a step in ascending order, and the differences between two such lists.
 !>
-!> The list has a row for each box: the boxes above it that it overlaps, ascending. Finders that look for all
-!> pairs at every step put them in order here; the differences to the list of the step before are the
-!> changes. Rows are short, so that sorting by row is cheap: pairs are counted by their lower box, moved to
-!> its row, and each row is sorted by insertion. What threads found is joined by this, and the list does
-!> not depend on how many they were.
+!> The list has one row per box: the overlapping boxes with higher numbers, in ascending order. Finders that search for
+!> all pairs at every step sort them here; the differences from the list of the previous step are the changes. The sort
+!> counts pairs by their lower box, moves them to the row of this box, and sorts each row by insertion. It is cheap
+!> because rows are short. It also joins the pairs of all threads, and the list does not depend on the number of
+!> threads.
 module polydem_box_pairs
    use polydem_kinds, only: ip, lp
    use polydem_pair_changes, only: pair_changes_t
    use polydem_sort, only: sort_keys
    implicit none
    private
-   public :: box_pairs_t, found_t, record_differences
+   public :: box_pairs_t, found_pairs_t, record_differences
 
-   !> Rows longer than this are not sorted by insertion
+   !> Largest length of a row that is sorted by insertion
    integer(ip), parameter :: long_row = 48_ip
 
-   !> Pairs of boxes in the order in which one thread found them
-   type :: found_t
+   !> Pairs of boxes that one thread found, in this order
+   type :: found_pairs_t
       !> Number of pairs
       integer(ip) :: n = 0_ip
-      !> Boxes of each pair, (2, pair); may be longer than n
+      !> Boxes of each pair, (2, pair); may have more than n columns
       integer(ip), allocatable :: box(:, :)
    contains
       procedure :: reserve => reserve_found
-      procedure :: keep_valid
-   end type found_t
+      procedure :: remove_invalid_pairs
+   end type found_pairs_t
 
    !> Ascending list of pairs of boxes
    type :: box_pairs_t
       !> Number of rows (boxes)
       integer(ip) :: n_rows = 0_ip
-      !> Place in `partner` at which each row begins, and the place behind the last row, (rows + 2); the last is spare
+      !> Index in `partner` of the first element of each row, and the index behind the last row, (rows + 2); the last
+      !> element is work space
       integer(ip), allocatable :: first(:)
-      !> Higher box of each pair; may be longer than the list
+      !> Higher box of each pair, (pair); may be longer than the list
       integer(ip), allocatable :: partner(:)
    contains
       procedure :: start
@@ -47,8 +48,8 @@ contains
 
    !> Make room for more pairs.
    pure subroutine reserve_found(self, more)
-      class(found_t), intent(inout) :: self
-      !> Number of pairs that may be added
+      class(found_pairs_t), intent(inout) :: self
+      !> Number of pairs to make room for
       integer(ip), intent(in) :: more
       integer(ip), allocatable :: longer(:, :)
 
@@ -60,12 +61,12 @@ contains
       call move_alloc(longer, self%box)
    end subroutine reserve_found
 
-   !> Put the lower box of each pair first, and drop pairs of one body or of two passive ones.
-   pure subroutine keep_valid(self, body, passive)
-      class(found_t), intent(inout) :: self
-      !> Body of each box
+   !> Put the lower box of each pair first, and remove pairs of the same body and pairs of two passive bodies.
+   pure subroutine remove_invalid_pairs(self, body, passive)
+      class(found_pairs_t), intent(inout) :: self
+      !> Body of each box, (box)
       integer(ip), intent(in), contiguous :: body(:)
-      !> Whether that body is passive
+      !> Whether the body of each box is passive, (box)
       logical, intent(in), contiguous :: passive(:)
       integer(ip) :: k, kept, a, b
 
@@ -78,9 +79,9 @@ contains
          kept = kept + merge(1_ip, 0_ip, body(a) /= body(b) .and. .not. (passive(a) .and. passive(b)))
       end do
       self%n = kept
-   end subroutine keep_valid
+   end subroutine remove_invalid_pairs
 
-   !> Begin with an empty list.
+   !> Make an empty list.
    pure subroutine start(self, n_rows)
       class(box_pairs_t), intent(inout) :: self
       !> Number of boxes
@@ -99,11 +100,11 @@ contains
       if (allocated(self%first)) number_of_pairs = self%first(self%n_rows + 1_ip) - 1_ip
    end function number_of_pairs
 
-   !> Make the list anew from what threads found; the rows remain to be sorted.
+   !> Replace the list by the pairs of all threads. The rows are not sorted yet.
    pure subroutine gather(self, found)
       class(box_pairs_t), intent(inout) :: self
-      !> Pairs with the lower box first
-      type(found_t), intent(in) :: found(:)
+      !> Pairs of each thread with the lower box first, (thread)
+      type(found_pairs_t), intent(in) :: found(:)
       integer(ip) :: k, row, place, total
       integer :: w
 
@@ -121,7 +122,7 @@ contains
       do row = 1_ip, self%n_rows
          self%first(row + 2_ip) = self%first(row + 1_ip) + self%first(row + 2_ip)
       end do
-      ! Entry row + 1 is the next free place of the row, and in the end the place behind it.
+      ! first(row + 1) is the next free index of the row, and at the end the index behind the row.
       do w = 1, size(found)
          do k = 1_ip, found(w)%n
             row = found(w)%box(1, k) + 1_ip
@@ -132,7 +133,7 @@ contains
       end do
    end subroutine gather
 
-   !> Sort some rows.
+   !> Sort a range of rows.
    pure subroutine sort_rows(self, low, high)
       class(box_pairs_t), intent(inout) :: self
       !> First row
@@ -150,6 +151,7 @@ contains
       end do
    end subroutine sort_rows
 
+   !> Sort values(low:high) by insertion.
    pure subroutine sort_by_insertion(values, low, high)
       integer(ip), intent(inout), contiguous :: values(:)
       integer(ip), intent(in) :: low, high
@@ -167,6 +169,7 @@ contains
       end do
    end subroutine sort_by_insertion
 
+   !> Sort a long row by merge sort.
    pure subroutine sort_long(values)
       integer(ip), intent(inout) :: values(:)
       integer(lp) :: keys(size(values)), spare_keys(size(values))
@@ -176,9 +179,9 @@ contains
       call sort_keys(size(values, kind=ip), keys, values, spare_keys, spare)
    end subroutine sort_long
 
-   !> Walk through some rows of two lists side by side and record what only one of them has.
+   !> Compare a range of rows of two lists and record the pairs that only one of them contains.
    pure subroutine record_differences(before, now, low, high, body, changes)
-      !> List of the step before
+      !> List of the previous step
       type(box_pairs_t), intent(in) :: before
       !> List of this step
       type(box_pairs_t), intent(in) :: now
@@ -186,9 +189,9 @@ contains
       integer(ip), intent(in) :: low
       !> Last row
       integer(ip), intent(in) :: high
-      !> Body of each box
+      !> Body of each box, (box)
       integer(ip), intent(in) :: body(:)
-      !> Changes, appended to what is there
+      !> List of changes; the new changes are appended
       type(pair_changes_t), intent(inout) :: changes
       integer(ip) :: row, a, b, end_a, end_b, order
 
@@ -213,7 +216,7 @@ contains
       end do
    end subroutine record_differences
 
-   !> Memory held [B]
+   !> Allocated memory [B]
    pure integer(lp) function bytes(self)
       class(box_pairs_t), intent(in) :: self
 
@@ -222,7 +225,7 @@ contains
          (size(self%first, kind=lp) + size(self%partner, kind=lp))
    end function bytes
 
-   !> Make `partner` long enough; its values are not needed any more.
+   !> Make `partner` long enough for n pairs; its values are lost.
    pure subroutine reserve(self, n)
       type(box_pairs_t), intent(inout) :: self
       integer(ip), intent(in) :: n

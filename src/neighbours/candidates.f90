@@ -1,28 +1,27 @@
-!> Pairs of boxes that may overlap, and whether they did when last compared.
+!> Candidates: pairs of boxes that may overlap, and whether they overlapped at the last comparison.
 !>
-!> The list is unordered and dense, so that comparing all is one run over plain arrays. The candidates of
-!> each box are linked too: entry (s, k) of `next` and `previous` belongs to box s (1 or 2) of candidate k
-!> and is named by the number 2(k - 1) + s, its *link*. So dropping and adding cost the same however long
-!> the list is.
+!> The list is unordered and dense, so the comparison of all candidates is one loop over plain arrays. The candidates of
+!> each box also form a doubly linked list. Element (s, k) of `next` and `previous` belongs to box s (1 or 2) of
+!> candidate k; its number 2(k - 1) + s is its *link*. Removing and adding a candidate cost O(1).
 module polydem_candidates
    use polydem_kinds, only: bp, dp, ip, lp, wp
    use polydem_pair_changes, only: pair_changes_t
    implicit none
    private
-   public :: candidates_t, places_t, meet, overlapping
+   public :: candidates_t, index_list_t, meet, overlapping
 
-   !> Candidates that are compared in one go
+   !> Number of candidates that are compared at once
    integer(ip), parameter :: block_size = 128_ip
 
    !> Candidates 1..n
    type :: candidates_t
       !> Number of candidates
       integer(ip) :: n = 0_ip
-      !> Boxes of each, (2, candidate)
+      !> Boxes of each candidate, (2, candidate)
       integer(ip), allocatable :: box(:, :)
-      !> 1 if they overlapped when last compared, else 0
+      !> 1 if the boxes overlapped at the last comparison, else 0, (candidate)
       integer(bp), allocatable :: overlap(:)
-      !> First link of each box, 0: none
+      !> First link of each box, (box); 0: none
       integer(ip), allocatable :: first(:)
       !> Next link of the same box, (2, candidate), 0: none
       integer(ip), allocatable :: next(:, :)
@@ -32,23 +31,23 @@ module polydem_candidates
       procedure :: start
       procedure :: add
       procedure :: compare
-      procedure :: drop_parted
+      procedure :: remove_separated
       procedure :: bytes
    end type candidates_t
 
-   !> A growing list of places in some array
-   type :: places_t
+   !> List of integers that grows
+   type :: index_list_t
       !> Number of entries
       integer(ip) :: n = 0_ip
-      !> Entries; may be longer than n
+      !> Entries, (entry); may be longer than n
       integer(ip), allocatable :: at(:)
    contains
       procedure :: push
-   end type places_t
+   end type index_list_t
 
 contains
 
-   !> Begin with no candidate.
+   !> Make an empty list.
    pure subroutine start(self, n_boxes)
       class(candidates_t), intent(inout) :: self
       !> Number of boxes
@@ -62,9 +61,9 @@ contains
    !> Append a candidate.
    pure subroutine add(self, a, b, overlap)
       class(candidates_t), intent(inout) :: self
-      !> One box
+      !> First box
       integer(ip), intent(in) :: a
-      !> Another box
+      !> Second box
       integer(ip), intent(in) :: b
       !> Whether they overlap
       logical, intent(in) :: overlap
@@ -84,18 +83,18 @@ contains
       end do
    end subroutine add
 
-   !> Compare the boxes of some candidates and record where the answer changed.
+   !> Compare the boxes of a range of candidates and record the pairs that begin or cease to overlap.
    subroutine compare(self, low, high, bounds, body, changes)
       class(candidates_t), intent(inout) :: self
       !> First candidate
       integer(ip), intent(in) :: low
       !> Last candidate
       integer(ip), intent(in) :: high
-      !> Boxes, (4, box) [m]
+      !> Bounds of the boxes, (4, box) [m]
       real(wp), intent(in), contiguous :: bounds(:, :)
-      !> Body of each box
+      !> Body of each box, (box)
       integer(ip), intent(in) :: body(:)
-      !> Changes, appended to what is there
+      !> List of changes; the new changes are appended
       type(pair_changes_t), intent(inout) :: changes
       integer(ip) :: from, to, k
       integer(bp) :: differ(block_size)
@@ -115,13 +114,13 @@ contains
       end do
    end subroutine compare
 
-   !> The inner loop of every step, on arrays of explicit shape and without branches.
+   !> Inner loop of every step, on arrays of explicit shape and without branches.
    pure subroutine compare_block(n, box, overlap, n_boxes, bounds, differ, any_differ)
       integer(ip), intent(in) :: n, n_boxes
       integer(ip), intent(in) :: box(2, n)
       integer(bp), intent(in) :: overlap(n)
       real(wp), intent(in) :: bounds(4, n_boxes)
-      !> 1 where the answer changed, else 0
+      !> 1 if the result changed, else 0
       integer(bp), intent(out) :: differ(n)
       logical, intent(out) :: any_differ
       integer(ip) :: k
@@ -138,14 +137,14 @@ contains
       any_differ = some /= 0_bp
    end subroutine compare_block
 
-   !> Drop the candidates of a box whose grown boxes do not overlap any more.
-   pure subroutine drop_parted(self, i, grown, n_dropped)
+   !> Remove the candidates of a box whose padded boxes do not overlap any longer.
+   pure subroutine remove_separated(self, i, padded, n_dropped)
       class(candidates_t), intent(inout) :: self
-      !> Box whose grown box is new
+      !> Box whose padded box changed
       integer(ip), intent(in) :: i
-      !> Grown boxes, (4, box)
-      real(dp), intent(in), contiguous :: grown(:, :)
-      !> Number of candidates dropped
+      !> Padded boxes, (4, box)
+      real(dp), intent(in), contiguous :: padded(:, :)
+      !> Number of candidates removed
       integer(ip), intent(out) :: n_dropped
       integer(ip) :: link, next, moved
 
@@ -153,8 +152,8 @@ contains
       link = self%first(i)
       do while (link /= 0_ip)
          next = self%next(side(link), place(link))
-         if (.not. meet(grown(:, i), grown(:, self%box(3_ip - side(link), place(link))))) then
-            ! The last candidate takes the place of this one, and may be the next to look at.
+         if (.not. meet(padded(:, i), padded(:, self%box(3_ip - side(link), place(link))))) then
+            ! The last candidate is moved to the place of this one, and may be the next candidate of the loop.
             moved = place(link)
             if (next /= 0_ip) then
                if (place(next) == self%n) next = 2_ip*(moved - 1_ip) + side(next)
@@ -164,9 +163,9 @@ contains
          end if
          link = next
       end do
-   end subroutine drop_parted
+   end subroutine remove_separated
 
-   !> Memory held [B]
+   !> Allocated memory [B]
    pure integer(lp) function bytes(self)
       class(candidates_t), intent(in) :: self
 
@@ -176,7 +175,7 @@ contains
                int(storage_size(self%overlap), lp)*size(self%overlap, kind=lp))/8_lp
    end function bytes
 
-   !> Drop one candidate; the last takes its place.
+   !> Remove one candidate; the last candidate is moved to its place.
    pure subroutine drop(self, k)
       type(candidates_t), intent(inout) :: self
       integer(ip), intent(in) :: k
@@ -197,7 +196,8 @@ contains
       self%n = self%n - 1_ip
    end subroutine drop
 
-   !> Let the neighbours in the chain of a box point at a link between them, or at each other if it is 0.
+   !> Set the pointers of two neighbours in the linked list of a box to a link between them, or to each other if the
+   !> link is 0.
    pure subroutine point_at(self, box, previous, next, link)
       type(candidates_t), intent(inout) :: self
       integer(ip), intent(in) :: box, previous, next, link
@@ -210,7 +210,7 @@ contains
       if (next /= 0_ip) self%previous(side(next), place(next)) = merge(previous, link, link == 0_ip)
    end subroutine point_at
 
-   !> Whether a link belongs to the first or the second box of its candidate
+   !> Box of the candidate to which a link belongs: 1 or 2
    pure integer(ip) function side(link)
       integer(ip), intent(in) :: link
 
@@ -224,26 +224,27 @@ contains
       place = shiftr(link + 1_ip, 1)
    end function place
 
-   !> Whether two boxes share a point; without branches, since the answer is hard to predict
+   !> Whether two boxes share a point. The function has no branches because the result is hard to predict
    pure logical function overlapping(a, b)
-      !> xmin, ymin, xmax, ymax of one box [m]
+      !> Bounds xmin, ymin, xmax, ymax of the first box [m]
       real(wp), intent(in) :: a(4)
-      !> The same of another [m]
+      !> Bounds of the second box [m]
       real(wp), intent(in) :: b(4)
 
       overlapping = min(min(b(3) - a(1), a(3) - b(1)), min(b(4) - a(2), a(4) - b(2))) >= 0.0_wp
    end function overlapping
 
-   !> Whether two grown boxes share a point
+   !> Whether two padded boxes share a point
    pure logical function meet(a, b)
-      !> xmin, ymin, xmax, ymax of one
+      !> Bounds xmin, ymin, xmax, ymax of the first box
       real(dp), intent(in) :: a(4)
-      !> The same of another
+      !> Bounds of the second box
       real(dp), intent(in) :: b(4)
 
       meet = a(1) <= b(3) .and. b(1) <= a(3) .and. a(2) <= b(4) .and. b(2) <= a(4)
    end function meet
 
+   !> Make room for n candidates.
    pure subroutine reserve(self, n)
       type(candidates_t), intent(inout) :: self
       integer(ip), intent(in) :: n
@@ -270,7 +271,7 @@ contains
 
    !> Append an entry.
    pure subroutine push(self, entry)
-      class(places_t), intent(inout) :: self
+      class(index_list_t), intent(inout) :: self
       !> Entry to append
       integer(ip), intent(in) :: entry
       integer(ip), allocatable :: longer(:)

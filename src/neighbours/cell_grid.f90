@@ -1,15 +1,15 @@
-!> The cells of one grid: where they lie, how many there are, and which of them holds a point.
+!> Layout of one grid of cells: region, cell size and number of cells.
 !>
-!> Boxes are binned by their lower corner. Let no box be larger than a cell. The lower corners of two boxes
-!> that overlap are then less than a cell apart on both axes, so their cells are the same or neighbours.
-!> This holds with rounding too: the cell of a point is a monotonic function, its error is below
-!> 2^-12 cells (`most_columns`), and cells exceed the largest box by more than twice that (`slack`).
+!> Boxes are binned by their lower corner, and no box is larger than a cell. The lower corners of two overlapping boxes
+!> are then less than a cell apart on both axes, so their cells are the same or neighbours. This also holds with
+!> rounding: the cell index is a monotonic function of the position, its error is below 2^-12 cells (`most_columns`),
+!> and cells exceed the largest box by more than twice that error (`slack`).
 !>
-!> The outermost cells reach to infinity: points outside are moved to the border of the grid. So the grid may cover
-!> less than all boxes, and does if a few of them lie so far away that covering them would take more than `most_cells`.
+!> The outermost cells extend to infinity: points outside the grid are moved to its border. The grid may therefore cover
+!> only a part of the boxes. This is the case if a few distant boxes would require more than `most_cells` cells per box.
 !>
-!> Cells are numbered by rows. Behind each row and above the last row there are empty cells, so that the
-!> neighbours of a cell may be looked up without asking whether they exist.
+!> Cells are numbered by rows. An empty cell follows each row, and a row of empty cells follows the last row. The search
+!> can therefore access the neighbours of any cell without a test whether they exist.
 module polydem_cell_grid
    use polydem_kinds, only: dp, ip, wp
    use polydem_sort_reals, only: sort_reals
@@ -17,40 +17,40 @@ module polydem_cell_grid
    private
    public :: cell_grid_t, extent_t, measure, measure_levels, new_grid
 
-   !> Most cells per box
+   !> Largest number of cells per box
    integer(ip), parameter :: most_cells = 4_ip
-   !> A grid that would have this many times as many cells leaves out boxes that lie far away
+   !> A grid leaves out distant boxes if covering them requires more than this multiple of the largest number of cells
    real(dp), parameter :: far_away = 16.0_dp
-   !> Boxes from which the place of the others is guessed then
+   !> Number of boxes in the sample from which the region of nearly all boxes is then estimated
    integer(ip), parameter :: sample_size = 512_ip
-   !> Most columns or rows, so that rounding moves no point by 2^-12 cells
+   !> Largest number of columns or rows; with it, rounding moves no point by 2^-12 cells
    real(wp), parameter :: most_columns = min(2.0_wp**(-13)/epsilon(1.0_wp), 2.0_wp**28)
-   !> Share by which cells are larger than the largest box
+   !> Relative excess of the cell size over the size of the largest box
    real(wp), parameter :: slack = 2.0_wp**(-10)
 
-   !> What must be known of some boxes to lay out their grid
+   !> Data of a set of boxes that determine the layout of their grid
    type :: extent_t
       !> Number of boxes
       integer(ip) :: n = 0_ip
-      !> Least and greatest lower corner [m]
+      !> Smallest and largest coordinates of the lower corners [m]
       real(wp) :: low(2) = huge(1.0_wp), high(2) = -huge(1.0_wp)
-      !> Greatest width and height of a box [m]
+      !> Largest width and height of a box [m]
       real(wp) :: side(2) = 0.0_wp
    end type extent_t
 
    !> One grid
    type :: cell_grid_t
-      !> Corners of the region in which points are told apart [m]
+      !> Lower left and upper right corner of the region that is divided into cells [m]
       real(wp) :: low(2) = 0.0_wp, high(2) = 0.0_wp
       !> Cells per metre [1/m]
       real(wp) :: scale(2) = 0.0_wp
       !> Number of columns and rows
       integer(ip) :: columns = 1_ip, rows = 1_ip
-      !> Cells of a row, the empty one behind it included
+      !> Number of cells of a row, including the empty cell behind it
       integer(ip) :: stride = 2_ip
-      !> Number of the first cell, less one
+      !> Number of the first cell minus one
       integer(ip) :: offset = 0_ip
-      !> First and last of the boxes of the grid, in the order of cells
+      !> First and last index of the boxes of the grid in the order of cells
       integer(ip) :: first_box = 1_ip, last_box = 0_ip
    contains
       procedure :: n_cells
@@ -58,15 +58,15 @@ module polydem_cell_grid
 
 contains
 
-   !> Find the extent of the free boxes, all of one level.
+   !> Find the extent of the free boxes if all belong to one level.
    pure subroutine measure(n, bounds, level, extent)
       !> Number of boxes
       integer(ip), intent(in) :: n
-      !> Their bounds [m]
+      !> Bounds of the boxes, (4, n) [m]
       real(wp), intent(in) :: bounds(4, n)
-      !> Level of each box, 1 or 2 (fixed)
+      !> Level of each box: 1 (free) or 2 (fixed)
       integer(ip), intent(in) :: level(n)
-      !> Extent of the free boxes; of the fixed ones the number
+      !> Extent of the free boxes (1); only the number of the fixed boxes (2)
       type(extent_t), intent(out) :: extent(2)
       real(wp) :: xlow, ylow, xhigh, yhigh, width, height
       integer(ip) :: i, n_free
@@ -96,11 +96,11 @@ contains
    pure subroutine measure_levels(n, bounds, level, extent)
       !> Number of boxes
       integer(ip), intent(in) :: n
-      !> Their bounds [m]
+      !> Bounds of the boxes, (4, n) [m]
       real(wp), intent(in) :: bounds(4, n)
       !> Level of each box
       integer(ip), intent(in) :: level(n)
-      !> Extent of the boxes of each level
+      !> Extent of the boxes of each level, (level)
       type(extent_t), intent(out) :: extent(:)
       integer(ip) :: i, l
 
@@ -123,7 +123,7 @@ contains
       real(wp), intent(in), contiguous :: corner(:, :)
       !> Number of all boxes
       integer(ip), intent(in) :: n
-      !> Number of cells in other grids before this one
+      !> Total number of cells of the grids before this one
       integer(ip), intent(in) :: offset
       real(wp) :: side(2), cells(2), span
       real(dp) :: most
@@ -152,7 +152,7 @@ contains
       self%stride = self%columns + 1_ip
    end subroutine new_grid
 
-   !> Columns and rows of cells of a given size in the region of a grid, whole numbers
+   !> Numbers of columns and rows of cells of a given size in the region of a grid, as whole real numbers
    pure function cells_that_fit(self, side) result(cells)
       type(cell_grid_t), intent(in) :: self
       real(wp), intent(in) :: side(2)
@@ -162,7 +162,7 @@ contains
       do a = 1, 2
          span = self%high(a) - self%low(a)
          cells(a) = 1.0_wp
-         ! Lengths whose reciprocal could overflow are not told apart.
+         ! One cell covers a length whose reciprocal could overflow.
          if (span < 2.0_wp**40*tiny(1.0_wp)) cycle
          if (span > most_columns*side(a)) then
             cells(a) = aint(most_columns)
@@ -172,7 +172,7 @@ contains
       end do
    end function cells_that_fit
 
-   !> Make cells larger so that there are not more than `most`.
+   !> Reduce the numbers of columns and rows to at most `most` cells.
    pure subroutine limit(cells, most)
       real(wp), intent(inout) :: cells(2)
       real(dp), intent(in) :: most
@@ -185,7 +185,8 @@ contains
       cells(longer) = min(cells(longer), aint(real(most/real(cells(3 - longer), dp), wp)))
    end subroutine limit
 
-   !> Shrink the region of a grid to where nearly all boxes are: between the 32-quantiles of a sample, and some more.
+   !> Shrink the region of a grid to that of nearly all boxes: from the lowest to the highest 32-quantile of a sample,
+   !> with a margin.
    pure subroutine leave_out_far_boxes(self, corner)
       type(cell_grid_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: corner(:, :)
@@ -210,7 +211,7 @@ contains
       end do
    end subroutine leave_out_far_boxes
 
-   !> Number of cells, the empty ones behind rows and above the last row included
+   !> Number of cells, including the empty cells behind each row and above the last row
    elemental integer(ip) function n_cells(self)
       class(cell_grid_t), intent(in) :: self
 

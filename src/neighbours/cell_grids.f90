@@ -1,63 +1,64 @@
-!> Boxes binned into the cells of one or several grids, and the search for overlapping pairs in them.
+!> Boxes binned into the cells of one or several grids, and the search for overlapping pairs in these cells.
 !>
 !> Each free box belongs to one grid, its level; finer grids come first. With one grid this is the method of linked
-!> cells (Quentrec & Brot 1973; Hockney & Eastwood 1981), with several the hierarchical grid (Krijgsman, Ogarko &
-!> Luding 2014). In place of links the boxes are sorted by their cell, grid after grid, by counting; copies
-!> of their bounds stand in that order, one array for each bound. Boxes of neighbouring cells of a row
-!> then stand side by side, and a search runs over plain ranges:
+!> cells (Quentrec & Brot 1973; Hockney & Eastwood 1981), with several grids the hierarchical grid (Krijgsman, Ogarko &
+!> Luding 2014). Instead of linked lists, a counting sort orders the boxes by cell, grid after grid. Copies of their
+!> bounds are stored in that order, one array for each bound. Boxes of neighbouring cells of a row are then adjacent in
+!> memory, and the search for the partners of a box runs over plain ranges:
 !>
-!>     in its own grid        the boxes behind it in its cell and those of the next cell of the row; three cells
-!>                            of the row above. Every pair of cells is visited from one side only.
-!>     in each coarser grid   the cells that its box covers, and one more to the left and below, since boxes are
+!>     in its own grid        the boxes behind it in its cell, the boxes of the next cell of the row, and those of three
+!>                            cells of the row above. Every pair of cells is visited from one side only.
+!>     in each coarser grid   the cells that the box covers, and one more cell to the left and below, because boxes are
 !>                            binned by their lower corner
 !>
-!> Fixed boxes, which are few and often large (walls), stand behind all grids in no cell, so that they do not make
-!> cells larger. Each of them looks in all grids, and none looks for them.
+!> Fixed boxes are few and often large (walls). They belong to no cell, so they do not enlarge the cells, and are stored
+!> behind all grids. The search for the partners of a fixed box covers all grids; other boxes do not search for fixed
+!> boxes.
 !>
-!> Comparing writes each pair and moves on only if it overlaps, which needs no branch.
+!> The comparison writes each pair and increases the count only if the pair overlaps; this needs no branch.
 module polydem_cell_grids
    use omp_lib, only: omp_get_max_threads
-   use polydem_box_pairs, only: found_t
+   use polydem_box_pairs, only: found_pairs_t
    use polydem_boxes, only: boxes_t
    use polydem_cell_grid, only: cell_grid_t, extent_t, measure, measure_levels, new_grid
-   use polydem_kinds, only: ip, lp, wp, worth_threads
+   use polydem_kinds, only: ip, lp, wp, min_parallel_size
    implicit none
    private
    public :: cell_grids_t, part
 
    !> Counts of one thread
    type :: tally_t
-      !> Comparisons of two boxes
+      !> Number of comparisons of two boxes
       integer(lp) :: tests = 0_lp
-      !> Cells looked at
+      !> Number of visited cells
       integer(lp) :: visits = 0_lp
-      !> Searches of a box in a grid
+      !> Number of searches of a box in a grid
       integer(lp) :: searches = 0_lp
    end type tally_t
 
-   !> Boxes in the order of cells
+   !> Grids with their boxes in the order of cells
    type :: cell_grids_t
       !> Number of grids
       integer :: n_levels = 0
-      !> Grid of each box; n_levels + 1 if it is fixed
+      !> Grid of each box, (box); n_levels + 1 if the box is fixed
       integer(ip), allocatable :: level(:)
-      !> Grids, the finest first; the last one is of one cell, for the fixed boxes
+      !> Grids, (level), the finest first; the last grid has one cell, for the fixed boxes
       type(cell_grid_t), allocatable :: grid(:)
-      !> What was measured to lay them out
+      !> Extents of the boxes from which the grids are laid out, (level)
       type(extent_t), allocatable :: extent(:)
-      !> Place of the first box of each cell, all grids one after the other
+      !> Index of the first box of each cell, (cell), for all grids one after the other
       integer(ip), allocatable, private :: first(:)
-      !> Number of cells, empty ones at borders included
+      !> Number of cells, including empty cells at borders
       integer(ip) :: n_cells = 0_ip
-      !> Number of each box
+      !> Box numbers in the order of cells
       integer(ip), allocatable, private :: box(:)
-      !> Cell of each box in this order, and in the order of numbers
+      !> Cell of each box, in the order of cells and in the order of box numbers
       integer(ip), allocatable, private :: cell(:), cell_of(:)
-      !> Bounds in this order [m]
+      !> Bounds of the boxes in the order of cells [m]
       real(wp), allocatable, private :: xmin(:), ymin(:), xmax(:), ymax(:)
-      !> Pairs that each thread found in the last search, lower box first
-      type(found_t), allocatable :: found(:)
-      !> Sums over all searches
+      !> Pairs of each thread in the last search, lower box first, (thread)
+      type(found_pairs_t), allocatable :: found(:)
+      !> Counts summed over all searches
       type(tally_t) :: total
    contains
       procedure :: set_levels
@@ -68,15 +69,15 @@ module polydem_cell_grids
 
 contains
 
-   !> First and last of the w-th of m equal parts of low..high
+   !> Split the range low..high into m parts of equal size and return part w.
    pure subroutine part(low, high, m, w, from, to)
-      !> Range to be shared out
+      !> Range to split
       integer(ip), intent(in) :: low, high
       !> Number of parts
       integer, intent(in) :: m
-      !> Part that is wanted
+      !> Number of the part, from 1
       integer, intent(in) :: w
-      !> First and last of it
+      !> First and last element of the part
       integer(ip), intent(out) :: from, to
       integer(lp) :: n
 
@@ -85,14 +86,14 @@ contains
       to = low + int((n*int(w, lp))/int(m, lp), ip) - 1_ip
    end subroutine part
 
-   !> Say which box belongs to which grid.
+   !> Assign each box to a grid.
    subroutine set_levels(self, n_levels, level, fixed)
       class(cell_grids_t), intent(inout) :: self
       !> Number of grids
       integer, intent(in) :: n_levels
-      !> Grid of each box, from 1 for the finest
+      !> Grid of each box, (box); 1 is the finest
       integer(ip), intent(in) :: level(:)
-      !> Whether each box is fixed, and so in no grid
+      !> Whether each box is fixed, (box); a fixed box is in no grid
       logical, intent(in) :: fixed(:)
 
       self%n_levels = n_levels
@@ -101,12 +102,12 @@ contains
       allocate (self%grid(n_levels + 1), self%extent(n_levels + 1))
    end subroutine set_levels
 
-   !> Bin the boxes.
+   !> Lay out the grids and bin the boxes.
    subroutine build(self, n, bounds)
       class(cell_grids_t), intent(inout) :: self
       !> Number of boxes
       integer(ip), intent(in) :: n
-      !> Their bounds, (4, box) [m]
+      !> Bounds of the boxes, (4, box) [m]
       real(wp), intent(in), contiguous :: bounds(:, :)
       integer(ip) :: place
       integer :: l
@@ -136,7 +137,7 @@ contains
                         self%xmin, self%ymin, self%xmax, self%ymax)
    end subroutine build
 
-   !> Column of a point, from 0 on
+   !> Column of a point, from 0
    elemental integer(ip) function column(grid, x)
       type(cell_grid_t), intent(in) :: grid
       real(wp), intent(in) :: x
@@ -144,7 +145,7 @@ contains
       column = int((min(max(x, grid%low(1)), grid%high(1)) - grid%low(1))*grid%scale(1), ip)
    end function column
 
-   !> Row of a point, from 0 on
+   !> Row of a point, from 0
    elemental integer(ip) function row(grid, y)
       type(cell_grid_t), intent(in) :: grid
       real(wp), intent(in) :: y
@@ -168,7 +169,7 @@ contains
       end do
    end subroutine find_cells
 
-   !> Sort the boxes by their cell, equal cells by number.
+   !> Sort the boxes by cell; boxes of the same cell are in the order of their numbers.
    pure subroutine sort_by_cell(n, n_cells, bounds, cell_of, first, box, cell, xmin, ymin, xmax, ymax)
       integer(ip), intent(in) :: n, n_cells
       real(wp), intent(in) :: bounds(4, n)
@@ -185,7 +186,7 @@ contains
       do c = 1_ip, n_cells
          first(c + 2_ip) = first(c + 1_ip) + first(c + 2_ip)
       end do
-      ! Entry c + 1 is the next free place of cell c, and in the end the first of the next cell.
+      ! first(c + 1) is the next free index of cell c, and at the end the first index of the next cell.
       do i = 1_ip, n
          c = cell_of(i)
          k = first(c + 1_ip)
@@ -199,10 +200,10 @@ contains
       end do
    end subroutine sort_by_cell
 
-   !> Find all pairs of boxes of different bodies, not both passive, that overlap.
+   !> Find all overlapping pairs of boxes of different bodies that are not both passive.
    subroutine search(self, boxes)
       class(cell_grids_t), intent(inout) :: self
-      !> Boxes; read are their bodies and whether these are passive
+      !> Boxes; only their bodies, and whether the bodies are passive, are used
       type(boxes_t), intent(in) :: boxes
       type(tally_t), allocatable :: tally(:)
       integer :: w
@@ -212,11 +213,11 @@ contains
       end if
       if (.not. allocated(self%found)) allocate (self%found(omp_get_max_threads()))
       allocate (tally(size(self%found)))
-      !$omp parallel do if (boxes%n > worth_threads) schedule(static, 1) default(none) &
+      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes, tally) private(w)
       do w = 1, size(self%found)
          call search_part(self, w, size(self%found), self%found(w), tally(w))
-         call self%found(w)%keep_valid(boxes%body, boxes%passive)
+         call self%found(w)%remove_invalid_pairs(boxes%body, boxes%passive)
       end do
       !$omp end parallel do
       self%total%tests = self%total%tests + sum(tally%tests)
@@ -224,18 +225,18 @@ contains
       self%total%searches = self%total%searches + sum(tally%searches)
    end subroutine search
 
-   !> Search for the boxes of one part of each level.
+   !> Search for the partners of the boxes in part w of each level.
    subroutine search_part(self, w, m, found, tally)
       class(cell_grids_t), intent(in) :: self
       integer, intent(in) :: w, m
-      type(found_t), intent(inout) :: found
+      type(found_pairs_t), intent(inout) :: found
       type(tally_t), intent(inout) :: tally
-      type(found_t) :: mine
+      type(found_pairs_t) :: mine
       type(tally_t) :: my_tally
       integer(ip) :: low, high
       integer :: l, other
 
-      ! What is written often stands on the stack of the thread; that of other threads is near in memory.
+      ! The local variables are on the stack of the thread. Those of other threads would be on the same cache lines.
       call move_alloc(found%box, mine%box)
       call mine%reserve(64_ip)
       do l = 1, self%n_levels
@@ -254,12 +255,12 @@ contains
       tally = my_tally
    end subroutine search_part
 
-   !> Compare boxes with those of their own grid that come later.
+   !> Compare boxes with later boxes of their own grid.
    subroutine search_own_grid(self, grid, low, high, found, tally)
       type(cell_grids_t), intent(in) :: self
       type(cell_grid_t), intent(in) :: grid
       integer(ip), intent(in) :: low, high
-      type(found_t), intent(inout) :: found
+      type(found_pairs_t), intent(inout) :: found
       type(tally_t), intent(inout) :: tally
       integer(ip) :: n, k, cell, beside, from, to, more
 
@@ -279,12 +280,12 @@ contains
       tally%searches = tally%searches + int(high - low + 1_ip, lp)
    end subroutine search_own_grid
 
-   !> Compare boxes with those of another grid.
+   !> Compare boxes with the boxes of another grid.
    subroutine search_other_grid(self, grid, low, high, found, tally)
       type(cell_grids_t), intent(in) :: self
       type(cell_grid_t), intent(in) :: grid
       integer(ip), intent(in) :: low, high
-      type(found_t), intent(inout) :: found
+      type(found_pairs_t), intent(inout) :: found
       type(tally_t), intent(inout) :: tally
       integer(ip) :: n, k, r, left, right, from, to
 
@@ -306,16 +307,17 @@ contains
       tally%searches = tally%searches + int(high - low + 1_ip, lp)
    end subroutine search_other_grid
 
-   !> Compare one box with a range of boxes; there is room for one pair more than are compared.
+   !> Compare one box with a range of boxes. `found` must have room for one pair more than the number of comparisons.
    pure subroutine compare(n_boxes, xmin, ymin, xmax, ymax, box, k, from, to, n_found, found)
       integer(ip), intent(in) :: n_boxes
       !> Bounds and numbers of the boxes in the order of cells
       real(wp), intent(in) :: xmin(n_boxes), ymin(n_boxes), xmax(n_boxes), ymax(n_boxes)
       integer(ip), intent(in) :: box(n_boxes)
-      !> Place of the one box, first and last place of the others
+      !> Index of the box, first and last index of the range
       integer(ip), intent(in) :: k, from, to
-      !> Pairs so far
+      !> Number of pairs found so far
       integer(ip), intent(inout) :: n_found
+      !> Pairs, (2, pair)
       integer(ip), intent(inout) :: found(2, *)
       integer(ip) :: j, n, own
 
@@ -330,6 +332,7 @@ contains
       n_found = n
    end subroutine compare
 
+   !> Allocate the arrays over boxes.
    subroutine reserve_boxes(self, n)
       type(cell_grids_t), intent(inout) :: self
       integer(ip), intent(in) :: n
@@ -341,6 +344,7 @@ contains
       allocate (self%box(n), self%cell(n), self%cell_of(n), self%xmin(n), self%ymin(n), self%xmax(n), self%ymax(n))
    end subroutine reserve_boxes
 
+   !> Allocate the array over cells.
    subroutine reserve_cells(self, n)
       type(cell_grids_t), intent(inout) :: self
       integer(ip), intent(in) :: n
@@ -352,7 +356,7 @@ contains
       allocate (self%first(n + n/8_ip))
    end subroutine reserve_cells
 
-   !> Memory held [B]
+   !> Allocated memory [B]
    pure integer(lp) function bytes(self)
       class(cell_grids_t), intent(in) :: self
       integer :: w

@@ -1,4 +1,4 @@
-!> The finders by name: the only place that knows them all.
+!> Makes finders by name. Only this module uses all finders.
 module polydem_finder_factory
    use polydem_all_pairs, only: all_pairs_t
    use polydem_errors, only: error_t, input_error, raise
@@ -7,11 +7,8 @@ module polydem_finder_factory
    use polydem_kinds, only: wp
    use polydem_linked_cells, only: linked_cells_t
    use polydem_partitioned_sweep, only: partitioned_sweep_t
-   use polydem_quadtree_called, only: quadtree_called_t => quadtree_t
    use polydem_quadtree_inlined, only: quadtree_t
-   use polydem_quadtree_o2, only: quadtree_o2_t => quadtree_t
    use polydem_sort_and_sweep, only: sort_and_sweep_t
-   use polydem_sort_and_sweep_o2, only: sort_and_sweep_o2_t => sort_and_sweep_t
    use polydem_strings, only: join
    use polydem_verlet, only: verlet_t
    implicit none
@@ -19,14 +16,13 @@ module polydem_finder_factory
    public :: new_finder, finder_names
 
    !> Names of all finders, as in the namelist and in results
-   character(len=*), parameter :: finder_names(13) = &
-      [character(len=18) :: 'all_pairs', 'sort_and_sweep', 'unsorted_sweep', 'partitioned_sweep', 'quadtree', &
-       'quadtree_called', 'pruned_quadtree', 'binary_tree', 'linked_cells', 'verlet', 'hierarchical_grid', &
-       'sort_and_sweep_o2', 'quadtree_o2']
+   character(len=*), parameter :: finder_names(*) = &
+      [character(len=17) :: 'all_pairs', 'sort_and_sweep', 'unsorted_sweep', 'partitioned_sweep', 'quadtree', &
+       'pruned_quadtree', 'binary_tree', 'linked_cells', 'verlet', 'hierarchical_grid']
 
 contains
 
-   !> Make a finder that has seen no box yet.
+   !> Make a finder in its initial state.
    subroutine new_finder(finder, name, error, skin)
       !> Finder to make
       class(finder_t), allocatable, intent(out) :: finder
@@ -34,7 +30,7 @@ contains
       character(len=*), intent(in) :: name
       !> Allocated if there is no such finder
       type(error_t), allocatable, intent(inout) :: error
-      !> Skin of a Verlet list [m]; 0 or left out: automatic
+      !> Skin of a Verlet list [m]; 0 or absent: automatic
       real(wp), intent(in), optional :: skin
       type(verlet_t), allocatable :: list
       type(sort_and_sweep_t), allocatable :: sweep
@@ -52,12 +48,6 @@ contains
          allocate (partitioned_sweep_t :: finder)
       case ('quadtree')
          call new_tree(finder, equal_leaves=.false., one_axis=.false.)
-      case ('quadtree_o2')
-         allocate (quadtree_o2_t :: finder)
-      case ('sort_and_sweep_o2')
-         allocate (sort_and_sweep_o2_t :: finder)
-      case ('quadtree_called')
-         allocate (quadtree_called_t :: finder)
       case ('pruned_quadtree')
          call new_tree(finder, equal_leaves=.true., one_axis=.false.)
       case ('binary_tree')
@@ -71,12 +61,12 @@ contains
       case ('hierarchical_grid')
          allocate (hierarchical_grid_t :: finder)
       case default
-         call raise(error, input_error, "there is no finder '"//trim(name)//"'; choose one of "// &
+         call raise(error, input_error, "unknown finder '"//trim(name)//"'; choose one of "// &
             join(finder_names, ', '))
       end select
    end subroutine new_finder
 
-   !> Make one of the tree finders that differ by a setting.
+   !> Make one of the tree finders, which differ only in their options.
    subroutine new_tree(finder, equal_leaves, one_axis)
       class(finder_t), allocatable, intent(out) :: finder
       logical, intent(in) :: equal_leaves, one_axis

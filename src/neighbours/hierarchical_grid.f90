@@ -1,15 +1,15 @@
-!> Hierarchical grid (Krijgsman, Ogarko & Luding 2014): one grid per size of boxes.
+!> Hierarchical grid (Krijgsman, Ogarko & Luding 2014): one grid per size class of boxes.
 !>
-!> A box belongs to the finest grid whose cells hold it. It is compared with boxes of its own grid as in linked cells,
-!> and with those in the cells of every coarser grid that it reaches; larger boxes do not look for smaller ones
-!> ("bottom-up" in their words). Number and cell sizes of the grids come from the distribution of sizes by their
-!> estimate of the work (`polydem_size_levels`).
+!> A box belongs to the finest grid whose cells are at least as large as the box. It is compared with boxes of its own
+!> grid as in linked cells, and with the boxes in those cells of every coarser grid that it reaches. Larger boxes do not
+!> search for smaller ones ("bottom-up" in that paper). The number of grids and their cell sizes follow from the size
+!> distribution and the work estimate of that paper (`polydem_size_levels`).
 !>
-!> They keep cells in a hash table and move only the particles that changed their cell. Here all boxes are sorted
-!> anew at every step, which costs a few nanoseconds per box, and cells follow the largest box of their
-!> level, so that a search does not depend on what was promised of the sizes. The levels are chosen at the start,
-!> from the sides that boxes can have at any angle, and again if a box outgrows its level by `tolerance`.
-!> Boxes that are nearly alike make one level; then this is `linked_cells`, and costs the same.
+!> Krijgsman et al. store cells in a hash table and move only particles whose cell changed. Here all boxes are sorted
+!> again at every step, which costs a few nanoseconds per box. The cell size follows the largest box of the level, so
+!> the search does not depend on assumptions about sizes. The levels are chosen at the start, from the sides that boxes
+!> can have at any angle, and again if a box exceeds the size of its level by `tolerance`. Boxes of nearly equal size
+!> form one level; the finder then works and costs the same as `linked_cells`.
 module polydem_hierarchical_grid
    use polydem_boxes, only: boxes_t
    use polydem_kinds, only: dp, ip, wp
@@ -20,13 +20,13 @@ module polydem_hierarchical_grid
    private
    public :: hierarchical_grid_t
 
-   !> Share by which boxes may exceed the size of their level before levels are chosen again
+   !> Relative excess over the size of its level at which a box triggers a new choice of levels
    real(dp), parameter :: tolerance = 0.25_dp
 
-   !> Finder that bins all boxes anew at every step, into grids by their size
+   !> Finder that bins all boxes at every step, into grids by size
    type, extends(linked_cells_t) :: hierarchical_grid_t
       private
-      !> Greatest side reckoned with in each level [m]
+      !> Largest side of a box assumed in the choice of the levels, (level) [m]
       real(dp), allocatable :: largest(:)
    contains
       procedure :: find
@@ -34,7 +34,7 @@ module polydem_hierarchical_grid
 
 contains
 
-   !> Choose levels if need be, then find as with one grid.
+   !> Choose levels if necessary, then search as with one grid.
    subroutine find(self, boxes, changes)
       class(hierarchical_grid_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -49,7 +49,7 @@ contains
       call self%linked_cells_t%find(boxes, changes)
    end subroutine find
 
-   !> Whether levels have been chosen and the boxes of the last step were not much larger than reckoned with
+   !> Whether levels have been chosen and the boxes of the last step were not much larger than assumed in that choice
    pure logical function fits(self)
       type(hierarchical_grid_t), intent(in) :: self
       integer :: l

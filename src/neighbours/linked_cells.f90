@@ -1,31 +1,32 @@
-!> Linked cells: all boxes are binned into a grid at every step, and each is compared with those of its own and
+!> Linked cells: all boxes are binned into a grid at every step. Each box is compared with the boxes of its own cell and
 !> of the neighbouring cells (`polydem_cell_grids`).
 !>
-!> Cells are no smaller than the largest free box, apart for width and height. That is the weakness of the method:
-!> with one free box as large as the scene there is one cell, and all pairs are compared. `hierarchical_grid`
-!> is the remedy. Nothing is kept between steps but the list of pairs, whose differences are the changes.
+!> A cell is at least as wide as the widest free box and at least as high as the highest one. This is the weakness of
+!> the method: if one free box is as large as the scene, there is a single cell, and all pairs are compared.
+!> `hierarchical_grid` avoids this. Between steps the finder stores only the list of pairs. The differences between two
+!> lists are the changes.
 module polydem_linked_cells
    use polydem_box_pairs, only: box_pairs_t, record_differences
    use polydem_boxes, only: boxes_t
    use polydem_cell_grids, only: cell_grids_t, part
    use polydem_finder, only: finder_t
-   use polydem_kinds, only: ip, lp, worth_threads
+   use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_nodes, count_rebuilds, &
+      count_searches, count_tests, count_visits, phase_filter, phase_search, phase_structure
+   use polydem_kinds, only: ip, lp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
-   use polydem_work, only: count_bytes, count_candidates, count_depth, count_nodes, count_rebuilds, count_searches, &
-      count_tests, count_visits, phase_filter, phase_search, phase_structure
    implicit none
    private
    public :: linked_cells_t
 
-   !> Finder that bins all boxes anew at every step
+   !> Finder that bins all boxes at every step
    type, extends(finder_t) :: linked_cells_t
-      !> The grid; several in extensions
+      !> Grid; extensions use several grids
       type(cell_grids_t) :: grids
-      !> Overlapping boxes of this step and of the step before; which is which alternates
+      !> Overlapping boxes of this step and of the previous step, in alternating order
       type(box_pairs_t), private :: list(2)
-      !> Place of this step in `list`
+      !> Index of this step in `list`
       integer, private :: now = 1
-      !> Changes that each thread recorded
+      !> Changes recorded by each thread, (thread)
       type(pair_changes_t), allocatable, private :: part_changes(:)
    contains
       procedure :: find
@@ -34,7 +35,7 @@ module polydem_linked_cells
 
 contains
 
-   !> Bin the boxes, search for pairs, put them in order and record the differences to the step before.
+   !> Bin the boxes, search for pairs, sort them and record the differences from the previous step.
    subroutine find(self, boxes, changes)
       class(linked_cells_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -59,7 +60,7 @@ contains
       call self%work%lap(phase_filter)
    end subroutine find
 
-   !> Sort the rows of the list and compare them with those of the step before.
+   !> Sort the rows of the list and compare them with those of the previous step.
    subroutine record_rows(self, boxes, changes)
       class(linked_cells_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -71,7 +72,7 @@ contains
          if (size(self%part_changes) /= size(self%grids%found)) deallocate (self%part_changes)
       end if
       if (.not. allocated(self%part_changes)) allocate (self%part_changes(size(self%grids%found)))
-      !$omp parallel do if (boxes%n > worth_threads) schedule(static, 1) default(none) &
+      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, size(self%part_changes)
          call self%part_changes(w)%clear()
@@ -86,7 +87,7 @@ contains
       end do
    end subroutine record_rows
 
-   !> Pairs kept from step to step, cells, grids and memory.
+   !> Set the counters: pairs stored between steps, cells, grids, and memory [B].
    subroutine survey(self)
       class(linked_cells_t), intent(inout) :: self
 

@@ -1,31 +1,30 @@
-!> The neighbourhood stage of the time step: boxes in, ascending list of pairs of bodies out.
+!> Neighbour stage of the time step. Its input are the boxes; its output is the ascending list of pairs of bodies whose
+!> boxes overlap.
 module polydem_neighbours
    use polydem_boxes, only: boxes_t
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t
    use polydem_finder, only: finder_t
    use polydem_finder_factory, only: new_finder
+   use polydem_finder_statistics, only: phase_merge, phase_order
    use polydem_kinds, only: ip, lp, wp
    use polydem_pair_changes, only: pair_changes_t
    use polydem_pair_list, only: pair_list_t
-   use polydem_work, only: phase_merge, phase_order
    implicit none
    private
-   public :: neighbours_t, new_neighbours
+   public :: neighbours_t, new_neighbours, start_neighbours
 
-   !> A finder, the changes that it finds and the list that they change
+   !> Finder, list of changes, and list of pairs
    type :: neighbours_t
       !> Pairs of bodies whose boxes overlap
       type(pair_list_t) :: pairs
-      !> What looks for changes
+      !> Finder of changes
       class(finder_t), allocatable :: finder
       !> Changes of the last step
       type(pair_changes_t) :: changes
-      !> Name of the finder
-      character(len=:), allocatable :: name
-      !> Skin of a Verlet list [m]; 0: automatic
-      real(wp), private :: skin = 0.0_wp
-      !> Boxes and bodies of the last step
+      !> Copy of the finder in its initial state
+      class(finder_t), allocatable, private :: unused
+      !> Number of boxes and bodies of the last step
       integer(ip), private :: n_boxes = 0_ip, n_bodies = 0_ip
    contains
       procedure :: update
@@ -38,29 +37,41 @@ module polydem_neighbours
 
 contains
 
-   !> Begin with an empty list.
+   !> Make the stage with an empty list and a finder given by its name.
    subroutine new_neighbours(self, finder_name, boxes, error, skin)
       !> Stage to make
       type(neighbours_t), intent(out) :: self
       !> Name of the finder
       character(len=*), intent(in) :: finder_name
-      !> Boxes to come; only their number and bodies matter
+      !> Boxes of the first step; only their number and bodies are used
       type(boxes_t), intent(in) :: boxes
       !> Allocated if there is no such finder
       type(error_t), allocatable, intent(inout) :: error
-      !> Skin of a Verlet list [m]; 0 or left out: automatic
+      !> Skin of a Verlet list [m]; 0 or absent: automatic
       real(wp), intent(in), optional :: skin
+      class(finder_t), allocatable :: finder
 
-      if (present(skin)) self%skin = skin
-      call new_finder(self%finder, finder_name, error, self%skin)
-      if (allocated(error)) return
-      self%name = finder_name
+      call new_finder(finder, finder_name, error, skin)
+      if (.not. allocated(error)) call start_neighbours(self, finder, boxes)
+   end subroutine new_neighbours
+
+   !> Make the stage with an empty list and a given finder.
+   subroutine start_neighbours(self, finder, boxes)
+      !> Stage to make
+      type(neighbours_t), intent(out) :: self
+      !> Finder in its initial state
+      class(finder_t), intent(in) :: finder
+      !> Boxes of the first step; only their number and bodies are used
+      type(boxes_t), intent(in) :: boxes
+
+      allocate (self%unused, source=finder)
+      allocate (self%finder, source=finder)
       self%n_boxes = boxes%n
       self%n_bodies = boxes%n_bodies
       call self%pairs%start(boxes%one_to_one)
-   end subroutine new_neighbours
+   end subroutine start_neighbours
 
-   !> Bring the list up to date with the boxes of a step.
+   !> Update the list of pairs to the boxes of a step.
    subroutine update(self, boxes)
       class(neighbours_t), intent(inout) :: self
       !> Boxes of this step
@@ -71,17 +82,17 @@ contains
       call self%merge()
    end subroutine update
 
-   !> First part of `update`: let the finder record the changes. If the number of boxes or bodies is
-   !> another than before, the slots may mean other bodies, and all pairs end and begin anew.
+   !> First part of `update`: the finder records the changes. If the number of boxes or bodies has changed, slots may
+   !> belong to other bodies; all pairs then end, and the finder starts again.
    subroutine find(self, boxes)
       class(neighbours_t), intent(inout) :: self
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
-      type(error_t), allocatable :: impossible
 
       call self%finder%work%start()
       if (boxes%n /= self%n_boxes .or. boxes%n_bodies /= self%n_bodies) then
-         call new_finder(self%finder, self%name, impossible, self%skin)
+         deallocate (self%finder)
+         allocate (self%finder, source=self%unused)
          call self%finder%work%start()
          self%n_boxes = boxes%n
          self%n_bodies = boxes%n_bodies
@@ -91,7 +102,7 @@ contains
       call self%finder%find(boxes, self%changes)
    end subroutine find
 
-   !> Second part of `update`: put the changes in order.
+   !> Second part of `update`: sort the changes.
    subroutine order(self)
       class(neighbours_t), intent(inout) :: self
 
@@ -100,7 +111,7 @@ contains
       call self%finder%work%lap(phase_order)
    end subroutine order
 
-   !> Third part of `update`: change the list.
+   !> Third part of `update`: apply the changes to the list.
    subroutine merge_changes(self)
       class(neighbours_t), intent(inout) :: self
 
@@ -109,31 +120,27 @@ contains
       call self%finder%work%lap(phase_merge)
    end subroutine merge_changes
 
-   !> Go on with another finder. The list stays as it is, since all finders find the same; the new one
-   !> learns the boxes of the last step.
-   subroutine change_finder(self, finder_name, boxes, error)
+   !> Replace the finder. The list does not change because all finders find the same pairs. The new finder starts with
+   !> the boxes of the last step.
+   subroutine change_finder(self, finder, boxes)
       class(neighbours_t), intent(inout) :: self
-      !> Name of the finder
-      character(len=*), intent(in) :: finder_name
+      !> Finder in its initial state
+      class(finder_t), intent(in) :: finder
       !> Boxes of the last step
       type(boxes_t), intent(in) :: boxes
-      !> Allocated if there is no such finder; then nothing is changed
-      type(error_t), allocatable, intent(inout) :: error
-      class(finder_t), allocatable :: finder
 
-      call new_finder(finder, finder_name, error, self%skin)
-      if (allocated(error)) return
-      call move_alloc(finder, self%finder)
-      self%name = finder_name
+      deallocate (self%unused, self%finder)
+      allocate (self%unused, source=finder)
+      allocate (self%finder, source=finder)
       call self%changes%clear()
       call self%finder%work%start()
       call self%finder%find(boxes, self%changes)
    end subroutine change_finder
 
-   !> Set the counters of the list and of the finder.
+   !> Set the counters of the list of pairs and of the finder.
    subroutine report(self, counters)
       class(neighbours_t), intent(inout) :: self
-      !> List to set them in
+      !> Counters to set
       type(counters_t), intent(inout) :: counters
 
       call counters%set('pairs', int(self%pairs%n, lp))

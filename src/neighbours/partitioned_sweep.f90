@@ -1,63 +1,62 @@
-!> Sort-and-sweep whose lists of ends are sorted by all threads together.
+!> Parallel sort-and-sweep: all threads together sort each list of ends.
 !>
-!> Krengel et al. (2026, section 4.1) report that their attempts at it failed, after Tenhagen and Matuttis
-!> (2013). This is the attempt made as well as we can, to see what fails. The list of each axis is cut into one
-!> part per thread. Pass 1: every thread gives the ends of its parts their new values and sorts them. Ends
-!> that must cross the border of two parts remain. Pass 2 shifts the parts by half of their length, so that
-!> the borders lie in their middle, and merges the two sorted halves of each; pass 3 has the first parts
-!> again, and so on, which is odd-even transposition of blocks (Knuth 1998, section 5.3.4). The last pass is
-!> the one that leaves the first and the last end of all its parts where they are: the neighbours beyond were
-!> in order before it. A merge looks at no more than the ends that move, and one more.
+!> Krengel et al. (2026, section 4.1) report that their attempts at this failed, after Tenhagen and Matuttis (2013).
+!> This implementation is optimised as far as possible and shows the reasons. The list of each axis is split into one
+!> part per thread. In pass 1, each thread sets the new values of the ends in its parts and sorts the parts. Ends that
+!> must cross the border between two parts remain. Pass 2 shifts the parts by half of their length, so the old borders
+!> lie in the middle of the new parts, and merges the two sorted halves of each part. Pass 3 uses the first parts again,
+!> and so on. This is odd-even transposition of blocks (Knuth 1998, section 5.3.4). The sort is complete after a pass
+!> that does not replace the first or the last end of any part, because the neighbouring ends beyond the borders were in
+!> order before this pass. A merge accesses only the ends that move, and one more end.
 !>
-!> Only neighbours are exchanged and only if they are in the wrong order, so exchanges and changes are those
-!> of `sort_and_sweep`. Crossings are those exchanges that the first pass could not make.
+!> Only neighbours in the wrong order are exchanged, so exchanges and changes are the same as in `sort_and_sweep`.
+!> Crossings are the exchanges that the first pass cannot make.
 !>
-!> What limits it: all threads must wait for one another after every pass, two times in nearly every step. The
-!> sorting of a part takes some ten microseconds and less with every further thread, the waiting does not; and a
-!> thread that the system stops makes all others wait, which is what happens where there are more threads than
-!> free processors. What one thread does for all (joining and ordering the changes, merging them into the list)
-!> is little. Ends that cross borders, the reason why the list does not simply fall into parts, are few, since ends move
-!> by a few places per step; they cost the second pass, not its work. Threads share no line of memory that
-!> is written but those at the borders.
+!> The synchronisation limits the speed-up: all threads wait for each other after every pass, twice in nearly every
+!> step. Sorting a part takes some ten microseconds, and less with more threads, but the waiting time does not decrease.
+!> A thread that the operating system suspends makes all others wait; this happens if there are more threads than free
+!> processors. The serial work (joining and sorting the changes, merging them into the list of pairs) is small. Few ends
+!> cross borders because ends move by a few places per step; these ends make the second pass necessary but add little
+!> work. Threads write to shared cache lines only at the borders.
 !>
-!> The time that a thread does not work while the lists are sorted, from the start of the threads to the end of the
-!> last, is booked as waiting, as the mean over the threads. A thread that works but is stopped by the system counts
-!> as working.
+!> The waiting time is the time in which a thread does not work, from the start of the threads to the end of the last
+!> one, as the mean over the threads. A thread that the operating system suspends during work counts as working.
 module polydem_partitioned_sweep
    use omp_lib, only: omp_get_max_threads, omp_get_num_threads, omp_get_thread_num
    use polydem_boxes, only: boxes_t
    use polydem_clock, only: wall_seconds
    use polydem_finder, only: finder_t
-   use polydem_kinds, only: dp, ip, lp, wp, worth_threads
+   use polydem_finder_statistics, only: count_bytes, count_crossings, count_passes, phase_filter, phase_structure, &
+      phase_waiting
+   use polydem_kinds, only: dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
-   use polydem_sweep_ends, only: bytes_of, ends_t, hand_over, place_ends, refresh_ends, report_t, sort_ends
-   use polydem_work, only: count_bytes, count_crossings, count_passes, phase_filter, phase_structure, phase_waiting
+   use polydem_sweep_ends, only: bytes_of, ends_t, add_report, place_ends, refresh_ends, report_t, sort_ends
    implicit none
    private
    public :: partitioned_sweep_t
 
-   !> One part of the lists of both axes, and what the thread that sorts it has to tell
+   !> One part of the lists of both axes, with the results of the thread that sorts it
    type :: part_t
       !> Changes and counts of the step
       type(report_t) :: report
-      !> Exchanges of the step in passes after the first
+      !> Number of exchanges of the step in passes after the first
       integer(lp) :: crossings = 0_lp
-      !> Whether the first or the last end of the part was replaced, in even and in odd passes
-      logical :: at_rim(0:1) = .false.
-      !> Time of the step that the thread whose first part this is has worked [s]
+      !> Whether the last even (0) and the last odd pass (1) replaced the first or the last end of the part
+      logical :: at_border(0:1) = .false.
+      !> Working time in this step of the thread whose first part this is; 0 for other parts [s]
       real(dp) :: busy = 0.0_dp
-      !> Keeps the next part on another line of memory
+      !> Padding that puts the next part on another cache line
       real(dp) :: padding(8) = 0.0_dp
    end type part_t
 
-   !> Finder that keeps the ends of boxes sorted
+   !> Finder that stores the sorted ends of boxes
    type, extends(finder_t) :: partitioned_sweep_t
       private
       !> Ends of all boxes in x and in y
       type(ends_t) :: ends(2)
-      !> Parts of both lists
+      !> Parts of both lists, (part)
       type(part_t), allocatable :: part(:)
-      !> Bounds of the step before, (4, box) [m]
+      !> Bounds of the previous step, (4, box) [m]
       real(wp), allocatable :: before(:, :)
    contains
       procedure :: find
@@ -66,32 +65,32 @@ module polydem_partitioned_sweep
 
 contains
 
-   !> Sort the ends again and record the changes that their exchanges show.
+   !> Sort the ends and record the changes that follow from exchanges of ends.
    subroutine find(self, boxes, changes)
       class(partitioned_sweep_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       type(pair_changes_t), intent(inout) :: changes
       integer(ip) :: passes, p
-      integer :: team
+      integer :: n_threads
       real(dp) :: began
 
       call prepare(self, boxes)
       began = wall_seconds()
-      !$omp parallel if (boxes%n > worth_threads) default(none) shared(self, boxes, passes, team)
-      call sort_together(self, boxes, omp_get_thread_num(), omp_get_num_threads(), passes, team)
+      !$omp parallel if (boxes%n > min_parallel_size) default(none) shared(self, boxes, passes, n_threads)
+      call sort_together(self, boxes, omp_get_thread_num(), omp_get_num_threads(), passes, n_threads)
       !$omp end parallel
       self%work%seconds(phase_waiting) = self%work%seconds(phase_waiting) + &
-         (wall_seconds() - began - total_busy(self%part)/real(team, dp))
+         (wall_seconds() - began - total_busy(self%part)/real(n_threads, dp))
       call self%work%lap(phase_structure)
       do p = 1_ip, size(self%part, kind=ip)
-         call hand_over(self%part(p)%report, changes, self%work)
+         call add_report(self%part(p)%report, changes, self%work)
          call self%work%add(count_crossings, self%part(p)%crossings)
       end do
       call self%work%add(count_passes, int(passes, lp))
       call self%work%lap(phase_filter)
    end subroutine find
 
-   !> Place the ends before the first step; make as many parts as there may be threads, but none of less than two ends.
+   !> Place the ends before the first step. Make one part per thread, but no part with fewer than two ends.
    subroutine prepare(self, boxes)
       type(partitioned_sweep_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -106,20 +105,20 @@ contains
       allocate (self%part(parts))
    end subroutine prepare
 
-   !> What one thread of a team does: its parts, pass by pass, until no thread can have left anything to sort.
-   subroutine sort_together(self, boxes, me, team, passes, team_size)
+   !> Work of one thread: sort its parts, pass by pass, until the whole list is sorted.
+   subroutine sort_together(self, boxes, me, n_threads, passes, threads_used)
       type(partitioned_sweep_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
-      !> Number of this thread, from 0 on; threads of the team
-      integer, intent(in) :: me, team
-      !> Passes made and threads of the team, told by thread 0
+      !> Number of this thread, from 0, and number of threads
+      integer, intent(in) :: me, n_threads
+      !> Number of passes and number of threads; thread 0 sets them
       integer(ip), intent(inout) :: passes
-      integer, intent(inout) :: team_size
+      integer, intent(inout) :: threads_used
       integer(ip) :: pass, p, low, high
       real(dp) :: since, busy
 
-      low = share(me, team, size(self%part, kind=ip)) + 1_ip
-      high = share(me + 1, team, size(self%part, kind=ip))
+      low = share(me, n_threads, size(self%part, kind=ip)) + 1_ip
+      high = share(me + 1, n_threads, size(self%part, kind=ip))
       busy = 0.0_dp
       pass = 0_ip
       do
@@ -133,29 +132,29 @@ contains
          if (is_sorted_after(self%part, pass)) exit
       end do
       since = wall_seconds()
-      do p = share(me, team, boxes%n) + 1_ip, share(me + 1, team, boxes%n)
+      do p = share(me, n_threads, boxes%n) + 1_ip, share(me + 1, n_threads, boxes%n)
          self%before(:, p) = boxes%bounds(:, p)
       end do
       do p = low, high
          self%part(p)%busy = 0.0_dp
       end do
       if (me == 0) passes = pass
-      if (me == 0) team_size = team
+      if (me == 0) threads_used = n_threads
       if (low <= high) self%part(low)%busy = busy + (wall_seconds() - since)
    end subroutine sort_together
 
-   !> Do one pass over one part of both lists. In even passes the part goes from the middle of the original part to the
-   !> middle of the next; the last one has no next and rests.
+   !> Do one pass over one part of both lists. In even passes the part extends from the middle of the original part to
+   !> the middle of the next part; the last part has no next part and nothing to merge.
    subroutine sort_part(self, boxes, p, pass)
       type(partitioned_sweep_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       integer(ip), intent(in) :: p, pass
       integer(ip) :: low, middle, high, moved(2)
       integer(lp) :: swaps
-      logical :: at_rim
+      logical :: at_border
       integer :: a
 
-      at_rim = .false.
+      at_border = .false.
       swaps = self%part(p)%report%swaps
       if (pass == 1_ip) call self%part(p)%report%clear()
       call limits(p, pass, size(self%part, kind=ip), 2_ip*boxes%n, low, middle, high)
@@ -163,9 +162,9 @@ contains
          if (pass == 1_ip) call refresh_ends(a, low, high, boxes, self%ends(a))
          call sort_ends(a, low, merge(low, middle, pass == 1_ip) + 1_ip, high, pass > 1_ip, self%work%thorough, boxes, &
                         self%before, self%ends(a), self%part(p)%report, moved)
-         at_rim = at_rim .or. moved(1) == low .or. moved(2) == high
+         at_border = at_border .or. moved(1) == low .or. moved(2) == high
       end do
-      self%part(p)%at_rim(iand(pass, 1_ip)) = at_rim
+      self%part(p)%at_border(iand(pass, 1_ip)) = at_border
       if (pass == 1_ip) then
          self%part(p)%crossings = 0_lp
       else
@@ -173,7 +172,7 @@ contains
       end if
    end subroutine sort_part
 
-   !> Places of a part in a pass: the first, the last of its lower half, the last.
+   !> First place, last place of the lower half, and last place of a part in a pass.
    pure subroutine limits(p, pass, parts, n_ends, low, middle, high)
       integer(ip), intent(in) :: p, pass, parts, n_ends
       integer(ip), intent(out) :: low, middle, high
@@ -192,13 +191,14 @@ contains
       end if
    end subroutine limits
 
+   !> Middle of the range low..high
    pure integer(ip) function half_way(low, high)
       integer(ip), intent(in) :: low, high
 
       half_way = low + (high - low)/2_ip
    end function half_way
 
-   !> How many of n things the first k of several equal shares hold
+   !> Number of elements in the first k of several equal parts of n elements
    pure integer(ip) function share(k, shares, n)
       integer, intent(in) :: k, shares
       integer(ip), intent(in) :: n
@@ -206,7 +206,7 @@ contains
       share = int(int(k, lp)*int(n, lp)/int(shares, lp), ip)
    end function share
 
-   !> Whether a pass, all of whose parts are sorted now, has left the borders of its parts in order
+   !> Whether the list is sorted after a pass: the pass did not replace the first or the last end of any part
    pure logical function is_sorted_after(part, pass)
       type(part_t), intent(in) :: part(:)
       integer(ip), intent(in) :: pass
@@ -215,12 +215,12 @@ contains
       is_sorted_after = size(part) == 1
       if (pass == 1_ip) return
       do p = 1, size(part)
-         if (part(p)%at_rim(iand(pass, 1_ip))) return
+         if (part(p)%at_border(iand(pass, 1_ip))) return
       end do
       is_sorted_after = .true.
    end function is_sorted_after
 
-   !> Seconds that all threads together have worked in this step
+   !> Total working time of all threads in this step [s]
    pure real(dp) function total_busy(part)
       type(part_t), intent(in) :: part(:)
       integer :: p
@@ -231,7 +231,7 @@ contains
       end do
    end function total_busy
 
-   !> Memory held: ends, bounds of the step before, parts with their changes.
+   !> Set the counter of memory [B]: ends, bounds of the previous step, parts with their changes.
    subroutine survey(self)
       class(partitioned_sweep_t), intent(inout) :: self
       integer(lp) :: bytes

@@ -1,73 +1,78 @@
 !> Incremental search on the minimal quadtree.
 !>
-!> Every box has a *grown cell*: the cell of its leaf, enlarged by its reach, the greatest half side that it
-!> can have at any angle. Boxes whose grown cells overlap are *candidates*. While the centres stay in
-!> their leaves the grown cells stay, and boxes that are no candidates cannot overlap, however they turn.
+!> Every box has a *padded cell*: the cell of its leaf, enlarged by the reach of the box. The reach is the largest half
+!> side that the box can have at any angle. Two boxes are *candidates* if their padded cells overlap. The padded cells
+!> do not change while the centres stay in their leaves, and boxes that are not candidates cannot overlap at any angle.
 !> A step therefore
 !>
 !>  1. moves the boxes whose centre left its leaf and repairs the tree (`polydem_quadtree_nodes`),
-!>  2. runs once over the candidates, compares their boxes and records where the answer changed,
-!>  3. searches the tree again for each box whose leaf changed, or whose leaf was split or merged by a
-!>     neighbour, and for no other box. Whether a pair was a candidate before is known from the grown cells
-!>     before the step, so only pairs that are candidates anew are added, and those that parted dropped.
+!>  2. compares the boxes of all candidates once and records the pairs that begin or cease to overlap,
+!>  3. searches the tree again for each box whose leaf changed, or whose leaf was split or merged because of a
+!>     neighbour, and for no other box. The padded cells before the step show whether a pair was a candidate before.
+!>     Only pairs that have become candidates are added, and pairs that have ceased to be candidates are removed.
 !>
-!> Krengel et al. (2026) walk across cell edges and corners within a window; here the search climbs to the
-!> lowest ancestor around the grown cell and descends from there into every cell close enough, so no box is
-!> missed because of its shape or of what lies between.
+!> Krengel et al. (2026) walk across cell edges and corners within a window. Here the search climbs to the lowest
+!> ancestor that contains the padded cell, and descends from there into every cell that is near enough. The search finds
+!> all boxes, whatever their shape and whatever lies between them.
 !>
-!> All but the repair runs on threads, each on a contiguous part of a list. The results are joined in the
-!> order of the list and so do not depend on the number of threads.
+!> All parts except the repair are parallel: each thread works on a contiguous part of a list. The results are joined in
+!> the order of the list and do not depend on the number of threads.
 !>
-!> The same source makes four finders: on the minimal quadtree compiled with and without inlining, on the pruned
-!> quadtree whose leaves are all equal, and on a binary tree along the longer axis for scenes that are
-!> nearly one-dimensional. So their differences are those of the trees, or of the compiler, alone.
+!> The same source makes four finders: the minimal quadtree compiled with and without inlining, the pruned quadtree,
+!> whose leaves all have the same size, and a binary tree along the longer axis for nearly one-dimensional scenes. They
+!> differ only in the tree or in the compilation.
 module polydem_quadtree
    use omp_lib, only: omp_get_max_threads
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t, overlapping, places_t
+   use polydem_candidates, only: candidates_t, overlapping, index_list_t
    use polydem_finder, only: finder_t
-   use polydem_kinds, only: dp, ip, lp, wp, worth_threads
+   use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_leaf_changes, &
+      count_left_leaf, count_nodes, count_searches, count_tests, count_visits, phase_filter, phase_search, &
+      phase_structure
+   use polydem_kinds, only: dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
    use polydem_quadtree_nodes, only: tree_t
-   use polydem_quadtree_search, only: grown_cells_t, search
-   use polydem_work, only: count_bytes, count_candidates, count_depth, count_leaf_changes, count_leavers, &
-      count_nodes, count_searches, count_tests, count_visits, phase_filter, phase_search, phase_structure
+   use polydem_quadtree_search, only: padded_cells_t, search
    implicit none
    private
    public :: quadtree_t
 
-   !> Side of some level's cells in units of the typical reach: the largest that hold one centre each in a
-   !> packing. Other values, between powers of two, give up to 1.6 times as many candidates (measured).
+   !> Side of the cells of one level in units of the typical (geometric mean) reach. These are the largest cells that
+   !> contain one centre each in a packing. Other values between powers of two give up to 1.6 times as many candidates
+   !> (measured)
    real(dp), parameter :: typical_share = 1.2_dp
-   !> Boxes to search from which on threads share the work: a search takes about two microseconds
+   !> Number of boxes above which the search is parallel. The search for one box takes about two microseconds
    integer(ip), parameter :: worth_searching = 16_ip
-   !> Most levels below that one
+   !> Largest number of levels below that level
    integer, parameter :: most_levels = 12
 
-   !> What one thread finds in its part of the lists
+   !> Results of one thread for its part of the lists
    type :: worker_t
-      !> Boxes whose centre left its leaf or that outgrew their reach
-      type(places_t) :: leavers
-      !> Boxes of new candidates, two entries each
-      type(places_t) :: found
-      !> Nodes looked at in searches
+      !> Boxes whose centre left its leaf or whose half side exceeds their reach
+      type(index_list_t) :: outside
+      !> Boxes of new candidates, two entries for each candidate
+      type(index_list_t) :: found
+      !> Number of visited nodes
       integer(lp) :: visits = 0_lp
-      !> Changes
+      !> Changes of pairs
       type(pair_changes_t) :: changes
    end type worker_t
 
-   !> Finder that keeps a tree
+   !> Finder that stores a tree
    type, extends(finder_t) :: quadtree_t
       !> Whether all leaves are on the finest level (pruned tree, Vemuri et al. 1998); set before the first step
       logical :: equal_leaves = .false.
-      !> Whether only the longer axis of the scene is looked at (binary tree); set before the first step
+      !> Whether the tree uses only the longer axis of the scene (binary tree); set before the first step
       logical :: one_axis = .false.
+      !> Tree of the boxes
       type(tree_t), private :: tree
+      !> Candidates
       type(candidates_t), private :: candidates
-      !> Grown cells of the boxes
-      type(grown_cells_t), private :: grown
-      !> Greatest side that a box may have before its reach must be enlarged [m]
+      !> Padded cells of the boxes
+      type(padded_cells_t), private :: padded
+      !> Largest side of each box for which its reach is sufficient, (box) [m]
       real(wp), allocatable, private :: greatest_side(:)
+      !> Results of the threads, (thread)
       type(worker_t), allocatable, private :: worker(:)
    contains
       procedure :: find
@@ -76,19 +81,19 @@ module polydem_quadtree
 
 contains
 
-   !> Repair the tree, compare the candidates, search again where leaves changed.
+   !> Repair the tree, compare the candidates, and search again for boxes whose leaf changed.
    subroutine find(self, boxes, changes)
       class(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       type(pair_changes_t), intent(inout) :: changes
 
       call prepare_workers(self)
-      if (allocated(self%grown%now)) then
+      if (allocated(self%padded%now)) then
          call update_tree(self, boxes)
       else
          call build_tree(self, boxes)
       end if
-      call update_grown_cells(self)
+      call update_padded_cells(self)
       call self%work%lap(phase_structure)
       call compare_candidates(self, boxes, changes)
       call self%work%lap(phase_filter)
@@ -101,6 +106,7 @@ contains
       call self%work%lap(phase_search)
    end subroutine find
 
+   !> Make one worker per thread and clear the workers.
    subroutine prepare_workers(self)
       type(quadtree_t), intent(inout) :: self
       integer :: w
@@ -110,14 +116,14 @@ contains
       end if
       if (.not. allocated(self%worker)) allocate (self%worker(omp_get_max_threads()))
       do w = 1, size(self%worker)
-         self%worker(w)%leavers%n = 0_ip
+         self%worker(w)%outside%n = 0_ip
          self%worker(w)%found%n = 0_ip
          self%worker(w)%visits = 0_lp
          call self%worker(w)%changes%clear()
       end do
    end subroutine prepare_workers
 
-   !> First and last of the w-th of m equal parts of 1..n
+   !> First and last element of part w, if 1..n is split into m parts of equal size
    pure subroutine part(n, m, w, low, high)
       integer(ip), intent(in) :: n
       integer, intent(in) :: m, w
@@ -127,7 +133,7 @@ contains
       high = int((int(n, lp)*int(w, lp))/int(m, lp), ip)
    end subroutine part
 
-   !> Put all boxes into a new tree.
+   !> Insert all boxes into a new tree.
    subroutine build_tree(self, boxes)
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -135,9 +141,9 @@ contains
       real(dp) :: reach, origin(2)
 
       call self%candidates%start(boxes%n)
-      allocate (self%grown%before(4, boxes%n), self%greatest_side(boxes%n))
-      self%grown%before = spread([1.0_dp, 1.0_dp, -1.0_dp, -1.0_dp]*huge(1.0_dp), 2, boxes%n)
-      self%grown%now = self%grown%before
+      allocate (self%padded%before(4, boxes%n), self%greatest_side(boxes%n))
+      self%padded%before = spread([1.0_dp, 1.0_dp, -1.0_dp, -1.0_dp]*huge(1.0_dp), 2, boxes%n)
+      self%padded%now = self%padded%before
       origin = 0.0_dp
       if (boxes%n > 0_ip) origin = real(boxes%bounds(1:2, 1), dp)
       self%tree%equal_leaves = self%equal_leaves
@@ -150,7 +156,7 @@ contains
       end do
    end subroutine build_tree
 
-   !> Side of the finest cells: no larger than the least reach, if that is not absurdly small [m]
+   !> Side of the finest cells [m]: at most the smallest reach, but not less than a limit set by `most_levels`
    pure real(dp) function finest_cell(boxes)
       type(boxes_t), intent(in) :: boxes
       real(dp) :: logarithms, least, reach
@@ -176,7 +182,7 @@ contains
       end do
    end function finest_cell
 
-   !> The axis along which the boxes extend less far
+   !> Axis along which the scene is shorter: 1 (x) or 2 (y)
    pure integer function shorter_axis(boxes)
       type(boxes_t), intent(in) :: boxes
       real(wp) :: extent(2)
@@ -191,46 +197,47 @@ contains
       shorter_axis = merge(1, 2, extent(1) < extent(2))
    end function shorter_axis
 
+   !> Half of the longer side of a box [m]
    pure real(wp) function half_side(box)
       real(wp), intent(in) :: box(4)
 
       half_side = 0.5_wp*max(box(3) - box(1), box(4) - box(2))
    end function half_side
 
-   !> Move the boxes that left their leaves.
+   !> Move the boxes that left their leaf, and enlarge reaches that are too small.
    subroutine update_tree(self, boxes)
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       integer(ip) :: k, i, low, high
       integer :: w
 
-      !$omp parallel do if (boxes%n > worth_threads) schedule(static, 1) default(none) &
+      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, size(self%worker)
          call part(boxes%n, size(self%worker), w, low, high)
-         call find_leavers(self%tree, low, high, boxes%bounds, self%greatest_side, self%worker(w)%leavers)
+         call find_outside(self%tree, low, high, boxes%bounds, self%greatest_side, self%worker(w)%outside)
       end do
       !$omp end parallel do
       do w = 1, size(self%worker)
-         do k = 1_ip, self%worker(w)%leavers%n
-            i = self%worker(w)%leavers%at(k)
+         do k = 1_ip, self%worker(w)%outside%n
+            i = self%worker(w)%outside%at(k)
             if (2.0_wp*half_side(boxes%bounds(:, i)) > self%greatest_side(i)) then
                self%greatest_side(i) = 2.0_wp*half_side(boxes%bounds(:, i))
-               call self%tree%widen(i, 0.5_dp*real(self%greatest_side(i), dp))
+               call self%tree%increase_reach(i, 0.5_dp*real(self%greatest_side(i), dp))
             end if
             call self%tree%move(i, boxes%bounds)
          end do
-         call self%work%add(count_leavers, int(self%worker(w)%leavers%n, lp))
+         call self%work%add(count_left_leaf, int(self%worker(w)%outside%n, lp))
       end do
    end subroutine update_tree
 
-   !> List the boxes of a part whose centre is not in its leaf, or that are larger than was promised.
-   subroutine find_leavers(tree, low, high, bounds, greatest_side, leavers)
+   !> List the boxes low..high whose centre is not in its leaf or whose side exceeds `greatest_side`.
+   subroutine find_outside(tree, low, high, bounds, greatest_side, outside)
       type(tree_t), intent(in) :: tree
       integer(ip), intent(in) :: low, high
       real(wp), intent(in), contiguous :: bounds(:, :)
       real(wp), intent(in), contiguous :: greatest_side(:)
-      type(places_t), intent(inout) :: leavers
+      type(index_list_t), intent(inout) :: outside
       real(dp) :: x, y
       integer(ip) :: i
 
@@ -240,12 +247,12 @@ contains
          if (x >= tree%cell(1, i) .and. x < tree%cell(3, i) .and. &
              y >= tree%cell(2, i) .and. y < tree%cell(4, i) .and. &
              max(bounds(3, i) - bounds(1, i), bounds(4, i) - bounds(2, i)) <= greatest_side(i)) cycle
-         call leavers%push(i)
+         call outside%push(i)
       end do
-   end subroutine find_leavers
+   end subroutine find_outside
 
-   !> Grow the cells of the boxes whose leaf changed, keeping what they were before.
-   subroutine update_grown_cells(self)
+   !> Compute the padded cells of the boxes whose leaf changed, and store the previous ones.
+   subroutine update_padded_cells(self)
       type(quadtree_t), intent(inout) :: self
       integer(ip) :: k, i
       real(dp) :: reach
@@ -253,11 +260,11 @@ contains
       do k = 1_ip, self%tree%n_changed
          i = self%tree%changed(k)
          reach = self%tree%reach(i)
-         self%grown%before(:, i) = self%grown%now(:, i)
-         self%grown%now(1:2, i) = self%tree%cell(1:2, i) - reach
-         self%grown%now(3:4, i) = self%tree%cell(3:4, i) + reach
+         self%padded%before(:, i) = self%padded%now(:, i)
+         self%padded%now(1:2, i) = self%tree%cell(1:2, i) - reach
+         self%padded%now(3:4, i) = self%tree%cell(3:4, i) + reach
       end do
-   end subroutine update_grown_cells
+   end subroutine update_padded_cells
 
    !> Compare the boxes of all candidates.
    subroutine compare_candidates(self, boxes, changes)
@@ -267,7 +274,7 @@ contains
       integer(ip) :: low, high
       integer :: w
 
-      !$omp parallel do if (self%candidates%n > worth_threads) schedule(static, 1) default(none) &
+      !$omp parallel do if (self%candidates%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, size(self%worker)
          call part(self%candidates%n, size(self%worker), w, low, high)
@@ -292,13 +299,13 @@ contains
       do w = 1, size(self%worker)
          call part(self%tree%n_changed, size(self%worker), w, low, high)
          do k = low, high
-            call search(self%tree, self%grown, boxes, self%tree%changed(k), self%worker(w)%found, &
+            call search(self%tree, self%padded, boxes, self%tree%changed(k), self%worker(w)%found, &
                         self%worker(w)%visits)
          end do
       end do
       !$omp end parallel do
       do k = 1_ip, self%tree%n_changed
-         self%grown%before(:, self%tree%changed(k)) = self%grown%now(:, self%tree%changed(k))
+         self%padded%before(:, self%tree%changed(k)) = self%padded%now(:, self%tree%changed(k))
       end do
       call self%work%add(count_searches, int(self%tree%n_changed, lp))
       do w = 1, size(self%worker)
@@ -306,7 +313,8 @@ contains
       end do
    end subroutine search_changed
 
-   !> Drop the candidates that parted and add those that the threads found, in the order of their parts.
+   !> Remove the pairs that are not candidates any longer, and add the new candidates of all threads in the order of the
+   !> threads.
    subroutine replace_candidates(self, boxes, changes)
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -316,7 +324,7 @@ contains
       logical :: overlap
 
       do k = 1_ip, self%tree%n_changed
-         call self%candidates%drop_parted(self%tree%changed(k), self%grown%now, dropped)
+         call self%candidates%remove_separated(self%tree%changed(k), self%padded%now, dropped)
       end do
       do w = 1, size(self%worker)
          do k = 1_ip, self%worker(w)%found%n, 2_ip
@@ -329,16 +337,16 @@ contains
       end do
    end subroutine replace_candidates
 
-   !> Candidates, nodes, levels and memory.
+   !> Set the counters: candidates, nodes, levels, and memory [B].
    subroutine survey(self)
       class(quadtree_t), intent(inout) :: self
 
-      if (.not. allocated(self%grown%now)) return
+      if (.not. allocated(self%padded%now)) return
       self%work%value(count_candidates) = int(self%candidates%n, lp)
       self%work%value(count_nodes) = int(self%tree%n_nodes, lp)
       self%work%value(count_depth) = int(self%tree%depth(), lp)
       self%work%value(count_bytes) = self%tree%bytes() + self%candidates%bytes() + &
-         (int(storage_size(self%grown%now), lp)*2_lp*size(self%grown%now, kind=lp) + &
+         (int(storage_size(self%padded%now), lp)*2_lp*size(self%padded%now, kind=lp) + &
           int(storage_size(self%greatest_side), lp)*size(self%greatest_side, kind=lp))/8_lp
    end subroutine survey
 

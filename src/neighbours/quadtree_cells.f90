@@ -1,7 +1,7 @@
-!> One node of a quadtree, a square cell with whole-numbered bounds.
+!> Node of a quadtree: a square cell with integer bounds.
 !>
-!> Lengths count in cells of the finest level. A cell of level L has 2^L of them on a side and begins at a
-!> multiple of 2^L, so whether it holds a place is a matter of bits.
+!> The unit of length is the side of a cell of the finest level. A cell of level L has 2^L finest cells on a side, and
+!> its lower bounds are multiples of 2^L. Bit operations show whether it contains a finest cell.
 module polydem_quadtree_cells
    use polydem_kinds, only: dp, ip
    implicit none
@@ -10,11 +10,11 @@ module polydem_quadtree_cells
 
    !> One cell of the tree
    type :: node_t
-      !> Bounds of the cell grown by the greatest reach in it, xmin, ymin, xmax, ymax [finest cells]
+      !> Bounds xmin, ymin, xmax, ymax of the cell, padded by the largest reach of its boxes [finest cells]
       real(dp) :: grown(4)
       !> Children: lower left, lower right, upper left, upper right; 0: none
       integer(ip) :: child(4)
-      !> Parent, 0 for the root; next free node for a free one
+      !> Parent, 0 for the root; for a free node the next free node
       integer(ip) :: parent
       !> Level, 0 for the finest: the cell has 2^level finest cells on a side
       integer(ip) :: level
@@ -22,45 +22,45 @@ module polydem_quadtree_cells
       integer(ip) :: count
       !> First box of a leaf, 0 for an internal node
       integer(ip) :: first
-      !> Lower left finest cell
+      !> Finest cell at the lower left corner
       integer(ip) :: low(2)
-      !> Greatest reach of the boxes in the cell [finest cells]
+      !> Largest reach of the boxes in the cell [finest cells]
       real(dp) :: reach
    end type node_t
 
 contains
 
-   !> Count one more box in.
+   !> Add one box to the count and to the largest reach of a node.
    pure subroutine count_in(node, reach, ignored)
       !> Node
       type(node_t), intent(inout) :: node
-      !> Reach [finest cells]
+      !> Reach of the box [finest cells]
       real(dp), intent(in) :: reach
-      !> As for `cell_bounds`
+      !> Ignored axis as in `cell_bounds`
       integer, intent(in) :: ignored
 
       node%count = node%count + 1_ip
       if (reach > node%reach) call set_reach(node, reach, ignored)
    end subroutine count_in
 
-   !> Set the greatest reach of a node and its grown bounds.
+   !> Set the largest reach of a node and its padded bounds.
    pure subroutine set_reach(node, reach, ignored)
       !> Node
       type(node_t), intent(inout) :: node
       !> Reach [finest cells]
       real(dp), intent(in) :: reach
-      !> As for `cell_bounds`
+      !> Ignored axis as in `cell_bounds`
       integer, intent(in) :: ignored
 
       node%reach = reach
       node%grown = cell_bounds(node, ignored) + [-reach, -reach, reach, reach]
    end subroutine set_reach
 
-   !> Bounds of a cell, xmin, ymin, xmax, ymax [finest cells]
+   !> Bounds xmin, ymin, xmax, ymax of a cell [finest cells]
    pure function cell_bounds(node, ignored) result(bounds)
       !> Node
       type(node_t), intent(in) :: node
-      !> Axis along which cells are endless (the tree is a binary one); 0: none
+      !> Axis along which cells are unbounded (binary tree); 0: none
       integer, intent(in) :: ignored
       real(dp) :: bounds(4)
 
@@ -69,7 +69,7 @@ contains
       if (ignored > 0) bounds(ignored:ignored + 2:2) = [-huge(1.0_dp), huge(1.0_dp)]
    end function cell_bounds
 
-   !> Whether a finest cell lies in a cell
+   !> Whether a cell contains a finest cell
    pure logical function holds(node, at)
       !> Node
       type(node_t), intent(in) :: node
@@ -79,7 +79,8 @@ contains
       holds = shiftr(ior(ieor(at(1), node%low(1)), ieor(at(2), node%low(2))), node%level) == 0_ip
    end function holds
 
-   !> Finest cell of a node nearest to a given one: where a box waits that has left but was not yet moved
+   !> Finest cell of a node nearest to a given finest cell. A box that has left its leaf but is not yet moved counts as
+   !> lying there
    pure function within(node, at) result(nearest)
       !> Node
       type(node_t), intent(in) :: node
@@ -90,7 +91,7 @@ contains
       nearest = max(node%low, min(at, node%low + (shiftl(1_ip, node%level) - 1_ip)))
    end function within
 
-   !> Child of a cell of some level in which a finest cell lies
+   !> Number (1 to 4) of the child of a cell that contains a finest cell
    pure integer(ip) function quadrant(level, at)
       !> Level of the cell, above 0
       integer(ip), intent(in) :: level

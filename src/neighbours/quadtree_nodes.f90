@@ -1,17 +1,17 @@
-!> The minimal quadtree: a leaf is the largest cell that holds a single box.
+!> Minimal quadtree: a leaf is the largest cell that contains a single box.
 !>
-!> Nodes exist only where boxes are: a node is internal if it holds at least two boxes and is above the finest
-!> level, otherwise a leaf; leaves on the finest level may hold several boxes. So the tree is a function of
-!> where the centres of the boxes are, not of how they came there.
+!> Nodes exist only where boxes are. A node is internal if it contains at least two boxes and is above the finest level;
+!> otherwise it is a leaf. Leaves on the finest level may contain several boxes. The tree is a function of the current
+!> centres of the boxes and does not depend on their paths.
 !>
-!> Two variants share all of this. The *pruned* tree (Vemuri et al. 1998) has all its leaves on the finest
-!> level, however few boxes there are. The *binary* tree (Krengel et al. 2026, section 3.2) looks at one axis
-!> only: along the other one cells are endless, and of the four children of a node two are never used.
+!> The module has two variants. The *pruned* tree (Vemuri et al. 1998) has all leaves on the finest level. The *binary*
+!> tree (Krengel et al. 2026, section 3.2) uses only one axis: its cells are unbounded along the other axis, and two of
+!> the four children of a node are never used.
 !>
-!> Centres count in whole cells of the finest level, 0 .. 2^30 - 1 in each direction. The origin of the space
-!> lies near the cell whose index alternates 0 and 1 bits: its ancestors then extend to the left and to the
-!> right in turn, and the root can grow in every direction. Centres further away count as if they lay in
-!> the outermost cell. This brings them closer to others, never further, so no neighbour is lost.
+!> Positions of centres are integers from 0 to 2^30 - 1 in each direction, in cells of the finest level. The origin of
+!> space lies near the cell whose index has alternating bits 0 and 1. The ancestors of this cell extend to the left and
+!> to the right in turn, so the root can grow in every direction. Centres outside this range are moved to the outermost
+!> cell. This never increases the distance between two centres, so no neighbour is lost.
 module polydem_quadtree_nodes
    use polydem_kinds, only: bp, dp, ip, lp, wp
    use polydem_quadtree_cells, only: cell_bounds, count_in, holds, quadrant, set_reach, within
@@ -20,36 +20,36 @@ module polydem_quadtree_nodes
    private
    public :: tree_t
 
-   !> Levels above the finest that the root can reach
+   !> Highest level of the root; 0 is the finest level
    integer(ip), parameter :: top_level = 30_ip
    !> Cell index with alternating bits, 0101...01
    integer(ip), parameter :: middle = 357913941_ip
 
-   !> The tree, where boxes are in it, and which of them changed leaf
+   !> Tree, leaf of each box, and list of the boxes whose leaf changed
    type, extends(node_pool_t) :: tree_t
-      !> Root; 0: no box yet
+      !> Root; 0: the tree has no box
       integer(ip) :: root = 0_ip
-      !> Leaf of each box
+      !> Leaf of each box, (box)
       integer(ip), allocatable :: leaf(:)
-      !> Next box in the same leaf, 0 for the last
+      !> Next box in the same leaf, (box); 0 for the last box
       integer(ip), allocatable :: next(:)
       !> Bounds of the leaf of each box, half open, (4, box) [finest cells]
       real(dp), allocatable :: cell(:, :)
-      !> Reach of each box with room for rounding [finest cells]
+      !> Reach of each box with an allowance for rounding, (box) [finest cells]
       real(dp), allocatable :: reach(:)
-      !> Greatest reach of all
+      !> Largest reach of all boxes [finest cells]
       real(dp) :: greatest_reach = 0.0_dp
-      !> Number of boxes whose leaf or reach changed since `settle`
+      !> Number of boxes whose leaf or reach changed since the last call of `settle`
       integer(ip) :: n_changed = 0_ip
-      !> These boxes
+      !> Boxes whose leaf or reach changed; the first `n_changed` entries are valid
       integer(ip), allocatable :: changed(:)
-      !> 1 if a box is among them, else 0
+      !> 1 if a box is in `changed`, else 0, (box)
       integer(bp), allocatable :: is_changed(:)
-      !> Finest cells per metre, halved because bounds are summed for the centre [1/m]
+      !> Finest cells per metre, halved because the sum of two bounds is twice the centre [1/m]
       real(dp) :: half_scale = 0.5_dp
-      !> Position of the origin [finest cells]
+      !> Position of the origin of space [finest cells]
       real(dp) :: shift(2) = 0.0_dp
-      !> Room for rounding in a reach [finest cells]
+      !> Allowance for rounding in a reach [finest cells]
       real(dp) :: slack = 0.0_dp
       !> Whether all leaves are on the finest level (pruned tree)
       logical :: equal_leaves = .false.
@@ -57,7 +57,7 @@ module polydem_quadtree_nodes
       procedure :: start
       procedure :: insert
       procedure :: move
-      procedure :: widen
+      procedure :: increase_reach
       procedure :: settle
       procedure :: depth
       procedure :: bytes
@@ -68,11 +68,11 @@ contains
    !> Make an empty tree.
    subroutine start(self, n, finest, origin)
       class(tree_t), intent(inout) :: self
-      !> Number of boxes to come
+      !> Number of boxes that will be inserted
       integer(ip), intent(in) :: n
       !> Side of a cell of the finest level [m]
       real(dp), intent(in) :: finest
-      !> A place amid the boxes [m]
+      !> Position among the boxes [m]
       real(dp), intent(in) :: origin(2)
       real(dp), parameter :: off_border = 0.381966_dp
 
@@ -86,12 +86,12 @@ contains
       self%slack = 8.0_dp*epsilon(1.0_dp)*(maxval(abs(origin))/finest + 2.0_dp**top_level)
    end subroutine start
 
-   !> Bring a box into the tree for the first time.
+   !> Insert a box into the tree for the first time.
    subroutine insert(self, box, reach, bounds)
       class(tree_t), intent(inout) :: self
       !> Box to insert
       integer(ip), intent(in) :: box
-      !> Its reach [m]
+      !> Reach of the box [m]
       real(dp), intent(in) :: reach
       !> Bounds of all boxes, (4, box) [m]
       real(wp), intent(in), contiguous :: bounds(:, :)
@@ -112,7 +112,7 @@ contains
       call descend(self, self%root, box, at, bounds)
    end subroutine insert
 
-   !> Bring a box that may have left its leaf into the right one.
+   !> Move a box that may have left its leaf to the leaf of its present position.
    subroutine move(self, box, bounds)
       class(tree_t), intent(inout) :: self
       !> Box that moved
@@ -132,10 +132,10 @@ contains
       call descend(self, node, box, at, bounds)
    end subroutine move
 
-   !> Give a box a greater reach.
-   subroutine widen(self, box, reach)
+   !> Increase the reach of a box.
+   subroutine increase_reach(self, box, reach)
       class(tree_t), intent(inout) :: self
-      !> Box that needs it
+      !> Box
       integer(ip), intent(in) :: box
       !> New reach [m]
       real(dp), intent(in) :: reach
@@ -148,10 +148,10 @@ contains
          call set_reach(self%node(node), max(self%node(node)%reach, self%reach(box)), self%ignored)
          node = self%node(node)%parent
       end do
-      call mark(self, box)
-   end subroutine widen
+      call mark_changed(self, box)
+   end subroutine increase_reach
 
-   !> Forget which boxes changed.
+   !> Clear the list of changed boxes.
    subroutine settle(self)
       class(tree_t), intent(inout) :: self
       integer(ip) :: k
@@ -162,7 +162,7 @@ contains
       self%n_changed = 0_ip
    end subroutine settle
 
-   !> Levels from the root to the lowest leaf, both counted
+   !> Number of levels from the root to the lowest leaf, both included
    integer(ip) function depth(self)
       class(tree_t), intent(in) :: self
       integer(ip) :: box
@@ -174,7 +174,7 @@ contains
       end do
    end function depth
 
-   !> Memory held [B]
+   !> Allocated memory [B]
    pure integer(lp) function bytes(self)
       class(tree_t), intent(in) :: self
 
@@ -186,7 +186,8 @@ contains
           int(storage_size(self%cell), lp)*5_lp*size(self%reach, kind=lp))/8_lp
    end function bytes
 
-   !> Take a box down from a node that counts it already to its leaf, splitting an occupied one.
+   !> Move a box down to its leaf from a node whose count already includes the box. A leaf that contains another box is
+   !> split.
    subroutine descend(self, top, box, at, bounds)
       type(tree_t), intent(inout) :: self
       integer(ip), intent(in) :: top, box, at(2)
@@ -200,17 +201,17 @@ contains
             self%node(node)%first = 0_ip
             call find_child(self, node, within(self%node(node), cell_of(self, bounds(:, resident))), child)
             call count_in(self%node(child), self%reach(resident), self%ignored)
-            call settle_in(self, child, resident)
+            call add_to_leaf(self, child, resident)
          end if
          call find_child(self, node, at, child)
          call count_in(self%node(child), self%reach(box), self%ignored)
          node = child
       end do
-      call settle_in(self, node, box)
+      call add_to_leaf(self, node, box)
    end subroutine descend
 
-   !> Take a box out of its leaf and of all cells below an ancestor; free empty cells, merge cells left with
-   !> one box.
+   !> Remove a box from its leaf and from all cells below an ancestor. Empty cells are freed, and cells that contain a
+   !> single box are merged.
    subroutine remove_below(self, ancestor, box)
       type(tree_t), intent(inout) :: self
       integer(ip), intent(in) :: ancestor, box
@@ -234,7 +235,7 @@ contains
       if (single /= 0_ip .and. .not. self%equal_leaves) call merge_cells(self, single)
    end subroutine remove_below
 
-   !> Make a node with a single box below it a leaf.
+   !> Turn a node that contains a single box into a leaf.
    subroutine merge_cells(self, top)
       type(tree_t), intent(inout) :: self
       integer(ip), intent(in) :: top
@@ -250,11 +251,11 @@ contains
       end do
       below = self%node(node)%first
       call self%free_node(node)
-      call settle_in(self, top, below)
+      call add_to_leaf(self, top, below)
    end subroutine merge_cells
 
-   !> Put a box into a leaf that counts it already, and note that it changed.
-   subroutine settle_in(self, leaf, box)
+   !> Add a box to a leaf whose count already includes it, and add the box to the list of changed boxes.
+   subroutine add_to_leaf(self, leaf, box)
       type(tree_t), intent(inout) :: self
       integer(ip), intent(in) :: leaf, box
 
@@ -262,9 +263,10 @@ contains
       self%node(leaf)%first = box
       self%leaf(box) = leaf
       self%cell(:, box) = cell_bounds(self%node(leaf), self%ignored)
-      call mark(self, box)
-   end subroutine settle_in
+      call mark_changed(self, box)
+   end subroutine add_to_leaf
 
+   !> Remove a box from the linked list of its leaf.
    subroutine unlink(self, leaf, box)
       type(tree_t), intent(inout) :: self
       integer(ip), intent(in) :: leaf, box
@@ -281,7 +283,8 @@ contains
       self%next(other) = self%next(box)
    end subroutine unlink
 
-   subroutine mark(self, box)
+   !> Add a box to the list of changed boxes.
+   subroutine mark_changed(self, box)
       type(tree_t), intent(inout) :: self
       integer(ip), intent(in) :: box
 
@@ -289,9 +292,9 @@ contains
       self%is_changed(box) = 1_bp
       self%n_changed = self%n_changed + 1_ip
       self%changed(self%n_changed) = box
-   end subroutine mark
+   end subroutine mark_changed
 
-   !> Put a cell of twice the side above the root; a root with one box just becomes larger.
+   !> Make a new root with twice the side above the root. A root that contains one box is enlarged instead.
    subroutine grow_root(self)
       type(tree_t), intent(inout) :: self
       integer(ip) :: old, root, level, low(2), box
@@ -305,7 +308,7 @@ contains
          call set_reach(self%node(old), self%node(old)%reach, self%ignored)
          box = self%node(old)%first
          self%node(old)%first = 0_ip
-         call settle_in(self, old, box)
+         call add_to_leaf(self, old, box)
          return
       end if
       call self%new_node(0_ip, level, low, root)
@@ -316,7 +319,7 @@ contains
       self%node(old)%parent = self%root
    end subroutine grow_root
 
-   !> Child of a node at a place, made if there is none yet
+   !> Find the child of a node that contains a finest cell; it is made if it does not exist.
    subroutine find_child(self, node, at, child)
       type(tree_t), intent(inout) :: self
       integer(ip), intent(in) :: node, at(2)
@@ -331,7 +334,7 @@ contains
       self%node(node)%child(q) = child
    end subroutine find_child
 
-   !> Find the greatest reach of a node again after its box with the greatest one left.
+   !> Compute the largest reach of a node again after a box has left it.
    subroutine shrink_reach(self, node)
       type(tree_t), intent(inout) :: self
       integer(ip), intent(in) :: node
@@ -351,7 +354,7 @@ contains
       if (reach < self%node(node)%reach) call set_reach(self%node(node), reach, self%ignored)
    end subroutine shrink_reach
 
-   !> Finest cell of the centre of a box; what is not a number lies in cell 0
+   !> Finest cell that contains the centre of a box; NaN lies in cell 0
    pure function cell_of(self, box) result(at)
       type(tree_t), intent(in) :: self
       real(wp), intent(in) :: box(4)
@@ -367,7 +370,7 @@ contains
       end do
    end function cell_of
 
-   !> A reach in finest cells, enlarged so that rounding of places cannot hide a neighbour
+   !> Reach in finest cells, enlarged to allow for rounding of positions
    pure real(dp) function padded(self, reach)
       type(tree_t), intent(in) :: self
       real(dp), intent(in) :: reach

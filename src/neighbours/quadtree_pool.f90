@@ -1,4 +1,4 @@
-!> The nodes of a tree in one array: those in use, and a list of free ones that are used again.
+!> Memory pool of the nodes of a tree: one array with the nodes in use and a list of free nodes for reuse.
 module polydem_quadtree_pool
    use polydem_kinds, only: dp, ip, lp
    use polydem_quadtree_cells, only: node_t, set_reach
@@ -6,17 +6,17 @@ module polydem_quadtree_pool
    private
    public :: node_pool_t
 
-   !> Nodes, used and free
+   !> Used and free nodes
    type :: node_pool_t
-      !> All nodes; a tree names them by their place
+      !> All nodes, (node); the tree refers to a node by its index
       type(node_t), allocatable :: node(:)
-      !> Nodes in use
+      !> Number of nodes in use
       integer(ip) :: n_nodes = 0_ip
-      !> Axis along which all cells are endless (binary tree); 0: none
+      !> Axis along which all cells are unbounded (binary tree); 0: none
       integer :: ignored = 0
       !> First free node, 0: none
       integer(ip), private :: free = 0_ip
-      !> Nodes that were ever in use
+      !> Number of nodes that have ever been in use
       integer(ip), private :: n_touched = 0_ip
    contains
       procedure :: reserve
@@ -27,25 +27,25 @@ module polydem_quadtree_pool
 
 contains
 
-   !> Make room for some nodes; none is in use.
+   !> Allocate memory for nodes; none is in use.
    subroutine reserve(self, n)
       class(node_pool_t), intent(inout) :: self
-      !> Number of nodes, at least 1; more get room when they come
+      !> Number of nodes, at least 1; the pool grows if it needs more
       integer(ip), intent(in) :: n
 
       allocate (self%node(n))
    end subroutine reserve
 
-   !> Take a node that holds no box yet.
+   !> Take a node without boxes from the pool.
    subroutine new_node(self, parent, level, low, node)
       class(node_pool_t), intent(inout) :: self
-      !> Its parent, 0 for a root
+      !> Parent of the node, 0 for a root
       integer(ip), intent(in) :: parent
-      !> Its level
+      !> Level of the node
       integer(ip), intent(in) :: level
-      !> Its lower left finest cell
+      !> Finest cell at the lower left corner of the node
       integer(ip), intent(in) :: low(2)
-      !> Its place
+      !> Index of the node
       integer(ip), intent(out) :: node
       type(node_t), allocatable :: longer(:)
 
@@ -71,10 +71,10 @@ contains
       call set_reach(self%node(node), 0.0_dp, self%ignored)
    end subroutine new_node
 
-   !> Give a node back.
+   !> Return a node to the pool.
    subroutine free_node(self, node)
       class(node_pool_t), intent(inout) :: self
-      !> Its place
+      !> Index of the node
       integer(ip), intent(in) :: node
 
       self%node(node)%parent = self%free
@@ -82,7 +82,7 @@ contains
       self%n_nodes = self%n_nodes - 1_ip
    end subroutine free_node
 
-   !> Memory held [B]
+   !> Allocated memory [B]
    pure integer(lp) function pool_bytes(self)
       class(node_pool_t), intent(in) :: self
 

@@ -1,45 +1,45 @@
-!> The search of the tree: which boxes are candidates of a given one that were none before.
+!> Search of the tree for the new candidates of a box.
 module polydem_quadtree_search
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: meet, places_t
+   use polydem_candidates, only: meet, index_list_t
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_quadtree_nodes, only: tree_t
    implicit none
    private
-   public :: grown_cells_t, search
+   public :: padded_cells_t, search
 
-   !> Cells that can wait to be searched: three per level and one
+   !> Size of the stack of cells to be searched: at most three cells per level and one more are on the stack
    integer, parameter :: stack_size = 96
 
-   !> Cells of the leaves of all boxes, enlarged by the reach of each box
-   type :: grown_cells_t
-      !> Now, (4, box) [finest cells]
+   !> Padded cells: the cells of the leaves of all boxes, each enlarged by the reach of its box
+   type :: padded_cells_t
+      !> Bounds of the padded cells in this step, (4, box) [finest cells]
       real(dp), allocatable :: now(:, :)
-      !> Before the step
+      !> Bounds of the padded cells before this step, (4, box) [finest cells]
       real(dp), allocatable :: before(:, :)
-   end type grown_cells_t
+   end type padded_cells_t
 
 contains
 
    !> Find the new candidates of one box.
-   subroutine search(tree, grown, boxes, i, found, visits)
-      !> Tree
+   subroutine search(tree, padded, boxes, i, found, visits)
+      !> Tree of the boxes
       type(tree_t), intent(in) :: tree
-      !> Grown cells now and before
-      type(grown_cells_t), intent(in) :: grown
-      !> Boxes; only bodies, and which are passive, matter
+      !> Padded cells in this step and before
+      type(padded_cells_t), intent(in) :: padded
+      !> Boxes; only their bodies, and whether the bodies are passive, are used
       type(boxes_t), intent(in) :: boxes
-      !> Box whose grown cell is new
+      !> Box whose padded cell changed
       integer(ip), intent(in) :: i
-      !> Boxes of new candidates, two entries each, appended to what is there
-      type(places_t), intent(inout) :: found
-      !> Nodes looked at, on the way up and down, added to what is there
+      !> List of the boxes of new candidates; two entries are appended for each candidate
+      type(index_list_t), intent(inout) :: found
+      !> Number of visited nodes, upwards and downwards; increased by this search
       integer(lp), intent(inout) :: visits
       integer(ip) :: stack(stack_size), node, child, j
       integer :: waiting, q
       real(dp) :: window(4)
 
-      window = grown%now(:, i)
+      window = padded%now(:, i)
       waiting = 1
       stack(1) = ancestor_around(tree, i, window)
       visits = visits + int(tree%node(stack(1))%level - tree%node(tree%leaf(i))%level, lp)
@@ -49,7 +49,7 @@ contains
          visits = visits + 1_lp
          j = tree%node(node)%first
          do while (j /= 0_ip)
-            if (is_new(tree, grown, boxes, i, j)) then
+            if (is_new(tree, padded, boxes, i, j)) then
                call found%push(i)
                call found%push(j)
             end if
@@ -65,7 +65,7 @@ contains
       end do
    end subroutine search
 
-   !> Lowest cell around the leaf of a box that holds the centre of every possible candidate
+   !> Lowest ancestor of the leaf of a box that contains the centres of all possible candidates
    pure integer(ip) function ancestor_around(tree, i, window) result(node)
       type(tree_t), intent(in) :: tree
       integer(ip), intent(in) :: i
@@ -81,7 +81,8 @@ contains
             if (a == tree%ignored) cycle
             low = real(tree%node(node)%low(a), dp)
             high = low + real(shiftl(1_ip, tree%node(node)%level), dp)
-            ! Formed as the grown cells are, and strict, because grown cells that touch make candidates.
+            ! These expressions round like those of the padded cells. The inequalities are strict because padded cells
+            ! that touch are candidates.
             inside = inside .and. low + tree%greatest_reach < window(a) .and. window(a + 2) < high - tree%greatest_reach
          end do
          if (inside) exit
@@ -89,10 +90,11 @@ contains
       end do
    end function ancestor_around
 
-   !> Whether two boxes are candidates now and were none before, and this search has to say so
-   pure logical function is_new(tree, grown, boxes, i, j)
+   !> Whether two boxes have become candidates and this search reports the pair. If the leaves of both boxes changed,
+   !> only the search for the box with the lower number reports it.
+   pure logical function is_new(tree, padded, boxes, i, j)
       type(tree_t), intent(in) :: tree
-      type(grown_cells_t), intent(in) :: grown
+      type(padded_cells_t), intent(in) :: padded
       type(boxes_t), intent(in) :: boxes
       integer(ip), intent(in) :: i, j
 
@@ -100,8 +102,8 @@ contains
       if (j <= i) then
          if (j == i .or. tree%is_changed(j) /= 0_bp) return
       end if
-      if (.not. meet(grown%now(:, i), grown%now(:, j))) return
-      if (meet(grown%before(:, i), grown%before(:, j))) return
+      if (.not. meet(padded%now(:, i), padded%now(:, j))) return
+      if (meet(padded%before(:, i), padded%before(:, j))) return
       is_new = boxes%body(i) /= boxes%body(j) .and. .not. (boxes%passive(i) .and. boxes%passive(j))
    end function is_new
 

@@ -1,14 +1,14 @@
-!> The levels of a hierarchical grid: how many, and which boxes belong to each.
+!> Levels of a hierarchical grid: their number, and the boxes of each level.
 !>
-!> Krijgsman, Ogarko & Luding (2014) choose cell sizes that make the expected work least. A box of side s that
-!> looks in a grid of cells of side h sees (s/h + 2)^2 cells and tests as many boxes as these hold; in its own
-!> grid half of that falls to it. A level holds all boxes with sides up to h that are too large for the level
-!> below, and smaller boxes look in the grids of larger ones. They let the sizes of the cells vary continuously
-!> and descend to a minimum for each number of levels. Here sizes fall into classes. The work is then a sum over
-!> levels of terms that depend on the first and last class of a level only, so the best levels, and their
-!> number with them, are found exactly as a shortest path.
+!> Krijgsman, Ogarko & Luding (2014) choose the cell sizes that minimise the expected work. The search for a box of side
+!> s in a grid of cells of side h visits (s/h + 2)^2 cells and tests all boxes in them; in its own grid the work is half
+!> of that. A level contains all boxes with sides up to h that are too large for the level below. Smaller boxes are
+!> searched in the grids of larger boxes. In that paper the cell sizes are continuous, and a descent method finds the
+!> minimum for each number of levels. Here sizes are divided into classes. The work is then a sum over levels, and each
+!> term depends only on the first and last class of its level. The best levels and their number are therefore the exact
+!> solution of a shortest-path problem.
 !>
-!> If all boxes are nearly alike, that is one level: linked cells.
+!> If all boxes have nearly the same size, the solution is one level, as with linked cells.
 module polydem_size_levels
    use polydem_boxes, only: boxes_t
    use polydem_kinds, only: dp, ip, wp
@@ -16,25 +16,27 @@ module polydem_size_levels
    private
    public :: choose_levels, typical_side
 
-   !> Size classes per octave, and octaves below the largest box that are told apart
+   !> Number of size classes per octave, and number of octaves below the largest box; smaller boxes are in the lowest
+   !> class
    integer, parameter :: classes_per_octave = 4, octaves = 24
-   !> Greatest number of classes
+   !> Largest number of classes
    integer, parameter :: most_classes = classes_per_octave*octaves + 1
-   !> Work of looking at a cell in units of that of a test. MercuryDPM, which has their recipe, takes 0.2 for particles
-   !> in linked lists. Here a test is a few plain comparisons, while what a cell holds is hard to predict (measured: 6)
+   !> Work of a visit of a cell in units of the work of a test. MercuryDPM, which implements the method of the paper,
+   !> uses 0.2 for particles in linked lists. Here a test is only a few comparisons, and the number of boxes in a cell
+   !> is hard to predict (measured: 6)
    real(dp), parameter :: visit_work = 6.0_dp
-   !> Boxes lie no thinner than if their squares covered this share of the area
+   !> Smallest assumed fraction of the area that squares with the sides of the boxes cover
    real(dp), parameter :: least_cover = 0.25_dp
 
-   !> Numbers of boxes by size
+   !> Size distribution of the boxes
    type :: spectrum_t
       !> Number of classes
       integer :: n = 0
-      !> Boxes of each class
+      !> Number of boxes of each class, (class)
       real(dp) :: boxes(most_classes) = 0.0_dp
-      !> Greatest side of each class [m]
+      !> Largest side of each class, (class) [m]
       real(dp) :: side(most_classes) = 0.0_dp
-      !> Area over which the boxes are spread [m2]
+      !> Area in which the boxes lie [m2]
       real(dp) :: area = 0.0_dp
    end type spectrum_t
 
@@ -42,15 +44,15 @@ contains
 
    !> Choose the levels of the free boxes.
    pure subroutine choose_levels(boxes, margin, n_levels, level, largest)
-      !> Boxes as they are now
+      !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
-      !> By how much the sides of the boxes to be searched exceed those of the boxes [m]
+      !> Excess of the sides of the padded boxes over those of the boxes [m]
       real(wp), intent(in) :: margin
       !> Number of levels
       integer, intent(out) :: n_levels
-      !> Level of each box, from 1 for the smallest
+      !> Level of each box, (box); 1 is the level of the smallest boxes
       integer(ip), allocatable, intent(out) :: level(:)
-      !> Greatest side of a box of each level that was reckoned with, margin included [m]
+      !> Largest side assumed for a box of each level, margin included, (level) [m]
       real(dp), allocatable, intent(out) :: largest(:)
       type(spectrum_t) :: spectrum
       integer :: class(boxes%n), level_of_class(most_classes)
@@ -68,7 +70,7 @@ contains
       end do
    end subroutine choose_levels
 
-   !> Greatest side that a box is known to take [m]
+   !> Largest side of a box, at present or at any angle [m]
    pure real(dp) function side_of(boxes, i)
       type(boxes_t), intent(in) :: boxes
       integer(ip), intent(in) :: i
@@ -77,9 +79,9 @@ contains
                          boxes%bounds(4, i) - boxes%bounds(2, i)), dp)
    end function side_of
 
-   !> Geometric mean of the sides of the free boxes that have any [m]
+   !> Geometric mean of the sides of the free boxes with positive sides [m]
    pure real(wp) function typical_side(boxes)
-      !> Boxes
+      !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
       real(dp) :: logarithms
       integer(ip) :: i, n
@@ -95,7 +97,7 @@ contains
       if (n > 0_ip) typical_side = real(exp(logarithms/real(n, dp)), wp)
    end function typical_side
 
-   !> Count the free boxes of each size class; fixed ones are put into class 1 but not counted.
+   !> Count the free boxes of each size class. Fixed boxes get class 1 but are not counted.
    pure subroutine sort_by_size(boxes, margin, spectrum, class)
       type(boxes_t), intent(in) :: boxes
       real(wp), intent(in) :: margin
@@ -134,12 +136,12 @@ contains
       end do
    end subroutine sort_by_size
 
-   !> Join classes to levels so that the expected work is least.
+   !> Combine classes into levels with the least expected work.
    pure subroutine shortest_path(spectrum, n_levels, level_of_class)
       type(spectrum_t), intent(in) :: spectrum
       integer, intent(out) :: n_levels
       integer, intent(out) :: level_of_class(:)
-      !> Least work of the classes up to each, and the first class of its last level
+      ! Least work of the classes 1 to b, and the first class of the last of their levels
       real(dp) :: work(0:most_classes), this
       integer :: first(most_classes), a, b
 
@@ -169,7 +171,7 @@ contains
       end do
    end subroutine shortest_path
 
-   !> Expected work of looking in the grid of a level for all boxes that do so
+   !> Expected work of all searches in the grid of a level
    pure real(dp) function work_of_level(spectrum, a, b) result(work)
       type(spectrum_t), intent(in) :: spectrum
       !> First and last class of the level

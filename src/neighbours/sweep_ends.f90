@@ -1,45 +1,47 @@
-!> Ends of boxes in order along one axis, and what their exchanges tell: the common part of all sweeps.
+!> Sorted ends of boxes along one axis, and the changes of pairs that follow from exchanges of ends. All sweeps use this
+!> module.
 !>
-!> The lower and higher ends of all boxes stand in a list ordered by (value, lower before higher, box), so
-!> that touching boxes count as overlapping. A step gives the ends their new values and sorts by exchanging
-!> neighbours, which is fast because the list is nearly sorted. Every change of a pair shows as an exchange
-!> of a lower end with a higher one:
+!> The lower and higher ends of all boxes form a list in the order (value, lower before higher, box). With this order,
+!> touching boxes count as overlapping. A step sets the new values of the ends and sorts the list by exchanges of
+!> neighbours, which is fast because the list is nearly sorted. Every change of a pair causes an exchange of a lower end
+!> with a higher end:
 !>
-!>     a lower end goes below a higher end     the two boxes may begin to overlap
-!>     a higher end goes below a lower end     they may cease to overlap
+!>     a lower end moves below a higher end     the two boxes may begin to overlap
+!>     a higher end moves below a lower end     they may cease to overlap
 !>
-!> and the bounds of the step and of the step before decide. A change that shows on both axes is reported by
-!> x only: y reports a beginning only if the boxes overlapped in x before, an end only if they still do.
+!> The bounds of this step and of the previous step decide. If a change causes exchanges on both axes, only x reports
+!> it: y reports the start of an overlap only if the boxes overlapped in x before, and the end only if they still
+!> overlap in x.
 !>
-!> Two ends are exchanged if and only if their order has changed, and then once, whatever the order in which
-!> the list is sorted. So any part of it may be sorted at any time: the reports together are the same.
+!> Two ends are exchanged once if their order has changed, and never otherwise, for any order of the exchanges. Parts of
+!> the list may therefore be sorted in any order; the sum of their reports is the same.
 module polydem_sweep_ends
    use polydem_boxes, only: boxes_t
+   use polydem_finder_statistics, only: count_idle_swaps, count_swaps, count_tests, finder_statistics_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_pair_changes, only: pair_changes_t
    use polydem_sort_reals, only: sort_reals
-   use polydem_work, only: count_idle_swaps, count_swaps, count_tests, work_t
    implicit none
    private
-   public :: ends_t, report_t, place_ends, refresh_ends, sort_ends, hand_over, bytes_of
+   public :: ends_t, report_t, place_ends, refresh_ends, sort_ends, add_report, bytes_of
 
    !> Ends of all boxes along one axis
    type :: ends_t
-      !> Value of each end [m], ascending
+      !> Value of each end in ascending order, (end) [m]
       real(wp), allocatable :: value(:)
-      !> Twice the box of each end, plus one if it is the higher end
+      !> Code of each end, (end): twice the number of the box, plus one for a higher end
       integer(ip), allocatable :: code(:)
    end type ends_t
 
-   !> What the sorting of some ends reports in a step
+   !> Changes and counts of the sort of a part of the ends in a step
    type :: report_t
-      !> Changes that showed
+      !> Changes of pairs
       type(pair_changes_t) :: changes
-      !> Exchanges
+      !> Number of exchanges
       integer(lp) :: swaps = 0_lp
-      !> Exchanges of a lower with a higher end, each a comparison of two boxes
+      !> Number of exchanges of a lower end with a higher end; each is a comparison of two boxes
       integer(lp) :: tests = 0_lp
-      !> Exchanges of ends of boxes that are apart on the other axis, before and after the step
+      !> Number of exchanges of ends of boxes that do not overlap on the other axis, neither before nor after the step
       integer(lp) :: idle_swaps = 0_lp
    contains
       procedure :: clear
@@ -47,15 +49,15 @@ module polydem_sweep_ends
 
 contains
 
-   !> Before the first step no box overlaps another: the two ends of each stand side by side.
+   !> Make the lists before the first step. No boxes overlap, so the two ends of each box are neighbours.
    subroutine place_ends(boxes, centres_first, ends, before)
       !> Boxes of the first step
       type(boxes_t), intent(in) :: boxes
-      !> Whether the boxes stand in the order of their centres (Krengel et al. 2026), or as they come
+      !> Whether the boxes are in the order of their centres (Krengel et al. 2026), not in the given order
       logical, intent(in) :: centres_first
-      !> Ends in x and in y; their values come with the step
+      !> Ends in x and in y; `refresh_ends` sets their values
       type(ends_t), intent(inout) :: ends(2)
-      !> Bounds of the step before: empty boxes, (4, box) [m]
+      !> Bounds of the previous step: empty boxes, (4, box) [m]
       real(wp), allocatable, intent(out) :: before(:, :)
       integer(ip), allocatable :: ranked(:)
       real(wp), allocatable :: centre(:)
@@ -79,22 +81,22 @@ contains
       end do
    end subroutine place_ends
 
-   !> Give the ends in some places their values of this step.
+   !> Set the values of a range of ends to those of this step.
    pure subroutine refresh_ends(a, low, high, boxes, ends)
       !> 1 for x, 2 for y
       integer, intent(in) :: a
-      !> First and last place
+      !> First and last index of the range
       integer(ip), intent(in) :: low, high
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
-      !> Ends whose boxes are known
+      !> Placed ends
       type(ends_t), intent(inout) :: ends
 
       call gather(a, low, high, boxes%n, boxes%bounds, 2_ip*boxes%n, ends%value, ends%code)
    end subroutine refresh_ends
 
-   !> As `refresh_ends`, with the bounds seen as the lower and the higher corner of each box: the code of an end is its
-   !> column, which saves a seventh of the whole step.
+   !> Kernel of `refresh_ends`. The bounds are an array of the lower and the higher corner of each box; the code of an
+   !> end is the column of its corner. This saves a seventh of the time of a step.
    pure subroutine gather(a, low, high, n_boxes, corner, n_ends, value, code)
       integer, intent(in) :: a
       integer(ip), intent(in) :: low, high
@@ -110,26 +112,26 @@ contains
       end do
    end subroutine gather
 
-   !> Sort the ends in places low to high by exchanges of neighbours. Those before `first` are sorted already.
+   !> Sort the ends low to high by exchanges of neighbours. The ends before `first` must be sorted already.
    subroutine sort_ends(a, low, first, high, two_runs, thorough, boxes, before, ends, report, moved)
       !> 1 for x, 2 for y
       integer, intent(in) :: a
-      !> Lowest place, first place whose end may have to go down, highest place
+      !> First index of the range, index of the first end that may move down, last index of the range
       integer(ip), intent(in) :: low, first, high
-      !> Whether those from `first` on are sorted too: then the first that need not go down is the last to be looked at,
-      !> and runs that hardly overlap cost hardly anything
+      !> Whether the ends from `first` on are sorted too. The sort then stops at the first end that does not move down,
+      !> and the merge of two runs that hardly overlap is cheap
       logical, intent(in) :: two_runs
       !> Whether to count idle exchanges
       logical, intent(in) :: thorough
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
-      !> Bounds of the step before, (4, box) [m]
+      !> Bounds of the previous step, (4, box) [m]
       real(wp), intent(in) :: before(:, :)
-      !> Refreshed ends
+      !> Ends with the values of this step
       type(ends_t), intent(inout) :: ends
-      !> Changes and counts are added to it
+      !> Report to which changes and counts are added
       type(report_t), intent(inout) :: report
-      !> First and last place that have got another end; huge and 0 if none has
+      !> First and last index whose end was replaced; huge and 0 if there is none
       integer(ip), intent(out), optional :: moved(2)
       integer(ip) :: places(2)
 
@@ -138,7 +140,7 @@ contains
       if (present(moved)) moved = places
    end subroutine sort_ends
 
-   !> As `sort_ends`, with all arrays in sight. What is counted stays in variables of the thread until the end.
+   !> Kernel of `sort_ends` on arrays of explicit shape. Counts are local variables of the thread until the end.
    subroutine insert(a, low, first, high, two_runs, thorough, boxes, n_boxes, now, before, n_ends, value, code, &
                      report, moved)
       integer, intent(in) :: a
@@ -153,7 +155,7 @@ contains
       type(report_t), intent(inout) :: report
       integer(ip), intent(out) :: moved(2)
       real(wp) :: new
-      integer(ip) :: k, place, mover, other, lowest, highest
+      integer(ip) :: k, place, buffer, other, lowest, highest
       integer(lp) :: swaps, tests
 
       swaps = 0_lp
@@ -163,20 +165,20 @@ contains
       k = first - 1_ip
       do
          k = k + 1_ip
-         if (.not. two_runs) k = next_suspect(k, high, n_ends, value)
+         if (.not. two_runs) k = next_unsorted(k, high, n_ends, value)
          if (k > high) exit
          new = value(k)
-         mover = code(k)
+         buffer = code(k)
          place = k
          do while (place > low)
             if (value(place - 1_ip) < new) exit
             other = code(place - 1_ip)
             if (.not. (value(place - 1_ip) > new)) then
-               if (comes_before(other, mover)) exit
+               if (comes_before(other, buffer)) exit
             end if
-            if (iand(ieor(mover, other), 1_ip) == 1_ip) then
+            if (iand(ieor(buffer, other), 1_ip) == 1_ip) then
                tests = tests + 1_lp
-               call judge(a, mover, other, boxes, n_boxes, now, before, report%changes)
+               call record_change(a, buffer, other, boxes, n_boxes, now, before, report%changes)
             end if
             value(place) = value(place - 1_ip)
             code(place) = other
@@ -187,27 +189,27 @@ contains
             cycle
          end if
          value(place) = new
-         code(place) = mover
+         code(place) = buffer
          swaps = swaps + int(k - place, lp)
          lowest = min(lowest, place)
          highest = k
          if (thorough) report%idle_swaps = report%idle_swaps + &
-            idle(3 - a, mover, code(place + 1_ip:k), n_boxes, now, before)
+            idle(3 - a, buffer, code(place + 1_ip:k), n_boxes, now, before)
       end do
       report%swaps = report%swaps + swaps
       report%tests = report%tests + tests
       moved = [lowest, highest]
    end subroutine insert
 
-   !> First place from k on whose end is not greater than the one before it; high + 1 if there is none.
-   pure integer(ip) function next_suspect(k, high, n_ends, value)
+   !> First index from k on whose end is not larger than the end before it; high + 1 if there is none
+   pure integer(ip) function next_unsorted(k, high, n_ends, value)
       integer(ip), intent(in) :: k, high, n_ends
       real(wp), intent(in) :: value(n_ends)
 
-      do next_suspect = k, high
-         if (.not. (value(next_suspect - 1_ip) < value(next_suspect))) return
+      do next_unsorted = k, high
+         if (.not. (value(next_unsorted - 1_ip) < value(next_unsorted))) return
       end do
-   end function next_suspect
+   end function next_unsorted
 
    !> Order of ends of equal value: lower ends first, then by box
    pure logical function comes_before(one, other)
@@ -217,12 +219,12 @@ contains
          (iand(one, 1_ip) == iand(other, 1_ip) .and. one < other)
    end function comes_before
 
-   !> Record the change, if any, that shows as one end going below another of the other sort.
-   subroutine judge(a, mover, other, boxes, n_boxes, now, before, changes)
+   !> Record the change of a pair, if any, that follows if a lower end moves below a higher end or the reverse.
+   subroutine record_change(a, buffer, other, boxes, n_boxes, now, before, changes)
       !> 1 for x, 2 for y
       integer, intent(in) :: a
-      !> End that goes down, end that it passes
-      integer(ip), intent(in) :: mover, other
+      !> Code of the end that moves down, and code of the end that it passes
+      integer(ip), intent(in) :: buffer, other
       type(boxes_t), intent(in) :: boxes
       integer(ip), intent(in) :: n_boxes
       real(wp), intent(in) :: now(4, n_boxes), before(4, n_boxes)
@@ -230,9 +232,9 @@ contains
       integer(ip) :: i, j
       logical :: begins, changed
 
-      i = shiftr(mover, 1)
+      i = shiftr(buffer, 1)
       j = shiftr(other, 1)
-      begins = iand(mover, 1_ip) == 0_ip
+      begins = iand(buffer, 1_ip) == 0_ip
       if (begins) then
          changed = meet(now(:, i), now(:, j), 2)
          if (changed) changed = meet(now(:, i), now(:, j), 1)
@@ -245,7 +247,7 @@ contains
       if (.not. changed) return
       if (boxes%body(i) == boxes%body(j) .or. (boxes%passive(i) .and. boxes%passive(j))) return
       call changes%record(boxes%body(i), boxes%body(j), merge(1_ip, -1_ip, begins))
-   end subroutine judge
+   end subroutine record_change
 
    !> Whether two boxes overlap on an axis
    pure logical function meet(one, other, a)
@@ -255,16 +257,16 @@ contains
       meet = one(a) <= other(a + 2) .and. other(a) <= one(a + 2)
    end function meet
 
-   !> How many of the ends that one end has passed belong to boxes that are apart from its box on an axis, in this
-   !> step and in the one before
-   pure integer(lp) function idle(axis, mover, passed, n_boxes, now, before)
+   !> Number of idle exchanges of an end with the ends that it has passed: their boxes do not overlap on an axis,
+   !> neither in this step nor in the previous step
+   pure integer(lp) function idle(axis, buffer, passed, n_boxes, now, before)
       integer, intent(in) :: axis
-      integer(ip), intent(in) :: mover, passed(:), n_boxes
+      integer(ip), intent(in) :: buffer, passed(:), n_boxes
       real(wp), intent(in) :: now(4, n_boxes), before(4, n_boxes)
       integer(ip) :: i, j, k
 
       idle = 0_lp
-      i = shiftr(mover, 1)
+      i = shiftr(buffer, 1)
       do k = 1_ip, size(passed, kind=ip)
          j = shiftr(passed(k), 1)
          if (meet(now(:, i), now(:, j), axis) .or. meet(before(:, i), before(:, j), axis)) cycle
@@ -272,7 +274,7 @@ contains
       end do
    end function idle
 
-   !> Forget what was reported, keeping the memory.
+   !> Clear the report without freeing memory.
    pure subroutine clear(self)
       class(report_t), intent(inout) :: self
 
@@ -282,26 +284,26 @@ contains
       self%idle_swaps = 0_lp
    end subroutine clear
 
-   !> Pass on the changes and counts of a step.
-   subroutine hand_over(report, changes, work)
-      !> What was reported
+   !> Add the changes and counts of a report to those of the step.
+   subroutine add_report(report, changes, work)
+      !> Report of a part of the ends
       type(report_t), intent(in) :: report
-      !> Changes of the step so far; those reported are appended
+      !> Changes of the step; those of the report are appended
       type(pair_changes_t), intent(inout) :: changes
-      !> Work of the finder so far; the counts are added
-      type(work_t), intent(inout) :: work
+      !> Statistics of the finder; the counts of the report are added
+      type(finder_statistics_t), intent(inout) :: work
 
       call changes%append(report%changes)
       call work%add(count_swaps, report%swaps)
       call work%add(count_tests, report%tests)
       call work%add(count_idle_swaps, report%idle_swaps)
-   end subroutine hand_over
+   end subroutine add_report
 
-   !> Memory of ends and bounds [B]
+   !> Allocated memory of ends and bounds [B]
    pure integer(lp) function bytes_of(ends, before)
       !> Placed ends in x and in y
       type(ends_t), intent(in) :: ends(2)
-      !> Bounds of the step before [m]
+      !> Bounds of the previous step, (4, box) [m]
       real(wp), intent(in) :: before(:, :)
       integer :: a
 

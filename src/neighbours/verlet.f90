@@ -1,20 +1,21 @@
-!> Verlet list (Verlet 1967): pairs of boxes that overlap if each is grown by half a skin on every side.
+!> Verlet list (Verlet 1967): pairs of boxes whose padded boxes overlap. The padding on every side is half the skin.
 !>
-!> A step first asks whether every box still lies inside the grown box of the last rebuild. While all do, boxes that are
-!> not in the list cannot overlap, whatever their displacement, rotation or change of shape, and with any rounding; the
-!> list is compared in one run over plain arrays, which records where the answer changed. If one box does not, a new
-!> list is made by a search in cells (`polydem_cell_grids`, levels as in the hierarchical grid), in ascending
-!> order, and what is known of its pairs is carried over from the old one.
+!> Each step first tests whether every box lies inside its padded box of the last rebuild. As long as all boxes do,
+!> boxes that are not in the list cannot overlap, for any displacement, rotation, change of shape and rounding. The step
+!> then compares the pairs of the list in one loop over plain arrays and records the changes. If a box does not lie
+!> inside its padded box, a search in cells makes a new list in ascending order (`polydem_cell_grids`, levels as in the
+!> hierarchical grid), and the states of its pairs are copied from the old list.
 !>
-!> The skin s. A thick one makes many pairs, a thin one does not last. Let a list of n boxes live for m steps and
-!> hold k pairs that do not overlap. To first order k grows as s, and m too, since boxes move at some speed. Tests in
-!> vain cost k per step, making lists costs R n/m per step, R tests per box being what a rebuild is worth. Their
-!> sum is least where both are equal, at
+!> The skin s has an optimum: a thick skin gives many pairs, a thin skin frequent rebuilds. Let a list of n boxes last
+!> for m steps and contain k pairs that do not overlap. To first order k and m are proportional to s, because boxes move
+!> with a given speed. Unnecessary tests cost k per step. Rebuilds cost R n/m per step, if a rebuild costs as much as R
+!> tests per box. The sum is least if both costs are equal, at
 !>
 !>     s' = s sqrt(R n/(k m)).
 !>
-!> So every rebuild sets the skin, within a factor of two, from exact counts of the life of the list before; no clock is
-!> asked, and runs repeat. A list that outlives its worth (k m > 4 R n: at rest, say) is made anew with the half.
+!> Every rebuild changes the skin to this value, but at most by a factor of two. It uses exact counts of the life of the
+!> last list and no clock, so runs are reproducible. A list that lasts too long (k m > 4 R n, for example at rest) is
+!> rebuilt with half the skin.
 module polydem_verlet
    use omp_lib, only: omp_get_max_threads
    use polydem_box_pairs, only: box_pairs_t
@@ -22,11 +23,11 @@ module polydem_verlet
    use polydem_candidates, only: candidates_t
    use polydem_cell_grids, only: cell_grids_t, part
    use polydem_finder, only: finder_t
-   use polydem_kinds, only: bp, dp, ip, lp, wp, worth_threads
+   use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_nodes, count_rebuilds, &
+      count_searches, count_tests, count_visits, phase_filter, phase_search, phase_structure
+   use polydem_kinds, only: bp, dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
    use polydem_size_levels, only: choose_levels, typical_side
-   use polydem_work, only: count_bytes, count_candidates, count_depth, count_nodes, count_rebuilds, count_searches, &
-      count_tests, count_visits, phase_filter, phase_search, phase_structure
    implicit none
    private
    public :: verlet_t
@@ -34,43 +35,44 @@ module polydem_verlet
    !> Cost of a rebuild per box in units of the cost of comparing a candidate (R above; measured in drums: 30 with
    !> 2522 boxes, 58 with 12651)
    real(dp), parameter :: rebuild_cost = 30.0_dp
-   !> Automatic skin at the start and its bounds in units of the typical side of a box
+   !> Initial value, lower and upper bound of the automatic skin in units of the typical side of a box
    real(wp), parameter :: first_skin = 0.125_wp, least_skin = 2.0_wp**(-10), greatest_skin = 4.0_wp
-   !> Boxes that are looked at before asking whether one of them left its grown box
+   !> Number of boxes in a block; after each block there is a test whether a box has left its padded box
    integer(ip), parameter :: block_size = 256_ip
 
-   !> What one thread finds in its part of the lists
+   !> Results of one thread for its part of the lists
    type :: worker_t
-      !> Changes
+      !> Changes of pairs
       type(pair_changes_t) :: changes
-      !> Whether all boxes lie inside their grown boxes
+      !> Whether all boxes lie inside their padded boxes
       logical :: inside = .true.
    end type worker_t
 
-   !> Finder that keeps a list of possible pairs until a box moved too far
+   !> Finder that stores a list of possible pairs until a box has moved too far
    type, extends(finder_t) :: verlet_t
-      !> Sum of what two boxes may move towards each other before the list must be made anew [m]; 0: automatic
+      !> Approach of two boxes after which the list must be rebuilt [m]; 0: automatic
       real(wp) :: skin = 0.0_wp
-      !> Skin in force [m]
+      !> Present skin [m]
       real(wp), private :: thickness = 0.0_wp
       !> Typical side of a box [m]
       real(wp), private :: side = 0.0_wp
-      !> Steps that the list served
+      !> Number of steps since the last rebuild
       integer(lp), private :: age = 0_lp
-      !> Candidates that did not overlap when the list was made
+      !> Number of candidates that did not overlap at the last rebuild
       integer(lp), private :: surplus = 0_lp
-      !> Grown boxes, (4, box) [m]
-      real(wp), allocatable, private :: grown(:, :)
-      !> Candidates, the lower box first, ascending
+      !> Padded boxes of the last rebuild, (4, box) [m]
+      real(wp), allocatable, private :: padded(:, :)
+      !> Candidates in ascending order, lower box first
       type(candidates_t), private :: candidates
-      !> The same in rows, and the list before; which is which alternates
+      !> Present and previous list of candidates in rows, in alternating order
       type(box_pairs_t), private :: list(2)
-      !> Place of the present list in `list`
+      !> Index of the present list in `list`
       integer, private :: now = 1
-      !> Whether the candidates of the list before overlapped
+      !> 1 if a candidate of the previous list overlapped, else 0, (candidate)
       integer(bp), allocatable, private :: overlap_before(:)
-      !> For rebuilds
+      !> Grids for the search of a rebuild
       type(cell_grids_t), private :: grids
+      !> Results of the threads, (thread)
       type(worker_t), allocatable, private :: worker(:)
    contains
       procedure :: find
@@ -79,7 +81,7 @@ module polydem_verlet
 
 contains
 
-   !> Make a new list if need be, then compare all candidates.
+   !> Rebuild the list if necessary, then compare all candidates.
    subroutine find(self, boxes, changes)
       class(verlet_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -88,9 +90,9 @@ contains
       logical :: keep
 
       call prepare_workers(self)
-      if (allocated(self%grown)) then
+      if (allocated(self%padded)) then
          self%age = self%age + 1_lp
-         keep = all_inside(self, boxes) .and. .not. outlived(self, boxes%n)
+         keep = all_inside(self, boxes) .and. .not. is_too_thick(self, boxes%n)
          if (.not. keep .and. .not. self%skin > 0.0_wp) call adapt_skin(self, boxes%n)
       else
          call start(self, boxes)
@@ -107,6 +109,7 @@ contains
       call self%work%lap(phase_filter)
    end subroutine find
 
+   !> Make one worker per thread and clear the workers.
    subroutine prepare_workers(self)
       type(verlet_t), intent(inout) :: self
       integer :: w
@@ -120,7 +123,7 @@ contains
       end do
    end subroutine prepare_workers
 
-   !> Begin with an empty list.
+   !> Choose skin and grids, and make an empty list.
    subroutine start(self, boxes)
       type(verlet_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -135,30 +138,30 @@ contains
       call self%grids%set_levels(n_levels, level, boxes%fixed(1:boxes%n))
       call self%list(1)%start(boxes%n)
       call self%list(2)%start(boxes%n)
-      allocate (self%grown(4, boxes%n), self%candidates%box(2, 0), self%candidates%overlap(0), self%overlap_before(0))
+      allocate (self%padded(4, boxes%n), self%candidates%box(2, 0), self%candidates%overlap(0), self%overlap_before(0))
    end subroutine start
 
-   !> Whether every box lies inside its grown box
+   !> Whether every box lies inside its padded box
    logical function all_inside(self, boxes)
       type(verlet_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       integer(ip) :: low, high
       integer :: w
 
-      !$omp parallel do if (boxes%n > worth_threads) schedule(static, 1) default(none) &
+      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, size(self%worker)
          call part(1_ip, boxes%n, size(self%worker), w, low, high)
-         self%worker(w)%inside = part_inside(boxes%n, boxes%bounds, self%grown, low, high)
+         self%worker(w)%inside = part_inside(boxes%n, boxes%bounds, self%padded, low, high)
       end do
       !$omp end parallel do
       all_inside = all(self%worker%inside)
    end function all_inside
 
-   !> The same for boxes low..high, block by block without branches
-   pure logical function part_inside(n, bounds, grown, low, high) result(inside)
+   !> Whether the boxes low..high lie inside their padded boxes; the loop over a block has no branches
+   pure logical function part_inside(n, bounds, padded, low, high) result(inside)
       integer(ip), intent(in) :: n, low, high
-      real(wp), intent(in) :: bounds(4, n), grown(4, n)
+      real(wp), intent(in) :: bounds(4, n), padded(4, n)
       real(wp) :: least(4)
       integer(ip) :: from, i
 
@@ -166,24 +169,24 @@ contains
       do from = low, high, block_size
          least = 0.0_wp
          do i = from, min(from + block_size - 1_ip, high)
-            least(1:2) = min(least(1:2), bounds(1:2, i) - grown(1:2, i))
-            least(3:4) = min(least(3:4), grown(3:4, i) - bounds(3:4, i))
+            least(1:2) = min(least(1:2), bounds(1:2, i) - padded(1:2, i))
+            least(3:4) = min(least(3:4), padded(3:4, i) - bounds(3:4, i))
          end do
          inside = all(least >= 0.0_wp)
          if (.not. inside) return
       end do
    end function part_inside
 
-   !> Whether an automatic skin has proved much too thick
-   pure logical function outlived(self, n)
+   !> Whether an automatic skin is much too thick
+   pure logical function is_too_thick(self, n)
       type(verlet_t), intent(in) :: self
       integer(ip), intent(in) :: n
 
-      outlived = real(self%surplus, dp)*real(self%age, dp) > 4.0_dp*rebuild_cost*real(n, dp) .and. &
+      is_too_thick = real(self%surplus, dp)*real(self%age, dp) > 4.0_dp*rebuild_cost*real(n, dp) .and. &
          .not. self%skin > 0.0_wp .and. self%thickness > least_skin*self%side
-   end function outlived
+   end function is_too_thick
 
-   !> Set the skin from the life of the list.
+   !> Set the skin from the counts of the last list.
    pure subroutine adapt_skin(self, n)
       type(verlet_t), intent(inout) :: self
       integer(ip), intent(in) :: n
@@ -194,7 +197,7 @@ contains
       self%thickness = min(max(self%thickness, least_skin*self%side), greatest_skin*self%side)
    end subroutine adapt_skin
 
-   !> Make a new list of candidates.
+   !> Rebuild the list of candidates.
    subroutine rebuild(self, boxes)
       type(verlet_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -204,9 +207,9 @@ contains
       integer :: w
 
       self%age = 0_lp
-      self%grown(1:2, :) = boxes%bounds(1:2, 1:boxes%n) - 0.5_wp*self%thickness
-      self%grown(3:4, :) = boxes%bounds(3:4, 1:boxes%n) + 0.5_wp*self%thickness
-      call self%grids%build(boxes%n, self%grown)
+      self%padded(1:2, :) = boxes%bounds(1:2, 1:boxes%n) - 0.5_wp*self%thickness
+      self%padded(3:4, :) = boxes%bounds(3:4, 1:boxes%n) + 0.5_wp*self%thickness
+      call self%grids%build(boxes%n, self%padded)
       call self%work%add(count_rebuilds, 1_lp)
       call self%work%lap(phase_structure)
       tests = self%grids%total%tests
@@ -221,7 +224,7 @@ contains
       call move_alloc(spare, self%candidates%overlap)
       self%candidates%n = self%list(self%now)%n()
       call reserve(self%candidates)
-      !$omp parallel do if (boxes%n > worth_threads) schedule(static, 1) default(none) &
+      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, size(self%worker)
          call part(1_ip, boxes%n, size(self%worker), w, low, high)
@@ -233,19 +236,19 @@ contains
       call self%work%lap(phase_search)
    end subroutine rebuild
 
-   !> Fill some rows of the candidates with what is known of them: those of the list before overlapped or not, new ones
-   !> did not. Those that overlapped and are no candidates any more have ceased to.
+   !> Fill a range of rows of the candidates. The state of a candidate is copied from the previous list; new candidates
+   !> did not overlap. Pairs that overlapped and are no longer candidates are recorded as separated.
    pure subroutine carry_over(before, overlap_before, now, low, high, body, box, overlap, changes)
-      !> The list before, and whether its candidates overlapped
+      !> Previous list, and 1 where its candidates overlapped
       type(box_pairs_t), intent(in) :: before
       integer(bp), intent(in) :: overlap_before(:)
-      !> The new list
+      !> New list
       type(box_pairs_t), intent(in) :: now
       !> First and last row
       integer(ip), intent(in) :: low, high
-      !> Body of each box
+      !> Body of each box, (box)
       integer(ip), intent(in) :: body(:)
-      !> Candidates to fill, (2, candidate), and whether they overlapped
+      !> Candidates to fill, (2, candidate), and 1 where they overlapped
       integer(ip), intent(inout) :: box(:, :)
       integer(bp), intent(inout) :: overlap(:)
       type(pair_changes_t), intent(inout) :: changes
@@ -280,7 +283,7 @@ contains
       integer(ip) :: low, high
       integer :: w
 
-      !$omp parallel do if (self%candidates%n > worth_threads) schedule(static, 1) default(none) &
+      !$omp parallel do if (self%candidates%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, size(self%worker)
          call part(1_ip, self%candidates%n, size(self%worker), w, low, high)
@@ -290,7 +293,7 @@ contains
       call self%work%add(count_tests, int(self%candidates%n, lp))
    end subroutine compare_candidates
 
-   !> Make room for the candidates; their old values are not needed.
+   !> Allocate memory for the candidates; their old values are lost.
    pure subroutine reserve(candidates)
       type(candidates_t), intent(inout) :: candidates
       integer(ip) :: n
@@ -305,18 +308,18 @@ contains
       allocate (candidates%box(2, n))
    end subroutine reserve
 
-   !> Candidates, cells, grids and memory.
+   !> Set the counters: candidates, cells, grids, and memory [B].
    subroutine survey(self)
       class(verlet_t), intent(inout) :: self
 
-      if (.not. allocated(self%grown)) return
+      if (.not. allocated(self%padded)) return
       self%work%value(count_candidates) = int(self%candidates%n, lp)
       self%work%value(count_nodes) = int(self%grids%n_cells, lp)
       self%work%value(count_depth) = int(self%grids%n_levels, lp)
       self%work%value(count_bytes) = self%list(1)%bytes() + self%list(2)%bytes() + self%grids%bytes() + &
          int(storage_size(self%candidates%box)/8, lp)*size(self%candidates%box, kind=lp) + &
          int(storage_size(self%overlap_before)/8, lp)*(size(self%candidates%overlap, kind=lp) + &
-         size(self%overlap_before, kind=lp)) + int(storage_size(self%grown)/8, lp)*size(self%grown, kind=lp)
+         size(self%overlap_before, kind=lp)) + int(storage_size(self%padded)/8, lp)*size(self%padded, kind=lp)
    end subroutine survey
 
 end module polydem_verlet

@@ -1,35 +1,37 @@
-!> From pairs of bodies to contacts: which polygons overlap, where, by how much, and how fast that changes.
+!> Finds the contacts among pairs of bodies: overlapping polygons with overlap area, its rate of change, contact point
+!> and direction.
 !>
-!> A contact without a direction (|N| vanishes against the square root of the area: one body inside the other,
-!> or bars that cross) is *degenerate*. So that a run can go on, or stop with a message, it gets the direction
-!> of the line of centres (of the x axis if they coincide) and the length of a square of the same area, a
-!> length at which no force or stiffness overflows. `normal`, `moment` and `rate` stay as they are.
+!> A contact is *degenerate* if it has no direction: |N| is negligible against the square root of the area, because one
+!> body is inside the other, or bars cross. A degenerate contact gets the direction of the line of centres (or of the x
+!> axis if the centres coincide) and the side of a square of the same area as its length. With this length no force or
+!> stiffness overflows, and the run can continue or stop with a message. `normal`, `moment` and `rate` are not changed.
 module polydem_find_contacts
    use omp_lib, only: omp_get_max_threads, omp_get_num_threads, omp_get_thread_num
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contact_memory_t, contacts_t, reserve_contacts
+   use polydem_contact_history, only: contact_memory_t
+   use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_convex_overlap, only: overlap_polygons, overlap_t
-   use polydem_kinds, only: ip, lp, wp, worth_threads
+   use polydem_kinds, only: ip, lp, wp, min_parallel_size
    implicit none
    private
    public :: find_contacts
 
-   !> Share of the square root of the area below which a length is rounding
+   !> Ratio of a length to the square root of the area below which the length is rounding error
    real(wp), parameter :: no_length = 4096.0_wp*epsilon(1.0_wp)
-   !> More threads than this are not used
+   !> Largest number of threads
    integer(ip), parameter :: most_threads = 1024_ip
-   !> A thread is not worth its start for fewer pairs than this
+   !> Smallest number of pairs for which starting a thread saves time
    integer(ip), parameter :: least_pairs = 64_ip
 
-   !> The pairs of one thread
+   !> Range of consecutive pairs of one thread
    type :: run_t
-      !> The pair before the first
+      !> Index of the first pair minus one
       integer(ip) :: start = 0_ip
-      !> The last pair
+      !> Index of the last pair
       integer(ip) :: end = 0_ip
-      !> Number of contacts among them
+      !> Number of contacts among these pairs
       integer(ip) :: n = 0_ip
-      !> Number of degenerate ones
+      !> Number of degenerate contacts
       integer(ip) :: n_degenerate = 0_ip
    end type run_t
 
@@ -37,21 +39,21 @@ contains
 
    !> Find the contacts of this step, in the order of the pairs.
    !>
-   !> Each thread takes one run of consecutive pairs and writes its contacts to the places of these pairs;
-   !> then the runs are moved together. The result does not depend on the number of threads.
-   subroutine find_contacts(bodies, n_pairs, first, second, memory, contacts)
-      !> Bodies with their polygons turned
+   !> Each thread processes one range of consecutive pairs and writes its contacts to the indices of these pairs. The
+   !> gaps between the ranges are then closed. The result does not depend on the number of threads.
+   subroutine find_contacts(bodies, n_pairs, first, second, history, contacts)
+      !> Bodies with rotated polygons
       type(bodies_t), intent(in) :: bodies
       !> Number of pairs
       integer(ip), intent(in) :: n_pairs
-      !> Lower slot of each pair, at least (n_pairs)
+      !> Lower slot of each pair, (n_pairs) or longer
       integer(ip), intent(in) :: first(:)
-      !> Higher slot of each pair, at least (n_pairs)
+      !> Higher slot of each pair, (n_pairs) or longer
       integer(ip), intent(in) :: second(:)
-      !> Memory of the pairs: `touching` and `separating_edge` are brought up to date, `tangential` and `area`
-      !> are cleared where the polygons are apart; any column may be missing
-      type(contact_memory_t), intent(inout) :: memory
-      !> Contacts, with `area_is_effective` set; the columns that forces fill are left alone
+      !> Contact history of the pairs: `separating_edge` is updated, and the other columns are cleared for pairs whose
+      !> polygons do not overlap; any column may be absent
+      type(contact_memory_t), intent(inout) :: history
+      !> Contacts; `area_is_effective` must be set. The columns that the forces fill are not changed
       type(contacts_t), intent(inout) :: contacts
       type(run_t) :: runs(0:most_threads - 1_ip)
       integer(ip) :: threads, me
@@ -59,18 +61,18 @@ contains
       call reserve_contacts(contacts, n_pairs)
       threads = min(int(omp_get_max_threads(), ip), most_threads, 1_ip + n_pairs/least_pairs)
       !$omp parallel num_threads(threads) default(none) private(me) &
-      !$omp shared(bodies, n_pairs, first, second, memory, contacts, runs, threads)
+      !$omp shared(bodies, n_pairs, first, second, history, contacts, runs, threads)
       !$omp single
       threads = int(omp_get_num_threads(), ip)
       !$omp end single
       me = int(omp_get_thread_num(), ip)
       runs(me) = run_t(start=share(n_pairs, me, threads), end=share(n_pairs, me + 1_ip, threads))
-      call find_in_run(bodies, first, second, memory, contacts, runs(me))
+      call find_in_run(bodies, first, second, history, contacts, runs(me))
       !$omp end parallel
       call close_gaps(runs(0:threads - 1_ip), contacts)
    end subroutine find_contacts
 
-   !> Number of items dealt out before a thread's turn
+   !> Number of items of all threads before the given one
    pure integer(ip) function share(n, thread, threads)
       integer(ip), intent(in) :: n
       integer(ip), intent(in) :: thread
@@ -79,12 +81,12 @@ contains
       share = int(int(n, lp)*int(thread, lp)/int(threads, lp), ip)
    end function share
 
-   !> Find the contacts of a run of pairs, and write them to the places after its start.
-   subroutine find_in_run(bodies, first, second, memory, contacts, run)
+   !> Find the contacts of a range of pairs and write them to the indices after its start.
+   subroutine find_in_run(bodies, first, second, history, contacts, run)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: first(:)
       integer(ip), intent(in) :: second(:)
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_memory_t), intent(inout) :: history
       type(contacts_t), intent(inout) :: contacts
       type(run_t), intent(inout) :: run
       type(overlap_t) :: overlap
@@ -100,11 +102,11 @@ contains
             i = first(p)
             j = second(p)
             offset = bodies%position(:, j) - bodies%position(:, i)
-            if (allocated(memory%separating_edge)) edge = memory%separating_edge(p)
+            if (allocated(history%separating_edge)) edge = history%separating_edge(p)
             call overlap_polygons(turned(:, start(i):start(i + 1_ip) - 1_ip), &
                                   turned(:, start(j):start(j + 1_ip) - 1_ip), offset, edge, overlap, &
                                   contacts%area_is_effective)
-            call remember(p, overlap, memory)
+            call update_history(p, overlap, history)
             if (overlap%area > 0.0_wp) then
                n = n + 1_ip
                call store(bodies, p, i, j, offset, overlap, run%start + n, contacts, degenerate)
@@ -116,36 +118,36 @@ contains
       run%n_degenerate = n_degenerate
    end subroutine find_in_run
 
-   !> Bring the memory of a pair up to date.
-   subroutine remember(p, overlap, memory)
+   !> Update the contact history of a pair.
+   subroutine update_history(p, overlap, history)
       integer(ip), intent(in) :: p
       type(overlap_t), intent(in) :: overlap
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_memory_t), intent(inout) :: history
       integer :: k
 
-      if (allocated(memory%separating_edge)) memory%separating_edge(p) = overlap%separating_edge
+      if (allocated(history%separating_edge)) history%separating_edge(p) = overlap%separating_edge
       if (overlap%area > 0.0_wp) return
-      do k = 1, size(memory%column)
-         if (allocated(memory%column(k)%value)) memory%column(k)%value(p) = 0.0_wp
+      do k = 1, size(history%column)
+         if (allocated(history%column(k)%value)) history%column(k)%value(p) = 0.0_wp
       end do
-   end subroutine remember
+   end subroutine update_history
 
    !> Write one contact.
    subroutine store(bodies, p, i, j, offset, overlap, c, contacts, degenerate)
       type(bodies_t), intent(in) :: bodies
-      !> Place in the pair list
+      !> Index of the pair in the pair list
       integer(ip), intent(in) :: p
-      !> First body
+      !> Slot of the first body
       integer(ip), intent(in) :: i
-      !> Second body
+      !> Slot of the second body
       integer(ip), intent(in) :: j
-      !> Centre of the second minus centre of the first
+      !> Centre of the second body minus centre of the first body [m]
       real(wp), intent(in) :: offset(2)
       type(overlap_t), intent(in) :: overlap
-      !> Place in the table of contacts
+      !> Index in the table of contacts
       integer(ip), intent(in) :: c
       type(contacts_t), intent(inout) :: contacts
-      !> Whether it has no direction of its own
+      !> Whether the contact is degenerate
       logical, intent(out) :: degenerate
 
       contacts%pair(c) = p
@@ -164,7 +166,7 @@ contains
       call find_direction(overlap, offset, contacts%direction(:, c), contacts%length(c), degenerate)
    end subroutine store
 
-   !> Direction from the second body to the first, and length of the contact.
+   !> Find the direction from the second body to the first, and the length of the contact [m].
    pure subroutine find_direction(overlap, offset, direction, length, degenerate)
       type(overlap_t), intent(in) :: overlap
       real(wp), intent(in) :: offset(2)
@@ -189,14 +191,14 @@ contains
       end if
    end subroutine find_direction
 
-   !> Length of a vector; unlike hypot the same bits everywhere
+   !> Length of a vector. Unlike hypot, it has the same bits on all machines
    pure real(wp) function length_of(vector)
       real(wp), intent(in) :: vector(2)
 
       length_of = sqrt(vector(1)*vector(1) + vector(2)*vector(2))
    end function length_of
 
-   !> Move the contacts of all runs together, each column by one thread, and count them.
+   !> Count the contacts of all ranges and close the gaps between the ranges; one thread moves each column.
    subroutine close_gaps(runs, contacts)
       type(run_t), intent(in) :: runs(:)
       type(contacts_t), intent(inout) :: contacts
@@ -210,7 +212,7 @@ contains
       end do
       contacts%n = n
       if (size(runs) == 1) return
-      !$omp parallel sections if (contacts%n > worth_threads) default(none) shared(runs, contacts)
+      !$omp parallel sections if (contacts%n > min_parallel_size) default(none) shared(runs, contacts)
       !$omp section
       call move_numbers(runs, contacts%pair)
       call move_numbers(runs, contacts%first)
@@ -229,7 +231,7 @@ contains
       !$omp end parallel sections
    end subroutine close_gaps
 
-   !> Close the gaps of a column of whole numbers.
+   !> Close the gaps of a column of integers.
    pure subroutine move_numbers(runs, column)
       type(run_t), intent(in) :: runs(:)
       integer(ip), intent(inout), contiguous :: column(:)

@@ -1,20 +1,20 @@
-!> Bed: grains that settle, or lie packed, between a floor and two side walls.
+!> Scene bed: grains that settle, or lie packed, between a floor and two side walls.
 module polydem_bed
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: draw_sizes, settled_area
    use polydem_kinds, only: wp
    use polydem_lattice, only: lattice_height
-   use polydem_pour, only: loose_spacing, pour_grains
+   use polydem_pour, only: loose_spacing, place_grains
    use polydem_settings, only: scene_settings_t
    use polydem_walls, only: append_box, rectangle
    implicit none
    private
    public :: list_bed
 
-   !> Width over depth of the settled bed if the width is not given
+   !> Ratio of width to depth of the settled bed if the width is not given
    real(wp), parameter :: aspect = 2.0_wp
-   !> Share of a rectangle that cells of different sizes surely find room in
+   !> Fraction of a rectangle that cells of different sizes can always fill
    real(wp), parameter :: cells_share = 0.6_wp
 
 contains
@@ -25,7 +25,7 @@ contains
       type(scene_settings_t), intent(in) :: scene
       !> List to extend
       type(body_list_t), intent(inout) :: list
-      !> If the grains do not fit
+      !> Allocated if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error
       real(wp) :: width, height, inside(2, 4)
 
@@ -35,17 +35,17 @@ contains
       end if
       height = loose_height(scene, width)
       if (height < 0.0_wp) then
-         call raise(error, input_error, 'width is less than a grain needs')
+         call raise(error, input_error, 'width is too small for a grain; increase width')
          return
       end if
       ! Grains that start with a speed may rise above the lattice.
       inside = rectangle(-0.5_wp*width, 0.5_wp*width, 0.0_wp, height + 2.0_wp*loose_spacing(scene))
-      call pour_grains(list, scene, inside, scene%bodies, error)
+      call place_grains(list, scene, inside, scene%bodies, error)
       if (allocated(error)) return
       call append_box(list, inside, scene%long_axis_max*sqrt(scene%size_ratio), closed=.false.)
    end subroutine list_bed
 
-   !> Height that loose grains need; negative if the bed is too narrow for one [m]
+   !> Height that loose grains need [m]; negative if the bed is too narrow for one grain
    pure real(wp) function loose_height(scene, width)
       type(scene_settings_t), intent(in) :: scene
       real(wp), intent(in) :: width

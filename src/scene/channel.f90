@@ -1,13 +1,13 @@
-!> Channel: grains with random velocities in one row between two long walls, in which hardly one can pass another.
+!> Scene channel: one row of grains with random velocities between two long walls. Grains can hardly pass each other.
 !>
-!> A scene with a single direction, for neighbour finders of one dimension.
+!> The scene is nearly one-dimensional. It tests neighbour finders that work along one axis.
 module polydem_channel
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_gas, only: append_flying, total_area
+   use polydem_gas, only: append_moving_grains, total_area
    use polydem_grains, only: draw_grains, grain_t
    use polydem_kinds, only: ip, wp
-   use polydem_pour, only: loose_spacing, shake
+   use polydem_pour, only: loose_spacing, displace_randomly
    use polydem_random, only: new_random, random_t
    use polydem_settings, only: scene_settings_t
    use polydem_walls, only: append_box, rectangle
@@ -15,19 +15,19 @@ module polydem_channel
    private
    public :: list_channel
 
-   !> Height over the greatest diameter of a grain
+   !> Height of the channel over the largest diameter of a grain
    real(wp), parameter :: height_share = 1.2_wp
 
 contains
 
-   !> List the bodies of the channel: grains from left to right, then floor, left end, right end, lid. The middle
-   !> is at 0.
+   !> List the bodies of the channel: grains from left to right, then floor, left end, right end, lid. The centre of the
+   !> channel is at the origin.
    subroutine list_channel(scene, list, error)
       !> Settings: bodies (grains), fraction (of the channel that the polygons cover), speed, grains
       type(scene_settings_t), intent(in) :: scene
       !> List to extend
       type(body_list_t), intent(inout) :: list
-      !> If the fraction is too large for a start without overlaps
+      !> Allocated if the fraction is too large for a start without overlaps
       type(error_t), allocatable, intent(inout) :: error
       type(random_t) :: random
       type(grain_t), allocatable :: grains(:)
@@ -43,14 +43,15 @@ contains
       length = total_area(grains)/(scene%fraction*height)
       spacing = length/real(n, wp)
       if (spacing < loose_spacing(scene)) then
-         call raise(error, input_error, 'fraction is too large for grains in a row that must not overlap at the start')
+         call raise(error, input_error, 'fraction is too large for a row of grains without overlap at the start; '// &
+                    'lower fraction')
          return
       end if
       do k = 1_ip, n
          centres(:, k) = [spacing*(real(k, wp) - 0.5_wp*real(n + 1_ip, wp)), 0.0_wp]
       end do
-      call shake(random, min(spacing, height) - scene%long_axis_max, centres)
-      call append_flying(list, scene, random, grains, centres)
+      call displace_randomly(random, min(spacing, height) - scene%long_axis_max, centres)
+      call append_moving_grains(list, scene, random, grains, centres)
       call append_box(list, rectangle(-0.5_wp*length, 0.5_wp*length, -0.5_wp*height, 0.5_wp*height), &
                       scene%long_axis_max, closed=.true.)
    end subroutine list_channel

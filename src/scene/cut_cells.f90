@@ -1,54 +1,55 @@
-!> Places for grains of many sizes: square cells of the given sides, cut from a rectangle.
+!> Positions for grains of many sizes: square cells with given sides, cut from a rectangle.
 !>
-!> The largest square is cut from a corner of the rectangle, chosen at random; what is left of it is cut into two
-!> rectangles along the line that leaves the larger one. The next square comes from the rectangle with the longest short
-!> side, and so on. Small squares so fill the gaps between large ones, and all sizes mix. (Guillotine cuts and
-!> the choice of the next rectangle are discussed by J. Jylanki, A thousand ways to pack the bin, 2010.)
+!> The largest square is cut from a random corner of the rectangle. The rest of the rectangle is cut into two
+!> rectangles, along the line that makes one of them as large as possible. The next square is cut from the rectangle
+!> with the longest short side, and so on. Small squares fill the gaps between large squares, and all sizes mix.
+!> (J. Jylanki, A thousand ways to pack the bin, 2010, discusses guillotine cuts and the choice of the next rectangle.)
 module polydem_cut_cells
    use polydem_kinds, only: ip, wp
    use polydem_random, only: random_t
    use polydem_sort_reals, only: sort_reals
    implicit none
    private
-   public :: cut_cells, spread_cells
+   public :: cut_cells, fit_cells
 
-   !> Share of the rectangle with which `spread_cells` begins, never reached by squares of different sizes
+   !> Fraction of the rectangle that the cells cover in the first attempt of `fit_cells`. Squares of different sizes
+   !> never reach this fraction
    real(wp), parameter :: greatest_share = 0.98_wp
-   !> Factor from one attempt of `spread_cells` to the next
+   !> Factor of the sides from one attempt of `fit_cells` to the next
    real(wp), parameter :: shrinkage = 0.99_wp
 
-   !> A binary heap of upright rectangles: none has a longer short side than its parent, number k/2
+   !> Binary heap of upright rectangles. The short side of rectangle k is not longer than that of its parent k/2
    type :: heap_t
       !> Number of rectangles
       integer(ip) :: n = 0_ip
-      !> xmin, ymin, xmax, ymax, (4, rectangle) [m]
+      !> Bounds xmin, ymin, xmax, ymax of each rectangle, (4, rectangle) [m]
       real(wp), allocatable :: bounds(:, :)
    end type heap_t
 
 contains
 
-   !> Find the widest cells in the given proportions for which there is room.
-   subroutine spread_cells(inside, least, random, centres, spread)
+   !> Find the largest cells with the given ratios of sides that fit into a rectangle.
+   subroutine fit_cells(inside, least, random, centres, spread)
       !> Corners of the rectangle, anticlockwise from the lower left, (2, 4) [m]
       real(wp), intent(in) :: inside(2, 4)
-      !> Least sides of the cells [m]
+      !> Smallest allowed sides of the cells, (cell) [m]
       real(wp), intent(in) :: least(:)
       !> Stream of random numbers
       type(random_t), intent(inout) :: random
       !> Centres of the cells, (2, cell) [m]
       real(wp), intent(out) :: centres(:, :)
-      !> By how much the sides are larger than the least ones; 0 if there is no room
+      !> Ratio of the sides to the smallest allowed sides; 0 if the cells do not fit
       real(wp), intent(out) :: spread
       logical :: fits
-      type(random_t) :: fresh
+      type(random_t) :: initial
       integer(ip) :: descending(size(least))
       real(wp) :: found(2, size(least))
 
       call sort_reals(-least, descending)
-      fresh = random
+      initial = random
       spread = sqrt(greatest_share*(inside(1, 3) - inside(1, 1))*(inside(2, 3) - inside(2, 1))/sum(least**2))
       do while (spread >= 1.0_wp)
-         random = fresh
+         random = initial
          call cut_cells(inside, spread*least(descending), random, found, fits)
          if (fits) then
             centres(:, descending) = found
@@ -57,19 +58,19 @@ contains
          spread = shrinkage*spread
       end do
       spread = 0.0_wp
-   end subroutine spread_cells
+   end subroutine fit_cells
 
    !> Cut square cells from a rectangle.
    subroutine cut_cells(inside, sides, random, centres, fits)
       !> Corners of the rectangle, anticlockwise from the lower left, (2, 4) [m]
       real(wp), intent(in) :: inside(2, 4)
-      !> Sides of the cells, in descending order [m]
+      !> Sides of the cells in descending order, (cell) [m]
       real(wp), intent(in) :: sides(:)
       !> Stream of random numbers
       type(random_t), intent(inout) :: random
       !> Centres of the cells, (2, cell) [m]
       real(wp), intent(out) :: centres(:, :)
-      !> Whether there was room for all
+      !> Whether all cells fit
       logical, intent(out) :: fits
       type(heap_t) :: heap
       real(wp) :: whole(4), rest(4), cell(4), room(2)
@@ -83,7 +84,7 @@ contains
          fits = all(room >= 0.0_wp)
          if (.not. fits) return
          call pop(heap)
-         ! The strip beside the cell has the full height if there is more room beside than above it.
+         ! The strip beside the cell has the full height if the room beside the cell is larger than that above it.
          along = merge(1, 2, room(1) > room(2))
          cell = whole
          do a = along, 3 - along, 3 - 2*along
@@ -102,7 +103,7 @@ contains
       fits = .true.
    end subroutine cut_cells
 
-   !> Add a rectangle.
+   !> Add a rectangle to the heap.
    pure subroutine push(heap, rectangle)
       type(heap_t), intent(inout) :: heap
       real(wp), intent(in) :: rectangle(4)
@@ -118,7 +119,7 @@ contains
       heap%bounds(:, k) = rectangle
    end subroutine push
 
-   !> Remove the first rectangle.
+   !> Remove the first rectangle of the heap, which has the longest short side.
    pure subroutine pop(heap)
       type(heap_t), intent(inout) :: heap
       real(wp) :: last(4)
@@ -139,6 +140,7 @@ contains
       if (heap%n > 0_ip) heap%bounds(:, k) = last
    end subroutine pop
 
+   !> Length of the shorter side of a rectangle [m]
    pure real(wp) function short_side(rectangle)
       real(wp), intent(in) :: rectangle(4)
 

@@ -1,35 +1,35 @@
-!> Drum: a ring of convex segments around loose grains that fill about half of it once they have settled.
+!> Scene drum: a ring of convex segments around loose grains. The settled grains fill about half of the drum.
 !>
-!> The axis is at the origin. Neighbouring segments share the corners on their common radius and do not
-!> overlap. The ring turns by the prescribed motion of the scene, rotation about the pivot (0, 0).
+!> The axis is at the origin. Neighbouring segments share the corners on their common radius and do not overlap. A
+!> prescribed rotation about the pivot (0, 0) turns the ring.
 module polydem_drum
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: pi, settled_area
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: row_height
-   use polydem_pour, only: loose_spacing, pour_grains
+   use polydem_pour, only: loose_spacing, place_grains
    use polydem_settings, only: scene_settings_t
    implicit none
    private
    public :: list_drum, choose_drum_size, draw_ring, draw_segments
 
-   !> Length of a segment over the mean long axis of the grains: short enough to be one box
+   !> Length of a segment over the mean long axis of the grains. The segment is short enough for a single box
    real(wp), parameter :: segment_length = 3.15_wp
    !> Thickness of a segment over the mean long axis of the grains
    real(wp), parameter :: segment_thickness = 1.05_wp
-   !> Least number of segments of a ring
+   !> Smallest number of segments of a ring
    integer(ip), parameter :: least_segments = 12_ip
 
 contains
 
-   !> List the bodies of the drum: grains first, then the ring, anticlockwise from the right.
+   !> List the bodies of the drum: grains first, then the segments of the ring, anticlockwise from the right.
    subroutine list_drum(scene, list, error)
-      !> Settings: boxes (in all) or bodies (grains), radius, grains
+      !> Settings: boxes (total) or bodies (grains), radius, grains
       type(scene_settings_t), intent(in) :: scene
       !> List to extend
       type(body_list_t), intent(inout) :: list
-      !> If the numbers do not fit together
+      !> Allocated if the segments need all boxes, or if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error
       real(wp), allocatable :: inner(:, :), corners(:, :, :)
       real(wp) :: radius
@@ -37,11 +37,11 @@ contains
 
       call choose_drum_size(scene, n, segments, radius)
       if (n < 1_ip) then
-         call raise(error, input_error, 'the ring alone needs more boxes: raise boxes or lower radius')
+         call raise(error, input_error, 'the ring alone needs all boxes; increase boxes or decrease radius')
          return
       end if
       call draw_ring(radius, segments, inner)
-      call pour_grains(list, scene, inner, n, error)
+      call place_grains(list, scene, inner, n, error)
       if (allocated(error)) return
       call draw_segments(radius, segment_thickness*mean_axis(scene), segments, corners)
       do k = 1_ip, segments
@@ -49,19 +49,20 @@ contains
       end do
    end subroutine list_drum
 
-   !> Number of grains and of segments, and inner radius.
+   !> Choose the number of grains, the number of segments and the inner radius.
    !>
-   !> A radius of 0 is replaced by one that leaves the drum half filled, or for few grains by one that has
-   !> room for them on their lattice. The number of segments depends on the radius, this on the number of
-   !> grains, and with a given number of boxes this on the number of segments: a few substitutions settle it.
+   !> If the given radius is 0, the settled grains fill half of the drum. For few grains the radius is larger, because
+   !> their initial lattice must fit. The number of segments depends on the radius, the radius on the number of grains,
+   !> and, for a given number of boxes, the number of grains on the number of segments. Ten fixed-point iterations solve
+   !> these equations.
    pure subroutine choose_drum_size(scene, n, segments, radius)
       !> Settings: boxes or bodies, radius, grains
       type(scene_settings_t), intent(in) :: scene
-      !> Number of grains, not positive if the segments need all boxes
+      !> Number of grains; 0 or negative if the segments need all boxes
       integer(ip), intent(out) :: n
       !> Number of segments
       integer(ip), intent(out) :: segments
-      !> Distance of the inner corners from the axis [m]
+      !> Inner radius: distance of the inner corners from the axis [m]
       real(wp), intent(out) :: radius
       real(wp) :: loose_area
       integer :: k
@@ -80,7 +81,7 @@ contains
       end do
    end subroutine choose_drum_size
 
-   !> Corners of a regular polygon around the origin, anticlockwise from the right.
+   !> Compute the corners of a regular polygon around the origin, anticlockwise from the right.
    subroutine draw_ring(radius, n, corners)
       !> Distance of the corners from the origin [m]
       real(wp), intent(in) :: radius
@@ -98,15 +99,16 @@ contains
       end do
    end subroutine draw_ring
 
-   !> Corners of the segments of a ring. What two segments share is one number, not two that nearly agree.
+   !> Compute the corners of the segments of a ring. Neighbouring segments share corners with identical bits.
    subroutine draw_segments(radius, thickness, n, corners)
       !> Distance of the inner corners from the origin [m]
       real(wp), intent(in) :: radius
-      !> Distance of the inner from the outer corners [m]
+      !> Radial distance between inner and outer corners [m]
       real(wp), intent(in) :: thickness
       !> Number of segments
       integer(ip), intent(in) :: n
-      !> Corners, anticlockwise, (2, 4, n) [m]: inner, outer at the start, outer, inner at the end
+      !> Corners of each segment, anticlockwise, (2, 4, n) [m]: inner and outer corner at its start, outer and inner
+      !> corner at its end
       real(wp), allocatable, intent(out) :: corners(:, :, :)
       real(wp), allocatable :: inner(:, :), outer(:, :)
       integer(ip) :: k, next
@@ -123,6 +125,7 @@ contains
       end do
    end subroutine draw_segments
 
+   !> Mean long axis of the grains (full length) [m]
    pure real(wp) function mean_axis(scene)
       type(scene_settings_t), intent(in) :: scene
 

@@ -1,32 +1,32 @@
-!> Granular gas: grains with random velocities and no total momentum, spread over a closed box.
+!> Scene gas: grains with random velocities and zero total momentum, spread over a closed container.
 !>
-!> Grains that may overlap at the start lie on a lattice that is as dense as the fraction asks for, and the walls half
-!> a long axis outside the box that this fraction is of, so that no grain reaches into them.
+!> Grains that may overlap at the start lie on a lattice with the density that the fraction requires. The walls then lie
+!> half a long axis outside the rectangle to which the fraction refers, and no grain overlaps a wall.
 module polydem_gas
    use polydem_body_list, only: body_list_t
-   use polydem_cut_cells, only: spread_cells
+   use polydem_cut_cells, only: fit_cells
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: append_grains, draw_grains, draw_sizes, grain_t
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: fill_lattice, row_height
-   use polydem_pour, only: looseness, loose_spacing, shake
+   use polydem_pour, only: loose_spacing_ratio, loose_spacing, displace_randomly
    use polydem_random, only: new_random, random_t
    use polydem_settings, only: scene_settings_t
-   use polydem_start_velocities, only: choose_movers, draw_spins, draw_velocities, remove_momentum, set_speed
+   use polydem_start_velocities, only: choose_moving_grains, draw_spins, draw_velocities, remove_momentum, set_speed
    use polydem_walls, only: append_box, rectangle
    implicit none
    private
-   public :: list_gas, total_area, append_flying
+   public :: list_gas, total_area, append_moving_grains
 
 contains
 
-   !> List the bodies of the gas: grains first, then floor, left wall, right wall, lid. The centre is at 0.
+   !> List the bodies of the gas: grains first, then floor, left wall, right wall, lid. The centre is at the origin.
    subroutine list_gas(scene, list, error)
-      !> Settings: bodies (grains), fraction (of the box that the polygons cover), width, speed, spin, grains
+      !> Settings: bodies (grains), fraction (of the container that the polygons cover), width, speed, spin, grains
       type(scene_settings_t), intent(in) :: scene
       !> List to extend
       type(body_list_t), intent(inout) :: list
-      !> If the fraction is too large for a start without overlaps
+      !> Allocated if the fraction is too large for a start without overlaps
       type(error_t), allocatable, intent(inout) :: error
       type(random_t) :: random
       type(grain_t), allocatable :: grains(:)
@@ -41,25 +41,26 @@ contains
       if (.not. width > 0.0_wp) width = sqrt(area)
       inside = rectangle(-0.5_wp*width, 0.5_wp*width, -0.5_wp*area/width, 0.5_wp*area/width)
       if (scene%size_ratio > 1.0_wp) then
-         call spread_cells(inside, looseness*grains%length, random, centres, spacing)
+         call fit_cells(inside, loose_spacing_ratio*grains%length, random, centres, spacing)
       else if (scene%overlap) then
          call spread_out(inside, 0.0_wp, centres, spacing)
-         call shake(random, spacing, centres)
+         call displace_randomly(random, spacing, centres)
          inside = inside + 0.5_wp*scene%long_axis_max*sign(1.0_wp, inside)
       else
          call spread_out(inside, loose_spacing(scene), centres, spacing)
-         call shake(random, spacing - scene%long_axis_max, centres)
+         call displace_randomly(random, spacing - scene%long_axis_max, centres)
       end if
       if (.not. spacing > 0.0_wp) then
-         call raise(error, input_error, 'fraction is too large for grains that must not overlap at the start')
+         call raise(error, input_error, 'fraction is too large for grains without overlap at the start; lower fraction')
          return
       end if
-      call append_flying(list, scene, random, grains, centres)
+      call append_moving_grains(list, scene, random, grains, centres)
       call append_box(list, inside, scene%long_axis_max*sqrt(scene%size_ratio), closed=.true.)
    end subroutine list_gas
 
-   !> Append grains with random velocities and angular velocities; no total momentum unless only one moves.
-   subroutine append_flying(list, scene, random, grains, centres)
+   !> Append grains with random velocities and angular velocities. The total momentum is zero unless one grain alone
+   !> moves.
+   subroutine append_moving_grains(list, scene, random, grains, centres)
       !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Settings: speed, spin, movers
@@ -68,21 +69,21 @@ contains
       type(random_t), intent(inout) :: random
       !> Grains
       type(grain_t), intent(in) :: grains(:)
-      !> Their centres, (2, grain) [m]
+      !> Centres of the grains, (2, grain) [m]
       real(wp), intent(in) :: centres(:, :)
       real(wp), allocatable :: velocities(:, :), spins(:)
       logical, allocatable :: moves(:)
 
       allocate (velocities(2, size(grains)), spins(size(grains)))
       call draw_velocities(random, 1.0_wp, velocities)
-      moves = choose_movers(size(grains, kind=ip), scene%movers)
+      moves = choose_moving_grains(size(grains, kind=ip), scene%movers)
       if (count(moves) > 1) call remove_momentum(grains, moves, velocities)
       call set_speed(scene%speed, moves, velocities)
       call draw_spins(random, scene%spin, spins)
       call append_grains(list, scene, grains, centres, velocities, spins)
-   end subroutine append_flying
+   end subroutine append_moving_grains
 
-   !> Area of all grains [m2]
+   !> Total area of the grains [m2]
    pure real(wp) function total_area(grains)
       !> Grains
       type(grain_t), intent(in) :: grains(:)
@@ -94,7 +95,7 @@ contains
       end do
    end function total_area
 
-   !> Widest lattice that has room for all points; spacing 0 if there is none as wide as the least.
+   !> Find the lattice with the largest spacing on which all points fit; the spacing is 0 if it would be below `least`.
    subroutine spread_out(inside, least, centres, spacing)
       real(wp), intent(in) :: inside(2, 4), least
       real(wp), intent(out) :: centres(:, :)

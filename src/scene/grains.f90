@@ -1,8 +1,8 @@
 !> Random grains: irregular convex polygons inscribed in ellipses.
 !>
-!> All grains share the short axis of their ellipses; long axis, number of corners, their places and the
-!> orientation are random. A polygon inscribed in an ellipse is convex wherever its corners are. Where grains
-!> differ in size, both axes are multiplied by it.
+!> All ellipses have the same short axis. The long axis, the number of corners, the positions of the corners and the
+!> orientation are random. A polygon inscribed in an ellipse is convex for any positions of its corners. If grains
+!> differ in size, both axes are multiplied by the size factor of the grain.
 module polydem_grains
    use polydem_body_list, only: body_list_t
    use polydem_kinds, only: ip, wp
@@ -14,17 +14,17 @@ module polydem_grains
    private
    public :: grain_t, draw_grains, draw_sizes, append_grains, settled_area, pi
 
-   !> Circumference of a circle over its diameter
+   !> The number pi
    real(wp), parameter :: pi = 3.141592653589793238462643383279503_wp
 
-   !> Share of the area of a settled bed that the ellipses around its grains amount to
-   real(wp), parameter :: settled_share = 0.895_wp
+   !> Total area of the ellipses around the grains of a settled bed over the area of the bed
+   real(wp), parameter :: settled_fraction = 0.895_wp
 
-   !> One grain before it is placed
+   !> One grain without a position
    type :: grain_t
-      !> Corners relative to a point inside, the centre of the ellipse, anticlockwise, (2, corner) [m]
+      !> Corners relative to an inner point (the centre of the ellipse), anticlockwise, (2, corner) [m]
       real(wp), allocatable :: corners(:, :)
-      !> Long axis (full length) of the ellipse, or another bound of the diameter about that point [m]
+      !> Upper bound of twice the distance of a corner from that point, such as the long axis of the ellipse [m]
       real(wp) :: length = 0.0_wp
       !> Area of the polygon [m2]
       real(wp) :: area = 0.0_wp
@@ -40,7 +40,7 @@ contains
       type(random_t), intent(inout) :: random
       !> Grains to draw
       type(grain_t), intent(out) :: grains(:)
-      !> Factor of the axes of each grain, 1 if absent
+      !> Size factor (of both axes) of each grain, (grain); 1 if absent
       real(wp), intent(in), optional :: sizes(:)
       real(wp) :: centroid(2), second_moment, factor
       integer :: k
@@ -53,13 +53,13 @@ contains
       end do
    end subroutine draw_grains
 
-   !> Sizes between 1 and the size ratio, in descending order, as evenly spread as can be.
+   !> Size factors between 1 and the size ratio, in descending order, without randomness.
    !>
-   !> The number of grains per size goes with size**-3, so that each octave of sizes covers the same area:
-   !> the share of grains smaller than s is (1 - s**-2)/(1 - ratio**-2), and grain k of n takes the size at
-   !> which this share is (n - k)/(n - 1). Both extremes are there.
+   !> The number density of the sizes is proportional to size**-3, so each octave of sizes covers the same area. The
+   !> fraction of grains smaller than s is (1 - s**-2)/(1 - ratio**-2). Grain k of n has the size at which this fraction
+   !> is (n - k)/(n - 1). The list contains both extremes.
    pure function draw_sizes(ratio, n) result(sizes)
-      !> Greatest size, at least 1
+      !> Largest size factor, at least 1
       real(wp), intent(in) :: ratio
       !> Number of grains
       integer(ip), intent(in) :: n
@@ -76,11 +76,11 @@ contains
       end do
    end function draw_sizes
 
-   !> Append grains to the list of bodies: as they stand, or if the order is 'descending', from right to left.
+   !> Append grains to the list of bodies in the given order or, if the order is 'descending', from right to left.
    !>
-   !> The latter is the worst start of a sweep that exchanges neighbours in lists of box ends: it has every
-   !> pair of boxes the wrong way round on x, and every second one on y; no other order has more in sum. With
-   !> two ends a box, n grains that hardly overlap make about 2 n**2 exchanges on x and n**2 on y.
+   !> The order 'descending' is the worst start of a sweep that exchanges neighbours in lists of box ends: all pairs of
+   !> boxes are in the wrong order on x, and half of them on y. No other order has a larger total. Each box has two
+   !> ends, so n grains that hardly overlap need about 2 n**2 exchanges on x and n**2 on y.
    subroutine append_grains(list, scene, grains, centres, velocities, spins)
       !> List to extend
       type(body_list_t), intent(inout) :: list
@@ -88,11 +88,11 @@ contains
       type(scene_settings_t), intent(in) :: scene
       !> Grains
       type(grain_t), intent(in) :: grains(:)
-      !> Where the corners of each are counted from, (2, grain) [m]
+      !> Position of the origin of the corners of each grain, (2, grain) [m]
       real(wp), intent(in) :: centres(:, :)
       !> Velocities, (2, grain) [m/s]
       real(wp), intent(in) :: velocities(:, :)
-      !> Angular velocities, 0 if absent [rad/s]
+      !> Angular velocities, (grain) [rad/s]; 0 if absent
       real(wp), intent(in), optional :: spins(:)
       real(wp), allocatable :: corners(:, :)
       real(wp) :: spin
@@ -111,7 +111,7 @@ contains
       end do
    end subroutine append_grains
 
-   !> Area that grains cover after they have settled, voids included [m2]
+   !> Area of a settled bed of grains, voids included [m2]
    pure real(wp) function settled_area(scene, n)
       !> Axes of the ellipses, size ratio
       type(scene_settings_t), intent(in) :: scene
@@ -120,15 +120,15 @@ contains
       real(wp) :: mean_ellipse
 
       mean_ellipse = 0.25_wp*pi*scene%short_axis*0.5_wp*(scene%long_axis_min + scene%long_axis_max)
-      settled_area = real(n, wp)*mean_ellipse/settled_share
+      settled_area = real(n, wp)*mean_ellipse/settled_fraction
       if (scene%size_ratio > 1.0_wp) settled_area = settled_area*sum(draw_sizes(scene%size_ratio, n)**2)/real(n, wp)
    end function settled_area
 
-   !> Corners of one grain.
+   !> Draw the corners of one grain.
    !>
-   !> The gaps between the corners, in the angle by which the ellipse is an image of the circle, are between
-   !> half and twice each other: no edge is tiny, and no gap reaches half a turn, so that the centre lies
-   !> inside.
+   !> The ellipse is the affine image of a circle. The gaps between neighbouring corners are angles on that circle; the
+   !> ratio of any two gaps is between one half and two. No edge is very short, and no gap reaches half a turn, so the
+   !> centre lies inside the polygon.
    subroutine draw_corners(scene, factor, random, corners, length)
       type(scene_settings_t), intent(in) :: scene
       real(wp), intent(in) :: factor

@@ -1,22 +1,22 @@
-!> Heap: a column of loose grains that collapses on a long floor.
+!> Scene heap: a column of loose grains that collapses on a long floor.
 !>
-!> The ends of the floor are as high as the column, so that grains that bounce stay on it.
+!> The end walls of the floor are as high as the column and stop bouncing grains.
 module polydem_heap
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: settled_area
    use polydem_kinds, only: wp
    use polydem_lattice, only: lattice_height
-   use polydem_pour, only: loose_spacing, pour_grains
+   use polydem_pour, only: loose_spacing, place_grains
    use polydem_settings, only: scene_settings_t
    use polydem_walls, only: append_box, rectangle
    implicit none
    private
    public :: list_heap
 
-   !> Width of the column over the root of the settled area
+   !> Width of the column over the square root of the settled area
    real(wp), parameter :: column_width = 1.2_wp
-   !> Length of the floor over the root of the settled area if it is not given
+   !> Length of the floor over the square root of the settled area if the length is not given
    real(wp), parameter :: floor_length = 8.0_wp
 
 contains
@@ -27,7 +27,7 @@ contains
       type(scene_settings_t), intent(in) :: scene
       !> List to extend
       type(body_list_t), intent(inout) :: list
-      !> If the column is wider than the floor is long
+      !> Allocated if the column is wider than the floor
       type(error_t), allocatable, intent(inout) :: error
       real(wp) :: size, column, length, height, inside(2, 4)
 
@@ -36,12 +36,13 @@ contains
       length = scene%width
       if (.not. length > 0.0_wp) length = max(floor_length*size, 2.0_wp*column)
       if (length < column) then
-         call raise(error, input_error, 'width, the length of the floor, is less than that of the column')
+         call raise(error, input_error, 'width (length of the floor) is less than the width of the column; '// &
+                    'increase width')
          return
       end if
       height = lattice_height(scene%bodies, column, loose_spacing(scene))
       inside = rectangle(-0.5_wp*column, 0.5_wp*column, 0.0_wp, height)
-      call pour_grains(list, scene, inside, scene%bodies, error)
+      call place_grains(list, scene, inside, scene%bodies, error)
       if (allocated(error)) return
       inside = rectangle(-0.5_wp*length, 0.5_wp*length, 0.0_wp, height)
       call append_box(list, inside, scene%long_axis_max, closed=.false.)

@@ -1,4 +1,4 @@
-!> Hopper: a silo with long inclined walls above an opening, over a bin that keeps what flows out.
+!> Scene hopper: a silo with long inclined walls above an opening, and a bin below that collects the outflow.
 !>
 !> The opening is at y = 0. Each of the five walls is one polygon (Krengel et al. 2026, Fig. 7).
 module polydem_hopper
@@ -7,7 +7,7 @@ module polydem_hopper
    use polydem_grains, only: pi, settled_area
    use polydem_kinds, only: wp
    use polydem_lattice, only: lattice_height
-   use polydem_pour, only: loose_spacing, pour_grains
+   use polydem_pour, only: loose_spacing, place_grains
    use polydem_settings, only: scene_settings_t
    use polydem_walls, only: append_box, rectangle
    implicit none
@@ -22,7 +22,7 @@ contains
       type(scene_settings_t), intent(in) :: scene
       !> List to extend
       type(body_list_t), intent(inout) :: list
-      !> If opening and width do not fit together
+      !> Allocated if the opening is not less than the width, or if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error
       real(wp) :: half, lip, rise, top, bottom, thickness
 
@@ -35,14 +35,14 @@ contains
       end if
       rise = (half - lip)*tan(scene%slope*pi/180.0_wp)
       top = rise + max(lattice_height(scene%bodies, 2.0_wp*half, loose_spacing(scene)), thickness)
-      call pour_grains(list, scene, funnel(half, lip, rise, top), scene%bodies, error)
+      call place_grains(list, scene, funnel(half, lip, rise, top), scene%bodies, error)
       if (allocated(error)) return
       bottom = -bin_depth(scene, half) - thickness/cos(scene%slope*pi/180.0_wp)
       call append_box(list, rectangle(-half, half, bottom, top), thickness, closed=.false.)
       call append_inclines(list, half, lip, rise, thickness/cos(scene%slope*pi/180.0_wp))
    end subroutine list_hopper
 
-   !> Given width, or else that of a square silo, at least three openings wide [m]
+   !> Given width, or the width of a square silo that is at least three openings wide [m]
    pure real(wp) function hopper_width(scene)
       type(scene_settings_t), intent(in) :: scene
 
@@ -51,7 +51,7 @@ contains
       hopper_width = max(sqrt(settled_area(scene, scene%bodies)), 3.0_wp*scene%opening)
    end function hopper_width
 
-   !> Depth of a bin that holds all grains under the opening, as a heap with a slope of up to one half [m]
+   !> Depth of a bin that holds all grains below the opening, as a heap with a slope of at most one half [m]
    pure real(wp) function bin_depth(scene, half)
       type(scene_settings_t), intent(in) :: scene
       real(wp), intent(in) :: half
@@ -59,7 +59,7 @@ contains
       bin_depth = settled_area(scene, scene%bodies)/(2.0_wp*half) + 0.5_wp*half + scene%opening
    end function bin_depth
 
-   !> Where grains start: the convex hexagon between the inclined walls and the walls above them
+   !> Convex hexagon in which the grains start, between the inclined walls and the walls above them, (2, 6) [m]
    pure function funnel(half, lip, rise, top) result(corners)
       real(wp), intent(in) :: half, lip, rise, top
       real(wp) :: corners(2, 6)
@@ -72,7 +72,7 @@ contains
       corners(:, 6) = [-half, rise]
    end function funnel
 
-   !> Append the inclined walls, parallelograms that meet the upright walls face to face.
+   !> Append the inclined walls: parallelograms that share a face with the upright walls.
    subroutine append_inclines(list, half, lip, rise, drop)
       type(body_list_t), intent(inout) :: list
       real(wp), intent(in) :: half, lip, rise, drop

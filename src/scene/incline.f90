@@ -1,7 +1,6 @@
-!> Incline: a rectangular block on one long slope, at rest in the normal direction.
+!> Scene incline: a rectangular block on a long slope, in equilibrium in the normal direction.
 !>
-!> The middle of the contact is at the origin at the start. The slope falls to the right and has a stop
-!> at either end.
+!> The centre of the contact is at the origin at the start. The slope falls to the right and has a stop at each end.
 module polydem_incline
    use polydem_body_list, only: body_list_t
    use polydem_grains, only: pi
@@ -13,9 +12,9 @@ module polydem_incline
    private
    public :: list_incline
 
-   !> Where the slope begins, in widths of the block from the start
+   !> Distance from the start to the upper end of the slope, in widths of the block
    real(wp), parameter :: uphill = 10.0_wp
-   !> Where the slope ends, in widths of the block from the start
+   !> Distance from the start to the lower end of the slope, in widths of the block
    real(wp), parameter :: downhill = 90.0_wp
 
 contains
@@ -44,7 +43,7 @@ contains
       end associate
    end subroutine list_incline
 
-   !> Corners turned about the origin from the horizontal to a direction
+   !> Corners rotated about the origin; the rotation turns the x axis to the unit vector `along`
    pure function tilted(corners, along)
       real(wp), intent(in) :: corners(2, 4), along(2)
       real(wp) :: tilted(2, 4)

@@ -1,26 +1,26 @@
-!> Places for grains: points of a hexagonal lattice inside a convex outline, from the bottom up.
+!> Positions for grains: points of a hexagonal lattice inside a convex outline, from the bottom up.
 module polydem_lattice
    use polydem_kinds, only: ip, wp
    implicit none
    private
    public :: fill_lattice, lattice_height, row_height
 
-   !> Distance of two rows over the distance of two neighbours
+   !> Distance of neighbouring rows over distance of neighbouring points
    real(wp), parameter :: row_height = 0.866025403784438646763723170752936_wp
 
 contains
 
-   !> Find lattice points row by row, each row from left to right, until there are enough.
+   !> Find lattice points row by row, each row from left to right, until `centres` is full.
    !>
-   !> Any two points are at least `spacing` apart, and each is half of it away from the outline.
+   !> Any two points are at least `spacing` apart. The distance of each point from the outline is at least half of it.
    pure subroutine fill_lattice(outline, spacing, centres, n_found)
       !> Corners of the convex outline, anticlockwise, (2, corner) [m]
       real(wp), intent(in) :: outline(:, :)
       !> Distance of neighbours [m]
       real(wp), intent(in) :: spacing
-      !> Points, (2, wanted) [m]
+      !> Points, (2, point) [m]
       real(wp), intent(out) :: centres(:, :)
-      !> Number of points found, less than wanted if the outline is full
+      !> Number of points found; less than size(centres, 2) if the outline has no room for more
       integer(ip), intent(out) :: n_found
       real(wp) :: middle, left, right, shift, x, y
       integer(ip) :: row, column
@@ -46,7 +46,7 @@ contains
       end do
    end subroutine fill_lattice
 
-   !> Height of an upright rectangle that holds n lattice points; negative if it is too narrow for any [m]
+   !> Height of an upright rectangle that holds n lattice points [m]; negative if it is too narrow for one point
    pure real(wp) function lattice_height(n, width, spacing)
       !> Number of points
       integer(ip), intent(in) :: n
@@ -65,7 +65,8 @@ contains
       lattice_height = (1.0_wp + row_height*real(rows, wp))*spacing
    end function lattice_height
 
-   !> Part of a horizontal line that is inside a convex outline, away from it; empty if left > right
+   !> Find the part of a horizontal line that is inside a convex outline with a clearance from it. The part is empty if
+   !> left > right.
    pure subroutine find_row(outline, clearance, y, left, right)
       real(wp), intent(in) :: outline(:, :)
       real(wp), intent(in) :: clearance

@@ -1,7 +1,7 @@
-!> A container filled with copies of a settled patch, so that a large scene starts nearly at rest.
+!> Fills a container with copies of a settled patch. A large scene then starts nearly at rest.
 !>
-!> The copies stand side by side and on top of each other; kept are the grains wholly inside the container, the
-!> lowest first. Time and memory grow with the number of grains.
+!> The copies lie side by side and on top of each other. Only grains wholly inside the container are used, from the
+!> lowest to the highest. Time and memory are proportional to the number of grains.
 module polydem_packing
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: grain_t, pi
@@ -11,33 +11,33 @@ module polydem_packing
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: pack_grains, fill_with_patch, turn_along
+   public :: pack_grains, fill_with_patch, rotate_with_walls
 
-   !> A convex outline, prepared to be asked what lies inside
+   !> Convex outline with the data for point-in-polygon tests
    type :: outline_t
       !> Corners, anticlockwise, (2, corner) [m]
       real(wp), allocatable :: corners(:, :)
-      !> Outward unit normal of the edge behind each corner, (2, corner)
+      !> Outward unit normal of the edge that starts at each corner, (2, corner)
       real(wp), allocatable :: normals(:, :)
-      !> Middle of the bounding box [m]
+      !> Centre of the bounding box [m]
       real(wp) :: middle(2) = 0.0_wp
-      !> Radius of the greatest circle about it [m]
+      !> Radius of the largest circle about that centre inside the outline [m]
       real(wp) :: radius = 0.0_wp
    end type outline_t
 
 contains
 
-   !> Grains and their places from the packing that the scene names.
+   !> Read the packing of a scene and fill a container with its grains.
    subroutine pack_grains(scene, corners, grains, centres, error)
-      !> Path of the packing
+      !> Settings: packing (path)
       type(scene_settings_t), intent(in) :: scene
       !> Corners of the container, convex, anticlockwise, (2, corner) [m]
       real(wp), intent(in) :: corners(:, :)
-      !> Grains, as many as wanted
+      !> Grains, (grain); their number is given
       type(grain_t), intent(out) :: grains(:)
-      !> Their centres, (2, grain) [m]
+      !> Centres of the grains, (2, grain) [m]
       real(wp), intent(out) :: centres(:, :)
-      !> If there is no packing, or no room for all
+      !> Allocated if the packing cannot be read, or if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error
       type(patch_t) :: patch
       integer(ip), allocatable :: source(:)
@@ -48,8 +48,8 @@ contains
       allocate (source(size(grains)))
       call fill_with_patch(corners, patch, centres, source, n_found)
       if (n_found < size(grains)) then
-         call raise(error, input_error, 'there is room for '//to_text(n_found)//' packed grains, not for ' &
-                    //to_text(size(grains, kind=ip))//': make the container larger or the grains fewer')
+         call raise(error, input_error, 'the container has room for '//to_text(n_found)//' packed grains, not for ' &
+                    //to_text(size(grains, kind=ip))//'; enlarge the container or reduce the number of grains')
          return
       end if
       do k = 1_ip, size(grains, kind=ip)
@@ -57,17 +57,17 @@ contains
       end do
    end subroutine pack_grains
 
-   !> Fill a container with copies of a patch, from the bottom up, until there are enough grains.
+   !> Fill a container with copies of a patch, from the bottom up, until `centres` is full.
    pure subroutine fill_with_patch(corners, patch, centres, source, n_found)
       !> Corners of the container, convex, anticlockwise, (2, corner) [m]
       real(wp), intent(in) :: corners(:, :)
-      !> Patch, with grains from the lowest to the highest
+      !> Patch; its grains are ordered from the lowest to the highest
       type(patch_t), intent(in) :: patch
-      !> Centres of the copies, (2, wanted) [m]
+      !> Centres of the copied grains, (2, copy) [m]
       real(wp), intent(out) :: centres(:, :)
-      !> Grain of the patch that each is a copy of, (wanted)
+      !> Grain of the patch from which each grain is copied, (copy)
       integer(ip), intent(out) :: source(:)
-      !> Number of copies, less than wanted if the container is full
+      !> Number of copied grains; less than size(source) if the container is full
       integer(ip), intent(out) :: n_found
       type(outline_t) :: outline
       real(wp) :: place(2), origin(2)
@@ -93,16 +93,16 @@ contains
       end do
    end subroutine fill_with_patch
 
-   !> Where walls turn from the start, have the grains turn with them as one rigid body: their contacts stay as they
-   !> are.
-   pure subroutine turn_along(scene, centres, velocities, spins)
+   !> If walls rotate from time 0 on, add the same rotation to the grains. Walls and grains then move as one rigid body,
+   !> and their contacts do not change.
+   pure subroutine rotate_with_walls(scene, centres, velocities, spins)
       !> Prescribed motion
       type(scene_settings_t), intent(in) :: scene
       !> Centres of the grains, (2, grain) [m]
       real(wp), intent(in) :: centres(:, :)
-      !> Velocities, to which those of the rotation are added, (2, grain) [m/s]
+      !> Velocities, (2, grain) [m/s]; the velocities of the rotation are added
       real(wp), intent(inout) :: velocities(:, :)
-      !> Angular velocities, likewise [rad/s]
+      !> Angular velocities, (grain) [rad/s]; the angular velocity of the rotation is added
       real(wp), intent(inout) :: spins(:)
       real(wp) :: rate
 
@@ -111,8 +111,9 @@ contains
       velocities(1, :) = velocities(1, :) - rate*(centres(2, :) - scene%motion_pivot(2))
       velocities(2, :) = velocities(2, :) + rate*(centres(1, :) - scene%motion_pivot(1))
       spins = spins + rate
-   end subroutine turn_along
+   end subroutine rotate_with_walls
 
+   !> Make an outline from its corners.
    pure function new_outline(corners) result(outline)
       real(wp), intent(in) :: corners(:, :)
       type(outline_t) :: outline
@@ -131,7 +132,7 @@ contains
       end do
    end function new_outline
 
-   !> Whether a grain lies wholly inside; the circle decides for nearly all
+   !> Whether a grain lies wholly inside an outline. The test with the circle is sufficient for nearly all grains
    pure logical function holds(outline, grain, place)
       type(outline_t), intent(in) :: outline
       type(grain_t), intent(in) :: grain

@@ -1,36 +1,32 @@
-!> Patches: the free bodies in the middle of a settled packing, cut out so that copies of them fit side by side.
+!> Patches: free bodies from the middle of a settled packing. Copies of a patch fit side by side.
 !>
-!> The packing is the last frame of a result, or a bodies file. A margin at its walls and under its surface is left
-!> out. What is left has its centres in a rectangle, which is the period of the patch: of two grains that overlap
-!> across the border of two copies one is dropped, so that copies touch but do not overlap.
+!> The packing is the last frame of a result, or a bodies file. A margin along its walls and below its surface is left
+!> out. The centres of the other bodies lie in a rectangle, which is the period of the patch. If two grains overlap
+!> across the border of two copies, one of them is removed. Copies touch but do not overlap.
 module polydem_patch
    use polydem_bodies, only: bodies_t
-   use polydem_bodies_file, only: read_bodies_file
-   use polydem_body_list, only: body_list_t, new_bodies
    use polydem_convex_overlap, only: overlap_polygons, overlap_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: grain_t
-   use polydem_hdf5_file, only: hdf5_file_t
-   use polydem_kinds, only: dp, ip, wp
-   use polydem_paths, only: is_folder
-   use polydem_segment_path, only: last_segment
+   use polydem_kinds, only: ip, wp
    use polydem_sort_reals, only: sort_reals
+   use polydem_trajectory_reader, only: read_packing
    implicit none
    private
-   public :: patch_t, read_patch, read_packing, cut_patch
+   public :: patch_t, read_patch, cut_patch
 
-   !> What is left out at walls and under the surface, in distances of grains
+   !> Width of the margin at walls and below the surface, in mean distances of grains
    real(wp), parameter :: margin = 3.0_wp
-   !> Least width and height of a patch, in distances of grains
+   !> Smallest width and height of a patch, in mean distances of grains
    real(wp), parameter :: least_size = 4.0_wp
 
-   !> Grains to repeat
+   !> Patch of grains that is repeated periodically
    type :: patch_t
       !> Grains, from the lowest to the highest; corners relative to the centre of mass
       type(grain_t), allocatable :: grains(:)
-      !> Centres of mass, from (0, 0) to `period`, (2, grain) [m]
+      !> Centres of mass, between (0, 0) and `period`, (2, grain) [m]
       real(wp), allocatable :: centres(:, :)
-      !> Width and height, by which copies are apart [m]
+      !> Width and height of the patch, which are the distances between neighbouring copies [m]
       real(wp) :: period(2) = 0.0_wp
    end type patch_t
 
@@ -42,7 +38,7 @@ contains
       character(len=*), intent(in) :: path
       !> Patch
       type(patch_t), intent(out) :: patch
-      !> If there is no packing, or it is too small
+      !> Allocated if the packing cannot be read or is too small
       type(error_t), allocatable, intent(inout) :: error
       type(bodies_t) :: bodies
 
@@ -51,88 +47,13 @@ contains
       if (allocated(error)) error%message = 'packing: '//error%message
    end subroutine read_patch
 
-   !> Read the bodies of a packing.
-   subroutine read_packing(path, bodies, error)
-      !> Result folder, segment of a trajectory, or bodies file
-      character(len=*), intent(in) :: path
-      !> Bodies, at angle 0 and at rest
-      type(bodies_t), intent(out) :: bodies
-      !> What cannot be read
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: file_path
-      type(hdf5_file_t) :: file
-      type(body_list_t) :: list
-      type(error_t), allocatable :: ignored
-      logical :: is_segment
-
-      file_path = path
-      if (is_folder(path)) file_path = last_segment(path)
-      if (file_path == '') then
-         call raise(error, input_error, path//' holds no closed segment of a trajectory; has its run ended?')
-         return
-      end if
-      call file%open(file_path, error)
-      if (allocated(error)) return
-      is_segment = file%has('frames')
-      if (is_segment) call list_last_frame(file, list, error)
-      call file%close(ignored)
-      if (.not. is_segment) call read_bodies_file(file_path, 1.0_wp, list, error)
-      if (.not. allocated(error)) call new_bodies(list, bodies, error)
-   end subroutine read_packing
-
-   !> List the bodies of a segment as they lie in its last frame.
-   subroutine list_last_frame(file, list, error)
-      type(hdf5_file_t), intent(in) :: file
-      type(body_list_t), intent(inout) :: list
-      type(error_t), allocatable, intent(inout) :: error
-      integer(ip), allocatable :: fixed(:), start(:)
-      real(dp), allocatable :: shape(:, :), position(:, :, :), angle(:, :)
-      real(wp), allocatable :: corners(:, :)
-      real(wp) :: c, s
-      integer(ip) :: k, v, last
-
-      call file%read('/bodies/fixed', fixed, error)
-      if (.not. allocated(error)) call file%read('/bodies/vertex_start', start, error)
-      if (.not. allocated(error)) call file%read('/bodies/vertex', shape, error)
-      if (.not. allocated(error)) call file%read('/frames/position', position, error)
-      if (.not. allocated(error)) call file%read('/frames/angle', angle, error)
-      if (allocated(error)) return
-      if (.not. fit(fixed, start, shape, position, angle)) then
-         call raise(error, input_error, 'the parts of its segment of a trajectory do not fit together')
-         return
-      end if
-      last = size(angle, 2, kind=ip)
-      do k = 1_ip, size(fixed, kind=ip)
-         c = cos(real(angle(k, last), wp))
-         s = sin(real(angle(k, last), wp))
-         corners = real(shape(:, start(k) + 1_ip:start(k + 1_ip)), wp)
-         do v = 1_ip, size(corners, 2, kind=ip)
-            corners(:, v) = [c*corners(1, v) - s*corners(2, v), s*corners(1, v) + c*corners(2, v)] &
-                            + real(position(:, k, last), wp)
-         end do
-         call list%append(corners, fixed=fixed(k) == 1_ip)
-      end do
-   end subroutine list_last_frame
-
-   !> Whether the parts of a segment belong to the same bodies and frames, at least one frame
-   pure logical function fit(fixed, start, shape, position, angle)
-      integer(ip), intent(in) :: fixed(:), start(:)
-      real(dp), intent(in) :: shape(:, :), position(:, :, :), angle(:, :)
-      integer :: n
-
-      n = size(fixed)
-      fit = size(start) == n + 1 .and. size(shape, 1) == 2 .and. size(angle, 1) == n .and. size(angle, 2) > 0 .and. &
-            size(position, 1) == 2 .and. size(position, 2) == n .and. size(position, 3) == size(angle, 2)
-      if (fit) fit = start(1) == 0_ip .and. start(n + 1) == size(shape, 2) .and. all(start(2:) >= start(:n))
-   end function fit
-
    !> Cut a patch from the free bodies of a packing.
    subroutine cut_patch(bodies, patch, error)
-      !> Bodies of the packing, turned to their angles
+      !> Bodies of the packing; their corners must be rotated to their angles
       type(bodies_t), intent(in) :: bodies
       !> Patch
       type(patch_t), intent(out) :: patch
-      !> If the packing is too small
+      !> Allocated if the packing is too small
       type(error_t), allocatable, intent(inout) :: error
       real(wp), allocatable :: centres(:, :)
       real(wp) :: low(2), high(2), distance
@@ -142,8 +63,8 @@ contains
       centres = bodies%position(:, bodies%free)
       call find_middle(centres, low, high, distance)
       if (any(.not. high - low > least_size*distance)) then
-         call raise(error, input_error, 'too few free bodies lie away from walls and surface to make a patch of '// &
-                    'them; a bed of a thousand grains is enough')
+         call raise(error, input_error, 'too few free bodies away from walls and surface to cut a patch; '// &
+                    'a bed of a thousand grains is enough')
          return
       end if
       chosen = pack([(k, k=1_ip, size(centres, 2, kind=ip))], &
@@ -166,7 +87,7 @@ contains
       call drop_overlaps(patch)
    end subroutine cut_patch
 
-   !> The rectangle that is left of a packing without its margins, whose surface is as low as in its lowest place.
+   !> Find the rectangle inside the margins of a packing. Its upper side is below the lowest point of the surface.
    pure subroutine find_middle(centres, low, high, distance)
       real(wp), intent(in) :: centres(:, :)
       real(wp), intent(out) :: low(2), high(2)
@@ -195,7 +116,7 @@ contains
       high = high - margin*distance
    end subroutine find_middle
 
-   !> Drop grains that overlap a copy of one that is kept.
+   !> Remove grains that overlap a copy of another grain of the patch.
    pure subroutine drop_overlaps(patch)
       type(patch_t), intent(inout) :: patch
       logical :: kept(size(patch%grains))
@@ -214,7 +135,7 @@ contains
       patch%centres = reshape(pack(patch%centres, spread(kept, 1, 2)), [2, count(kept)])
    end subroutine drop_overlaps
 
-   !> Whether a grain sticks out of the rectangle
+   !> Whether a grain is so near the border of the rectangle that it may overlap a copy of a grain
    pure logical function near_border(patch, k)
       type(patch_t), intent(in) :: patch
       integer(ip), intent(in) :: k
@@ -222,7 +143,7 @@ contains
       near_border = any(min(patch%centres(:, k), patch%period - patch%centres(:, k)) <= maxval(patch%grains%length))
    end function near_border
 
-   !> Whether grain k overlaps any of the eight copies of grain j around
+   !> Whether grain k overlaps any of the eight neighbouring copies of grain j
    pure logical function meets_copy(patch, j, k)
       type(patch_t), intent(in) :: patch
       integer(ip), intent(in) :: j, k

@@ -1,37 +1,37 @@
-!> Grains inside a convex outline, which is how every scene with falling grains starts: loose on a lattice, loose in
-!> cells of many sizes, or packed as in a former result.
+!> Places grains inside a convex outline. Every scene with falling grains uses it. The grains are loose on a lattice,
+!> loose in cells of many sizes, or packed as in an earlier result.
 module polydem_pour
    use polydem_body_list, only: body_list_t
-   use polydem_cut_cells, only: spread_cells
+   use polydem_cut_cells, only: fit_cells
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: append_grains, draw_grains, draw_sizes, grain_t
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: fill_lattice
-   use polydem_packing, only: pack_grains, turn_along
+   use polydem_packing, only: pack_grains, rotate_with_walls
    use polydem_random, only: new_random, random_t
    use polydem_settings, only: scene_settings_t
    use polydem_start_velocities, only: draw_velocities
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: pour_grains, loose_spacing, looseness, shake
+   public :: place_grains, loose_spacing, loose_spacing_ratio, displace_randomly
 
-   !> Distance of loose grains over the greatest diameter of a grain
-   real(wp), parameter :: looseness = 1.02_wp
+   !> Distance of loose grains over the largest diameter of a grain
+   real(wp), parameter :: loose_spacing_ratio = 1.02_wp
 
 contains
 
    !> Append n free grains, from the bottom of the outline up, with random velocities.
-   subroutine pour_grains(list, scene, outline, n, error)
+   subroutine place_grains(list, scene, outline, n, error)
       !> List to extend
       type(body_list_t), intent(inout) :: list
-      !> Grains, seed, speed, packing
+      !> Settings: grains, seed, speed, packing
       type(scene_settings_t), intent(in) :: scene
-      !> Corners of the convex outline, anticlockwise, (2, corner) [m]; upright rectangle if grains differ in size
+      !> Corners of the convex outline, anticlockwise, (2, corner) [m]; an upright rectangle if grains differ in size
       real(wp), intent(in) :: outline(:, :)
       !> Number of grains
       integer(ip), intent(in) :: n
-      !> If the grains do not fit
+      !> Allocated if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error
       type(random_t) :: random
       type(grain_t), allocatable :: grains(:)
@@ -49,11 +49,11 @@ contains
       if (allocated(error)) return
       call draw_velocities(random, scene%speed, velocities)
       spins = 0.0_wp
-      if (scene%packing /= '') call turn_along(scene, centres, velocities, spins)
+      if (scene%packing /= '') call rotate_with_walls(scene, centres, velocities, spins)
       call append_grains(list, scene, grains, centres, velocities, spins)
-   end subroutine pour_grains
+   end subroutine place_grains
 
-   !> Loose grains on a lattice, from the bottom up.
+   !> Place loose grains on a lattice, from the bottom up.
    subroutine pour_loosely(scene, outline, random, grains, centres, error)
       type(scene_settings_t), intent(in) :: scene
       real(wp), intent(in) :: outline(:, :)
@@ -65,15 +65,15 @@ contains
 
       call fill_lattice(outline, loose_spacing(scene), centres, n_found)
       if (n_found < size(grains)) then
-         call raise(error, input_error, 'there is room for '//to_text(n_found)//' loose grains, not for ' &
-                    //to_text(size(grains, kind=ip))//': make the container larger or the grains fewer')
+         call raise(error, input_error, 'the container has room for '//to_text(n_found)//' loose grains, not for ' &
+                    //to_text(size(grains, kind=ip))//'; enlarge the container or reduce the number of grains')
          return
       end if
       call draw_grains(scene, random, grains)
-      call shake(random, loose_spacing(scene) - scene%long_axis_max, centres)
+      call displace_randomly(random, loose_spacing(scene) - scene%long_axis_max, centres)
    end subroutine pour_loosely
 
-   !> Loose grains of many sizes all over an upright rectangle.
+   !> Place loose grains of many sizes in an upright rectangle.
    subroutine pour_sizes(scene, outline, random, grains, centres, error)
       type(scene_settings_t), intent(in) :: scene
       real(wp), intent(in) :: outline(:, :)
@@ -84,38 +84,38 @@ contains
       real(wp) :: spread
 
       call draw_grains(scene, random, grains, draw_sizes(scene%size_ratio, size(grains, kind=ip)))
-      call spread_cells(outline, looseness*grains%length, random, centres, spread)
+      call fit_cells(outline, loose_spacing_ratio*grains%length, random, centres, spread)
       if (.not. spread > 0.0_wp) then
-         call raise(error, input_error, 'there is no room for grains of such different sizes: make the container '// &
-                    'larger or the grains fewer')
+         call raise(error, input_error, 'the container has no room for grains of such different sizes; enlarge the '// &
+                    'container or reduce the number of grains')
       end if
    end subroutine pour_sizes
 
    !> Distance of the centres of loose grains on the lattice [m]
    pure real(wp) function loose_spacing(scene)
-      !> Axes of the grains
+      !> Settings: axes of the grains
       type(scene_settings_t), intent(in) :: scene
 
-      loose_spacing = looseness*scene%long_axis_max
+      loose_spacing = loose_spacing_ratio*scene%long_axis_max
    end function loose_spacing
 
-   !> Displace points at random, so that the distance of two shrinks by less than the play between them.
-   subroutine shake(random, play, centres)
+   !> Displace points at random. The distance of two points decreases by less than `play`.
+   subroutine displace_randomly(random, play, centres)
       !> Stream of random numbers
       type(random_t), intent(inout) :: random
-      !> Distance of neighbours that is not needed [m]
+      !> Gap between neighbours [m]
       real(wp), intent(in) :: play
-      !> Points, (2, :) [m]
+      !> Points, (2, point) [m]
       real(wp), intent(inout) :: centres(:, :)
       real(wp) :: most
       integer :: k
 
-      ! Each point moves by less than sqrt(2) 0.35 play < play/2.
+      ! The displacement of each point is less than sqrt(2) 0.35 play < play/2.
       most = 0.35_wp*play
       do k = 1, size(centres, 2)
          centres(1, k) = centres(1, k) + random%between(-most, most)
          centres(2, k) = centres(2, k) + random%between(-most, most)
       end do
-   end subroutine shake
+   end subroutine displace_randomly
 
 end module polydem_pour

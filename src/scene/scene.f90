@@ -1,23 +1,24 @@
-!> What there is at the start: the bodies of a scene and the prescribed motion of its walls.
+!> Initial state: the bodies of a scene and the prescribed motion of its walls.
 !>
-!> A generator lists polygons; this module makes the bodies and ties the motion to them. A new scene is a
-!> generator, its name here, and its name in the table of namelist entries, where single entries are checked.
+!> A generator lists polygons. This module makes the bodies from them and assigns the motion. A new scene needs a
+!> generator, a case in `list_generated`, and its name in the table of namelist entries, which also holds the checks of
+!> single entries.
 module polydem_scene
    use polydem_bed, only: list_bed
    use polydem_bodies, only: bodies_t
-   use polydem_bodies_file, only: read_bodies_file
+   use polydem_bodies_reader, only: read_bodies_file
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_channel, only: list_channel
    use polydem_drum, only: list_drum
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_file_system, only: exists
    use polydem_gas, only: list_gas
    use polydem_grains, only: pi
    use polydem_heap, only: list_heap
    use polydem_hopper, only: list_hopper
    use polydem_incline, only: list_incline
    use polydem_kinds, only: ip, wp
-   use polydem_motion, only: motion_t, new_motion
-   use polydem_paths, only: exists
+   use polydem_prescribed_motion, only: motion_t, new_motion
    use polydem_settings, only: scene_settings_t, settings_t
    use polydem_stack, only: list_stack
    use polydem_strings, only: to_text
@@ -29,13 +30,13 @@ contains
 
    !> Make the bodies of a scene and the motions of its walls.
    subroutine build_scene(settings, bodies, motions, error)
-      !> Settings; groups &scene and &forces (gravity and stiffness, for blocks at rest)
+      !> Settings: groups &scene and &forces (gravity and stiffness, for blocks at rest)
       type(settings_t), intent(in) :: settings
-      !> Bodies at the start, free ones first unless a bodies file says otherwise
+      !> Bodies at the start; free bodies come first unless a bodies file has another order
       type(bodies_t), intent(out) :: bodies
       !> Prescribed motions, none or one
       type(motion_t), allocatable, intent(out) :: motions(:)
-      !> What in the namelist or the bodies file cannot be used
+      !> Error in the namelist or the bodies file
       type(error_t), allocatable, intent(inout) :: error
       type(body_list_t) :: list
       character(len=:), allocatable :: origin
@@ -55,11 +56,11 @@ contains
          error%message = origin//': '//error%message
          return
       end if
-      call tie_motion(settings%scene, bodies, motions, error)
+      call assign_motion(settings%scene, bodies, motions, error)
       if (allocated(error)) error%message = settings%file//': &scene: '//error%message
    end subroutine build_scene
 
-   !> Have the generator of the scene list its bodies.
+   !> Call the generator of the scene, which lists the bodies.
    subroutine list_generated(settings, list, error)
       type(settings_t), intent(in) :: settings
       type(body_list_t), intent(inout) :: list
@@ -83,12 +84,12 @@ contains
       case ('stack')
          call list_stack(settings, list)
       case default
-         call raise(error, input_error, 'there is no scene '//settings%scene%name)
+         call raise(error, input_error, 'unknown scene '//settings%scene%name)
       end select
    end subroutine list_generated
 
-   !> Tie the prescribed motion to its bodies, from revolutions and hertz to radians per second.
-   subroutine tie_motion(scene, bodies, motions, error)
+   !> Assign the prescribed motion to its bodies; convert revolutions per second and hertz to radians per second.
+   subroutine assign_motion(scene, bodies, motions, error)
       type(scene_settings_t), intent(in) :: scene
       type(bodies_t), intent(in) :: bodies
       type(motion_t), allocatable, intent(out) :: motions(:)
@@ -112,9 +113,10 @@ contains
       prescription%ramp = scene%motion_ramp
       allocate (motions(1))
       call new_motion(motions(1), prescription, bodies, slots)
-   end subroutine tie_motion
+   end subroutine assign_motion
 
-   !> Slots of the bodies to move: those with the given identifiers, or all fixed ones if none are given
+   !> Find the slots of the bodies with prescribed motion: the bodies with the given identifiers, or all fixed bodies if
+   !> no identifiers are given.
    subroutine find_moved(ids, bodies, slots, error)
       integer(ip), intent(in) :: ids(:)
       type(bodies_t), intent(in) :: bodies
@@ -124,14 +126,14 @@ contains
 
       slots = pack([(s, s=1_ip, bodies%n)], bodies%fixed)
       if (size(slots) == 0) then
-         call raise(error, input_error, 'motion needs a fixed body, and there is none')
+         call raise(error, input_error, 'motion needs a fixed body, but the scene has none')
       end if
       if (size(ids) == 0 .or. allocated(error)) return
       slots = ids
       do k = 1_ip, size(ids, kind=ip)
          slots(k) = findloc(bodies%id, ids(k), dim=1)
          if (slots(k) == 0_ip) then
-            call raise(error, input_error, 'motion_bodies: there is no body '//to_text(ids(k)))
+            call raise(error, input_error, 'motion_bodies: body '//to_text(ids(k))//' does not exist')
          else if (.not. bodies%fixed(slots(k))) then
             call raise(error, input_error, 'motion_bodies: body '//to_text(ids(k))//' is not fixed')
          else if (any(ids(:k - 1_ip) == ids(k))) then

@@ -1,4 +1,4 @@
-!> Stack: blocks on top of each other at rest, each interface as deep as the weight above it asks for.
+!> Scene stack: blocks on top of each other at rest. The depth of each contact carries the weight above it.
 module polydem_stack
    use polydem_body_list, only: body_list_t
    use polydem_kinds, only: ip, wp
@@ -9,12 +9,13 @@ module polydem_stack
    private
    public :: list_stack
 
-   !> Width of the floor over that of a block
+   !> Width of the floor over width of a block
    real(wp), parameter :: floor_width = 10.0_wp
 
 contains
 
-   !> List the bodies of the stack: blocks from the bottom up, then the floor, as thick as a block, top at 0.
+   !> List the bodies of the stack: blocks from the bottom up, then the floor. The floor is as thick as a block and its
+   !> top is at y = 0.
    subroutine list_stack(settings, list)
       !> Settings: bodies (blocks), width and height of a block; gravity, stiffness and law
       type(settings_t), intent(in) :: settings

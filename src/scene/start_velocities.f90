@@ -1,11 +1,11 @@
-!> Velocities of grains at the start.
+!> Initial velocities and angular velocities of grains.
 module polydem_start_velocities
    use polydem_grains, only: grain_t
    use polydem_kinds, only: ip, wp
    use polydem_random, only: random_t
    implicit none
    private
-   public :: draw_velocities, draw_spins, choose_movers, remove_momentum, set_speed
+   public :: draw_velocities, draw_spins, choose_moving_grains, remove_momentum, set_speed
 
 contains
 
@@ -13,9 +13,9 @@ contains
    subroutine draw_velocities(random, speed, velocities)
       !> Stream of random numbers
       type(random_t), intent(inout) :: random
-      !> Expected root of the mean square of the speed [m/s]
+      !> Expected root mean square speed [m/s]
       real(wp), intent(in) :: speed
-      !> Velocities, (2, :) [m/s]
+      !> Velocities, (2, grain) [m/s]
       real(wp), intent(out) :: velocities(:, :)
       integer :: k
 
@@ -25,13 +25,13 @@ contains
       end do
    end subroutine draw_velocities
 
-   !> Draw angular velocities from a normal distribution and scale them to a given root of the mean square.
+   !> Draw angular velocities from a normal distribution and scale them to a given root mean square.
    subroutine draw_spins(random, spin, spins)
       !> Stream of random numbers
       type(random_t), intent(inout) :: random
-      !> Root of the mean square of the angular velocities [rad/s]
+      !> Root mean square of the angular velocities [rad/s]
       real(wp), intent(in) :: spin
-      !> Angular velocities [rad/s]
+      !> Angular velocities, (grain) [rad/s]
       real(wp), intent(out) :: spins(:)
       real(wp) :: squares
       integer :: k
@@ -46,12 +46,12 @@ contains
       spins = spin*sqrt(real(size(spins), wp)/squares)*spins
    end subroutine draw_spins
 
-   !> Choose the grains that get a speed, evenly spaced in their order; one alone is in the middle. The only grain of
-   !> a scene rests unless it is asked to move.
-   pure function choose_movers(n, movers) result(moves)
+   !> Choose the grains that move. They are evenly spaced in the order of the grains; a single one is in the middle. If
+   !> the scene has only one grain, this grain rests unless `movers` is 1.
+   pure function choose_moving_grains(n, movers) result(moves)
       !> Number of grains
       integer(ip), intent(in) :: n
-      !> Number of those that move, at most n; 0: all
+      !> Number of grains that move, at most n; 0: all
       integer(ip), intent(in) :: movers
       logical :: moves(n)
       integer(ip) :: k
@@ -60,14 +60,14 @@ contains
       do k = 1_ip, movers
          moves(ceiling((real(k, wp) - 0.5_wp)*real(n, wp)/real(movers, wp), ip)) = .true.
       end do
-   end function choose_movers
+   end function choose_moving_grains
 
-   !> Subtract the velocity of the common centre of mass of those that move, at least one. All grains have the same
-   !> density.
+   !> Subtract the velocity of the common centre of mass of the moving grains. At least one grain must move. All grains
+   !> have the same density.
    pure subroutine remove_momentum(grains, moves, velocities)
       !> Grains
       type(grain_t), intent(in) :: grains(:)
-      !> Which of them move
+      !> Whether each grain moves, (grain)
       logical, intent(in) :: moves(:)
       !> Velocities, (2, grain) [m/s]
       real(wp), intent(inout) :: velocities(:, :)
@@ -87,12 +87,12 @@ contains
       end do
    end subroutine remove_momentum
 
-   !> Scale the velocities of those that move to a given root of the mean square of their speed, which stays 0
-   !> if it is; the others rest.
+   !> Scale the velocities of the moving grains to a given root mean square speed, and set those of the other grains to
+   !> zero. If all speeds are 0 they stay 0.
    pure subroutine set_speed(speed, moves, velocities)
-      !> Root of the mean square of the speed [m/s]
+      !> Root mean square speed [m/s]
       real(wp), intent(in) :: speed
-      !> Which grains move
+      !> Whether each grain moves, (grain)
       logical, intent(in) :: moves(:)
       !> Velocities, (2, grain) [m/s]
       real(wp), intent(inout) :: velocities(:, :)

@@ -1,4 +1,4 @@
-!> Straight walls: each is one rectangle, however long. Walls of a container share edges and do not overlap.
+!> Straight walls. Each wall is one rectangle of any length. Walls of a container share edges and do not overlap.
 module polydem_walls
    use polydem_body_list, only: body_list_t
    use polydem_kinds, only: wp
@@ -10,13 +10,13 @@ contains
 
    !> Corners of an upright rectangle, anticlockwise, (2, 4) [m]
    pure function rectangle(left, right, bottom, top) result(corners)
-      !> Least x [m]
+      !> Smallest x [m]
       real(wp), intent(in) :: left
-      !> Greatest x [m]
+      !> Largest x [m]
       real(wp), intent(in) :: right
-      !> Least y [m]
+      !> Smallest y [m]
       real(wp), intent(in) :: bottom
-      !> Greatest y [m]
+      !> Largest y [m]
       real(wp), intent(in) :: top
       real(wp) :: corners(2, 4)
 
@@ -26,11 +26,11 @@ contains
       corners(:, 4) = [left, top]
    end function rectangle
 
-   !> Append the walls of a box around an upright rectangle: floor, left, right and, if closed, a lid.
+   !> Append the walls of a container around an upright rectangle: floor, left, right and, if closed, a lid.
    subroutine append_box(list, inside, thickness, closed)
       !> List to extend
       type(body_list_t), intent(inout) :: list
-      !> Corners of the rectangle as `rectangle` gives them, (2, 4) [m]
+      !> Corners of the rectangle in the order of `rectangle`, (2, 4) [m]
       real(wp), intent(in) :: inside(2, 4)
       !> Thickness of the walls [m]
       real(wp), intent(in) :: thickness

@@ -1,7 +1,8 @@
 !> The bodies of a simulation as a structure of arrays.
 !>
-!> A body is a convex polygon, free or fixed. Its *slot* is its place in the arrays and may change; its
-!> *identifier* never does. Slots stand in ascending order of identifiers.
+!> A body is a convex polygon, free or fixed. Its *slot* is its index in the arrays, which may change. Its
+!> *identifier* never changes. Slots are in ascending order of identifiers. Fixed bodies are on every rank; a free
+!> body is on the rank that moves it and, as a halo body, on ranks nearby.
 !>
 !> Vertices are packed: body `s` owns the columns `vertex_start(s) : vertex_start(s + 1) - 1`,
 !> anticlockwise, of two arrays:
@@ -9,11 +10,11 @@
 !>     shape(:, k)    in the body frame: relative to the centre of mass, at angle 0; never changes
 !>     turned(:, k)   shape turned by the angle, still relative to the centre of mass
 !>
-!> World coordinates are `position + turned`. They are not stored: differences between two near bodies
-!> are exact only if they are formed from positions first, so that results do not suffer far from the origin.
+!> World coordinates are `position + turned`. They are not stored. Vectors between two near bodies start from the
+!> difference of their positions, which is exact; the precision is then independent of the distance from the origin.
 module polydem_bodies
-   use polydem_kinds, only: ip, lp, wp, dp, worth_threads
    use polydem_hash, only: mix_word
+   use polydem_kinds, only: ip, lp, wp, dp, min_parallel_size
    implicit none
    private
    public :: bodies_t, turn_bodies, state_hash, state_words
@@ -24,19 +25,19 @@ module polydem_bodies
       integer(ip) :: n = 0_ip
       !> Identifier of each slot, ascending
       integer(ip), allocatable :: id(:)
-      !> Whether the body is moved by prescription or not at all
+      !> Whether the body is fixed: it rests or follows a prescribed motion
       logical, allocatable :: fixed(:)
-      !> Slots of the free bodies that this process moves, ascending
+      !> Slots of the free bodies that this rank moves, ascending
       integer(ip), allocatable :: free(:)
-      !> Whether another process moves the body, which is here because it is near one of `free`
-      logical, allocatable :: ghost(:)
-      !> Place of each body in the ascending order of all bodies of the run
-      integer(ip), allocatable :: row(:)
+      !> Whether the body is in the halo: a copy of a body near one of `free` that another rank moves
+      logical, allocatable :: in_halo(:)
+      !> Global index of each body: its position in the ascending order of all bodies of the run, from 1
+      integer(ip), allocatable :: global_index(:)
       !> Number of all bodies of the run
       integer(ip) :: n_all = 0_ip
-      !> Mass [kg/m]; infinite mass of a fixed body is stored as 0
+      !> Mass [kg/m]; an infinite mass is stored as 0
       real(wp), allocatable :: mass(:)
-      !> Moment of inertia about the centre of mass [kg m]; infinite is stored as 0
+      !> Moment of inertia about the centre of mass [kg m]; an infinite one is stored as 0
       real(wp), allocatable :: inertia(:)
       !> 1/mass, 0 for infinite mass [m/kg]
       real(wp), allocatable :: inverse_mass(:)
@@ -70,9 +71,9 @@ module polydem_bodies
 
 contains
 
-   !> Bring `direction` and `turned` of the given bodies up to date with their angles.
+   !> Update `direction` and `turned` of the given bodies to their angles.
    !>
-   !> The only place of the program that takes the sine of a body's angle.
+   !> No other procedure of the program takes the sine or cosine of the angle of a body.
    subroutine turn_bodies(bodies, slots)
       !> Bodies; only `direction` and `turned` change
       type(bodies_t), intent(inout) :: bodies
@@ -81,7 +82,7 @@ contains
       integer(ip) :: k, s, v
       real(wp) :: c, si
 
-      !$omp parallel do if (size(slots) > worth_threads) schedule(static) default(none) &
+      !$omp parallel do if (size(slots) > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(bodies, slots) private(k, s, v, c, si)
       do k = 1_ip, size(slots, kind=ip)
          s = slots(k)
@@ -99,7 +100,7 @@ contains
 
    !> Hash of the bits of every body's identifier, position, angle and velocities in identifier order.
    !>
-   !> Real numbers enter as double precision. Two runs agree in every bit if their hashes agree.
+   !> Real numbers enter in double precision. Two states with the same hash agree in every bit (up to collisions).
    pure integer(lp) function state_hash(bodies)
       !> Bodies to hash
       type(bodies_t), intent(in) :: bodies
@@ -116,7 +117,7 @@ contains
       end do
    end function state_hash
 
-   !> What a body adds to the hash of the state
+   !> Contribution of a body to the hash of the state
    pure function state_words(bodies, s) result(words)
       !> Bodies
       type(bodies_t), intent(in) :: bodies
@@ -129,6 +130,7 @@ contains
                bits(bodies%velocity(1, s)), bits(bodies%velocity(2, s)), bits(bodies%angular_velocity(s))]
    end function state_words
 
+   !> Bits of a real number in double precision
    pure integer(lp) function bits(number)
       real(wp), intent(in) :: number
 

@@ -1,4 +1,4 @@
-!> Bodies one by one, as generators and readers find them, to be turned into the arrays of `bodies_t`.
+!> A list to which generators and readers append bodies one by one, and its conversion to the arrays of `bodies_t`.
 module polydem_body_list
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_errors, only: error_t, input_error, raise
@@ -10,20 +10,20 @@ module polydem_body_list
    private
    public :: body_list_t, new_bodies
 
-   !> Density where none is given [kg/m3]
+   !> Default density [kg/m3]
    real(wp), parameter :: default_density = 2500.0_wp
 
-   !> Least mass [kg/m] and moment of inertia [kg m]; the greatest is its inverse. Products of two are normal numbers,
-   !> in single precision only the numbers themselves.
+   !> Least mass [kg/m] and moment of inertia [kg m]; the greatest is the inverse of this. In double precision products
+   !> of two such values are normal numbers; in single precision only the values themselves are.
    real(wp), parameter :: least_mass = 10.0_wp**(-min(100, range(1.0_wp)))
 
-   !> What is known of one body before its masses are computed
+   !> One body before its mass properties are computed
    type :: entry_t
       !> Identifier
       integer(ip) :: id = 0_ip
       !> Whether it is fixed
       logical :: fixed = .false.
-      !> Corners in the world, (2, corner) [m]
+      !> Vertices in world coordinates, (2, vertex) [m]
       real(wp), allocatable :: vertices(:, :)
       !> Density [kg/m3]
       real(wp) :: density = default_density
@@ -39,7 +39,7 @@ module polydem_body_list
 
    !> A growing list of bodies
    type :: body_list_t
-      !> Number of bodies so far
+      !> Number of bodies in the list
       integer(ip) :: n = 0_ip
       type(entry_t), allocatable, private :: entries(:)
    contains
@@ -48,11 +48,11 @@ module polydem_body_list
 
 contains
 
-   !> Append a body. Without `mass` a free body gets that of its polygon, without `inertia` that of its mass spread
-   !> evenly over the polygon; a fixed body is infinitely heavy in what it is not given.
+   !> Append a body. The default `mass` of a free body is density times area. Its default `inertia` is that of its mass
+   !> spread evenly over the polygon. The default mass and moment of inertia of a fixed body are infinite.
    subroutine append(self, vertices, fixed, density, velocity, angular_velocity, id, mass, inertia)
       class(body_list_t), intent(inout) :: self
-      !> Corners in the world, any orientation, (2, corner) [m]
+      !> Vertices in world coordinates, clockwise or anticlockwise, (2, vertex) [m]
       real(wp), intent(in) :: vertices(:, :)
       !> Whether the body is fixed, .false. if absent
       logical, intent(in), optional :: fixed
@@ -62,7 +62,7 @@ contains
       real(wp), intent(in), optional :: velocity(2)
       !> Angular velocity [rad/s]
       real(wp), intent(in), optional :: angular_velocity
-      !> Identifier, the place in the list if absent
+      !> Identifier; the position in the list if absent
       integer(ip), intent(in), optional :: id
       !> Mass instead of that of the polygon [kg/m]
       real(wp), intent(in), optional :: mass
@@ -84,13 +84,13 @@ contains
       end associate
    end subroutine append
 
-   !> Check every polygon and make the arrays, in ascending order of the identifiers, at angle 0.
+   !> Check every polygon and build the arrays, in ascending order of the identifiers, at angle 0.
    subroutine new_bodies(list, bodies, error)
-      !> Bodies one by one
+      !> List of bodies
       type(body_list_t), intent(in) :: list
-      !> Structure of arrays
+      !> The same bodies as a structure of arrays
       type(bodies_t), intent(out) :: bodies
-      !> Names the body whose polygon or identifier cannot be used
+      !> Allocated if a body is invalid; the message names it
       type(error_t), allocatable, intent(inout) :: error
       integer(lp), allocatable :: key(:), spare_key(:)
       integer(ip), allocatable :: order(:), spare(:)
@@ -104,7 +104,8 @@ contains
       call sort_keys(list%n, key, order, spare_key, spare)
       do k = 2_ip, list%n
          if (key(k) == key(k - 1_ip)) then
-            call raise(error, input_error, 'body '//to_text(key(k))//': the identifier is used twice')
+            call raise(error, input_error, 'body '//to_text(key(k))// &
+                       ': the identifier is used twice; each body needs its own')
             return
          end if
       end do
@@ -146,7 +147,7 @@ contains
       allocate (bodies%shape(2, 16*n))
    end subroutine allocate_bodies
 
-   !> Put one body into its slot.
+   !> Check one body and store it in its slot.
    subroutine place(entry, s, bodies, error)
       type(entry_t), intent(in) :: entry
       integer(ip), intent(in) :: s
@@ -168,7 +169,7 @@ contains
       end if
       if (entry%fixed .and. any(abs([entry%velocity, entry%angular_velocity]) > 0.0_wp)) then
          call raise(error, input_error, 'body '//to_text(entry%id)//': it is fixed and cannot have a velocity '// &
-                    'or an angular velocity; fixed bodies move as motion in &scene of the namelist says')
+                    'or an angular velocity; set motion in &scene of the namelist to move it')
          return
       end if
       call mass_properties(cleaned, area, centroid, second_moment)
@@ -191,7 +192,8 @@ contains
       bodies%vertex_start(s + 1_ip) = bodies%vertex_start(s) + size(cleaned, 2, kind=ip)
    end subroutine place
 
-   !> Refuse masses so small or large that their inverses or products leave the normal numbers; 0: infinite.
+   !> Reject a mass so small or large that its inverse or products leave the range of normal numbers. 0 is infinite and
+   !> valid for fixed bodies.
    subroutine check_mass(name, mass, entry, error)
       character(len=*), intent(in) :: name
       real(wp), intent(in) :: mass
@@ -202,7 +204,7 @@ contains
       if (entry%fixed .and. abs(mass) <= 0.0_wp) return
       call raise(error, input_error, 'body '//to_text(entry%id)//': the '//name//' is '//to_text(mass)// &
                  ', but must be between '//to_text(least_mass)//' and '//to_text(1.0_wp/least_mass)// &
-                 '; use units in which the bodies are neither so small nor so large')
+                 '; choose units that bring it into this range')
    end subroutine check_mass
 
    subroutine reserve_vertices(bodies, first, more)
@@ -228,8 +230,8 @@ contains
       where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass
       where (bodies%inertia > 0.0_wp) bodies%inverse_inertia = 1.0_wp/bodies%inertia
       bodies%n_all = bodies%n
-      bodies%row = [(s, s=1_ip, bodies%n)]
-      bodies%ghost = spread(.false., 1, bodies%n)
+      bodies%global_index = [(s, s=1_ip, bodies%n)]
+      bodies%in_halo = spread(.false., 1, bodies%n)
       bodies%free = pack([(s, s=1_ip, bodies%n)],.not. bodies%fixed)
       call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
    end subroutine finish

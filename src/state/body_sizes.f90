@@ -1,4 +1,4 @@
-!> How thick and how long bodies are, measured from their centres of mass.
+!> Thickness and radius of bodies, measured from their centres of mass.
 module polydem_body_sizes
    use polydem_bodies, only: bodies_t
    use polydem_kinds, only: ip, wp

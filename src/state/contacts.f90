@@ -1,31 +1,27 @@
-!> Contacts (pairs of bodies whose polygons overlap), and what is remembered about pairs between steps.
+!> Contacts: pairs of bodies whose polygons overlap.
 !>
-!> Contacts stand in ascending order of their pairs: of the first body, then of the second. The first body
-!> has the lower identifier. All vectors point in world directions.
-!>
-!> Memory rides on the pair list: entry `p` belongs to pair `p`, follows it when the list changes, and is
-!> cleared when the polygons part. A column of memory, or `twist`, that no model of the scene needs is never allocated.
+!> Contacts are in ascending order of their pairs: of the first body, then of the second. The first body has the lower
+!> identifier. All vectors are in world coordinates. `twist` is allocated only if a force model of the run needs it.
 module polydem_contacts
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: contacts_t, contact_memory_t, memory_kinds, at_tangential, at_area, at_direction, &
-      reserve_contacts, is_degenerate
+   public :: contacts_t, reserve_contacts, is_degenerate
 
    !> Structure of arrays over contacts 1..n; the arrays may be longer
    type :: contacts_t
       !> Number of contacts
       integer(ip) :: n = 0_ip
-      !> Number of contacts without a direction (one body inside the other, or crossing bars)
+      !> Number of degenerate contacts, which have no direction (one body inside the other, or crossing bars)
       integer(ip) :: n_degenerate = 0_ip
-      !> Whether the elastic force has an energy, quadratic in `area`: half of elastic area/length
+      !> Whether the elastic force has an energy, quadratic in `area`: elastic*area/(2 length)
       logical :: energy_is_quadratic = .false.
-      !> Whether `area` and what follows from it (`rate`, `normal`, `moment`, `direction`, `length`) are to be those of
-      !> the effective area, which differs from the area by the shape of the overlap
+      !> Whether `area` and the columns derived from it (`rate`, `normal`, `moment`, `direction`, `length`) are those of
+      !> the effective area (see `polydem_effective_area`)
       logical :: area_is_effective = .false.
-      !> Whether the law needs the column `twist`
+      !> Whether the force model needs the column `twist`
       logical :: has_twist = .false.
-      !> Place in the pair list
+      !> Index in the pair list
       integer(ip), allocatable :: pair(:)
       !> Slot of the body with the lower identifier
       integer(ip), allocatable :: first(:)
@@ -48,7 +44,7 @@ module polydem_contacts
       real(wp), allocatable :: direction(:, :)
       !> Length of the contact |normal|, or the square root of the area if degenerate [m]
       real(wp), allocatable :: length(:)
-      !> Reciprocal of the characteristic length of the force law [1/m]
+      !> Reciprocal of the characteristic length of the force model [1/m]
       real(wp), allocatable :: inverse_length(:)
       !> Torque of the normal force about the centroid of the overlap, on the first body, per unit of force [m]
       real(wp), allocatable :: lever(:)
@@ -58,56 +54,25 @@ module polydem_contacts
       real(wp), allocatable :: normal_force(:)
       !> Tangential force on the first body along (-direction_y, direction_x) [N/m]
       real(wp), allocatable :: tangential_force(:)
-      !> Torque on the first body besides those of the forces, the opposite on the second, where a model needs it [N]
+      !> Torque on the first body in addition to those of the forces; the opposite acts on the second [N]
       real(wp), allocatable :: twist(:)
-      !> Force on the first body; the second feels the opposite, (2, contact) [N/m]
+      !> Force on the first body; the opposite acts on the second, (2, contact) [N/m]
       real(wp), allocatable :: force(:, :)
    end type contacts_t
 
-   !> Something that force parts remember of pairs from step to step
-   type :: memory_kind_t
-      !> Name in checkpoints, and unit
-      character(len=16) :: name, unit
-      !> What it is
-      character(len=48) :: meaning
-   end type memory_kind_t
-
-   !> Rows of the table of what is remembered
-   integer, parameter :: at_tangential = 1, at_area = 2, at_direction = 3
-   !> All that can be remembered. The tangential force is that of the spring or of exact friction; the area serves
-   !> the book's backward difference, and to know new contacts; the direction, packed in one number, serves a guard
-   type(memory_kind_t), parameter :: memory_kinds(*) = [ &
-      memory_kind_t('tangential', 'N/m', 'tangential force remembered'), &
-      memory_kind_t('area', 'm2', 'area of the overlap at the last step'), &
-      memory_kind_t('direction', '1', 'direction at the last step, packed')]
-
-   !> A column of memory
-   type :: memory_column_t
-      !> Value of each pair, zero when its bodies do not overlap; not allocated where no model asks for it, (pair)
-      real(wp), allocatable :: value(:)
-   end type memory_column_t
-
-   !> What is remembered of pairs: columns that ride on the pair list
-   type :: contact_memory_t
-      !> Edge that separated the pair last: +k of the first body, -k of the second, 0 unknown
-      integer(ip), allocatable :: separating_edge(:)
-      !> Columns in the order of the table
-      type(memory_column_t) :: column(size(memory_kinds))
-   end type contact_memory_t
-
 contains
 
-   !> Whether a contact has no direction of its own: its `normal` vanishes, and its `length` is made up.
+   !> Whether a contact is degenerate: its `normal` vanishes, and its `length` is the square root of the area.
    pure logical function is_degenerate(contacts, c)
       !> Table of contacts
       type(contacts_t), intent(in) :: contacts
-      !> Place in the table
+      !> Index of the contact
       integer(ip), intent(in) :: c
 
       is_degenerate = contacts%normal(1, c)**2 + contacts%normal(2, c)**2 < 0.25_wp*contacts%length(c)**2
    end function is_degenerate
 
-   !> Make room for at least `capacity` contacts; contents are lost when the arrays grow.
+   !> Make room for at least `capacity` contacts. If the arrays grow, their contents are lost.
    subroutine reserve_contacts(contacts, capacity)
       !> Table of contacts
       type(contacts_t), intent(inout) :: contacts

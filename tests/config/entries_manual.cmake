@@ -1,7 +1,7 @@
 # cmake -D PROGRAM=print_entries -D README=inputs/README.md [-D UPDATE=ON] -P entries_manual.cmake
 #
 # Compare the table between the lines <!-- entries --> and <!-- /entries --> of the manual with the table that
-# the program prints; or, with UPDATE, put the printed one there.
+# the program prints. With UPDATE, replace it by the printed table.
 set(opening "<!-- entries -->\n")
 set(closing "<!-- /entries -->")
 
@@ -26,5 +26,5 @@ elseif(UPDATE)
   message(STATUS "${README} has a new table of entries")
 else()
   message(FATAL_ERROR "the table of entries in ${README} is not that of the code; "
-    "cmake --build BUILD --target entries_manual writes it anew")
+    "cmake --build BUILD --target entries_manual generates it")
 endif()

@@ -1,4 +1,4 @@
-!> Short namelists for the tests of config; `|` stands for a line end.
+!> Short namelists for the tests of config; `|` is a line end.
 module sample_settings
    use polydem_errors, only: error_t
    use polydem_read_settings, only: read_settings_text
@@ -7,7 +7,7 @@ module sample_settings
    private
    public :: with_line_ends, message_of, override_message, settings_of, drum
 
-   !> The least that describes a run
+   !> Shortest namelist of a run
    character(len=*), parameter :: drum = "&scene name = 'drum' bodies = 10 /|&integrate duration = 1 /"
 
 contains
@@ -25,7 +25,7 @@ contains
       end do
    end function with_line_ends
 
-   !> What is said about a namelist called t.nml, with an input error; 'no error' if it is accepted
+   !> Message of the input error of a namelist called t.nml; 'no error' if it is accepted
    function message_of(text) result(message)
       !> Namelist
       character(len=*), intent(in) :: text
@@ -34,7 +34,7 @@ contains
       message = override_message(text, '')
    end function message_of
 
-   !> What is said about a namelist called t.nml and an override
+   !> Message of the input error of a namelist called t.nml with an override; 'no error' if they are accepted
    function override_message(text, override) result(message)
       !> Namelist
       character(len=*), intent(in) :: text

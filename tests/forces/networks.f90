@@ -1,9 +1,10 @@
 !> Networks of contacts made by hand or by chance, and their dense matrices, for tests of exact friction.
 module networks
-   use polydem_assemble, only: incidence_t, index_contacts
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_contacts, only: at_tangential, contact_memory_t, contacts_t, reserve_contacts
+   use polydem_contact_history, only: at_tangential, contact_memory_t
+   use polydem_contact_incidence, only: incidence_t, index_contacts
+   use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_random, only: random_t

@@ -2,7 +2,8 @@
 module two_squares
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_contacts, only: at_area, at_tangential, contact_memory_t, contacts_t, reserve_contacts
+   use polydem_contact_history, only: at_area, at_tangential, contact_memory_t
+   use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    implicit none

@@ -6,17 +6,17 @@
 !> promise; a crash is a broken promise, too.
 program fuzz
    use, intrinsic :: iso_fortran_env, only: error_unit
-   use fuzz_cases, only: spoilt_file, try_bodies, try_bytes, try_checkpoint, try_namelist, try_override, &
-      try_scene, try_segment, try_trace, write_sound_file
+   use fuzz_cases, only: spoilt_file, try_bodies, try_bytes, try_checkpoint, try_namelist, try_override, try_scene, &
+      try_segment, try_trace, write_sound_file
    use hostile_fields, only: field_t
    use hostile_file, only: count_open_objects, start_hdf5
+   use spoilt_checkpoint, only: sound_checkpoint
    use polydem_clock, only: wall_seconds
    use polydem_errors, only: error_t, input_error, io_error, run_error
    use polydem_kinds, only: dp, ip
    use polydem_random, only: new_random, random_t
+   use polydem_strings, only: text_t
    use polydem_text_file, only: read_text_file
-   use polydem_words, only: text_t
-   use spoilt_checkpoint, only: sound_checkpoint
    implicit none
 
    character(len=16), parameter :: namelists(*) = [character(len=16) :: 'stack.nml', 'drum.nml', 'gas.nml', &

@@ -3,20 +3,22 @@ module fuzz_cases
    use damaged_text, only: damage, damage_bytes
    use hostile_fields, only: field_t, new_field, new_text, spoil_fields
    use hostile_file, only: write_hostile_file
+   use spoilt_checkpoint, only: go_on_from, put_behind_seal, sound_checkpoint
    use polydem_bench_settings, only: bench_settings_t
    use polydem_bodies, only: bodies_t
    use polydem_errors, only: error_t
-   use polydem_info, only: describe_result
    use polydem_kinds, only: dp, ip, wp
    use polydem_namelist_entries, only: choices_of
-   use polydem_patch, only: read_packing
    use polydem_random, only: random_t
    use polydem_read_bench, only: read_bench_text
    use polydem_read_settings, only: read_settings_text
    use polydem_replay, only: replay_trace
+   use polydem_result_info, only: describe_result
    use polydem_settings, only: settings_t
-   use polydem_simulation, only: advance, new_simulation, simulation_t
-   use spoilt_checkpoint, only: go_on_from, put_behind_seal, sound_checkpoint
+   use polydem_simulation, only: simulation_t
+   use polydem_start, only: new_simulation
+   use polydem_time_step, only: advance
+   use polydem_trajectory_reader, only: read_packing
    implicit none
    private
    public :: try_namelist, try_override, try_scene, try_bodies, try_trace, try_checkpoint, try_segment, try_bytes, &

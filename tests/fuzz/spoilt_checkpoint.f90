@@ -1,17 +1,19 @@
 !> Checkpoints for fuzzing: one of a small run as fields to be spoilt, and a run that goes on from what came of them.
 module spoilt_checkpoint
    use hostile_fields, only: field_t, new_field
-   use polydem_archive, only: archive_t
-   use polydem_checkpoint_contents, only: history_t, keep_run
+   use polydem_checkpoint_fields, only: attempts_t, serialize_run
    use polydem_checkpoint_file, only: checkpoint_file_t
    use polydem_errors, only: error_t
+   use polydem_file_checksum, only: append_checksum, checksum_length
    use polydem_kinds, only: dp, lp
+   use polydem_monitor, only: new_monitor, monitor_t
    use polydem_read_settings, only: read_settings_text
-   use polydem_sealed_file, only: seal_file, seal_length
+   use polydem_serializer, only: serializer_t
    use polydem_settings, only: settings_t
-   use polydem_simulation, only: advance, new_simulation, simulation_t
+   use polydem_simulation, only: simulation_t
+   use polydem_start, only: new_simulation
    use polydem_text_file, only: read_text_file
-   use polydem_watch, only: new_watch, watch_t
+   use polydem_time_step, only: advance
    implicit none
    private
    public :: sound_checkpoint, put_behind_seal, go_on_from
@@ -26,32 +28,32 @@ module spoilt_checkpoint
    character(len=*), parameter :: none(*) = [character(len=1) ::]
 
    !> An archive whose columns become fields
-   type, extends(archive_t) :: field_archive_t
+   type, extends(serializer_t) :: field_serializer_t
       !> The columns so far
       type(field_t), allocatable :: fields(:)
    contains
-      procedure :: exchange_reals
-      procedure :: exchange_longs
-   end type field_archive_t
+      procedure :: transfer_reals
+      procedure :: transfer_longs
+   end type field_serializer_t
 
 contains
 
    !> The columns of a sound checkpoint
    function sound_checkpoint() result(fields)
       type(field_t), allocatable :: fields(:)
-      type(field_archive_t) :: archive
+      type(field_serializer_t) :: serializer
       type(simulation_t) :: simulation
-      type(history_t) :: history
-      type(watch_t) :: watch
+      type(attempts_t) :: history
+      type(monitor_t) :: watch
       type(error_t), allocatable :: error
 
       call begin(simulation, watch, error)
       call do_steps(simulation, steps_before, error)
       if (allocated(error)) error stop 'fuzz: the run of the checkpoint fails'
-      allocate (archive%fields(0))
+      allocate (serializer%fields(0))
       history%scene = any_hash
-      call keep_run(archive, simulation, history, watch)
-      call move_alloc(archive%fields, fields)
+      call serialize_run(serializer, simulation, history, watch)
+      call move_alloc(serializer%fields, fields)
    end function sound_checkpoint
 
    !> Turn an HDF5 file into a sealed one: HDF5 finds its data behind the seal.
@@ -65,9 +67,9 @@ contains
       call read_text_file(path, bytes, error)
       if (allocated(error)) error stop 'fuzz: a file that was just written cannot be read'
       open (newunit=unit, file=path, access='stream', form='unformatted', action='write', status='replace')
-      write (unit) repeat(' ', seal_length), bytes
+      write (unit) repeat(' ', checksum_length), bytes
       close (unit)
-      call seal_file(path, error)
+      call append_checksum(path, error)
    end subroutine put_behind_seal
 
    !> Let the small run go on from a checkpoint.
@@ -78,14 +80,14 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
       type(simulation_t) :: simulation
-      type(history_t) :: history
-      type(watch_t) :: watch
+      type(attempts_t) :: history
+      type(monitor_t) :: watch
 
       call begin(simulation, watch, error)
       history%scene = any_hash
       call file%open(path, error)
       if (allocated(error)) return
-      call keep_run(file, simulation, history, watch)
+      call serialize_run(file, simulation, history, watch)
       call file%close(error)
       if (allocated(error)) error%message = path//' does not fit this run: '//error%message
       call do_steps(simulation, steps_after, error)
@@ -93,13 +95,13 @@ contains
 
    subroutine begin(simulation, watch, error)
       type(simulation_t), intent(out) :: simulation
-      type(watch_t), intent(out) :: watch
+      type(monitor_t), intent(out) :: watch
       type(error_t), allocatable, intent(inout) :: error
       type(settings_t) :: settings
 
       call read_settings_text('small.nml', scene, none, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
-      if (.not. allocated(error)) call new_watch(watch, simulation)
+      if (.not. allocated(error)) call new_monitor(watch, simulation)
    end subroutine begin
 
    subroutine do_steps(simulation, n, error)
@@ -114,8 +116,8 @@ contains
    end subroutine do_steps
 
    !> Take a column of real numbers as a field.
-   subroutine exchange_reals(self, name, width, values, unit, meaning)
-      class(field_archive_t), intent(inout) :: self
+   subroutine transfer_reals(self, name, width, values, unit, meaning)
+      class(field_serializer_t), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer, intent(in) :: width
       real(dp), intent(inout), contiguous :: values(:)
@@ -125,11 +127,11 @@ contains
       end associate
       if (width == 1) self%fields = [self%fields, new_field(name, [size(values)], values, .false.)]
       if (width > 1) self%fields = [self%fields, new_field(name, [width, size(values)/width], values, .false.)]
-   end subroutine exchange_reals
+   end subroutine transfer_reals
 
    !> Take a column of whole numbers as a field.
-   subroutine exchange_longs(self, name, values, unit, meaning)
-      class(field_archive_t), intent(inout) :: self
+   subroutine transfer_longs(self, name, values, unit, meaning)
+      class(field_serializer_t), intent(inout) :: self
       character(len=*), intent(in) :: name
       integer(lp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
@@ -137,6 +139,6 @@ contains
       associate (unused => unit//meaning)
       end associate
       self%fields = [self%fields, new_field(name, [size(values)], real(values, dp), .true.)]
-   end subroutine exchange_longs
+   end subroutine transfer_longs
 
 end module spoilt_checkpoint

@@ -13,7 +13,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-MESSAGE = re.compile(r"polydem: (step \d+: .*bod(?:y|ies) \d+.* at \([-+.0-9E]+, [-+.0-9E]+\) m.*Take a smaller dt.*)")
+MESSAGE = re.compile(r"polydem: (step \d+: .*bod(?:y|ies) \d+.* at \([-+.0-9E]+, [-+.0-9E]+\) m.*Reduce dt.*)")
 RUN_ERROR = 1
 
 

@@ -2,17 +2,17 @@
 
     check_exact_overlap.py PROGRAM [--full] [--seed SEED] [--table FOLDER] [--behind]
 
-Ten thousand pairs, more than a thousand of them degenerate on purpose; `--full`: a hundred thousand random and ten
-thousand degenerate ones. `--table` prints rows of the table of `./polydem verify` and writes them into a folder, with
-`--behind` at the end of the table that is there.
+By default there are ten thousand pairs, more than a thousand of them degenerate; with `--full` a hundred thousand
+random and ten thousand degenerate ones. `--table` prints rows of the table of `./polydem verify` and writes them into
+a folder. With `--behind` it appends them to the existing table.
 
 Exit status 1 if any pair misses its bound:
 
     |A - A*| <= max(1e-12 A*, 16 u p s),  p perimeter and s size of the smaller body, u = 2^-53
     A = 0 where A* = 0
-    |N - N*| <= e s and |M - M*| <= e s (s + |offset|) with e = max(1e-12, 16 u s^2/A*), but for polygons whose common
-    edges are common up to rounding only: there N jumps
-    every remembered edge gives the same bits
+    |N - N*| <= e s and |M - M*| <= e s (s + |offset|) with e = max(1e-12, 16 u s^2/A*), except for polygons whose
+    common edges agree only up to rounding: there N jumps
+    every stored separating edge gives the same bits
 """
 
 import argparse
@@ -125,7 +125,7 @@ def lattice_polygon(rng, span):
 
 
 def lattice_pair(rng):
-    """Vertices on vertices and on edges, common edges, containment, copies: all of it exact."""
+    """Exact degeneracies: vertices on vertices and on edges, common edges, containment, copies."""
     a = lattice_polygon(rng, rng.choice([2, 3, 5]))
     b = rng.choice([a, lattice_polygon(rng, 3), lattice_polygon(rng, 2)])
     unit = rng.choice([1.0, 0.125, 2.0**-30])
@@ -135,7 +135,7 @@ def lattice_pair(rng):
 
 
 def turned_lattice_pair(rng):
-    """The same, degenerate up to rounding only."""
+    """Degeneracies as in `lattice_pair`, but only up to rounding."""
     a, b, offset = lattice_pair(rng)
     angle = rng.uniform(0, 2 * math.pi)
     return turned(a, angle), turned(b, angle), turned([offset], angle)[0]
@@ -197,7 +197,7 @@ def allowed_error(a, b, exact):
 
 
 def integral_error(a, b, offset, exact, integrals, result):
-    """Greatest error of N, M_a and M_b over the allowed; rounding moves the ends of slivers along the edges."""
+    """Greatest error of N, M_a and M_b over the allowed error; rounding moves the ends of slivers along the edges."""
     size = min(max(math.dist(v, w) for v in p for w in p) for p in (a, b))
     allowed = max(1e-12, 16 * UNIT_ROUNDOFF * size**2 / float(exact))
     scales = [size, size] + 2 * [size * (size + math.hypot(*offset))]
@@ -206,17 +206,17 @@ def integral_error(a, b, offset, exact, integrals, result):
 
 @dataclass
 class Findings:
-    """What came out of comparing pairs of one kind."""
+    """Result of the comparison of pairs of one kind."""
 
     pairs: int = 0
     contacts: int = 0
-    #: Worst error of the area over the allowed
+    #: Greatest error of the area over the allowed error
     worst: float = 0.0
-    #: The same of N and M
+    #: Greatest error of N and M over the allowed error
     worst_integral: float = 0.0
-    #: Processor time, that of the program included [s]
+    #: Processor time, including that of the program [s]
     seconds: float = 0.0
-    #: What is wrong, a line for each pair
+    #: Failures, one line per pair
     misses: tuple = ()
 
     def __add__(self, other):
@@ -241,7 +241,7 @@ def check(program, kind, count, seed):
 
 
 def compare(kind, pair, result, other):
-    """Compare one pair; `other` is the result with a remembered edge."""
+    """Compare one pair; `other` is the result with a stored separating edge."""
     a, b, offset = pair
     exact, integrals = exact_overlap(a, b, offset)
     found, miss = Findings(), []
@@ -265,7 +265,7 @@ def compare(kind, pair, result, other):
 
 
 def check_kind(pool, program, kind, count, seed):
-    """Compare one kind of pairs in lots; print the first misses."""
+    """Compare the pairs of one kind in batches; print the first failures."""
     sizes = [min(LOT, count - first) for first in range(0, count, LOT)]
     lots = [pool.submit(check, program, kind, size, f"{seed} {lot}") for lot, size in enumerate(sizes)]
     found = sum((lot.result() for lot in lots), Findings())

@@ -24,7 +24,7 @@ def edges_of(polygon):
 
 
 def intervals(edges, other_edges, keep_common):
-    """For each edge the interval (t0, t1) inside the other polygon; None in the list's place if apart.
+    """For each edge the interval (t0, t1) inside the other polygon; None instead of the list if the polygons are apart.
 
     An edge on a line of the other's outline counts if the directions agree and `keep_common` is set. If the
     directions are opposite the polygons lie on opposite sides of that line: no overlap at all.
@@ -56,7 +56,7 @@ def intervals(edges, other_edges, keep_common):
 
 
 def reach(polygon):
-    """Size of a polygon by which the program tells the smaller of two from the larger."""
+    """Size of a polygon by which the program chooses the smaller of two."""
     return max(abs(x) + abs(y) for x, y in polygon)
 
 

@@ -7,17 +7,17 @@ module overlap_cases
    use polydem_random, only: random_t
    implicit none
    private
-   public :: rectangle, regular, grain, turned, overlap_of, roundoff, two_pi
+   public :: rectangle, regular, median_diameter, turned, overlap_of, roundoff, two_pi
    public :: worst_area, worst_normal, worst_normal_far, worst_moment, worst_centroid
 
    !> Full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586476925286766559_wp
-   !> Angles at which every case is computed: none, odd ones, a quarter, a half [rad]
+   !> Angles of the positions: zero, two general angles, a quarter turn, half a turn [rad]
    real(wp), parameter :: angles(8) = [0.0_wp, 0.1_wp, 0.7853981_wp, 1.0_wp, 0.25_wp*two_pi, 2.3_wp, &
                                        0.5_wp*two_pi, 5.77_wp]
-   !> Units in which it is computed
+   !> Units of length of the positions
    real(wp), parameter :: scales(3) = [1.0_wp, 1.0e-9_wp, 1.0e9_wp]
-   !> Positions: two orders at every angle in every unit
+   !> Number of positions: two orders at every angle in every unit
    integer, parameter :: n_positions = 2*size(angles)*size(scales)
    !> A place far from the origin, in these units
    real(wp), parameter :: far(2) = [1.0e6_wp, -0.7e6_wp]
@@ -53,7 +53,7 @@ contains
    end function regular
 
    !> Irregular polygon in a circle about its centre
-   function grain(random, corners, radius) result(vertices)
+   function median_diameter(random, corners, radius) result(vertices)
       !> Source of its irregularity
       type(random_t), intent(inout) :: random
       !> Number of vertices
@@ -68,7 +68,7 @@ contains
          angle = start + two_pi*(real(k, wp) + random%between(0.0_wp, 0.6_wp))/real(corners, wp)
          vertices(:, k) = radius*[cos(angle), sin(angle)]
       end do
-   end function grain
+   end function median_diameter
 
    !> Points turned about the origin
    pure function turned(points, angle) result(image)
@@ -85,7 +85,7 @@ contains
       image(2, :) = s*points(1, :) + c*points(2, :)
    end function turned
 
-   !> Overlap of two polygons without a remembered edge
+   !> Overlap of two polygons without a stored separating edge
    pure function overlap_of(a, b, offset) result(overlap)
       !> First polygon
       real(wp), intent(in), contiguous :: a(:, :)
@@ -98,7 +98,7 @@ contains
       call overlap_polygons(a, b, offset, 0_ip, overlap)
    end function overlap_of
 
-   !> The rounding that is allowed: 16 u times perimeter times diameter of the smaller polygon
+   !> Allowed rounding error: 16 u times perimeter times diameter of the smaller polygon
    pure real(wp) function roundoff(a, b)
       !> First polygon
       real(wp), intent(in) :: a(:, :)
@@ -126,8 +126,8 @@ contains
 
    !> Greatest error of the area over all positions, near the origin and far from it.
    !>
-   !> Far away a position is rounded to its last digit, and the area changes by the distance times at most
-   !> half of the perimeter; this is not an error of the overlap, and is taken off.
+   !> Far from the origin a position is rounded to its last digit. The area changes by at most this rounding error times
+   !> half of the perimeter. This is not an error of the overlap and is subtracted.
    pure real(wp) function worst_area(a, b, offset, area)
       !> First polygon
       real(wp), intent(in) :: a(:, :)
@@ -174,7 +174,8 @@ contains
       worst_normal = worst_normal_at([0.0_wp, 0.0_wp], a, b, offset, normal)
    end function worst_normal
 
-   !> The same far from it, for overlaps whose normal vector follows their position without a jump.
+   !> Greatest error of the normal vector over all positions far from the origin, for overlaps whose normal vector is a
+   !> continuous function of the position
    pure real(wp) function worst_normal_far(a, b, offset, normal)
       !> First polygon
       real(wp), intent(in) :: a(:, :)

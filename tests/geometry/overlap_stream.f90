@@ -2,7 +2,7 @@
 !>
 !>     overlap_stream PAIRS RESULTS
 !>
-!> PAIRS holds for each pair n, m, the remembered edge, the offset (2), the vertices of a (2 n) and b (2 m);
+!> PAIRS holds for each pair n, m, the stored separating edge, the offset (2), the vertices of a (2 n) and b (2 m);
 !> RESULTS gets area, centroid (2), normal (2), both moments and the separating edge. All are 8-byte reals.
 program overlap_stream
    use polydem_convex_overlap, only: overlap_t, overlap_polygons

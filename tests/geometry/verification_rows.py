@@ -9,7 +9,7 @@ HEADINGS = ("benchmark", "quantity", "expected", "got", "error", "tolerance", "s
 
 @dataclass(frozen=True)
 class Row:
-    """One quantity of one benchmark; all but the verdict as text."""
+    """One quantity of one benchmark; the numbers are text."""
 
     benchmark: str
     quantity: str
@@ -24,14 +24,14 @@ class Row:
 
 
 def number(value):
-    """A number with six significant digits, as short as can be."""
+    """A number with six significant digits in its shortest form."""
     if value == 0:
         return "0"
     return f"{value:#.6g}" if 0.1 <= abs(value) < 1e6 else f"{value:.4E}"
 
 
 def expect_zero(benchmark, quantity, got, tolerance, seconds):
-    """Row of a quantity that should vanish up to a tolerance; NaN fulfils none."""
+    """Row of a quantity that should vanish up to a tolerance; NaN is a miss."""
     verdict = "good" if abs(got) <= tolerance else "MISSED"
     return Row(benchmark, quantity, "0", number(got), f"{abs(got):.1E}", f"{tolerance:.1E}", f"{seconds:.2f}", verdict)
 
@@ -51,7 +51,7 @@ def revision():
 
 
 def write_rows(rows, folder, behind):
-    """Write table.csv and table.md into a folder, or behind the rows that are there."""
+    """Write table.csv and table.md into a folder, or append to the existing tables."""
     os.makedirs(folder, exist_ok=True)
     cells = [astuple(row) for row in rows]
     csv = [f'{row[0]},"{row[1]}",{",".join(row[2:])}' for row in cells]

@@ -12,7 +12,7 @@ module crowd
 
 contains
 
-   !> Boxes of given bounds, one per body, all free.
+   !> Boxes with given bounds, one per body, all free.
    subroutine new_boxes(boxes, bounds)
       type(boxes_t), intent(out) :: boxes
       real(wp), intent(in) :: bounds(:, :)
@@ -26,7 +26,7 @@ contains
       boxes%reach = 0.5_wp*max(bounds(3, :) - bounds(1, :), bounds(4, :) - bounds(2, :))
    end subroutine new_boxes
 
-   !> Let the reach of the boxes be enough for all frames.
+   !> Set reaches of the boxes that are sufficient for all frames.
    subroutine grow_reach(boxes, frames)
       type(boxes_t), intent(inout) :: boxes
       real(wp), intent(in) :: frames(:, :, :)
@@ -38,7 +38,7 @@ contains
       end do
    end subroutine grow_reach
 
-   !> Boxes strewn over a square, with sides between two values.
+   !> Boxes at random positions in a square, with sides between two values.
    subroutine scatter(seed, n, width, side_min, side_max, bounds)
       integer(ip), intent(in) :: seed, n
       real(wp), intent(in) :: width, side_min, side_max
@@ -56,7 +56,7 @@ contains
       end do
    end subroutine scatter
 
-   !> Pairs of bodies that overlap, ascending, as keys first*(bodies + 1) + second.
+   !> Overlapping pairs of bodies in ascending order, as keys first*(bodies + 1) + second.
    subroutine direct_pairs(boxes, keys)
       type(boxes_t), intent(in) :: boxes
       integer(ip), allocatable, intent(out) :: keys(:)
@@ -86,7 +86,7 @@ contains
       end do
    end subroutine direct_pairs
 
-   !> Steps, over all finders, at which the list or what rides on it is not as it must be.
+   !> Number of steps of all finders in which the list of pairs or values carried with the pairs are wrong.
    integer(ip) function wrong_steps(boxes, frames)
       type(boxes_t), intent(in) :: boxes
       !> Bounds, (4, box, step)
@@ -99,7 +99,7 @@ contains
       end do
    end function wrong_steps
 
-   !> The same for one finder.
+   !> Number of steps of one finder in which the list of pairs or values carried with the pairs are wrong.
    integer(ip) function count_wrong(finder, boxes, frames)
       character(len=*), intent(in) :: finder
       type(boxes_t), intent(in) :: boxes
@@ -124,12 +124,12 @@ contains
       end do
    end function count_wrong
 
-   !> Whether the list is the expected one, its changes lead there, and riders stayed with their pairs.
+   !> Whether the list and its changes are as expected, and carried values stayed with their pairs.
    logical function as_expected(neighbours, n_bodies, expected, before, rider)
       type(neighbours_t), intent(in) :: neighbours
       integer(ip), intent(in) :: n_bodies
       integer(ip), intent(in) :: expected(:), before(:)
-      !> Key of each pair, carried along since it began
+      !> Value carried with each pair: the key of the pair, set when the pair began
       integer(ip), allocatable, intent(inout) :: rider(:)
       integer(ip), allocatable :: keys(:)
       integer(ip) :: n, k

@@ -34,7 +34,7 @@ fn=__polydem_quadtree_called_MOD_update_tree._omp_fn.0
 0 20 0 0 0 0 0 0 0 0
 fn=__polydem_sort_and_sweep_o2_MOD_find
 0 10 0 0 0 0 0 0 0 0
-fn=__polydem_work_meter_MOD_read
+fn=__polydem_finder_meter_MOD_read
 0 4444 4 4 4444 44 44 4444 44 44
 summary: 18886 17 17 17831 181 178 17798 178 177
 """

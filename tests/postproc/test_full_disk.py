@@ -17,7 +17,7 @@ def test_a_failed_write_ends_with_one_message_and_keeps_closed_segments(tmp_path
     assert end.returncode == 3
     lines = end.stderr.splitlines()
     assert len(lines) == 1
-    assert "trajectory_0003.h5.open: cannot be created; is there such a folder, room and permission?" in lines[0]
+    assert "trajectory_0003.h5.open: cannot be created; check that the folder exists" in lines[0]
     with pytest.warns(UserWarning, match="left out: .*trajectory_0003.h5.open"):
         run = Trajectory(folder)
     assert_array_equal(run.steps, [1, 2, 3, 4, 5, 6, 7, 8])

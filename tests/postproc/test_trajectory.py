@@ -1,4 +1,4 @@
-"""Reading finished results. What is in them is said in tests/output/sample.f90."""
+"""Reading finished results. What is in them is said in tests/io/sample.f90."""
 
 import h5py
 import numpy as np

@@ -247,7 +247,7 @@ def test_bodies_at_the_end_of_the_numbers_are_told(tmp_path):
                             for k in range(12)]
     told = [run(scene, tmp_path / f"of_{ranks}", ranks, 1, options, code=FAILED) for ranks in (None, 2, 3)]
     assert len({message_of(text) for _, text in told}) == 1, told
-    assert "step 2: body 4 at (8." in told[0][1] and "is nowhere" in told[0][1], told
+    assert "step 2: body 4 at (8." in told[0][1] and "has an invalid pose" in told[0][1], told
     assert len({state_hash(output) for output, _ in told}) == 1, told
 
 
@@ -304,7 +304,7 @@ def test_a_damaged_checkpoint_is_passed_over(whole, interrupted, tmp_path):
         with open(newest, "r+b") as file:
             damage(file, newest.stat().st_size)
         output = finish(whole, folder, 2)
-        assert f"warning: {newest}: is damaged" in output and "the newest good one" in output, output
+        assert f"warning: {newest}: is damaged" in output and "the newest valid checkpoint" in output, output
 
 
 def test_changed_settings_are_refused_with_the_difference(whole, interrupted, tmp_path):

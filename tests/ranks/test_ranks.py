@@ -87,7 +87,7 @@ def interrupt(folder, namelist, ranks, options):
     process.send_signal(signal.SIGUSR1)
     output, message = process.communicate(timeout=120)
     assert process.returncode == 75, (process.returncode, message)
-    return int(re.search(r"stopped early by the signal USR1 after step (\d+) of", message).group(1)), output
+    return int(re.search(r"interrupted by SIGUSR1 at step (\d+) of", message).group(1)), output
 
 
 @pytest.mark.parametrize("scene, ranks", [("drum", (3, 2, None)), ("gas", (None, 4, 3)), ("bed", (2, 7, 1))],

@@ -1,9 +1,9 @@
-!> What the tests of scenes share: making a scene from a few words, and naive checks of its geometry.
+!> Common procedures of the tests of scenes: making a scene from a few entries, and simple checks of its geometry.
 module scene_checks
    use polydem_bodies, only: bodies_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
-   use polydem_motion, only: motion_t
+   use polydem_prescribed_motion, only: motion_t
    use polydem_read_settings, only: read_settings_text
    use polydem_scene, only: build_scene
    use polydem_settings, only: settings_t
@@ -14,7 +14,7 @@ module scene_checks
 
 contains
 
-   !> Make the scene that the entries of &scene describe.
+   !> Make a scene from entries of &scene.
    subroutine make_scene(entries, bodies, error, settings, motions)
       !> Entries, separated by commas
       character(len=*), intent(in) :: entries
@@ -37,7 +37,7 @@ contains
       if (present(motions) .and. .not. allocated(error)) call move_alloc(own_motions, motions)
    end subroutine make_scene
 
-   !> Message of the error that a scene ends with; empty if there is none
+   !> Message of the error of a scene; empty if there is none
    function scene_message(entries) result(message)
       !> Entries, separated by commas
       character(len=*), intent(in) :: entries
@@ -50,13 +50,13 @@ contains
       if (allocated(error)) message = error%message
    end function scene_message
 
-   !> Corners of a body in the world.
+   !> Find the corners of a body in world coordinates.
    subroutine find_vertices(bodies, slot, vertices)
       !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Slot of the body
       integer(ip), intent(in) :: slot
-      !> Its corners, anticlockwise, (2, :) [m]
+      !> Corners of the body, anticlockwise, (2, corner) [m]
       real(wp), allocatable, intent(out) :: vertices(:, :)
       integer :: k, first, n
 
@@ -147,7 +147,7 @@ contains
       separated = .false.
    end function separated
 
-   !> Number of coordinates in which two sets of bodies differ at all; -1 if their shapes differ in size
+   !> Number of coordinates that differ in two sets of bodies; -1 if their numbers of corners differ
    integer function count_differences(a, b)
       !> Bodies
       type(bodies_t), intent(in) :: a

@@ -17,8 +17,8 @@ import tempfile
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
-#: Modules of libraries, and how the links that show them begin
-LIBRARIES = {"hdf5": "hdf5::", "mpi_f08": "MPI::"}
+#: Libraries: the module that stands for each, and how the links that show it begin
+LIBRARIES = {"the library HDF5": ("hdf5", "hdf5::"), "the library MPI": ("mpi_f08", "MPI::")}
 USE = re.compile(r"^ *use\b *(?:, *(?:non_)?intrinsic *)?(?:::)? *(\w+)", re.MULTILINE | re.IGNORECASE)
 MODULE = re.compile(r"^ *module +(?!procedure\b|subroutine\b|function\b)(\w+) *$", re.MULTILINE | re.IGNORECASE)
 
@@ -45,7 +45,7 @@ class Target:
     def declares(self, room):
         """Whether it names a room, or a library of LIBRARIES."""
         if room in LIBRARIES:
-            return any(link.startswith(LIBRARIES[room]) for link in self.links)
+            return any(link.startswith(LIBRARIES[room][1]) for link in self.links)
         return f"polydem::{room}" in self.links
 
 
@@ -90,13 +90,13 @@ def read_targets(build):
 def rooms_of(targets):
     """Rooms by name, each with a module that stands for it; and the libraries."""
     found = {target.room: sorted(target.defined)[0] for target in targets.values() if target.room and target.defined}
-    return {**found, **{name: name for name in LIBRARIES}}
+    return {**found, **{name: module for name, (module, _) in LIBRARIES.items()}}
 
 
 def check_declarations(targets):
     """What is named and not used, and what is used and not named."""
     owner = {module: target.room for target in targets.values() if target.room for module in target.defined}
-    owner.update({module: module for module in LIBRARIES})
+    owner.update({module: name for name, (module, _) in LIBRARIES.items()})
     for target in targets.values():
         used = {owner[module] for module in target.used if module in owner} - {target.room}
         named = {room for room in set(owner.values()) if target.declares(room)}

@@ -52,13 +52,19 @@ def is_pointer(statement):
     return statement.is_declaration and statement.scopes and re.search(r",\s*pointer\b", statement.attributes)
 
 
+#: Stages that have the name of a namelist group, not that of the room that does the work
+STAGES_OF_ROOMS = {"exchange": "decomposition", "output": "io"}
+
+
 def of_any(statement, room):
     """Statements that are nowhere allowed, or only in one room."""
     code = statement.code
     if re.match(r"use\b", code) and not re.search(r",\s*only\s*:", code):
         yield "use without only"
-    if re.match(r"use\b.*\b(hdf5|h5lt|h5ds)\b\s*,", code) and room != "files":
-        yield "hdf5 is used in src/files only"
+    if re.match(r"use\b.*\b(hdf5|h5lt|h5ds)\b\s*,", code) and room != "hdf5":
+        yield "the library HDF5 is used in src/hdf5 only"
+    if re.match(r"use\b.*\bmpi(_f08)?\b\s*,", code) and room not in ("hdf5", "communicator"):
+        yield "MPI is used in src/communicator and src/hdf5 only"
     if re.match(r"(if\s*\(.*\)\s*)?(error\s+)?stop\b(?!\s*[=%(])", code) and room != "app":
         yield "only the program in src/app stops"
     if re.match(r"(if\s*\(.*\)\s*)?call\s+(exit|abort)\b", code) and room != "app":
@@ -217,7 +223,7 @@ def check_names(sources):
 
 def check_stages(sources):
     """Timed stages are folders of src and groups of the namelist."""
-    folders = {os.path.basename(os.path.dirname(source.path)) for source in sources}
+    folders = {os.path.basename(os.path.dirname(source.path)) for source in sources} | set(STAGES_OF_ROOMS)
     groups = set()
     for source in sources:
         if os.path.basename(os.path.dirname(source.path)) == "config":

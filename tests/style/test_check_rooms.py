@@ -41,8 +41,10 @@ class TestDeclarations(unittest.TestCase):
         targets = rooms()
         targets["polydem_high"].used.add("hdf5")
         targets["polydem_middle"].links.append("MPI::MPI_Fortran")
-        self.assertEqual(sorted(check_declarations(targets)), ["polydem_high uses hdf5 and does not name it",
-                                                               "polydem_middle names mpi_f08 and does not use it"])
+        self.assertEqual(
+            sorted(check_declarations(targets)),
+            ["polydem_high uses the library HDF5 and does not name it",
+             "polydem_middle names the library MPI and does not use it"])
 
     def test_all_forms_of_use_are_read(self):
         text = "  use a, only: x\nuse :: b\n USE, intrinsic :: c, only: y\n! use d\nused = 1\n   use, non_intrinsic::e"

@@ -89,8 +89,9 @@ BAD = [
     ("   implicit none\n", "\n", 2, "without implicit none"),
     ("   private\n", "\n", 2, "without private"),
     ("polydem_kinds, only: ip, wp", "polydem_kinds", 3, "use without only"),
-    ("polydem_kinds, only", "hdf5, only", 3, "hdf5 is used in src/files only"),
-    ("polydem_kinds, only", "h5lt, only", 3, "hdf5 is used in src/files only"),
+    ("polydem_kinds, only", "hdf5, only", 3, "the library HDF5 is used in src/hdf5 only"),
+    ("polydem_kinds, only", "h5lt, only", 3, "the library HDF5 is used in src/hdf5 only"),
+    ("polydem_kinds, only", "mpi_f08, only", 3, "MPI is used in src/communicator and src/hdf5 only"),
     ("integer(ip), parameter ::", "integer(ip) ::", 9, "a variable of a module"),
     ("integer(ip), parameter ::", "integer(ip), save ::", 9, "no save"),
     ("integer(ip), parameter ::", "integer(4), parameter ::", 9, "kinds come from"),
@@ -149,7 +150,7 @@ class Rules(unittest.TestCase):
                 self.assertIn(words, found[0][1])
 
     def test_what_a_room_alone_may_do(self):
-        self.assertEqual(found_in(GOOD.replace("polydem_kinds, only", "hdf5, only"), "files"), [])
+        self.assertEqual(found_in(GOOD.replace("polydem_kinds, only", "hdf5, only"), "hdf5"), [])
         self.assertEqual(found_in(GOOD.replace("self%length + by", "by\n      if (by < 0.0_wp) stop"), "app"), [])
 
     def test_arguments_of_foreign_and_inherited_procedures_are_explained_elsewhere(self):

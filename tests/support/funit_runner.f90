@@ -83,7 +83,7 @@ contains
 
       if (.not. allocated(self%tests)) allocate (self%tests(0))
       call read_command_line(self)
-      if (.not. any(self%tests%chosen)) call give_up('no test matches "'//self%filter//'"')
+      if (.not. any(self%tests%chosen)) call abort_all('no test matches "'//self%filter//'"')
       unit = output_unit
       if (len(self%output) > 0) open (newunit=unit, file=self%output, status='replace', action='write')
       do k = 1, size(self%tests)
@@ -129,7 +129,7 @@ contains
                '-v (names), -x (JUnit XML), -o FILE (where to write), -h'
             stop
          case default
-            call give_up('unknown option '//word)
+            call abort_all('unknown option '//word)
          end select
          k = k + 1
       end do
@@ -144,20 +144,20 @@ contains
       character(len=:), allocatable :: word
       integer :: length
 
-      if (place > command_argument_count()) call give_up('the last option lacks its value')
+      if (place > command_argument_count()) call abort_all('the last option lacks its value')
       call get_command_argument(place, length=length)
       allocate (character(len=length) :: word)
       call get_command_argument(place, word)
    end function argument
 
    !> End the program because of its command line.
-   subroutine give_up(message)
+   subroutine abort_all(message)
       character(len=*), intent(in) :: message
 
       write (output_unit, '(a)') 'tests: '//message
       flush (output_unit)
       stop misuse
-   end subroutine give_up
+   end subroutine abort_all
 
    !> Before, test and after; after also if the test failed, neither if before did.
    subroutine run_test(test, unit, verbose, quiet)

@@ -5,13 +5,13 @@
 !> one.
 module b01_free_flight
    use outlines, only: gravity
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
-   use trial, only: begin, block_at, steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_free_flight

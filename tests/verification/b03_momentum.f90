@@ -7,14 +7,15 @@
 !> The elastic gas has the conservative law: with the area law, whose closed loops do work (B5), it heats up
 !> until bodies are too fast for the step, after 9e5 of a million steps.
 module b03_momentum
-   use polydem_errors, only: error_t
-   use polydem_kinds, only: ip, wp
-   use polydem_ledger, only: balance_t
-   use polydem_read_settings, only: read_settings_text
-   use polydem_settings, only: settings_t
-   use polydem_simulation, only: new_simulation, simulation_t, take_stock
    use trial, only: steps
    use verification_table, only: table_t
+   use polydem_energy_balance, only: balance_t
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: ip, wp
+   use polydem_read_settings, only: read_settings_text
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: simulation_t, compute_balance
+   use polydem_start, only: new_simulation
    implicit none
    private
    public :: run_momentum
@@ -54,7 +55,7 @@ contains
                                  error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
       if (.not. allocated(error)) then
-         call take_stock(simulation, start)
+         call compute_balance(simulation, start)
          scale = 0.0_wp
          associate (bodies => simulation%bodies)
             do k = 1_ip, size(bodies%free, kind=ip)
@@ -69,7 +70,7 @@ contains
       end if
       call table%note_error(error)
       if (allocated(error)) return
-      call take_stock(simulation, end)
+      call compute_balance(simulation, end)
       missing(:2) = end%momentum - start%momentum - end%impulse
       missing(3) = end%angular_momentum - start%angular_momentum - end%angular_impulse
       call table%expect_absolute(name//': momentum that is missing, over sum |m v|', 0.0_wp, &

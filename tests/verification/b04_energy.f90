@@ -6,14 +6,14 @@
 !> on the step.
 module b04_energy
    use outlines, only: pi
-   use polydem_body_list, only: body_list_t
-   use polydem_errors, only: error_t
-   use polydem_kinds, only: wp
-   use polydem_ledger, only: balance_t
-   use polydem_simulation, only: simulation_t, take_stock
-   use polydem_strings, only: to_text
    use trial, only: begin, block_at, steps
    use verification_table, only: table_t
+   use polydem_body_list, only: body_list_t
+   use polydem_energy_balance, only: balance_t
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: wp
+   use polydem_simulation, only: simulation_t, compute_balance
+   use polydem_strings, only: to_text
    implicit none
    private
    public :: run_energy
@@ -67,12 +67,12 @@ contains
       worst = 0.0_wp
       change = 0.0_wp
       if (.not. allocated(error)) then
-         call take_stock(simulation, balance)
+         call compute_balance(simulation, balance)
          first = balance%kinetic
          do k = 1, nint(0.012_wp/dt)
             call steps(simulation, 1, error)
             if (allocated(error)) exit
-            call take_stock(simulation, balance)
+            call compute_balance(simulation, balance)
             worst = max(worst, abs(balance%energy_residual)/first)
          end do
          change = abs(balance%kinetic - first)/first

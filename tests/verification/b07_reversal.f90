@@ -3,14 +3,15 @@
 !> Velocity Verlet is symmetric in time, and without damping and friction forces depend on positions alone, so that only
 !> rounding errors keep a run from retracing its steps. Collisions amplify them.
 module b07_reversal
+   use trial, only: steps
+   use verification_table, only: table_t
    use polydem_bodies, only: bodies_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
-   use polydem_simulation, only: new_simulation, simulation_t
-   use trial, only: steps
-   use verification_table, only: table_t
+   use polydem_simulation, only: simulation_t
+   use polydem_start, only: new_simulation
    implicit none
    private
    public :: run_reversal

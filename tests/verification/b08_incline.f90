@@ -10,14 +10,14 @@
 !> tends to w/h with E^(-1/3) only.
 module b08_incline
    use outlines, only: gravity, integrate_text
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
-   use polydem_contacts, only: at_tangential
+   use polydem_contact_history, only: at_tangential
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
-   use trial, only: begin, block_at, steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_incline, put_on_slope

@@ -6,11 +6,11 @@
 module b09_stopping
    use b08_incline, only: put_on_slope
    use outlines, only: gravity
+   use trial, only: steps
+   use verification_table, only: table_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_simulation, only: simulation_t
-   use trial, only: steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_stopping

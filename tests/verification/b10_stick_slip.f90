@@ -15,14 +15,14 @@
 !> falls as k_t^(-1/2), by about ten for k_t a hundred times as large.
 module b10_stick_slip
    use outlines, only: gravity, pi
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
-   use polydem_motion, only: motion_t
+   use polydem_prescribed_motion, only: motion_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
-   use trial, only: begin, block_at, steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_stick_slip

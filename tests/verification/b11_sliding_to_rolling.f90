@@ -5,12 +5,12 @@
 !> so up to its radius, which varies by the factor cos(pi/n), 0.9988 for 64.
 module b11_sliding_to_rolling
    use outlines, only: gravity, inertia_ratio, integrate_text, pi, regular_polygon
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_simulation, only: simulation_t
-   use trial, only: begin, block_at, steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_sliding_to_rolling

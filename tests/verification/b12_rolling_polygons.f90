@@ -12,13 +12,13 @@
 !> damping are so strong that impacts are plastic.
 module b12_rolling_polygons
    use outlines, only: gravity, inertia_ratio, integrate_text, pi, regular_polygon
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
-   use trial, only: begin, block_at, steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_rolling_polygons

@@ -12,13 +12,13 @@
 !> is plastic. The block pivots within what the support reaches under it.
 module b13_rocking_block
    use outlines, only: gravity, integrate_text
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_simulation, only: simulation_t, time_of
    use polydem_strings, only: to_text
-   use trial, only: begin, block_at, steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_rocking_block

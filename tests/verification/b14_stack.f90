@@ -10,14 +10,15 @@
 !> 65): n = (0.653 E/(rho g w))^(1/3) blocks, 29.9 at E = 1e7 and 64 at E = 1e8. Stacks of 24 and 36 blocks get a nudge.
 module b14_stack
    use outlines, only: gravity
+   use trial, only: steps
+   use verification_table, only: table_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
-   use polydem_simulation, only: new_simulation, simulation_t
+   use polydem_simulation, only: simulation_t
+   use polydem_start, only: new_simulation
    use polydem_strings, only: to_text
-   use trial, only: steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_stack

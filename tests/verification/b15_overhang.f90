@@ -10,13 +10,13 @@
 !> too, so that ten blocks with E = 1e10 fall (shown).
 module b15_overhang
    use outlines, only: integrate_text
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
-   use trial, only: begin, block_at, steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_overhang

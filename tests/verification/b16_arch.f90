@@ -9,14 +9,14 @@
 !> thickness.
 module b16_arch
    use outlines, only: gravity, integrate_text, pi
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_polygon, only: mass_properties
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
-   use trial, only: begin, block_at, steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_arch

@@ -8,13 +8,13 @@
 module b17_dominoes
    use domino_train, only: domino_t, wave_speed
    use outlines, only: gravity
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_simulation, only: simulation_t, time_of
    use polydem_strings, only: to_text
-   use trial, only: begin, block_at, steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_dominoes

@@ -17,14 +17,14 @@
 !> a very large moment of inertia, and the walls lose nothing, for a very small mass in the damping.
 module b18_cooling_gas
    use outlines, only: pi, regular_polygon
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_random, only: new_random, random_t
    use polydem_simulation, only: simulation_t, time_of
    use polydem_strings, only: to_text
-   use trial, only: begin, block_at, steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_cooling_gas

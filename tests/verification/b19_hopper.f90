@@ -7,14 +7,15 @@
 !> 1.4, which was found with spheres, and the k for which Q^(2/3) is linear in D are shown. Q is taken between a fifth
 !> and three fifths of the grains out, and in the two halves of that.
 module b19_hopper
+   use trial, only: steps
+   use verification_table, only: table_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
-   use polydem_simulation, only: new_simulation, simulation_t, time_of
+   use polydem_simulation, only: simulation_t, time_of
+   use polydem_start, only: new_simulation
    use polydem_strings, only: to_text
-   use trial, only: steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_hopper

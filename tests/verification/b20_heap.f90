@@ -9,16 +9,17 @@
 module b20_heap
    use omp_lib, only: omp_get_max_threads, omp_set_num_threads
    use outlines, only: pi
+   use trial, only: steps
+   use verification_table, only: table_t
    use polydem_bodies, only: state_hash
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
-   use polydem_simulation, only: new_simulation, simulation_t
+   use polydem_simulation, only: simulation_t
    use polydem_sort_reals, only: sort_reals
+   use polydem_start, only: new_simulation
    use polydem_strings, only: to_text
-   use trial, only: steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_heap

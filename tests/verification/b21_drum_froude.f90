@@ -6,14 +6,15 @@
 !> about 3500 and 35000 here. With a tenth of that, 400 grains of one seed differed by 2.8 degrees.
 module b21_drum_froude
    use outlines, only: gravity, pi
+   use trial, only: steps
+   use verification_table, only: table_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
-   use polydem_simulation, only: new_simulation, simulation_t
+   use polydem_simulation, only: simulation_t
+   use polydem_start, only: new_simulation
    use polydem_strings, only: to_text
-   use trial, only: steps
-   use verification_table, only: table_t
    implicit none
    private
    public :: run_drum_froude

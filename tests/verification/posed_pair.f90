@@ -1,9 +1,11 @@
 !> Two bodies in given poses and the elastic forces between them, without a time step.
 module posed_pair
-   use polydem_assemble, only: assemble_forces, incidence_t, index_contacts
+   use polydem_assemble_forces, only: assemble_forces
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_contacts, only: contact_memory_t, contacts_t
+   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_incidence, only: incidence_t, index_contacts
+   use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_find_contacts, only: find_contacts
    use polydem_force_law, only: evaluate_law, force_law_t, new_force_law

@@ -8,13 +8,14 @@
 !> the mean over phases converges with the second order of the step, the worst phase with the first.
 module s32_flat_impact
    use outlines, only: gravity, integrate_text, pi
+   use trial, only: begin, block_at, steps
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
-   use polydem_simulation, only: advance, simulation_t
+   use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
-   use trial, only: begin, block_at, steps
-   use verification_table, only: table_t
+   use polydem_time_step, only: advance
    implicit none
    private
    public :: run_flat_impact

@@ -7,12 +7,13 @@
 !> that its error does not count.
 module s33_corner_impact
    use outlines, only: integrate_text, pi
+   use trial, only: begin, block_at
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
-   use polydem_simulation, only: advance, simulation_t
-   use trial, only: begin, block_at
-   use verification_table, only: table_t
+   use polydem_simulation, only: simulation_t
+   use polydem_time_step, only: advance
    implicit none
    private
    public :: run_corner_impact

@@ -7,13 +7,14 @@
 !> by s_t = v_t t_c, by which the normal force turns the body; this error falls with the stiffness (shown at 100 E).
 module s34_oblique_impact
    use outlines, only: inertia_ratio, integrate_text, pi, regular_polygon
+   use trial, only: begin, block_at
+   use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
-   use polydem_simulation, only: advance, simulation_t
+   use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
-   use trial, only: begin, block_at
-   use verification_table, only: table_t
+   use polydem_time_step, only: advance
    implicit none
    private
    public :: run_oblique_impact

@@ -4,10 +4,12 @@ module trial
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
-   use polydem_motion, only: motion_t, new_motion
+   use polydem_prescribed_motion, only: motion_t, new_motion
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
-   use polydem_simulation, only: advance, simulation_t, start_simulation
+   use polydem_simulation, only: simulation_t
+   use polydem_start_simulation, only: start_simulation
+   use polydem_time_step, only: advance
    implicit none
    private
    public :: begin, steps, block_at

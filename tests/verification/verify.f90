@@ -13,7 +13,7 @@ program verify
    use polydem_errors, only: error_t
    use polydem_line_writer, only: line_writer_t
    use polydem_kinds, only: ip
-   use polydem_paths, only: make_folder
+   use polydem_file_system, only: make_folder
    use polydem_provenance, only: collect_provenance, provenance_t
    use polydem_strings, only: to_text
    use verification_table, only: table_t

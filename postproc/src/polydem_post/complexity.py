@@ -27,7 +27,7 @@ BLIND_SPOTS = (
 )
 
 #: Modules that all finders share
-SHARED = {"finder", "finder_factory", "neighbours", "pair_changes", "pair_list", "work", "overlapping"}
+SHARED = {"finder_factory", "neighbours"}
 
 #: Part of Table 3 -> beginnings of the names of procedures; what is of no part updates the structure
 INITIALIZATION = re.compile(r"(start|begin|build|new_|make|prepare|set_up|reserve|first|finest|initial|choose|create)")

@@ -309,8 +309,10 @@ def seconds_of_steps(path: Path) -> float:
 
 
 def stable_share(path: Path) -> float:
-    """Greatest share of the stable step of the contacts, as the log of a run says; NaN if there was no contact."""
-    found = re.search(r"greatest share of the stable step of the contacts: *(\S+)", path.read_text(encoding="utf-8"))
+    """Greatest ratio of dt to the stable time step of the contacts, from the log of a run; NaN without contacts."""
+    # Older logs use the second wording.
+    found = re.search(r"(?:max dt / stable dt|greatest share of the stable step) of the contacts: *(\S+)",
+                      path.read_text(encoding="utf-8"))
     return float(found.group(1)) if found else float("nan")
 
 

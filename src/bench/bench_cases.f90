@@ -1,0 +1,154 @@
+!> The samples of a bench: one for each scene, finder, number of threads and repeat.
+module polydem_bench_cases
+   use omp_lib, only: omp_set_num_threads
+   use polydem_bench_scene, only: scene_t
+   use polydem_bench_settings, only: bench_settings_t
+   use polydem_bench_subject, only: complete_case, find_reference, load_subject, subject_t, take_sample
+   use polydem_bench_summary, only: ns_per_box
+   use polydem_check_sample, only: check_sample
+   use polydem_errors, only: error_t
+   use polydem_file_system, only: exists
+   use polydem_finder_statistics, only: count_names, phase_names
+   use polydem_folder_lock, only: folder_lock_t
+   use polydem_kinds, only: dp, ip, lp
+   use polydem_log, only: log_t
+   use polydem_provenance, only: collect_provenance, provenance_t
+   use polydem_reference, only: reference_t
+   use polydem_reference_file, only: read_reference, write_reference
+   use polydem_replay, only: sample_path
+   use polydem_sample_file, only: sample_t, write_sample
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: bench_t, measure_scene
+
+   !> State of a bench
+   type :: bench_t
+      !> Settings of the bench
+      type(bench_settings_t) :: settings
+      !> Folder of traces, reference lists and samples
+      character(len=:), allocatable :: folder
+      !> Lock of the folder
+      type(folder_lock_t) :: lock
+      !> Log on the screen
+      type(log_t) :: log
+      !> Number of threads outside timed sections
+      integer :: all_threads = 1
+      !> Number of samples taken or found on disk, and total number of samples
+      integer :: n_done = 0, n_samples = 0
+   end type bench_t
+
+contains
+
+   !> Take all samples of a scene.
+   subroutine measure_scene(bench, scene, n_boxes, error)
+      !> The bench
+      type(bench_t), intent(inout) :: bench
+      !> Scene to measure
+      type(scene_t), intent(in) :: scene
+      !> Number of boxes of the scene
+      integer(ip), intent(out) :: n_boxes
+      !> Allocated if a sample cannot be taken or a list is wrong
+      type(error_t), allocatable, intent(inout) :: error
+      type(subject_t) :: subject
+      type(reference_t) :: reference
+      integer :: n_cases, c, k, r
+
+      associate (settings => bench%settings)
+         call load_subject(scene, settings%mode == 'live', settings%steps, subject, error)
+         n_boxes = subject%case%boxes
+         if (.not. allocated(error)) call provide_reference(bench, subject, reference, error)
+         n_cases = size(settings%finders)*size(settings%threads)
+         do r = 0, settings%repeats
+            do k = 0, n_cases - 1
+               if (allocated(error)) return
+               c = mod(k + r, n_cases)
+               subject%case%finder = settings%finders(1 + c/size(settings%threads))%text
+               subject%case%threads = settings%threads(1 + mod(c, size(settings%threads)))
+               subject%case%repeat = int(r, ip)
+               call measure_case(bench, subject, reference, error)
+            end do
+         end do
+      end associate
+   end subroutine measure_scene
+
+   !> Read the reference lists of pairs from disk, or compute and write them.
+   subroutine provide_reference(bench, subject, reference, error)
+      type(bench_t), intent(inout) :: bench
+      type(subject_t), intent(inout) :: subject
+      type(reference_t), intent(out) :: reference
+      type(error_t), allocatable, intent(inout) :: error
+      type(provenance_t) :: provenance
+      character(len=:), allocatable :: path
+      integer(lp) :: finish
+
+      path = bench%folder//'/oracle/'//subject%case%scene//'.h5'
+      if (exists(path)) then
+         call read_reference(path, subject%case%steps, subject%start, reference, finish, error)
+      else
+         call bench%log%write_line(subject%case%scene//': '//to_text(subject%case%boxes)//' boxes, '// &
+            to_text(subject%case%steps)//' steps; comparing all pairs')
+         call find_reference(subject, bench%settings%finders(1)%text, reference, finish, error)
+         if (allocated(error)) return
+         call collect(bench, provenance)
+         call write_reference(path, reference, subject%start, finish, provenance, error)
+      end if
+      if (.not. allocated(error)) call complete_case(reference, finish, subject)
+   end subroutine provide_reference
+
+   !> Take one sample, or check the one on disk.
+   subroutine measure_case(bench, subject, reference, error)
+      type(bench_t), intent(inout) :: bench
+      type(subject_t), intent(inout) :: subject
+      type(reference_t), intent(inout) :: reference
+      type(error_t), allocatable, intent(inout) :: error
+      type(sample_t) :: sample
+      type(provenance_t) :: provenance
+      character(len=:), allocatable :: path
+      logical :: is_lost
+
+      sample%case = subject%case
+      call omp_set_num_threads(int(sample%case%threads))
+      call collect(bench, provenance)
+      path = sample_path(bench%folder//'/samples', sample%case)
+      if (exists(path)) then
+         call check_sample(path, sample%case, provenance, error)
+         bench%n_done = bench%n_done + 1
+         return
+      end if
+      call take_sample(subject, reference, sample, error)
+      call bench%lock%check(is_lost, error)
+      if (allocated(error)) return
+      call write_sample(path, sample, phase_names, count_names, provenance, error)
+      if (allocated(error)) return
+      bench%n_done = bench%n_done + 1
+      call write_progress(bench, sample)
+   end subroutine measure_case
+
+   !> Print one line with the time per box and step of a sample [ns].
+   subroutine write_progress(bench, sample)
+      type(bench_t), intent(inout) :: bench
+      type(sample_t), intent(in) :: sample
+      character(len=110) :: line
+      real(dp) :: time
+
+      associate (case => sample%case)
+         if (case%threads == 1_ip) time = ns_per_box(sample%processor, case%boxes)
+         if (case%threads > 1_ip) time = ns_per_box(sample%elapsed, case%boxes)
+         write (line, '(i6,a,i0,7a,f10.2,a)') bench%n_done, ' of ', bench%n_samples, '  '//case%scene//'  ', &
+            case%finder, '  threads ', to_text(case%threads), '  repeat ', to_text(case%repeat), ': ', time, ' ns'
+         call bench%log%write_line(trim(line))
+      end associate
+   end subroutine write_progress
+
+   !> Collect the provenance of a sample.
+   subroutine collect(bench, provenance)
+      type(bench_t), intent(in) :: bench
+      type(provenance_t), intent(out) :: provenance
+
+      associate (settings => bench%settings)
+         call collect_provenance(provenance, settings%file, settings%text, settings%resolved, 0_ip)
+      end associate
+   end subroutine collect
+
+end module polydem_bench_cases

@@ -1,0 +1,192 @@
+!> The subject of a sample: a trace in memory (replay), or the state of a simulation (live).
+module polydem_bench_subject
+   use polydem_bench_scene, only: provide_trace, scene_t
+   use polydem_bodies, only: state_hash
+   use polydem_boxes, only: boxes_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_kinds, only: dp, ip, lp
+   use polydem_live_sample, only: live_sample
+   use polydem_neighbours, only: neighbours_t
+   use polydem_recorder, only: first_trace_step
+   use polydem_reference, only: set_by_all_pairs, new_reference, reference_t, all_pairs_steps, total_hash
+   use polydem_replay, only: describe_trace, set_by_trace
+   use polydem_replay_sample, only: replay_sample, first_boxes
+   use polydem_sample_file, only: case_t, sample_t
+   use polydem_simulation, only: simulation_t
+   use polydem_start, only: new_simulation
+   use polydem_strings, only: to_text, quoted
+   use polydem_time_step, only: advance
+   use polydem_trace_reader, only: read_trace, trace_t
+   implicit none
+   private
+   public :: subject_t, load_subject, find_reference, complete_case, take_sample
+
+   !> A trace, or the state of a simulation
+   type :: subject_t
+      !> Properties common to all cases of the subject
+      type(case_t) :: case
+      !> Hash of all recorded bounds, or of the initial state; identifies the reference lists
+      integer(lp) :: start = 0_lp
+      !> Recorded boxes, if the bench replays them
+      type(trace_t) :: trace
+      !> Boxes of one step of the trace
+      type(boxes_t) :: boxes
+      !> Initial state, if the bench runs whole time steps; else unallocated
+      type(simulation_t), allocatable :: simulation
+   end type subject_t
+
+contains
+
+   !> Load a scene into memory.
+   subroutine load_subject(scene, live, steps, subject, error)
+      !> Scene
+      type(scene_t), intent(in) :: scene
+      !> Whether the bench runs whole time steps
+      logical, intent(in) :: live
+      !> Number of steps; 0: all steps of the trace
+      integer(ip), intent(in) :: steps
+      !> Subject of the samples
+      type(subject_t), intent(out) :: subject
+      !> Allocated if the scene cannot be run or read
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (live) then
+         call load_simulation(scene, steps, subject, error)
+      else
+         call provide_trace(scene, error)
+         if (.not. allocated(error)) call read_trace(scene%path, subject%trace, error, steps)
+         if (allocated(error)) return
+         call check_length(scene, steps, subject%trace%n_steps, error)
+         if (allocated(error)) return
+         call first_boxes(subject%trace, subject%boxes)
+         call describe_trace(subject%trace, subject%boxes, subject%case)
+         subject%start = subject%case%identity
+      end if
+      subject%case%scene = scene%name
+      subject%case%trace = scene%text
+   end subroutine load_subject
+
+   !> Check that a trace has the requested number of steps.
+   subroutine check_length(scene, steps, n_steps, error)
+      type(scene_t), intent(in) :: scene
+      integer(ip), intent(in) :: steps, n_steps
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: wanted
+
+      wanted = steps
+      if (steps == 0_ip .and. .not. scene%is_trace) wanted = scene%settings%output%trace_steps
+      if (wanted > n_steps) call raise(error, input_error, scene%path//': has '//to_text(n_steps)//' steps, but '// &
+         to_text(wanted)//' are wanted')
+   end subroutine check_length
+
+   !> Run a scene up to the first step of its trace.
+   subroutine load_simulation(scene, steps, subject, error)
+      type(scene_t), intent(in) :: scene
+      integer(ip), intent(in) :: steps
+      type(subject_t), intent(inout) :: subject
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp) :: first
+
+      if (scene%is_trace) then
+         call raise(error, input_error, quoted(scene%text)//': a live bench needs a namelist file, not a trace')
+         return
+      end if
+      allocate (subject%simulation)
+      associate (simulation => subject%simulation, case => subject%case)
+         call new_simulation(scene%settings, simulation, error)
+         if (allocated(error)) return
+         first = first_trace_step(scene%settings%output%trace_start, simulation%dt)
+         do while (simulation%step < first .and. .not. allocated(error))
+            call advance(simulation, error)
+            call simulation%timers%end_step()
+         end do
+         if (allocated(error)) return
+         subject%start = state_hash(simulation%bodies)
+         case%mode = 'live'
+         case%boxes = simulation%boxes%n
+         case%fixed = count(simulation%boxes%fixed(:case%boxes), kind=ip)
+         case%bodies = simulation%bodies%n
+         case%dt = real(simulation%dt, dp)
+         case%input = scene%settings%resolved
+         case%steps = steps
+         if (steps == 0_ip) case%steps = scene%settings%output%trace_steps
+      end associate
+   end subroutine load_simulation
+
+   !> Compute the reference lists: by comparing all pairs at the steps of `all_pairs_steps`, by the first finder at the
+   !> others.
+   subroutine find_reference(subject, finder, reference, finish, error)
+      !> Subject of the samples
+      type(subject_t), intent(inout) :: subject
+      !> Name of the first finder
+      character(len=*), intent(in) :: finder
+      !> Reference lists
+      type(reference_t), intent(out) :: reference
+      !> Hash of the last state of a live bench; else 0
+      integer(lp), intent(out) :: finish
+      !> Allocated if a list of the finder is wrong
+      type(error_t), allocatable, intent(inout) :: error
+      type(sample_t) :: sample
+      type(neighbours_t) :: oracle
+      logical :: wanted(subject%case%steps)
+      integer(ip) :: s
+
+      finish = 0_lp
+      call new_reference(reference, subject%case%steps)
+      wanted = all_pairs_steps(subject%case%boxes, subject%case%steps)
+      sample%case = subject%case
+      sample%case%finder = finder
+      if (allocated(subject%simulation)) then
+         reference%other = finder
+         call live_sample(subject%simulation, .true., reference, sample, finish, error, wanted)
+         return
+      end if
+      call set_by_trace(subject%trace, reference)
+      do s = 1_ip, subject%case%steps
+         if (.not. wanted(s)) cycle
+         subject%boxes%bounds = subject%trace%bounds(:, :, s)
+         call set_by_all_pairs(reference, s, subject%boxes, oracle, error)
+         if (allocated(error)) return
+      end do
+      call replay_sample(subject%trace, subject%boxes, .true., reference, sample, error)
+      reference%other = finder
+   end subroutine find_reference
+
+   !> Set the properties of all cases that follow from the reference lists.
+   subroutine complete_case(reference, finish, subject)
+      !> Reference lists
+      type(reference_t), intent(in) :: reference
+      !> Hash of the last state of a live bench; else 0
+      integer(lp), intent(in) :: finish
+      !> Subject of the samples
+      type(subject_t), intent(inout) :: subject
+
+      associate (case => subject%case)
+         case%pairs_total = sum(int(reference%pairs, lp))
+         case%pair_hash = total_hash(reference%hash)
+         case%checked = 'all_pairs '//to_text(count(reference%by_oracle, kind=ip))//' steps'
+         if (.not. all(reference%by_oracle)) case%checked = case%checked//', else '//reference%other
+         if (allocated(subject%simulation)) case%identity = finish
+      end associate
+   end subroutine complete_case
+
+   !> Take one sample.
+   subroutine take_sample(subject, reference, sample, error)
+      !> Subject of the samples
+      type(subject_t), intent(inout) :: subject
+      !> Reference lists
+      type(reference_t), intent(inout) :: reference
+      !> The sample; its case is set on entry
+      type(sample_t), intent(inout) :: sample
+      !> Allocated if a list is wrong
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp) :: finish
+
+      if (allocated(subject%simulation)) then
+         call live_sample(subject%simulation, sample%case%repeat == 0_ip, reference, sample, finish, error)
+      else
+         call replay_sample(subject%trace, subject%boxes, sample%case%repeat == 0_ip, reference, sample, error)
+      end if
+   end subroutine take_sample
+
+end module polydem_bench_subject

@@ -1,0 +1,49 @@
+!> Neighbour finders of a bench: those of a run, and variants of them with other compiler options.
+!>
+!> `quadtree_called` is the quadtree compiled without inlining; `quadtree_o2` and `sort_and_sweep_o2` are compiled at
+!> -O2.
+module polydem_finder_variants
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_finder, only: finder_t
+   use polydem_finder_factory, only: finder_names, new_finder
+   use polydem_quadtree_called, only: quadtree_called_t => quadtree_t
+   use polydem_quadtree_o2, only: quadtree_o2_t => quadtree_t
+   use polydem_sort_and_sweep_o2, only: sort_and_sweep_o2_t => sort_and_sweep_t
+   use polydem_strings, only: join
+   implicit none
+   private
+   public :: new_finder_or_variant, variant_names
+
+   !> Names of the variants
+   character(len=*), parameter :: variant_names(*) = &
+      [character(len=17) :: 'quadtree_called', 'quadtree_o2', 'sort_and_sweep_o2']
+
+contains
+
+   !> Create a finder or a variant of one, without boxes.
+   subroutine new_finder_or_variant(finder, name, error)
+      !> The new finder
+      class(finder_t), allocatable, intent(out) :: finder
+      !> One of `finder_names` or `variant_names`
+      character(len=*), intent(in) :: name
+      !> Allocated if there is no finder of this name
+      type(error_t), allocatable, intent(inout) :: error
+
+      select case (name)
+      case ('quadtree_called')
+         allocate (quadtree_called_t :: finder)
+      case ('quadtree_o2')
+         allocate (quadtree_o2_t :: finder)
+      case ('sort_and_sweep_o2')
+         allocate (sort_and_sweep_o2_t :: finder)
+      case default
+         if (any(finder_names == name)) then
+            call new_finder(finder, name, error)
+         else
+            call raise(error, input_error, "there is no finder '"//trim(name)//"'; choose one of "// &
+                       join([finder_names, variant_names], ', '))
+         end if
+      end select
+   end subroutine new_finder_or_variant
+
+end module polydem_finder_variants

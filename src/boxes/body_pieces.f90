@@ -1,0 +1,222 @@
+!> Division of large bodies into pieces, once and in the body frame.
+!>
+!> A grid is aligned with the longest edge of the body. Its cells are about one median diameter wide. A block of cells
+!> is halved until it is one cell, or lies deep enough in the body that its bounding box stays inside the body at any
+!> angle. Pieces are therefore one cell large along the outline, and larger with increasing depth. Together they fill
+!> the body: a small body inside a large one always meets a piece. The number of pieces is proportional to the
+!> circumference of the body, not to its area.
+module polydem_body_pieces
+   use polydem_kinds, only: ip, wp
+   use polydem_polygon, only: clip_half_plane, diameter
+   implicit none
+   private
+   public :: pieces_t, cut_body
+
+   !> A growing list of pieces
+   type :: pieces_t
+      !> Number of pieces
+      integer(ip) :: n = 0_ip
+      !> First vertex of each piece, and one past the last vertex of the last piece; may be longer than n + 1
+      integer(ip), allocatable :: start(:)
+      !> Vertices in the body frame, (2, vertex) [m]; may be longer than needed
+      real(wp), allocatable :: vertices(:, :)
+   contains
+      procedure :: append
+   end type pieces_t
+
+   !> Grid for the division of a body; axis 1 is along its longest edge, axis 2 across
+   type :: grid_t
+      !> Unit vectors, (2, axis)
+      real(wp) :: direction(2, 2)
+      !> Least coordinate of the body along each axis [m]
+      real(wp) :: from(2)
+      !> Extent of the body along each axis [m]
+      real(wp) :: length(2)
+      !> Number of cells along each axis
+      integer(ip) :: cells(2)
+   end type grid_t
+
+contains
+
+   !> Append the pieces of a body. A body that is small enough has no pieces.
+   pure subroutine cut_body(vertices, median_diameter, largest_ratio, room, pieces, fits)
+      !> Vertices of the body in the body frame, anticlockwise, (2, n) [m]
+      real(wp), intent(in) :: vertices(:, :)
+      !> Median diameter of the free bodies [m]
+      real(wp), intent(in) :: median_diameter
+      !> A body longer than this many median diameters is cut
+      real(wp), intent(in) :: largest_ratio
+      !> Greatest number of pieces to append
+      integer(ip), intent(in) :: room
+      !> Pieces of all bodies
+      type(pieces_t), intent(inout) :: pieces
+      !> Whether there was room; if not, the pieces are incomplete
+      logical, intent(out) :: fits
+      type(grid_t) :: grid
+      integer(ip) :: most
+      integer :: a
+
+      fits = .true.
+      if (diameter(vertices)/median_diameter <= largest_ratio) return
+      grid%direction(:, 1) = longest_edge(vertices)
+      grid%direction(:, 2) = [-grid%direction(2, 1), grid%direction(1, 1)]
+      do a = 1, 2
+         call extent(vertices, grid%direction(:, a), grid%from(a), grid%length(a))
+         grid%cells(a) = number_of_cells(grid%length(a)/median_diameter, largest_ratio, room)
+      end do
+      ! The outline alone has more pieces than the grid has cells along an axis.
+      fits = all(grid%cells == 1_ip .or. grid%cells <= room)
+      if (all(grid%cells == 1_ip) .or. .not. fits) return
+      most = pieces%n + room
+      call cut_block(grid, vertices, [0_ip, 0_ip], grid%cells, vertices, most, pieces)
+      fits = pieces%n <= most
+   end subroutine cut_body
+
+   !> Number of cells along a length in median diameters; `room` + 1 if they are too many
+   pure integer(ip) function number_of_cells(diameters, largest_ratio, room)
+      real(wp), intent(in) :: diameters, largest_ratio
+      integer(ip), intent(in) :: room
+
+      number_of_cells = 1_ip
+      if (diameters <= largest_ratio) return
+      number_of_cells = room + 1_ip
+      if (diameters <= real(room, wp)) number_of_cells = max(1_ip, ceiling(diameters, ip))
+   end function number_of_cells
+
+   !> Append the pieces of a body in a block of cells. Halve the block as often as necessary.
+   pure recursive subroutine cut_block(grid, outline, low, high, part, most, pieces)
+      type(grid_t), intent(in) :: grid
+      !> The whole body [m]
+      real(wp), intent(in) :: outline(:, :)
+      !> The block has the cells low + 1 to high
+      integer(ip), intent(in) :: low(2), high(2)
+      !> The body in this block [m]
+      real(wp), intent(in) :: part(:, :)
+      !> Greatest number of pieces; beyond it the procedure returns
+      integer(ip), intent(in) :: most
+      type(pieces_t), intent(inout) :: pieces
+      real(wp) :: point(2), direction(2)
+      real(wp), allocatable :: half(:, :)
+      integer(ip) :: middle(2)
+      integer :: a
+
+      if (size(part, 2) == 0 .or. pieces%n > most) return
+      if (all(high - low == 1_ip) .or. lies_deep(grid, outline, low, high)) then
+         call pieces%append(part)
+         return
+      end if
+      a = merge(2, 1, high(2) - low(2) >= high(1) - low(1))
+      middle = (low + high)/2_ip
+      direction = grid%direction(:, a)
+      point = line(grid, a, middle(a))*direction
+      call clip_half_plane(part, point, direction, half)
+      call cut_block(grid, outline, low, merge(middle, high, [1, 2] == a), half, most, pieces)
+      call clip_half_plane(part, point, -direction, half)
+      call cut_block(grid, outline, merge(middle, low, [1, 2] == a), high, half, most, pieces)
+   end subroutine cut_block
+
+   !> Whether the distance of a block from the outline is at least half its longer side. The bounding box of a turned
+   !> block extends at most this far beyond the block.
+   pure logical function lies_deep(grid, outline, low, high)
+      type(grid_t), intent(in) :: grid
+      real(wp), intent(in) :: outline(:, :)
+      integer(ip), intent(in) :: low(2), high(2)
+      real(wp) :: centre(2), half(2), edge(2), depth
+      integer(ip) :: v, n
+      integer :: a
+      ! Tolerance for square blocks, which can be exactly at the limit
+      real(wp), parameter :: nearly = 0.999_wp
+
+      centre = 0.0_wp
+      do a = 1, 2
+         half(a) = 0.5_wp*(line(grid, a, high(a)) - line(grid, a, low(a)))
+         centre = centre + 0.5_wp*(line(grid, a, high(a)) + line(grid, a, low(a)))*grid%direction(:, a)
+      end do
+      n = size(outline, 2, kind=ip)
+      lies_deep = .false.
+      do v = 1_ip, n
+         edge = outline(:, 1_ip + modulo(v, n)) - outline(:, v)
+         depth = cross(edge, centre - outline(:, v)) - half(1)*abs(cross(edge, grid%direction(:, 1))) &
+                 - half(2)*abs(cross(edge, grid%direction(:, 2)))
+         if (depth < nearly*maxval(half)*hypot(edge(1), edge(2))) return
+      end do
+      lies_deep = .true.
+   end function lies_deep
+
+   !> Coordinate of line k of the grid, counted from 0 [m]
+   pure real(wp) function line(grid, a, k)
+      type(grid_t), intent(in) :: grid
+      !> Axis: 1 for lines perpendicular to the longest edge, 2 for lines along it
+      integer, intent(in) :: a
+      integer(ip), intent(in) :: k
+
+      line = grid%from(a) + grid%length(a)*real(k, wp)/real(grid%cells(a), wp)
+   end function line
+
+   !> Unit vector along the longest edge
+   pure function longest_edge(vertices) result(direction)
+      real(wp), intent(in) :: vertices(:, :)
+      real(wp) :: direction(2), edge(2), longest
+      integer(ip) :: v, n
+
+      n = size(vertices, 2, kind=ip)
+      longest = -1.0_wp
+      direction = [1.0_wp, 0.0_wp]
+      do v = 1_ip, n
+         edge = vertices(:, 1_ip + modulo(v, n)) - vertices(:, v)
+         if (hypot(edge(1), edge(2)) <= longest) cycle
+         longest = hypot(edge(1), edge(2))
+         direction = edge/longest
+      end do
+   end function longest_edge
+
+   !> Least coordinate and extent of a polygon in a direction
+   pure subroutine extent(vertices, direction, from, length)
+      real(wp), intent(in) :: vertices(:, :)
+      real(wp), intent(in) :: direction(2)
+      real(wp), intent(out) :: from, length
+      real(wp) :: along(size(vertices, 2))
+
+      along = vertices(1, :)*direction(1) + vertices(2, :)*direction(2)
+      from = minval(along)
+      length = maxval(along) - from
+   end subroutine extent
+
+   !> Third component of the cross product
+   pure real(wp) function cross(p, q)
+      real(wp), intent(in) :: p(2), q(2)
+
+      cross = p(1)*q(2) - p(2)*q(1)
+   end function cross
+
+   !> Append a piece. A piece without vertices is a body that is not cut.
+   pure subroutine append(self, vertices)
+      class(pieces_t), intent(inout) :: self
+      !> Vertices in the body frame, (2, n) [m]
+      real(wp), intent(in) :: vertices(:, :)
+      integer(ip), allocatable :: longer(:)
+      real(wp), allocatable :: more(:, :)
+      integer(ip) :: first, last
+
+      if (.not. allocated(self%start)) then
+         allocate (self%start(64), self%vertices(2, 256))
+         self%start(1) = 1_ip
+      end if
+      first = self%start(self%n + 1_ip)
+      last = first + size(vertices, 2, kind=ip) - 1_ip
+      if (self%n + 2_ip > size(self%start)) then
+         allocate (longer(2_ip*self%n + 2_ip))
+         longer(1:self%n + 1_ip) = self%start(1:self%n + 1_ip)
+         call move_alloc(longer, self%start)
+      end if
+      if (last > size(self%vertices, 2)) then
+         allocate (more(2, 2_ip*last))
+         more(:, 1:first - 1_ip) = self%vertices(:, 1:first - 1_ip)
+         call move_alloc(more, self%vertices)
+      end if
+      self%vertices(:, first:last) = vertices
+      self%n = self%n + 1_ip
+      self%start(self%n + 1_ip) = last + 1_ip
+   end subroutine append
+
+end module polydem_body_pieces

@@ -1,0 +1,194 @@
+!> Redistribution of table rows into global order: each rank gets one block of the globally sorted table.
+!>
+!> A row has a key: the global index of its body, and the number of the row among the rows of that body. The block of
+!> rank r of P contains the rows of bodies n r/P + 1 to n (r + 1)/P in ascending order of keys, where n is the number of
+!> bodies of the run. The blocks of all ranks, one after the other, are equal to the table of a serial run.
+module polydem_global_order
+   use polydem_communicator, only: communicator_t
+   use polydem_kinds, only: dp, ip, lp
+   use polydem_rank_order, only: sort_by_rank
+   use polydem_sort, only: sort_keys
+   implicit none
+   private
+   public :: global_order_t, row_key, component, vector
+
+   !> Communication plan that brings rows into blocks; `to_blocks` applies it to a column
+   type :: global_order_t
+      !> Number of rows in the block of this rank
+      integer(ip) :: n = 0_ip
+      !> Number of rows in the blocks of all lower ranks
+      integer(lp) :: first = 0_lp
+      !> Number of rows in all blocks
+      integer(lp) :: total = 0_lp
+      !> Number of rows in the local columns, including rows that other ranks own
+      integer(ip) :: n_known = 0_ip
+      !> Local indices of the rows that this rank owns, in the order of their destination ranks
+      integer(ip), allocatable, private :: slot(:)
+      !> Number of rows to send to each rank, (0:size - 1)
+      integer(ip), allocatable, private :: counts(:)
+      !> Index of the received row for each row of the block, (n)
+      integer(ip), allocatable, private :: source(:)
+      !> Whether there is only one rank and the rows are already in order
+      logical, private :: is_in_order = .false.
+   contains
+      procedure :: lay_out
+      !> Bring a column into blocks: to_blocks(comm, values, block)
+      generic :: to_blocks => longs_to_blocks, doubles_to_blocks
+      procedure, private :: longs_to_blocks, doubles_to_blocks
+   end type global_order_t
+
+contains
+
+   !> Sort key of a row: body in the upper 32 bits, number of the row in the lower 32 bits
+   elemental integer(lp) function row_key(body, k)
+      !> Global index of the body of the row, from 1
+      integer(ip), intent(in) :: body
+      !> Number of the row among the rows of that body
+      integer(ip), intent(in) :: k
+
+      row_key = ior(shiftl(int(body, lp), 32), int(k, lp))
+   end function row_key
+
+   !> Set up the communication plan; collective.
+   subroutine lay_out(self, comm, n_bodies, n_known, key, slot)
+      class(global_order_t), intent(inout) :: self
+      !> The communicator
+      class(communicator_t), intent(inout) :: comm
+      !> Number of bodies of the run
+      integer(ip), intent(in) :: n_bodies
+      !> Number of rows in the local columns
+      integer(ip), intent(in) :: n_known
+      !> Keys of the rows that this rank owns, in any order; each row has one owner
+      integer(lp), intent(in) :: key(:)
+      !> Local indices of these rows, in [1, n_known]
+      integer(ip), intent(in) :: slot(:)
+      integer(lp), allocatable :: sent(:, :), received(:, :), sizes(:)
+      integer(ip), allocatable :: destinations(:), counts(:)
+      integer(ip) :: k
+
+      self%n_known = n_known
+      destinations = destination_of(key, n_bodies, comm%size)
+      call sort_by_rank(destinations, comm%size, self%counts, self%slot)
+      allocate (sent(1, size(key)))
+      do k = 1_ip, size(key, kind=ip)
+         sent(1, k) = key(self%slot(k))
+      end do
+      self%slot = slot(self%slot)
+      call comm%all_to_all(sent, self%counts, received, counts)
+      self%n = size(received, 2, kind=ip)
+      call rank_keys(received(1, :), self%source)
+      self%is_in_order = comm%size == 1_ip .and. all(self%source(2:) > self%source(:self%n - 1_ip))
+      call comm%gather([int(self%n, lp)], sizes, counts)
+      self%first = sum(sizes(:comm%rank))
+      self%total = sum(sizes)
+   end subroutine lay_out
+
+   !> Bring a column of integers into blocks; collective.
+   subroutine longs_to_blocks(self, comm, values, block)
+      class(global_order_t), intent(in) :: self
+      !> The communicator, as in `lay_out`
+      class(communicator_t), intent(inout) :: comm
+      !> The local column, (width, n_known)
+      integer(lp), intent(in) :: values(:, :)
+      !> The block of this rank, (width, n)
+      integer(lp), allocatable, intent(out) :: block(:, :)
+      integer(lp), allocatable :: sent(:, :), received(:, :)
+      integer(ip), allocatable :: counts(:)
+      integer(ip) :: k
+
+      allocate (sent(size(values, 1), size(self%slot)))
+      do k = 1_ip, size(self%slot, kind=ip)
+         sent(:, k) = values(:, self%slot(k))
+      end do
+      if (self%is_in_order) then
+         call move_alloc(sent, block)
+         return
+      end if
+      call comm%all_to_all(sent, self%counts, received, counts)
+      allocate (block(size(values, 1), self%n))
+      do k = 1_ip, self%n
+         block(:, k) = received(:, self%source(k))
+      end do
+   end subroutine longs_to_blocks
+
+   !> Bring a column of real numbers into blocks without changing a bit; collective.
+   subroutine doubles_to_blocks(self, comm, values, block)
+      class(global_order_t), intent(in) :: self
+      !> The communicator, as in `lay_out`
+      class(communicator_t), intent(inout) :: comm
+      !> The local column, (width, n_known)
+      real(dp), intent(in) :: values(:, :)
+      !> The block of this rank, (width, n)
+      real(dp), allocatable, intent(out) :: block(:, :)
+      integer(lp), allocatable :: words(:, :), words_of_block(:, :)
+      integer :: k
+
+      if (self%is_in_order) then
+         allocate (block(size(values, 1), self%n))
+         do k = 1, size(block, 2)
+            block(:, k) = values(:, self%slot(k))
+         end do
+         return
+      end if
+      allocate (words(size(values, 1), size(values, 2)))
+      do k = 1, size(values, 2)
+         words(:, k) = transfer(values(:, k), 0_lp, size(values, 1))
+      end do
+      call self%to_blocks(comm, words, words_of_block)
+      allocate (block(size(values, 1), self%n))
+      do k = 1, size(block, 2)
+         block(:, k) = transfer(words_of_block(:, k), 0.0_dp, size(block, 1))
+      end do
+   end subroutine doubles_to_blocks
+
+   !> One component of each row of a block
+   pure function component(block, k)
+      !> The block, (width, row)
+      real(dp), intent(in) :: block(:, :)
+      !> Index of the component
+      integer, intent(in) :: k
+      real(dp) :: component(size(block, 2))
+
+      component = block(k, :)
+   end function component
+
+   !> Two consecutive components of each row of a block
+   pure function vector(block, k)
+      !> The block, (width, row)
+      real(dp), intent(in) :: block(:, :)
+      !> Index of the first component
+      integer, intent(in) :: k
+      real(dp) :: vector(2, size(block, 2))
+
+      vector = block(k:k + 1, :)
+   end function vector
+
+   !> Rank whose block contains the row of a key, from 0
+   elemental integer(ip) function destination_of(key, n_bodies, n_ranks)
+      integer(lp), intent(in) :: key
+      integer(ip), intent(in) :: n_bodies, n_ranks
+
+      ! The largest integer r below body P/n.
+      destination_of = int((shiftr(key, 32)*int(n_ranks, lp) - 1_lp)/int(n_bodies, lp), ip)
+   end function destination_of
+
+   !> Permutation that sorts keys in ascending order
+   pure subroutine rank_keys(keys, ranked)
+      integer(lp), intent(in) :: keys(:)
+      integer(ip), allocatable, intent(out) :: ranked(:)
+      integer(lp), allocatable :: sorted(:), spare_keys(:)
+      integer(ip), allocatable :: spare(:)
+      integer(ip) :: k, n
+
+      n = size(keys, kind=ip)
+      allocate (ranked(n))
+      do k = 1_ip, n
+         ranked(k) = k
+      end do
+      if (all(keys(2:) > keys(:n - 1_ip))) return
+      allocate (sorted(n), spare_keys(n), spare(n))
+      sorted = keys
+      call sort_keys(n, sorted, ranked, spare_keys, spare)
+   end subroutine rank_keys
+
+end module polydem_global_order

@@ -1,0 +1,206 @@
+!> The ranks of an MPI run. In this room only this module and `world_communicator.f90` use MPI.
+!>
+!> Buffers are contiguous. Real rows are sent as bytes, so one code serves every working precision. Open MPI does not
+!> copy array sections and does not use the asynchronous attribute. Therefore every non-blocking call is completed in
+!> the procedure that starts it.
+module polydem_mpi_communicator
+   use mpi_f08, only: mpi_allgather, mpi_allgatherv, mpi_allreduce, mpi_alltoall, mpi_bcast, mpi_byte, mpi_comm_world, &
+      mpi_double_precision, mpi_finalize, mpi_in_place, mpi_integer, mpi_integer8, mpi_irecv, mpi_isend, mpi_max, &
+      mpi_recv, mpi_request, mpi_send, mpi_statuses_ignore, mpi_status_ignore, mpi_sum, mpi_waitall
+   use polydem_communicator, only: neighbour_ranks_t, communicator_t
+   use polydem_kinds, only: dp, ip, lp, wp
+   implicit none
+   private
+   public :: mpi_communicator_t
+
+   !> All ranks of MPI_COMM_WORLD
+   type, extends(communicator_t) :: mpi_communicator_t
+   contains
+      procedure :: all_reduce_sum
+      procedure :: all_reduce_max_longs
+      procedure :: all_reduce_max_doubles
+      procedure :: broadcast_longs
+      procedure :: gather_longs
+      procedure :: all_to_all_longs
+      procedure :: exchange
+      procedure :: receive_from_previous
+      procedure :: send_to_next
+      procedure :: finalize
+   end type mpi_communicator_t
+
+   !> Tag of all messages. One tag is enough because MPI keeps the order of messages between two ranks
+   integer, parameter :: tag = 1
+
+contains
+
+   !> Replace numbers by their sums over all ranks.
+   subroutine all_reduce_sum(self, values)
+      class(mpi_communicator_t), intent(inout) :: self
+      !> Numbers of this rank; afterwards the same on all ranks
+      integer(lp), intent(inout), contiguous :: values(:)
+
+      if (self%size == 1_ip) return
+      call mpi_allreduce(mpi_in_place, values, size(values), mpi_integer8, mpi_sum, mpi_comm_world)
+   end subroutine all_reduce_sum
+
+   !> Replace numbers by their maxima over all ranks.
+   subroutine all_reduce_max_longs(self, values)
+      class(mpi_communicator_t), intent(inout) :: self
+      !> Numbers of this rank; afterwards the same on all ranks
+      integer(lp), intent(inout), contiguous :: values(:)
+
+      if (self%size == 1_ip) return
+      call mpi_allreduce(mpi_in_place, values, size(values), mpi_integer8, mpi_max, mpi_comm_world)
+   end subroutine all_reduce_max_longs
+
+   !> Replace numbers by their maxima over all ranks.
+   subroutine all_reduce_max_doubles(self, values)
+      class(mpi_communicator_t), intent(inout) :: self
+      !> Numbers of this rank; afterwards the same on all ranks
+      real(dp), intent(inout), contiguous :: values(:)
+
+      if (self%size == 1_ip) return
+      call mpi_allreduce(mpi_in_place, values, size(values), mpi_double_precision, mpi_max, mpi_comm_world)
+   end subroutine all_reduce_max_doubles
+
+   !> Broadcast numbers of the root rank.
+   subroutine broadcast_longs(self, values)
+      class(mpi_communicator_t), intent(inout) :: self
+      !> Numbers of the root rank; afterwards the same on all ranks
+      integer(lp), intent(inout), contiguous :: values(:)
+
+      if (self%size == 1_ip) return
+      call mpi_bcast(values, size(values), mpi_integer8, 0, mpi_comm_world)
+   end subroutine broadcast_longs
+
+   !> Collect the lists of all ranks on every rank.
+   subroutine gather_longs(self, mine, all_of_them, counts)
+      class(mpi_communicator_t), intent(inout) :: self
+      !> List of this rank
+      integer(lp), intent(in), contiguous :: mine(:)
+      !> All lists, in the order of ranks
+      integer(lp), allocatable, intent(out) :: all_of_them(:)
+      !> Lengths of the lists, (0:size - 1)
+      integer(ip), allocatable, intent(out) :: counts(:)
+      integer :: lengths(0:self%size - 1_ip), starts(0:self%size - 1_ip)
+
+      call mpi_allgather(size(mine), 1, mpi_integer, lengths, 1, mpi_integer, mpi_comm_world)
+      starts = starts_of(lengths)
+      allocate (all_of_them(sum(lengths)), counts(0:self%size - 1_ip))
+      counts = int(lengths, ip)
+      call mpi_allgatherv(mine, size(mine), mpi_integer8, all_of_them, lengths, starts, mpi_integer8, mpi_comm_world)
+   end subroutine gather_longs
+
+   !> Send rows to all ranks and receive rows from all ranks.
+   subroutine all_to_all_longs(self, rows, counts, received, counts_received)
+      class(mpi_communicator_t), intent(inout) :: self
+      !> Rows to send, in the order of their destination ranks, (width, row)
+      integer(lp), intent(in), contiguous :: rows(:, :)
+      !> Number of rows to send to each rank, (0:size - 1)
+      integer(ip), intent(in) :: counts(0:)
+      !> Received rows, in the order of their source ranks, (width, row)
+      integer(lp), allocatable, intent(out) :: received(:, :)
+      !> Number of rows received from each rank, (0:size - 1)
+      integer(ip), allocatable, intent(out) :: counts_received(:)
+      type(mpi_request) :: requests(2*self%size)
+      integer :: n_out(0:self%size - 1_ip), n_in(0:self%size - 1_ip), from(0:self%size - 1_ip), to(0:self%size - 1_ip)
+      integer :: k, n, width
+
+      width = size(rows, 1)
+      n_out = int(counts)
+      call mpi_alltoall(n_out, 1, mpi_integer, n_in, 1, mpi_integer, mpi_comm_world)
+      from = starts_of(n_in)
+      to = starts_of(n_out)
+      allocate (received(width, sum(n_in)), counts_received(0:self%size - 1_ip))
+      counts_received = int(n_in, ip)
+      n = 0
+      do k = 0, int(self%size) - 1
+         if (n_in(k) == 0 .or. k == self%rank) cycle
+         n = n + 1
+         call mpi_irecv(received(1, from(k) + 1), width*n_in(k), mpi_integer8, k, tag, mpi_comm_world, requests(n))
+      end do
+      do k = 0, int(self%size) - 1
+         if (n_out(k) == 0 .or. k == self%rank) cycle
+         n = n + 1
+         call mpi_isend(rows(1, to(k) + 1), width*n_out(k), mpi_integer8, k, tag, mpi_comm_world, requests(n))
+         self%messages = self%messages + 1_lp
+         self%bytes = self%bytes + int(width, lp)*int(n_out(k), lp)*int(storage_size(rows)/8, lp)
+      end do
+      k = int(self%rank)
+      received(:, from(k) + 1:from(k) + n_in(k)) = rows(:, to(k) + 1:to(k) + n_out(k))
+      call mpi_waitall(n, requests, mpi_statuses_ignore)
+   end subroutine all_to_all_longs
+
+   !> Exchange rows with neighbour ranks.
+   subroutine exchange(self, route, sent, received)
+      class(mpi_communicator_t), intent(inout) :: self
+      !> Neighbour ranks, and the rows sent to and received from each
+      type(neighbour_ranks_t), intent(in) :: route
+      !> Rows to send, in the order of the route, (width, row)
+      real(wp), intent(in), contiguous, target :: sent(:, :)
+      !> Received rows, in the order of the route, (width, row)
+      real(wp), intent(inout), contiguous, target :: received(:, :)
+      type(mpi_request) :: requests(2*size(route%rank))
+      integer :: k, n, bytes, row_bytes
+
+      row_bytes = size(sent, 1)*(storage_size(sent)/8)
+      n = 0
+      do k = 1, size(route%rank)
+         bytes = row_bytes*int(route%received(k + 1) - route%received(k))
+         if (bytes == 0) cycle
+         n = n + 1
+         call mpi_irecv(received(1, route%received(k)), bytes, mpi_byte, int(route%rank(k)), tag, mpi_comm_world, &
+                        requests(n))
+      end do
+      do k = 1, size(route%rank)
+         bytes = row_bytes*int(route%sent(k + 1) - route%sent(k))
+         if (bytes == 0) cycle
+         n = n + 1
+         call mpi_isend(sent(1, route%sent(k)), bytes, mpi_byte, int(route%rank(k)), tag, mpi_comm_world, requests(n))
+         self%messages = self%messages + 1_lp
+         self%bytes = self%bytes + int(bytes, lp)
+      end do
+      call mpi_waitall(n, requests, mpi_statuses_ignore)
+   end subroutine exchange
+
+   !> Receive numbers from rank - 1. Nothing happens on rank 0.
+   subroutine receive_from_previous(self, values)
+      class(mpi_communicator_t), intent(inout) :: self
+      !> Numbers of rank - 1; unchanged on rank 0
+      integer(lp), intent(inout), contiguous :: values(:)
+
+      if (self%rank == 0_ip) return
+      call mpi_recv(values, size(values), mpi_integer8, int(self%rank) - 1, tag, mpi_comm_world, mpi_status_ignore)
+   end subroutine receive_from_previous
+
+   !> Send numbers to rank + 1. Nothing happens on the last rank.
+   subroutine send_to_next(self, values)
+      class(mpi_communicator_t), intent(inout) :: self
+      !> The numbers; unchanged
+      integer(lp), intent(inout), contiguous :: values(:)
+
+      if (self%rank == self%size - 1_ip) return
+      call mpi_send(values, size(values), mpi_integer8, int(self%rank) + 1, tag, mpi_comm_world)
+   end subroutine send_to_next
+
+   !> End MPI.
+   subroutine finalize(self)
+      class(mpi_communicator_t), intent(inout) :: self
+
+      self%size = 1_ip
+      call mpi_finalize()
+   end subroutine finalize
+
+   !> Start of each list, counted from 0, if lists of these lengths are stored one after the other
+   pure function starts_of(lengths) result(starts)
+      integer, intent(in) :: lengths(0:)
+      integer :: starts(0:size(lengths) - 1)
+      integer :: k
+
+      starts = 0
+      do k = 1, size(lengths) - 1
+         starts(k) = starts(k - 1) + lengths(k - 1)
+      end do
+   end function starts_of
+
+end module polydem_mpi_communicator

@@ -1,0 +1,35 @@
+!> The communicator of this program: one process (build without MPI).
+module polydem_world_communicator
+   use polydem_communicator, only: communicator_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_serial_communicator, only: serial_communicator_t
+   implicit none
+   private
+   public :: create_world, communicator_description
+
+   !> Kind of communicator, for the log
+   character(len=*), parameter :: communicator_description = 'no MPI'
+   !> Environment variables in which Open MPI and other launchers store the number of processes
+   character(len=*), parameter :: size_variables(*) = [character(len=20) :: 'OMPI_COMM_WORLD_SIZE', 'PMI_SIZE']
+
+contains
+
+   !> Create the communicator of one process.
+   subroutine create_world(comm, error)
+      !> The communicator
+      class(communicator_t), allocatable, intent(out) :: comm
+      !> Allocated if several processes were started: they could not communicate
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=16) :: size
+      integer :: k
+
+      allocate (serial_communicator_t :: comm)
+      do k = 1, ubound(size_variables, 1)
+         call get_environment_variable(trim(size_variables(k)), size)
+         if (size /= '' .and. size /= '1') call raise(error, input_error, trim(size)//' processes were started, '// &
+            'but this program is built without MPI; use the program of the preset mpi, or ./polydem run '// &
+            'FILE.nml --ranks '//trim(size)//', which builds and starts it')
+      end do
+   end subroutine create_world
+
+end module polydem_world_communicator

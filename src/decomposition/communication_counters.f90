@@ -1,0 +1,54 @@
+!> Exact counts of the communication of a run: the distribution of bodies, halo bodies and messages over the ranks. The
+!> halo exchange of every step is counted separately from redistributions.
+module polydem_communication_counters
+   use polydem_communicator, only: communicator_t
+   use polydem_counters, only: counters_t
+   use polydem_domain, only: domain_t
+   use polydem_kinds, only: ip, lp
+   implicit none
+   private
+   public :: report_communication
+
+contains
+
+   !> Set the counters of a run on several ranks. A counter "most of a process" is the maximum over the ranks,
+   !> separately for each quantity. Bodies and pairs are present numbers; all other counts are sums over steps.
+   !> Collective.
+   subroutine report_communication(comm, domain, n_free, n_pairs, counters)
+      !> Ranks
+      class(communicator_t), intent(inout) :: comm
+      !> Domain of this rank
+      type(domain_t), intent(in) :: domain
+      !> Number of free bodies and of pairs of this rank
+      integer(lp), intent(in) :: n_free, n_pairs
+      !> Counters of the run
+      type(counters_t), intent(inout) :: counters
+      integer(lp) :: sums(9), most(5)
+
+      if (comm%size == 1_ip) return
+      sums = [comm%messages, comm%bytes, domain%halo_steps, domain%arrivals, domain%first_migrations, &
+              domain%step_messages, domain%step_bytes, domain%first_messages, domain%first_bytes]
+      most = [n_free, n_pairs, domain%halo_steps, domain%step_messages, domain%step_bytes]
+      call comm%all_reduce_sum(sums)
+      call comm%all_reduce_max(most)
+      call counters%set('processes', int(comm%size, lp))
+      call counters%set('settlements', domain%redistributions)
+      call counters%set('divisions of space', domain%divisions)
+      call counters%set('rectangles', int(domain%regions%n_rectangles(), lp))
+      call counters%set('migrations', sums(4))
+      call counters%set('migrations at the start', sums(5))
+      call counters%set('ghosts, summed over steps', sums(3))
+      call counters%set('messages', sums(1))
+      call counters%set('bytes in messages', sums(2))
+      call counters%set('messages at the start', sums(8))
+      call counters%set('bytes at the start', sums(9))
+      call counters%set('messages to ghosts', sums(6))
+      call counters%set('bytes to ghosts', sums(7))
+      call counters%set('most of a process: bodies', most(1))
+      call counters%set('most of a process: pairs', most(2))
+      call counters%set('most of a process: ghosts', most(3))
+      call counters%set('most of a process: messages', most(4))
+      call counters%set('most of a process: bytes', most(5))
+   end subroutine report_communication
+
+end module polydem_communication_counters

@@ -1,0 +1,146 @@
+!> Domain: the part of space of one rank, and the criterion for the next redistribution of bodies.
+!>
+!> A partition of space assigns each body to a rank. The halo of a rank contains the bodies of other ranks whose padded
+!> boxes overlap the padded boxes of its own bodies; the padding is a margin. The halo is sufficient until the box of a
+!> body leaves the padded box recorded at the last redistribution. The next redistribution then takes place in the
+!> middle of the step, after the prediction and before the search for pairs: no pair can be missed.
+module polydem_domain
+   use polydem_communicator, only: communicator_t
+   use polydem_errors, only: error_t
+   use polydem_halo, only: halo_t
+   use polydem_kinds, only: dp, ip, lp, wp, min_parallel_size
+   use polydem_partition, only: partition_t
+   use polydem_partition_factory, only: new_partition
+   use polydem_rank_bounds, only: rank_bounds_t
+   use polydem_settings, only: exchange_settings_t
+   implicit none
+   private
+   public :: domain_t, new_domain
+
+   !> Domain of one rank
+   type :: domain_t
+      !> Group &exchange
+      type(exchange_settings_t) :: settings
+      !> Partition of space; not allocated in a run on one rank
+      class(partition_t), allocatable :: partition
+      !> Bounding rectangles of the bodies of the other ranks
+      type(rank_bounds_t) :: regions
+      !> Halo: copies of bodies of other ranks
+      type(halo_t) :: halo
+      !> Distance that a box may move before the next redistribution [m]
+      real(wp) :: margin = 0.0_wp
+      !> Median diameter of the free bodies of the run [m]
+      real(wp) :: median_diameter = 0.0_wp
+      !> Number of halo bodies of all ranks per body of the run
+      real(wp) :: halo_share = 0.0_wp
+      !> Padded boxes recorded at the last redistribution, (4, box) [m]
+      real(wp), allocatable :: reference(:, :)
+      !> Step of the last redistribution; -1 before the first
+      integer(lp) :: last_step = -1_lp
+      !> Step of the last partition of space; -1 before the first
+      integer(lp) :: partition_step = -1_lp
+      !> Computing time of this rank up to the last partition of space [s]
+      real(dp) :: partition_seconds = 0.0_dp
+      !> Number of redistributions; of partitions of space; of bodies that migrated to this rank; of halo bodies, summed
+      !> over steps
+      integer(lp) :: redistributions = 0_lp, divisions = 0_lp, arrivals = 0_lp, halo_steps = 0_lp
+      !> Part of the first redistribution: number of bodies that migrated to this rank, of messages of this rank, and of
+      !> their bytes
+      integer(lp) :: first_migrations = 0_lp, first_messages = 0_lp, first_bytes = 0_lp
+      !> Number of messages of this rank in the halo exchanges of all steps, and of their bytes
+      integer(lp) :: step_messages = 0_lp, step_bytes = 0_lp
+   contains
+      procedure :: must_redistribute
+      procedure :: set_reference
+      procedure :: adapt_margin
+   end type domain_t
+
+   !> Margin at the start, and bounds of later margins, in median diameters
+   real(wp), parameter :: first_margin = 0.15_wp, least_margin = 0.02_wp, greatest_margin = 2.0_wp
+   !> Cost of a redistribution in steps, and of a halo body in bodies (measured; see postproc/verdicts/scale)
+   real(wp), parameter :: redistribution_cost = 4.0_wp, halo_body_cost = 0.5_wp
+   !> Greatest factor by which the margin changes in a redistribution
+   real(wp), parameter :: greatest_change = 3.0_wp
+
+contains
+
+   !> Start a domain. In a run on several ranks the first redistribution is in the first step.
+   subroutine new_domain(domain, settings, median_diameter, comm, error)
+      !> The domain
+      type(domain_t), intent(out) :: domain
+      !> Group &exchange
+      type(exchange_settings_t), intent(in) :: settings
+      !> Median diameter of the free bodies of the run [m]
+      real(wp), intent(in) :: median_diameter
+      !> Ranks
+      class(communicator_t), intent(in) :: comm
+      !> Allocated if the settings name no known partition of space
+      type(error_t), allocatable, intent(inout) :: error
+
+      domain%settings = settings
+      domain%median_diameter = median_diameter
+      domain%margin = settings%margin
+      if (settings%margin <= 0.0_wp) domain%margin = first_margin*median_diameter
+      if (comm%size > 1_ip) call new_partition(domain%partition, settings%cut, error)
+   end subroutine new_domain
+
+   !> Whether a box of a body of this rank has left its padded box recorded at the last redistribution. In a run on
+   !> several ranks it is true before the first redistribution.
+   logical function must_redistribute(self, bounds, passive)
+      class(domain_t), intent(in) :: self
+      !> xmin, ymin, xmax, ymax of the boxes in the middle of a step, (4, box) [m]
+      real(wp), intent(in) :: bounds(:, :)
+      !> Whether the body of a box is fixed or in the halo, (box)
+      logical, intent(in) :: passive(:)
+      integer(ip) :: b
+      logical :: inside
+
+      must_redistribute = allocated(self%partition) .and. .not. allocated(self%reference)
+      if (.not. allocated(self%reference)) return
+      inside = .true.
+      !$omp parallel do if (size(passive) > min_parallel_size) schedule(static) default(none) &
+      !$omp    shared(self, bounds, passive) private(b) reduction(.and.:inside)
+      do b = 1_ip, size(passive, kind=ip)
+         if (passive(b)) cycle
+         inside = inside .and. all(bounds(1:2, b) >= self%reference(1:2, b)) &
+            .and. all(bounds(3:4, b) <= self%reference(3:4, b))
+      end do
+      !$omp end parallel do
+      must_redistribute = .not. inside
+   end function must_redistribute
+
+   !> Record the padded boxes of a redistribution.
+   subroutine set_reference(self, bounds, step)
+      class(domain_t), intent(inout) :: self
+      !> xmin, ymin, xmax, ymax of the boxes, (4, box) [m]
+      real(wp), intent(in) :: bounds(:, :)
+      !> The step
+      integer(lp), intent(in) :: step
+
+      if (allocated(self%reference)) deallocate (self%reference)
+      allocate (self%reference(4, size(bounds, 2)))
+      self%reference(1:2, :) = bounds(1:2, :) - self%margin
+      self%reference(3:4, :) = bounds(3:4, :) + self%margin
+      self%last_step = step
+   end subroutine set_reference
+
+   !> Choose the margin, unless the settings give one. With a wide margin redistributions are rare, but the halo is
+   !> large: both the interval between redistributions and the number of halo bodies grow with the margin. At the chosen
+   !> margin redistributions cost as much as the halo.
+   subroutine adapt_margin(self, step)
+      class(domain_t), intent(inout) :: self
+      !> Step of the redistribution that begins. It and `halo_share` are equal on all ranks, and so is the margin
+      integer(lp), intent(in) :: step
+      real(wp) :: cost_of_redistributions, cost_of_halo, factor
+
+      if (self%settings%margin > 0.0_wp .or. self%last_step < 0_lp) return
+      cost_of_redistributions = redistribution_cost/real(max(1_lp, step - self%last_step), wp)
+      cost_of_halo = halo_body_cost*self%halo_share
+      factor = greatest_change
+      if (cost_of_halo*greatest_change**2 > cost_of_redistributions) &
+         factor = max(1.0_wp/greatest_change, sqrt(cost_of_redistributions/cost_of_halo))
+      self%margin = max(least_margin*self%median_diameter, min(factor*self%margin, &
+         greatest_margin*self%median_diameter))
+   end subroutine adapt_margin
+
+end module polydem_domain

@@ -1,0 +1,103 @@
+!> Ownership and global order of bodies, of parts of bodies (such as boxes and vertices), and of pairs of bodies.
+!>
+!> A rank owns the free bodies that it moves. The root rank also owns the fixed bodies, which all ranks have. Two ranks
+!> can have the same pair of bodies. Its owner is the owner of the *leading* body: the first body, or the second one if
+!> the first is fixed.
+module polydem_ownership
+   use polydem_bodies, only: bodies_t
+   use polydem_communicator, only: communicator_t
+   use polydem_global_order, only: global_order_t, row_key
+   use polydem_kinds, only: ip, lp
+   implicit none
+   private
+   public :: owns_body, owns_pair, order_bodies, order_parts, order_pairs
+
+contains
+
+   !> Whether a rank owns a body
+   elemental logical function owns_body(is_root, in_halo, is_fixed)
+      !> Whether the rank is the root rank
+      logical, intent(in) :: is_root
+      !> Whether the body is in the halo; whether it is fixed
+      logical, intent(in) :: in_halo, is_fixed
+
+      owns_body = .not. in_halo .and. (is_root .or. .not. is_fixed)
+   end function owns_body
+
+   !> Whether this rank owns a pair of bodies, not both fixed
+   pure logical function owns_pair(bodies, first, second)
+      !> Bodies of this rank
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the two bodies, in ascending order
+      integer(ip), intent(in) :: first, second
+
+      owns_pair = .not. bodies%in_halo(merge(second, first, bodies%fixed(first)))
+   end function owns_pair
+
+   !> Find the global order of columns over the bodies. Collective.
+   subroutine order_bodies(comm, bodies, blocks)
+      !> Ranks
+      class(communicator_t), intent(inout) :: comm
+      !> Bodies of this rank
+      type(bodies_t), intent(in) :: bodies
+      !> Destination of each row
+      type(global_order_t), intent(inout) :: blocks
+      integer(ip) :: s
+
+      call order_parts(comm, bodies, [(s, s=1_ip, bodies%n)], blocks)
+   end subroutine order_bodies
+
+   !> Find the global order of columns over parts of bodies, such as boxes and vertices. Collective.
+   subroutine order_parts(comm, bodies, body, blocks)
+      !> Ranks
+      class(communicator_t), intent(inout) :: comm
+      !> Bodies of this rank
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body of each part, ascending; the parts of one body have the same order on all ranks
+      integer(ip), intent(in) :: body(:)
+      !> Destination of each row
+      type(global_order_t), intent(inout) :: blocks
+      integer(lp), allocatable :: key(:)
+      integer(ip), allocatable :: slot(:)
+      integer(ip) :: k, n
+
+      allocate (key(size(body)), slot(size(body)))
+      n = 0_ip
+      do k = 1_ip, size(body, kind=ip)
+         associate (s => body(k))
+            if (.not. owns_body(comm%is_root(), bodies%in_halo(s), bodies%fixed(s))) cycle
+            n = n + 1_ip
+            key(n) = row_key(bodies%global_index(s), k)
+            slot(n) = k
+         end associate
+      end do
+      call blocks%lay_out(comm, bodies%n_all, size(body, kind=ip), key(:n), slot(:n))
+   end subroutine order_parts
+
+   !> Find the global order of columns over pairs of bodies, such as contacts. Pairs of two fixed bodies are not
+   !> allowed. Collective.
+   subroutine order_pairs(comm, bodies, first, second, blocks)
+      !> Ranks
+      class(communicator_t), intent(inout) :: comm
+      !> Bodies of this rank
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the two bodies of each pair, in ascending order
+      integer(ip), intent(in) :: first(:), second(:)
+      !> Destination of each row
+      type(global_order_t), intent(inout) :: blocks
+      integer(lp), allocatable :: key(:)
+      integer(ip), allocatable :: slot(:)
+      integer(ip) :: k, n
+
+      allocate (key(size(first)), slot(size(first)))
+      n = 0_ip
+      do k = 1_ip, size(first, kind=ip)
+         if (.not. owns_pair(bodies, first(k), second(k))) cycle
+         n = n + 1_ip
+         key(n) = row_key(bodies%global_index(first(k)), bodies%global_index(second(k)))
+         slot(n) = k
+      end do
+      call blocks%lay_out(comm, bodies%n_all, size(first, kind=ip), key(:n), slot(:n))
+   end subroutine order_pairs
+
+end module polydem_ownership

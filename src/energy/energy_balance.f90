@@ -1,0 +1,400 @@
+!> Energy and momentum balance of a run.
+!>
+!> Work is the integral of power over time, by the trapezoidal rule between the ends of steps. Its channels are the
+!> elastic normal forces, damping and friction (all contacts; usually negative), and moving walls. Powers are those of
+!> the final velocities of a step. With predicted velocities each jump of a force would leave a residual. Force times
+!> final velocity is exactly the energy that velocity Verlet adds from the middle of a step to the middle of the next.
+!> With the potential energy of gravity, kinetic + potential - work is constant up to the error of integration.
+!> The area law has no potential energy: its elastic work does not return to zero when contacts open. The elastic work
+!> of the conservative law is not a sum over steps. It is the elastic energy at the start minus the present one.
+!>
+!> Impulses of gravity and of the fixed bodies are summed in the same way. For velocity Verlet these sums equal the
+!> change of momentum and angular momentum up to rounding, if and only if the forces of every contact are opposite and
+!> act at one point.
+!>
+!> Every free body has its own channels (see `polydem_body_contributions`) on the rank that moves it. A channel is a sum
+!> of rates over steps. The first rate has the weight 1/2; `evaluate_balance` subtracts half of the last rate. Totals
+!> over bodies are exact sums, rounded once, then multiplied by the time step. Their bits do not depend on the number of
+!> threads and ranks.
+!>
+!> Residuals of momentum are relative to a scale of impulses: the sum of absolute values over contacts with fixed
+!> bodies, and over bodies for gravity. Forces that cancel within a fixed body therefore add to the scale.
+module polydem_energy_balance
+   use polydem_bodies, only: bodies_t
+   use polydem_body_contributions, only: add_rates, elastic_energy_of, motion_of, n_channels, n_motions, n_wall_channels
+   use polydem_communicator, only: communicator_t
+   use polydem_contact_incidence, only: incidence_t
+   use polydem_contacts, only: contacts_t
+   use polydem_exact_all_reduce, only: all_reduce_exact_sums
+   use polydem_exact_sum, only: exact_sum_t
+   use polydem_kinds, only: ip, lp, wp, min_parallel_size
+   use polydem_serializer, only: serializer_t
+   implicit none
+   private
+   public :: energy_balance_t, balance_t, start_energy_balance, accumulate_step, evaluate_balance, serialize_balance, &
+      serialize_contributions
+
+   !> Running sums of the energy and momentum balance, and its values at the start
+   type :: energy_balance_t
+      !> Greatest energy turned over so far (kinetic energy or work of a channel), the scale of the residual [J/m]
+      real(wp) :: energy_scale = 0.0_wp
+      !> Whether bodies and contacts are those of the last accumulated step. `accumulate_step` sets it. The caller must
+      !> clear it when a step begins; the last rates then have full weight, as is right in the middle of a step
+      logical :: is_current = .false.
+      !> Sums over steps of the powers of forces on each body, (n_channels, slot); not allocated without a balance [W/m]
+      real(wp), allocatable :: power_sum(:, :)
+      !> Sums over steps of the torque of gravity on each body about the origin, (slot) [N]
+      real(wp), allocatable :: torque(:)
+      !> Sums over steps of the wall channels of each body, (n_wall_channels, slot)
+      real(wp), allocatable :: wall_sum(:, :)
+      !> Number of accumulated steps
+      integer(lp), private :: steps = 0_lp
+      !> Energy, momentum along x and y, and angular momentum at the start
+      real(wp), private :: start(4) = 0.0_wp
+      !> Elastic energy of the contacts at the start, if they have one [J/m]
+      real(wp), private :: elastic_start = 0.0_wp
+   end type energy_balance_t
+
+   !> Terms and residuals of the balance at one time
+   type :: balance_t
+      !> Kinetic energy of the free bodies [J/m]
+      real(wp) :: kinetic = 0.0_wp
+      !> Potential energy of gravity of the free bodies, zero at the origin [J/m]
+      real(wp) :: potential = 0.0_wp
+      !> Momentum of the free bodies, (2) [kg/s]
+      real(wp) :: momentum(2) = 0.0_wp
+      !> Their angular momentum about the origin [kg m/s]
+      real(wp) :: angular_momentum = 0.0_wp
+      !> Work of the elastic normal forces on both bodies [J/m]
+      real(wp) :: elastic_work = 0.0_wp
+      !> Work of the damping of normal motion and of tilts [J/m]
+      real(wp) :: damping_work = 0.0_wp
+      !> Work of the tangential forces [J/m]
+      real(wp) :: friction_work = 0.0_wp
+      !> Work done by moving walls [J/m]
+      real(wp) :: wall_work = 0.0_wp
+      !> Impulse of gravity and fixed bodies, (2) [N s/m]
+      real(wp) :: impulse(2) = 0.0_wp
+      !> Angular impulse of gravity and fixed bodies about the origin [N s]
+      real(wp) :: angular_impulse = 0.0_wp
+      !> Unexplained energy [J/m]
+      real(wp) :: energy_residual = 0.0_wp
+      !> Unexplained energy over the energy turned over: the greatest kinetic energy or work so far, but at least 1e-9
+      !> of the potential energy, which is the level of rounding errors
+      real(wp) :: relative_energy_residual = 0.0_wp
+      !> Unexplained momentum, over the sum of the absolute momentum at the start and the absolute impulses of gravity
+      !> and of all contacts with fixed bodies
+      real(wp) :: relative_momentum_residual = 0.0_wp
+      !> Unexplained angular momentum, over the sum of the absolute angular momentum at the start and the absolute
+      !> angular impulses of gravity on each body and of all contacts with fixed bodies
+      real(wp) :: relative_angular_residual = 0.0_wp
+   end type balance_t
+
+   !> Least energy turned over, as a fraction of the potential energy
+   real(wp), parameter :: least_share = 1.0e-9_wp
+   !> Least number of bodies in a partial sum, and the greatest number of partial sums
+   integer(ip), parameter :: block = 1024_ip, most_blocks = 32_ip
+
+   !> Indices of the totals: values of `motion_of`; mass times steps; torque of gravity and its absolute value; elastic
+   !> energy; number of bodies with unknown last rates; then channels and wall channels
+   integer, parameter :: at_mass = n_motions + 1, at_torque = at_mass + 1, at_energy = at_torque + 2, &
+      at_unknown = at_energy + 1, at_channels = at_unknown, at_walls = at_channels + n_channels, &
+      n_totals = at_walls + n_wall_channels
+
+contains
+
+   !> Start the balance with the bodies and forces of step 0. Collective.
+   subroutine start_energy_balance(sums, comm, gravity, bodies, incidence, contacts)
+      !> Running sums
+      type(energy_balance_t), intent(out) :: sums
+      !> Ranks that share the bodies
+      class(communicator_t), intent(inout) :: comm
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Bodies with their forces
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts of each body
+      type(incidence_t), intent(in) :: incidence
+      !> Contacts with their forces
+      type(contacts_t), intent(in) :: contacts
+      real(wp) :: total(n_totals)
+
+      call allocate_channels(sums, bodies%n)
+      call accumulate_rates(sums, 0.5_wp, gravity, bodies, incidence, contacts)
+      sums%is_current = .true.
+      total = totals(sums, comm, gravity, bodies, incidence, contacts)
+      sums%energy_scale = total(1)
+      sums%start = [total(1) + total(2), total(3:5)]
+      sums%elastic_start = total(at_energy)
+   end subroutine start_energy_balance
+
+   !> Accumulate one step. To be called at its end.
+   subroutine accumulate_step(sums, gravity, bodies, incidence, contacts)
+      !> Running sums
+      type(energy_balance_t), intent(inout) :: sums
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Bodies at the end of this step
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts of each body
+      type(incidence_t), intent(in) :: incidence
+      !> Contacts with the forces of this step
+      type(contacts_t), intent(in) :: contacts
+
+      call accumulate_rates(sums, 1.0_wp, gravity, bodies, incidence, contacts)
+      sums%steps = sums%steps + 1_lp
+      sums%is_current = .true.
+   end subroutine accumulate_step
+
+   !> Evaluate all terms and residuals. Collective.
+   subroutine evaluate_balance(sums, comm, dt, gravity, bodies, incidence, contacts, balance)
+      !> Running sums
+      type(energy_balance_t), intent(inout) :: sums
+      !> Ranks that share the bodies
+      class(communicator_t), intent(inout) :: comm
+      !> Time step, the same for the whole run [s]
+      real(wp), intent(in) :: dt
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Bodies at the end of a step
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts of each body
+      type(incidence_t), intent(in) :: incidence
+      !> Contacts with the forces of this step
+      type(contacts_t), intent(in) :: contacts
+      !> Terms and residuals
+      type(balance_t), intent(out) :: balance
+      real(wp) :: total(n_totals)
+
+      total = totals(sums, comm, gravity, bodies, incidence, contacts)
+      balance%kinetic = total(1)
+      balance%potential = total(2)
+      balance%momentum = total(3:4)
+      balance%angular_momentum = total(5)
+      associate (works => dt*total(at_channels + 1:at_walls), walls => dt*total(at_walls + 1:), &
+                 mass_time => dt*total(at_mass), torques => dt*total(at_torque:at_torque + 1))
+         balance%elastic_work = works(1)
+         if (contacts%energy_is_quadratic .and. .not. total(at_unknown) > 0.0_wp) &
+            balance%elastic_work = sums%elastic_start - total(at_energy)
+         balance%damping_work = works(2)
+         balance%friction_work = works(3)
+         balance%wall_work = walls(1)
+         balance%impulse = walls(2:3) + mass_time*gravity
+         balance%angular_impulse = walls(4) + torques(1)
+         call find_residuals(sums, walls(5) + mass_time*(abs(gravity(1)) + abs(gravity(2))), walls(6) + torques(2), &
+                             balance)
+      end associate
+   end subroutine evaluate_balance
+
+   !> Serialize the values of the whole run.
+   subroutine serialize_balance(sums, serializer)
+      !> Running sums
+      type(energy_balance_t), intent(inout) :: sums
+      !> Serializer
+      class(serializer_t), intent(inout) :: serializer
+
+      call serializer%field('/run/ledger_start', sums%start, 'J/m, N s/m, N s', &
+                        'energy, momentum and angular momentum at the start')
+      call serializer%field('/run/ledger_steps', sums%steps, '1', 'number of accumulated steps')
+      call serializer%field('/run/elastic_start', sums%elastic_start, 'J/m', 'elastic energy at the start')
+      call serializer%field('/run/energy_scale', sums%energy_scale, 'J/m', 'greatest energy turned over')
+   end subroutine serialize_balance
+
+   !> Serialize the channels of the bodies. When reading, the bodies may differ from those before.
+   subroutine serialize_contributions(sums, n_bodies, serializer)
+      !> Running sums
+      type(energy_balance_t), intent(inout) :: sums
+      !> Number of bodies
+      integer(ip), intent(in) :: n_bodies
+      !> Serializer
+      class(serializer_t), intent(inout) :: serializer
+
+      if (serializer%is_reading) sums%is_current = .false.
+      if (serializer%is_reading .or. .not. allocated(sums%power_sum)) call allocate_channels(sums, n_bodies)
+      call serializer%field('/bodies/book', sums%power_sum, 'W/m', &
+                        'sums over steps of the powers of elastic, damping and tangential forces')
+      call serializer%field('/bodies/torque_book', sums%torque, 'N', 'sum over steps of the torque of gravity')
+      call serializer%field('/bodies/wall_book', sums%wall_sum, 'W/m, N/m, N/m, N, N/m, N', &
+                        'sums over steps for fixed bodies: power, force, torque, absolute forces and torques')
+   end subroutine serialize_contributions
+
+   !> Make room for the channels of bodies and set them to zero.
+   subroutine allocate_channels(sums, n)
+      type(energy_balance_t), intent(inout) :: sums
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+
+      if (allocated(sums%power_sum)) deallocate (sums%power_sum, sums%torque, sums%wall_sum)
+      allocate (sums%power_sum(n_channels, n), sums%torque(n), sums%wall_sum(n_wall_channels, n))
+      sums%power_sum = 0.0_wp
+      sums%torque = 0.0_wp
+      sums%wall_sum = 0.0_wp
+   end subroutine allocate_channels
+
+   !> Find the unexplained energy, momentum and angular momentum.
+   subroutine find_residuals(sums, impulse_scale, angular_scale, balance)
+      type(energy_balance_t), intent(inout) :: sums
+      !> Absolute impulses [N s/m] and angular impulses [N s] of gravity and fixed bodies
+      real(wp), intent(in) :: impulse_scale, angular_scale
+      type(balance_t), intent(inout) :: balance
+      real(wp) :: missing(2), missing_angular, work
+
+      associate (b => balance, start => sums%start)
+         sums%energy_scale = max(sums%energy_scale, b%kinetic, abs(b%elastic_work), abs(b%damping_work), &
+                                   abs(b%friction_work), abs(b%wall_work), least_share*abs(b%potential))
+         work = b%elastic_work + b%damping_work + b%friction_work + b%wall_work
+         b%energy_residual = b%kinetic + b%potential - start(1) - work
+         missing = b%momentum - start(2:3) - b%impulse
+         missing_angular = b%angular_momentum - start(4) - b%angular_impulse
+         b%relative_energy_residual = share(b%energy_residual, sums%energy_scale)
+         b%relative_momentum_residual = share(abs(missing(1)) + abs(missing(2)), &
+                                              abs(start(2)) + abs(start(3)) + impulse_scale)
+         b%relative_angular_residual = share(missing_angular, abs(start(4)) + angular_scale)
+      end associate
+   end subroutine find_residuals
+
+   !> Absolute value of a part over the whole; 0 if the whole is 0
+   pure real(wp) function share(part, whole)
+      real(wp), intent(in) :: part, whole
+
+      share = 0.0_wp
+      if (whole > 0.0_wp) share = abs(part)/whole
+   end function share
+
+   !> Add the present rates, times a weight, to the channels of all bodies of this rank.
+   subroutine accumulate_rates(sums, weight, gravity, bodies, incidence, contacts)
+      type(energy_balance_t), intent(inout) :: sums
+      real(wp), intent(in) :: weight, gravity(2)
+      type(bodies_t), intent(in) :: bodies
+      type(incidence_t), intent(in) :: incidence
+      type(contacts_t), intent(in) :: contacts
+      integer(ip) :: b, n, n_blocks
+
+      n = size(bodies%free, kind=ip)
+      n_blocks = max(1_ip, n/min_parallel_size)
+      !$omp parallel do if (n_blocks > 1_ip) schedule(static) default(none) &
+      !$omp    shared(sums, weight, gravity, bodies, incidence, contacts, n, n_blocks) private(b)
+      do b = 1_ip, n_blocks
+         call accumulate_rates_of_some(sums, weight, gravity, bodies, incidence, contacts, &
+                          bodies%free(end_of(b - 1_ip, n_blocks, n) + 1_ip:end_of(b, n_blocks, n)))
+      end do
+      !$omp end parallel do
+   end subroutine accumulate_rates
+
+   !> Add the present rates to the channels of some bodies. A separate procedure: its arguments do not alias, and the
+   !> compiler can optimize its loops.
+   pure subroutine accumulate_rates_of_some(sums, weight, gravity, bodies, incidence, contacts, slots)
+      type(energy_balance_t), intent(inout) :: sums
+      real(wp), intent(in) :: weight, gravity(2)
+      type(bodies_t), intent(in) :: bodies
+      type(incidence_t), intent(in) :: incidence
+      type(contacts_t), intent(in) :: contacts
+      integer(ip), intent(in), contiguous :: slots(:)
+      integer(ip) :: k, s
+
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
+         sums%torque(s) = sums%torque(s) + weight*torque_of(gravity, bodies, s)
+      end do
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
+         if (has_contacts(incidence, s)) &
+            call add_rates(bodies, incidence, contacts, s, weight, sums%power_sum(:, s), sums%wall_sum(:, s))
+      end do
+   end subroutine accumulate_rates_of_some
+
+   !> Whether a body has contacts; without contacts its powers are zero
+   pure logical function has_contacts(incidence, s)
+      type(incidence_t), intent(in) :: incidence
+      integer(ip), intent(in) :: s
+
+      has_contacts = incidence%start_first(s + 1_ip) > incidence%start_first(s) &
+         .or. incidence%start_second(s + 1_ip) > incidence%start_second(s)
+   end function has_contacts
+
+   !> Totals over all bodies of the communicator
+   function totals(sums, comm, gravity, bodies, incidence, contacts) result(total)
+      type(energy_balance_t), intent(in) :: sums
+      class(communicator_t), intent(inout) :: comm
+      real(wp), intent(in) :: gravity(2)
+      type(bodies_t), intent(in) :: bodies
+      type(incidence_t), intent(in) :: incidence
+      type(contacts_t), intent(in) :: contacts
+      real(wp) :: total(n_totals)
+      type(exact_sum_t), allocatable :: partial_sums(:, :)
+      integer(ip) :: b, n, n_blocks
+      integer :: i
+
+      n = size(bodies%free, kind=ip)
+      n_blocks = max(1_ip, min(n/block, most_blocks))
+      allocate (partial_sums(n_totals, n_blocks))
+      !$omp parallel do if (n_blocks > 1_ip) schedule(static) default(none) &
+      !$omp    shared(n, n_blocks, partial_sums, sums, gravity, bodies, incidence, contacts) private(b)
+      do b = 1_ip, n_blocks
+         call add_block(sums, gravity, bodies, incidence, contacts, &
+                        end_of(b - 1_ip, n_blocks, n) + 1_ip, end_of(b, n_blocks, n), partial_sums(:, b))
+      end do
+      !$omp end parallel do
+      do b = 2_ip, n_blocks
+         do i = 1, n_totals
+            call partial_sums(i, 1)%add(partial_sums(i, b))
+         end do
+      end do
+      call all_reduce_exact_sums(comm, partial_sums(:, 1))
+      total = partial_sums(:, 1)%value()
+   end function totals
+
+   !> Last entry of block b if n entries are divided into n_blocks blocks
+   pure integer(ip) function end_of(b, n_blocks, n)
+      integer(ip), intent(in) :: b, n_blocks, n
+
+      end_of = int(int(n, lp)*int(b, lp)/int(n_blocks, lp), ip)
+   end function end_of
+
+   !> Add the contributions of some free bodies to the sums.
+   subroutine add_block(sums, gravity, bodies, incidence, contacts, low, high, partial_sums)
+      type(energy_balance_t), intent(in) :: sums
+      real(wp), intent(in) :: gravity(2)
+      type(bodies_t), intent(in) :: bodies
+      type(incidence_t), intent(in) :: incidence
+      type(contacts_t), intent(in) :: contacts
+      !> First and last index in `bodies%free`
+      integer(ip), intent(in) :: low, high
+      type(exact_sum_t), intent(inout) :: partial_sums(n_totals)
+      real(wp) :: row(n_totals)
+      integer(ip) :: k, s
+      integer :: i
+
+      do k = low, high
+         s = bodies%free(k)
+         row = 0.0_wp
+         row(:n_motions) = motion_of(gravity, bodies, s)
+         row(at_mass) = bodies%mass(s)*real(sums%steps, wp)
+         row(at_torque) = sums%torque(s)
+         row(at_channels + 1:at_walls) = sums%power_sum(:, s)
+         row(at_walls + 1:) = sums%wall_sum(:, s)
+         if (sums%is_current) then
+            row(at_torque) = row(at_torque) - 0.5_wp*torque_of(gravity, bodies, s)
+            call add_rates(bodies, incidence, contacts, s, -0.5_wp, row(at_channels + 1:at_walls), row(at_walls + 1:))
+            if (contacts%energy_is_quadratic) row(at_energy) = elastic_energy_of(bodies, incidence, contacts, s)
+         else
+            row(at_mass) = row(at_mass) + 0.5_wp*bodies%mass(s)
+            row(at_unknown) = 1.0_wp
+         end if
+         row(at_torque + 1) = abs(row(at_torque))
+         do i = 1, n_totals
+            call partial_sums(i)%add(row(i))
+         end do
+      end do
+   end subroutine add_block
+
+   !> Torque of gravity on a free body about the origin [N]
+   pure real(wp) function torque_of(gravity, bodies, s)
+      real(wp), intent(in) :: gravity(2)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+
+      torque_of = bodies%mass(s)*(bodies%position(1, s)*gravity(2) - bodies%position(2, s)*gravity(1))
+   end function torque_of
+
+end module polydem_energy_balance

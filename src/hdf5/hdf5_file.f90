@@ -1,0 +1,184 @@
+!> HDF5 files: the interface of this room for all other rooms. It writes and reads named numbers and texts.
+!>
+!> Names have the form /frames/position; missing groups are created. Real numbers in files are always double precision.
+!> An array (2, n) appears as (n, 2) in h5py, because the fastest dimension is the first in Fortran and the last in
+!> h5py. Files have the default format of HDF5; flushed data remain readable after the program is killed. All calls must
+!> come from one thread.
+module polydem_hdf5_file
+   use, intrinsic :: iso_c_binding, only: c_loc
+   use hdf5, only: hsize_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_hdf5_appender, only: hdf5_appender_t
+   use polydem_hdf5_dataset, only: double_type, holds_integers, holds_reals, library_version, long_type, read_dataset, &
+      start_library
+   use polydem_hdf5_hyperslab, only: part_t
+   use polydem_hdf5_location, only: place_t
+   use polydem_hdf5_shape_check, only: checked_shape, shape_text
+   use polydem_hdf5_strings, only: read_attribute_value, read_text
+   use polydem_kinds, only: dp, ip, lp
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: hdf5_file_t, part_t, library_version, start_library
+
+   !> An HDF5 file: create, join (for parallel writing), open (for reading), flush, close, has, shape_of, write, append,
+   !> append_rows, write_attribute, read
+   type, extends(hdf5_appender_t) :: hdf5_file_t
+   contains
+      !> Read a data set into an allocatable: read(name, values, error). Integers in the file may have any width, or be
+      !> booleans of h5py.
+      generic :: read => read_reals, read_real_table, read_real_block, read_integers, read_longs, &
+         read_one_text
+      procedure :: read_rows
+      procedure :: read_real_attribute
+      procedure, private :: read_reals, read_real_table, read_real_block, read_integers, read_longs
+      procedure, private :: read_one_text
+   end type hdf5_file_t
+
+contains
+
+   !> Read real numbers. The other forms of `read` differ only in kind and shape.
+   subroutine read_reals(self, name, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      !> Name of the data set
+      character(len=*), intent(in) :: name
+      !> Values of the data set, fastest dimension first
+      real(dp), allocatable, target, intent(out) :: values(:)
+      !> Allocated on failure, or if the data set has another number of dimensions
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call expect_rank(self%place_of(name), 1, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1)))
+      call read_dataset(self%place_of(name), holds_reals, double_type(), 0*extent, extent, &
+                        c_loc(values), error)
+   end subroutine read_reals
+
+   subroutine read_real_table(self, name, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), allocatable, target, intent(out) :: values(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call expect_rank(self%place_of(name), 2, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1), extent(2)))
+      call read_dataset(self%place_of(name), holds_reals, double_type(), 0*extent, extent, &
+                        c_loc(values), error)
+   end subroutine read_real_table
+
+   subroutine read_real_block(self, name, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      real(dp), allocatable, target, intent(out) :: values(:, :, :)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call expect_rank(self%place_of(name), 3, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1), extent(2), extent(3)))
+      call read_dataset(self%place_of(name), holds_reals, double_type(), 0*extent, extent, &
+                        c_loc(values), error)
+   end subroutine read_real_block
+
+   !> Read some rows of a three-dimensional data set.
+   subroutine read_rows(self, name, first, n_rows, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      !> Name of the data set
+      character(len=*), intent(in) :: name
+      !> First row along the slowest dimension, counted from 1
+      integer(ip), intent(in) :: first
+      !> Number of rows; rows first to first + n_rows - 1 must exist
+      integer(ip), intent(in) :: n_rows
+      !> Values of the rows, fastest dimension first
+      real(dp), allocatable, target, intent(out) :: values(:, :, :)
+      !> Allocated on failure, or if the data set has another number of dimensions
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call expect_rank(self%place_of(name), 3, extent, error)
+      if (allocated(error)) return
+      extent(3) = int(n_rows, hsize_t)
+      allocate (values(extent(1), extent(2), extent(3)))
+      call read_dataset(self%place_of(name), holds_reals, double_type(), &
+                        [0_hsize_t, 0_hsize_t, int(first - 1_ip, hsize_t)], extent, c_loc(values), error)
+   end subroutine read_rows
+
+   subroutine read_longs(self, name, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(lp), allocatable, target, intent(out) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call expect_rank(self%place_of(name), 1, extent, error)
+      if (allocated(error)) return
+      allocate (values(extent(1)))
+      call read_dataset(self%place_of(name), holds_integers, long_type(), 0*extent, extent, &
+                        c_loc(values), error)
+   end subroutine read_longs
+
+   !> Read 64-bit integers and check their range, because HDF5 clips values beyond 32 bits without an error.
+   subroutine read_integers(self, name, values, error)
+      class(hdf5_file_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      integer(ip), allocatable, intent(out) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp), allocatable :: wide(:)
+      type(place_t) :: place
+
+      place = self%place_of(name)
+      call self%read_longs(name, wide, error)
+      if (allocated(error)) return
+      if (any(wide > huge(1_ip) .or. wide < -huge(1_ip))) then
+         call raise(error, input_error, place%path//': '//name//' holds numbers beyond 32 bits')
+         return
+      end if
+      values = int(wide, ip)
+   end subroutine read_integers
+
+   subroutine read_one_text(self, name, text, error)
+      class(hdf5_file_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable, intent(out) :: text
+      type(error_t), allocatable, intent(inout) :: error
+
+      call read_text(self%place_of(name), text, error)
+   end subroutine read_one_text
+
+   !> Read a real attribute of a group or data set.
+   subroutine read_real_attribute(self, object, name, value, error)
+      class(hdf5_file_t), intent(in) :: self
+      !> Group or data set, and name of the attribute
+      character(len=*), intent(in) :: object, name
+      !> The number; unchanged if the attribute does not exist
+      real(dp), intent(inout), target :: value
+      !> Allocated if the attribute cannot be read
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: there
+
+      call read_attribute_value(self%place_of(object), name, double_type(), c_loc(value), there, error)
+   end subroutine read_real_attribute
+
+   !> Read the shape of a data set and check its number of dimensions.
+   subroutine expect_rank(place, rank, extent, error)
+      !> File and name
+      type(place_t), intent(in) :: place
+      !> Required number of dimensions
+      integer, intent(in) :: rank
+      !> Shape, fastest dimension first
+      integer(hsize_t), allocatable, intent(out) :: extent(:)
+      !> Allocated if the data set is missing, has another number of dimensions, or claims more data than the file can
+      !> hold
+      type(error_t), allocatable, intent(inout) :: error
+
+      call checked_shape(place, extent, error)
+      if (allocated(error)) return
+      if (size(extent) == rank) return
+      call raise(error, input_error, place%path//': '//place%name//' has the shape '//shape_text(extent)// &
+                 ' but must have '//to_text(int(rank, ip))//' dimensions')
+   end subroutine expect_rank
+
+end module polydem_hdf5_file

@@ -1,0 +1,234 @@
+!> Handle of an HDF5 file: create, open, flush, query and close. Extended types read and write its contents.
+module polydem_hdf5_handle
+   use hdf5, only: h5f_acc_rdonly_f, h5f_acc_rdwr_f, h5f_acc_trunc_f, h5f_scope_global_f, h5fclose_f, h5fcreate_f, &
+      h5fflush_f, h5fis_hdf5_f, h5fopen_f, h5p_file_access_f, h5p_file_create_f, h5pclose_f, h5pcreate_f, &
+      h5pset_userblock_f, hid_t, hsize_t
+   use polydem_errors, only: error_t, input_error, io_error, raise
+   use polydem_file_system, only: check_access, disk_hint, exists, is_folder
+   use polydem_hdf5_access, only: enable_parallel_access, barrier, abort_all
+   use polydem_hdf5_dataset, only: has_link, start_library
+   use polydem_hdf5_location, only: place_t
+   use polydem_hdf5_shape_check, only: checked_shape
+   use polydem_kinds, only: ip, lp
+   implicit none
+   private
+   public :: hdf5_handle_t
+
+   !> An open HDF5 file
+   type :: hdf5_handle_t
+      private
+      !> HDF5 identifier of the file; negative if the file is closed
+      integer(hid_t) :: id = -1_hid_t
+      !> Path of the file
+      character(len=:), allocatable :: path
+      !> Whether extendible data sets are compressed
+      logical :: compressed = .false.
+      !> Whether all ranks of the run write the file in parallel
+      logical :: together = .false.
+   contains
+      procedure :: create
+      procedure :: join
+      procedure :: open => open_file
+      procedure :: flush => flush_file
+      procedure :: close => close_file
+      procedure :: abandon
+      procedure :: has
+      procedure :: shape_of
+      procedure :: place_of
+      procedure, private :: check
+   end type hdf5_handle_t
+
+   !> Hint for messages about existing files that cannot be opened
+   character(len=*), parameter :: locking_hint = &
+      '; another program may be writing it; on a network file system try HDF5_USE_FILE_LOCKING=FALSE'
+
+contains
+
+   !> Create a file for writing. An existing file of the same name is overwritten.
+   subroutine create(self, path, error, compressed, user_block)
+      class(hdf5_handle_t), intent(inout) :: self
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      !> Whether extendible data sets are compressed (lossless); false if absent
+      logical, intent(in), optional :: compressed
+      !> Size of the user block, the first bytes of the file, which HDF5 does not use [B]: 0, 512 or a larger power of
+      !> 2; 0 if absent
+      integer(ip), intent(in), optional :: user_block
+      integer(hid_t) :: properties
+      integer :: status, ignored
+
+      call start_library(error)
+      if (allocated(error)) return
+      self%path = path
+      self%together = .false.
+      self%compressed = .false.
+      if (present(compressed)) self%compressed = compressed
+      call h5pcreate_f(h5p_file_create_f, properties, status)
+      if (status >= 0 .and. present(user_block)) call h5pset_userblock_f(properties, int(user_block, hsize_t), status)
+      if (status >= 0) call h5fcreate_f(path, h5f_acc_trunc_f, self%id, status, creation_prp=properties)
+      call h5pclose_f(properties, ignored)
+      if (status >= 0) return
+      self%id = -1_hid_t
+      call raise(error, io_error, path//': cannot be created; check that the folder exists, '// &
+                 'that you may write there and that the disk is not full'//locking_hint)
+   end subroutine create
+
+   !> Open a file for parallel writing by all ranks of the run. One rank must have created and closed it before. Until
+   !> the file is closed, all ranks must make the same calls in the same order. A rank that fails aborts all ranks.
+   subroutine join(self, path, error)
+      class(hdf5_handle_t), intent(inout) :: self
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: properties
+      integer :: status, ignored
+
+      call start_library(error)
+      if (allocated(error)) return
+      ! Open MPI waits for ever for a rank that cannot open the file.
+      call check_access(path, error)
+      if (allocated(error)) call abort_all(error%message//'; all ranks must see the same folder')
+      self%path = path
+      self%together = .true.
+      call h5pcreate_f(h5p_file_access_f, properties, status)
+      if (status >= 0) call enable_parallel_access(properties, path, status)
+      if (status >= 0) call h5fopen_f(path, h5f_acc_rdwr_f, self%id, status, access_prp=properties)
+      call h5pclose_f(properties, ignored)
+      call self%check(status, 'cannot be opened by all ranks; all ranks must see the same folder'//locking_hint, error)
+   end subroutine join
+
+   !> Open a file for reading.
+   subroutine open_file(self, path, error)
+      class(hdf5_handle_t), intent(inout) :: self
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: is_hdf5
+      integer :: status
+
+      if (.not. exists(path)) then
+         call raise(error, input_error, path//': there is no such file')
+         return
+      end if
+      if (is_folder(path)) then
+         call raise(error, input_error, path//': is a folder, not a file')
+         return
+      end if
+      call start_library(error)
+      if (allocated(error)) return
+      self%path = path
+      self%together = .false.
+      call h5fopen_f(path, h5f_acc_rdonly_f, self%id, status)
+      if (status >= 0) return
+      self%id = -1_hid_t
+      call h5fis_hdf5_f(path, is_hdf5, status)
+      if (status >= 0 .and. .not. is_hdf5) then
+         call raise(error, io_error, path//': is not an HDF5 file')
+      else
+         call raise(error, io_error, path//': cannot be opened as an HDF5 file'//locking_hint)
+      end if
+   end subroutine open_file
+
+   !> Pass all written data to the operating system. They then survive a crash of the program.
+   subroutine flush_file(self, error)
+      class(hdf5_handle_t), intent(in) :: self
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: status
+
+      call h5fflush_f(self%id, h5f_scope_global_f, status)
+      call self%check(status, 'cannot be flushed', error)
+   end subroutine flush_file
+
+   !> Close the file; nothing happens if it is already closed. A file that cannot be closed is abandoned.
+   subroutine close_file(self, error)
+      class(hdf5_handle_t), intent(inout) :: self
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: failure
+      integer :: status
+
+      if (self%id < 0_hid_t) return
+      ! MPI-IO does not report a failure to close a file, but it reports a failure to flush it.
+      if (self%together) call self%flush(failure)
+      call h5fclose_f(self%id, status)
+      call self%check(status, 'cannot be closed', failure)
+      if (self%together) call barrier()
+      if (allocated(failure)) then
+         call self%abandon(failure)
+         if (.not. allocated(error)) call move_alloc(failure, error)
+      end if
+      self%id = -1_hid_t
+   end subroutine close_file
+
+   !> Convert a failed status of HDF5 into an error. If the file is written in parallel, abort all ranks.
+   subroutine check(self, status, problem, error)
+      class(hdf5_handle_t), intent(in) :: self
+      !> Status of the call on this rank
+      integer, intent(in) :: status
+      !> Error message if the status is negative
+      character(len=*), intent(in) :: problem
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (status >= 0) return
+      if (self%together) call abort_all(self%path//': '//problem)
+      call raise(error, io_error, self%path//': '//problem)
+   end subroutine check
+
+   !> Abandon a file that could not be written, and add a hint to the error message. The file is not closed, because
+   !> HDF5 would try to write it again and might crash. The operating system closes it when the program ends.
+   subroutine abandon(self, error)
+      class(hdf5_handle_t), intent(inout) :: self
+      !> Error of the failed write; its message gets a hint
+      type(error_t), intent(inout) :: error
+
+      if (self%id < 0_hid_t) return
+      self%id = -1_hid_t
+      if (index(error%message, disk_hint) == 0) error%message = error%message//disk_hint
+   end subroutine abandon
+
+   !> Whether the file contains a group or data set of this name
+   logical function has(self, name)
+      class(hdf5_handle_t), intent(in) :: self
+      !> Name like /frames/position
+      character(len=*), intent(in) :: name
+
+      has = has_link(self%place_of(name))
+   end function has
+
+   !> Read the shape of a data set in the order of h5py, with the slowest dimension first.
+   subroutine shape_of(self, name, shape, error)
+      class(hdf5_handle_t), intent(in) :: self
+      !> Name of the data set
+      character(len=*), intent(in) :: name
+      !> Shape; empty for a scalar
+      integer(lp), allocatable, intent(out) :: shape(:)
+      !> Allocated if the data set is missing, or if it claims more data than the file can hold
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hsize_t), allocatable :: extent(:)
+
+      call checked_shape(self%place_of(name), extent, error)
+      if (allocated(error)) return
+      shape = int(extent(size(extent):1:-1), lp)
+   end subroutine shape_of
+
+   !> Location of a data set, for the procedures of `polydem_hdf5_dataset`
+   function place_of(self, name) result(place)
+      class(hdf5_handle_t), intent(in) :: self
+      !> Name of the data set
+      character(len=*), intent(in) :: name
+      type(place_t) :: place
+
+      place%file = self%id
+      place%path = self%path
+      place%name = name
+      place%compressed = self%compressed
+      place%together = self%together
+   end function place_of
+
+end module polydem_hdf5_handle

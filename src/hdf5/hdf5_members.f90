@@ -1,0 +1,79 @@
+!> Contents of the root group of an open HDF5 file: names, and whether a name is a data set.
+!>
+!> All calls must come from one thread.
+module polydem_hdf5_members
+   use hdf5, only: h5_index_name_f, h5_iter_inc_f, h5gclose_f, h5gget_info_f, h5gopen_f, h5i_dataset_f, h5iget_type_f, &
+      h5lget_name_by_idx_f, h5oclose_f, h5oopen_f, hid_t, hsize_t, size_t
+   use polydem_errors, only: error_t
+   use polydem_hdf5_links, only: is_external_link
+   use polydem_hdf5_location, only: expect, place_t
+   implicit none
+   private
+   public :: count_names, read_name, is_dataset
+
+contains
+
+   !> Count the names in the root group.
+   subroutine count_names(place, n, error)
+      !> File; its name is that of the root group, /
+      type(place_t), intent(in) :: place
+      !> Number of names
+      integer, intent(out) :: n
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: group
+      integer :: kind_of_links, last_order, status, ignored
+
+      n = 0
+      call h5gopen_f(place%file, '/', group, status)
+      call expect(status, 'open', place, error)
+      if (allocated(error)) return
+      call h5gget_info_f(group, kind_of_links, n, last_order, status)
+      call expect(status, 'count the names in', place, error)
+      call h5gclose_f(group, ignored)
+   end subroutine count_names
+
+   !> Read one name of the root group, in alphabetical order. One name at a time, because all names may need much
+   !> memory.
+   subroutine read_name(place, k, name, error)
+      !> File; its name is that of the root group, /
+      type(place_t), intent(in) :: place
+      !> Index of the name, from 1
+      integer, intent(in) :: k
+      !> The name
+      character(len=:), allocatable, intent(out) :: name
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(size_t) :: length
+      integer :: status, pass
+
+      ! The first pass reads the length, the second pass reads the name.
+      length = 1_size_t
+      do pass = 1, 2
+         if (allocated(name)) deallocate (name)
+         allocate (character(len=length) :: name)
+         call h5lget_name_by_idx_f(place%file, '/', h5_index_name_f, h5_iter_inc_f, int(k - 1, hsize_t), name, status, &
+                                   length)
+         call expect(status, 'read the names in', place, error)
+         if (allocated(error)) return
+      end do
+   end subroutine read_name
+
+   !> Whether a name is that of a data set, not of a group, a type or a dangling link. The result is true for a name in
+   !> another file; an attempt to read it gives an error
+   logical function is_dataset(place)
+      !> File and name
+      type(place_t), intent(in) :: place
+      integer(hid_t) :: object
+      integer :: kind_of_object, status
+
+      is_dataset = is_external_link(place)
+      if (is_dataset) return
+      call h5oopen_f(place%file, place%name, object, status)
+      if (status < 0) return
+      call h5iget_type_f(object, kind_of_object, status)
+      if (status >= 0) is_dataset = kind_of_object == h5i_dataset_f
+      call h5oclose_f(object, status)
+   end function is_dataset
+
+end module polydem_hdf5_members

@@ -1,0 +1,255 @@
+!> One segment of a trajectory: a self-describing HDF5 file.
+!>
+!>     /bodies      id, fixed, mass, inertia, vertex_start, vertex: the bodies, in ascending order of identifiers
+!>     /frames      step, time, position, angle, velocity, angular_velocity: one row per frame
+!>     /walls       id; force and torque on the fixed bodies: one row per frame
+!>     /contacts    start: rows start[k] to start[k + 1] - 1 belong to frame k; first, second, area, point,
+!>                  normal, force: one row per contact (optional)
+!>     /ledger      energy balance: one data set per entry, one row per frame (optional)
+!>     /provenance  origin of the file
+!>
+!> Indices count from 0. The normal of a contact is the integral of the outward normal over the part of the outline of
+!> the first body that is inside the second body. The force of a contact acts on the first body.
+!>
+!> All ranks write a segment collectively. Each rank writes a block of rows in ascending order of identifiers. All
+!> procedures except `start_segment` are collective.
+module polydem_trajectory_segment
+   use polydem_bodies, only: bodies_t
+   use polydem_communicator, only: communicator_t
+   use polydem_contacts, only: contacts_t
+   use polydem_errors, only: error_t
+   use polydem_global_order, only: component, global_order_t, vector
+   use polydem_hdf5_file, only: hdf5_file_t, part_t
+   use polydem_kinds, only: bp, dp, ip, lp
+   use polydem_named_values, only: named_values_t
+   use polydem_ownership, only: order_bodies, order_pairs, order_parts
+   use polydem_provenance, only: provenance_t, write_provenance, schema_version
+   implicit none
+   private
+   public :: start_segment, write_bodies, add_frame, add_walls, add_contacts, add_balance
+
+contains
+
+   !> Write the attributes and the provenance of a segment. Called by the root rank only.
+   subroutine start_segment(file, provenance, error)
+      !> New file
+      type(hdf5_file_t), intent(inout) :: file
+      !> Origin of the result
+      type(provenance_t), intent(in) :: provenance
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+
+      call file%write_attribute('/', 'content', 'segment of a trajectory by polydem', error)
+      call file%write_attribute('/', 'schema_version', schema_version, error)
+      call write_provenance(provenance, file, error)
+   end subroutine start_segment
+
+   !> Write the constant properties of the bodies: identifier, fixed flag, mass, inertia and shape.
+   subroutine write_bodies(file, comm, bodies, error)
+      !> Segment
+      type(hdf5_file_t), intent(inout) :: file
+      !> Communicator
+      class(communicator_t), intent(inout) :: comm
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      type(global_order_t) :: blocks
+      type(part_t) :: part
+      integer(lp), allocatable :: numbers(:, :)
+      real(dp), allocatable :: masses(:, :)
+      integer(ip) :: s
+
+      call order_bodies(comm, bodies, blocks)
+      part = part_t(blocks%first, blocks%total)
+      associate (n => bodies%n)
+         call blocks%to_blocks(comm, reshape([(int(bodies%id(s), lp), merge(1_lp, 0_lp, bodies%fixed(s)), &
+            int(bodies%vertex_start(s + 1_ip) - bodies%vertex_start(s), lp), s=1_ip, n)], [3_ip, n]), numbers)
+         call blocks%to_blocks(comm, reshape([(real(bodies%mass(s), dp), real(bodies%inertia(s), dp), s=1_ip, n)], &
+                                         [2_ip, n]), masses)
+      end associate
+      call file%write('/bodies/id', int(numbers(1, :), ip), error, '1', 'identifier of each body, ascending', part)
+      call file%write('/bodies/fixed', int(numbers(2, :), bp), error, '1', &
+                      '1: fixed or with prescribed motion, 0: free', part)
+      call file%write('/bodies/mass', component(masses, 1), error, 'kg/m', 'mass; 0: infinite', part)
+      call file%write('/bodies/inertia', component(masses, 2), error, 'kg m', &
+                      'moment of inertia about the centre of mass; 0: infinite', part)
+      call write_vertices(file, comm, bodies, numbers(3, :), part, error)
+      if (.not. any(bodies%fixed(:bodies%n))) return
+      call file%write('/walls/id', pack(bodies%id(:bodies%n), bodies%fixed(:bodies%n)), error, '1', &
+                      'identifier of each fixed body, ascending')
+   end subroutine write_bodies
+
+   !> Write the vertices of all bodies and the first vertex of each body.
+   subroutine write_vertices(file, comm, bodies, n_vertices, part, error)
+      type(hdf5_file_t), intent(inout) :: file
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      !> Number of vertices of each body in the block of this rank
+      integer(lp), intent(in) :: n_vertices(:)
+      !> Block of bodies of this rank
+      type(part_t), intent(in) :: part
+      type(error_t), allocatable, intent(inout) :: error
+      type(global_order_t) :: blocks
+      integer(ip), allocatable :: body(:), start(:)
+      real(dp), allocatable :: vertices(:, :)
+      integer(ip) :: k, n, s
+
+      n = bodies%vertex_start(bodies%n + 1_ip) - 1_ip
+      allocate (body(n), start(size(n_vertices) + 1))
+      do s = 1_ip, bodies%n
+         body(bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip) = s
+      end do
+      call order_parts(comm, bodies, body, blocks)
+      call blocks%to_blocks(comm, real(bodies%shape(:, :n), dp), vertices)
+      start(1) = int(blocks%first, ip)
+      do k = 1_ip, size(n_vertices, kind=ip)
+         start(k + 1) = start(k) + int(n_vertices(k), ip)
+      end do
+      ! The last rank also writes the final entry, the number of all vertices.
+      n = size(n_vertices, kind=ip)
+      if (comm%rank == comm%size - 1_ip) n = n + 1_ip
+      call file%write('/bodies/vertex_start', start(:n), error, '1', &
+                      'body k owns the rows vertex_start[k] to vertex_start[k + 1] - 1 of vertex', &
+                      part_t(part%first, part%total + 1_lp))
+      call file%write('/bodies/vertex', vertices, error, 'm', &
+                      'vertices relative to the centre of mass at angle 0, anticlockwise', &
+                      part_t(blocks%first, blocks%total))
+   end subroutine write_vertices
+
+   !> Add the poses and velocities of all bodies.
+   subroutine add_frame(file, comm, step, time, bodies, error)
+      !> Segment
+      type(hdf5_file_t), intent(inout) :: file
+      !> Communicator
+      class(communicator_t), intent(inout) :: comm
+      !> Number of the step
+      integer(lp), intent(in) :: step
+      !> Simulated time [s]
+      real(dp), intent(in) :: time
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      type(global_order_t) :: blocks
+      type(part_t) :: part
+      real(dp), allocatable :: state(:, :), block(:, :)
+      integer(ip) :: s
+
+      allocate (state(6, bodies%n))
+      do s = 1_ip, bodies%n
+         state(1:2, s) = real(bodies%position(:, s), dp)
+         state(3, s) = real(bodies%angle(s), dp)
+         state(4:5, s) = real(bodies%velocity(:, s), dp)
+         state(6, s) = real(bodies%angular_velocity(s), dp)
+      end do
+      call order_bodies(comm, bodies, blocks)
+      call blocks%to_blocks(comm, state, block)
+      part = part_t(blocks%first, blocks%total)
+      call file%append('/frames/step', step, error, '1', 'number of the time step')
+      call file%append('/frames/time', time, error, 's', 'simulated time')
+      call file%append('/frames/position', vector(block, 1), error, 'm', 'centres of mass', part)
+      call file%append('/frames/angle', component(block, 3), error, 'rad', 'angles since the start, anticlockwise', &
+                       part)
+      call file%append('/frames/velocity', vector(block, 4), error, 'm/s', 'velocities of the centres of mass', part)
+      call file%append('/frames/angular_velocity', component(block, 6), error, 'rad/s', &
+                       'angular velocities, anticlockwise', part)
+   end subroutine add_frame
+
+   !> Add the forces and torques on the fixed bodies, if there are any.
+   subroutine add_walls(file, bodies, error)
+      !> Segment
+      type(hdf5_file_t), intent(inout) :: file
+      !> Bodies; on the root rank with the total forces on the fixed bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      real(dp), allocatable :: force(:, :), torque(:)
+      integer(ip) :: s, w
+
+      w = int(count(bodies%fixed(:bodies%n)), ip)
+      if (w == 0_ip) return
+      allocate (force(2, w), torque(w))
+      w = 0_ip
+      do s = 1_ip, bodies%n
+         if (.not. bodies%fixed(s)) cycle
+         w = w + 1_ip
+         force(:, w) = real(bodies%force(:, s), dp)
+         torque(w) = real(bodies%torque(s), dp)
+      end do
+      call file%append('/walls/force', force, error, 'N/m', 'forces of the other bodies on each fixed body')
+      call file%append('/walls/torque', torque, error, 'N', 'torques about its centre of mass')
+   end subroutine add_walls
+
+   !> Add the contacts of a frame.
+   subroutine add_contacts(file, comm, n_before, bodies, contacts, error)
+      !> Segment
+      type(hdf5_file_t), intent(inout) :: file
+      !> Communicator
+      class(communicator_t), intent(inout) :: comm
+      !> On entry the number of contacts in the earlier frames of this segment; on return including this frame
+      integer(lp), intent(inout) :: n_before
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with their forces
+      type(contacts_t), intent(in) :: contacts
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      type(global_order_t) :: blocks
+      type(part_t) :: part
+      integer(lp), allocatable :: ids(:, :), pairs(:, :)
+      real(dp), allocatable :: values(:, :), block(:, :)
+      integer(ip) :: c
+
+      associate (n => contacts%n)
+         allocate (ids(2, n), values(7, n))
+         do c = 1_ip, n
+            ids(1, c) = int(bodies%id(contacts%first(c)), lp)
+            ids(2, c) = int(bodies%id(contacts%second(c)), lp)
+            values(1, c) = real(contacts%area(c), dp)
+            values(2:3, c) = real(bodies%position(:, contacts%first(c)) + contacts%arm_first(:, c), dp)
+            values(4:5, c) = real(contacts%normal(:, c), dp)
+            values(6:7, c) = real(contacts%force(:, c), dp)
+         end do
+         call order_pairs(comm, bodies, contacts%first(:n), contacts%second(:n), blocks)
+      end associate
+      call blocks%to_blocks(comm, ids, pairs)
+      call blocks%to_blocks(comm, values, block)
+      part = part_t(blocks%first, blocks%total)
+      if (.not. file%has('/contacts/start')) then
+         call file%append('/contacts/start', 0_lp, error, '1', 'frame k owns the rows start[k] to start[k + 1] - 1')
+      end if
+      n_before = n_before + blocks%total
+      call file%append('/contacts/start', n_before, error)
+      call file%append_rows('/contacts/first', int(pairs(1, :), ip), error, '1', &
+                            'identifier of the first body, the lower one', part)
+      call file%append_rows('/contacts/second', int(pairs(2, :), ip), error, '1', 'identifier of the second body', part)
+      call file%append_rows('/contacts/area', component(block, 1), error, 'm2', &
+                            'area of the overlap; with the conservative law its effective area', part)
+      call file%append_rows('/contacts/point', vector(block, 2), error, 'm', 'centroid of the overlap in the world', &
+                            part)
+      call file%append_rows('/contacts/normal', vector(block, 4), error, 'm', &
+                            'integral of the outward normal over the outline of first inside second, '// &
+                            'the gradient of that area', part)
+      call file%append_rows('/contacts/force', vector(block, 6), error, 'N/m', &
+                            'force on the first body; the second feels the opposite', part)
+   end subroutine add_contacts
+
+   !> Add a row of the energy balance.
+   subroutine add_balance(file, row, error)
+      !> Segment
+      type(hdf5_file_t), intent(inout) :: file
+      !> Entries of the energy balance of this frame, the same on all ranks
+      type(named_values_t), intent(in) :: row
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      if (.not. allocated(row%name)) return
+      do k = 1, size(row%name)
+         call file%append('/ledger/'//trim(row%name(k)), row%value(k), error, trim(row%unit(k)), &
+                          trim(row%meaning(k)))
+      end do
+   end subroutine add_balance
+
+end module polydem_trajectory_segment

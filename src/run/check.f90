@@ -1,0 +1,96 @@
+!> The verb `check`: builds a simulation, describes it and reports its warnings, without running it.
+module polydem_check
+   use polydem_dangers, only: warn_of_risks
+   use polydem_description, only: describe, list_overlaps
+   use polydem_errors, only: error_t
+   use polydem_guards, only: check_motion
+   use polydem_host, only: resident_memory
+   use polydem_kinds, only: lp, wp
+   use polydem_log, only: log_t
+   use polydem_monitor, only: look, new_monitor, report_pending_warnings, monitor_t
+   use polydem_run_output, only: count_frames
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: simulation_t
+   use polydem_start, only: new_simulation
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: check_simulation
+
+contains
+
+   !> Build the scene and print the resolved settings, the models in use, sizes, masses, speeds, time step, memory and
+   !> the warnings of a run at its start. A condition that stops a run at its first step is an error here, too.
+   subroutine check_simulation(settings, error, oversubscription)
+      !> Checked settings
+      type(settings_t), intent(in) :: settings
+      !> Allocated for bad input, or if a run stops at its first step
+      type(error_t), allocatable, intent(inout) :: error
+      !> Warning if the ranks have more threads than there are processors; none if absent or empty
+      character(len=*), intent(in), optional :: oversubscription
+      type(simulation_t) :: simulation
+      type(log_t) :: log
+      integer(lp) :: before, after, frames
+
+      before = resident_memory()
+      call new_simulation(settings, simulation, error)
+      if (allocated(error)) return
+      after = resident_memory()
+      call log%open('', error)
+      if (allocated(error)) return
+      call write_lines(log, settings%resolved)
+      call describe(simulation, log)
+      call list_overlaps(simulation, '', log, error)
+      if (present(oversubscription)) then
+         if (oversubscription /= '') call log%write_line(oversubscription)
+      end if
+      call log%write_line('memory     '//to_text(after)//' KiB resident, including '//to_text(after - before)// &
+                          ' KiB for the scene, boxes, pairs and contacts')
+      frames = count_frames(simulation)
+      call log%write_line('frames     '//to_text(frames)//' of '//to_text(frame_size(simulation)/1024_lp + 1_lp)// &
+                          ' KiB each, '// &
+                          to_text(real(frames, wp)*real(frame_size(simulation), wp)/1048576.0_wp, 3)//' MiB in total')
+      call warn_at_start(simulation, log, error)
+      call log%close(error)
+   end subroutine check_simulation
+
+   !> Write the warnings about the initial state, then apply the guards of a run at step 0.
+   subroutine warn_at_start(simulation, log, error)
+      type(simulation_t), intent(inout) :: simulation
+      type(log_t), intent(inout) :: log
+      type(error_t), allocatable, intent(inout) :: error
+      type(monitor_t) :: watch
+
+      call new_monitor(watch, simulation)
+      call warn_of_risks(simulation, log, watch%at_start)
+      call look(watch, simulation, .true., log, error)
+      if (allocated(error)) return
+      ! A body that is too fast at the start moves too far in the first step.
+      call check_motion(simulation%guard, simulation%bodies, simulation%step, simulation%dt, error)
+      call report_pending_warnings(watch, simulation, log)
+   end subroutine warn_at_start
+
+   !> Size of a frame [B]: bodies, and the initial contacts if contacts are written
+   pure integer(lp) function frame_size(simulation)
+      type(simulation_t), intent(in) :: simulation
+
+      frame_size = 48_lp*int(simulation%bodies%n, lp)
+      if (simulation%settings%output%contacts) frame_size = frame_size + 72_lp*int(simulation%contacts%n, lp)
+   end function frame_size
+
+   !> Write a text of several lines to the log.
+   subroutine write_lines(log, text)
+      type(log_t), intent(inout) :: log
+      character(len=*), intent(in) :: text
+      integer :: first, length
+
+      first = 1
+      do while (first <= len(text))
+         length = index(text(first:), new_line('a')) - 1
+         if (length < 0) length = len(text) - first + 1
+         call log%write_line(text(first:first + length - 1))
+         first = first + length + 1
+      end do
+   end subroutine write_lines
+
+end module polydem_check

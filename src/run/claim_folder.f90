@@ -1,0 +1,94 @@
+!> Claiming a result folder: the manifest lists the files of a run before the run writes any of them.
+module polydem_claim_folder
+   use polydem_checked_files, only: check_free
+   use polydem_description, only: has_deep_contacts
+   use polydem_errors, only: error_t
+   use polydem_folder_lock, only: lock_path
+   use polydem_kinds, only: ip
+   use polydem_manifest, only: manifest_t
+   use polydem_replaced_result, only: check_inputs, move_to_replaced, replaced_name
+   use polydem_result_files, only: checkpoint_path, log_path, n_checkpoints, name_in, overlaps_path, profile_path, &
+      steps_path, trace_path
+   use polydem_simulation, only: simulation_t
+   implicit none
+   private
+   public :: claim_folder
+
+   !> Greatest length of the name of a result file
+   integer, parameter :: longest = 32
+
+contains
+
+   !> Begin the manifest of a run, or continue that of earlier attempts. A result to be replaced is moved aside.
+   subroutine claim_folder(simulation, folder, force, is_restart, manifest, error)
+      !> Simulation at time 0
+      type(simulation_t), intent(in) :: simulation
+      !> Result folder; this run holds its lock
+      character(len=*), intent(in) :: folder
+      !> Whether the run replaces an existing result
+      logical, intent(in) :: force
+      !> Whether the run keeps the files of earlier attempts
+      logical, intent(in) :: is_restart
+      !> On entry the valid manifest of the folder, or none; on return that of this run
+      type(manifest_t), intent(inout) :: manifest
+      !> Allocated if a file is in the way; names the file. The folder is then unchanged
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=longest), allocatable :: names(:)
+      character(len=longest) :: lock
+      integer :: k
+
+      call list_output_names(simulation, names)
+      call check_free(manifest, folder, names, error)
+      lock = name_in(lock_path(''))
+      if (.not. manifest%is_found) then
+         if (.not. allocated(error)) call manifest%begin(folder, [lock, names], error)
+      else if (force) then
+         call check_inputs(manifest, folder, input_paths(simulation), error)
+         call manifest%continue_writing()
+         if (.not. allocated(error)) call move_to_replaced(manifest, folder, error)
+         names = [character(len=longest) :: lock, names, replaced_name]
+         if (.not. allocated(error)) call manifest%begin(folder, names, error)
+      else
+         call manifest%continue_writing()
+         do k = 1, size(names)
+            call manifest%own(trim(names(k)), error)
+         end do
+         do k = 1, merge(0, manifest%n, is_restart)
+            if (manifest%entry(k)%name /= lock .and. .not. allocated(error)) &
+               call manifest%empty(trim(manifest%entry(k)%name), error)
+         end do
+      end if
+   end subroutine claim_folder
+
+   !> Paths of the input files of a run: namelist, bodies file, packing; empty where the scene reads no such file
+   function input_paths(simulation) result(inputs)
+      type(simulation_t), intent(in) :: simulation
+      character(len=:), allocatable :: inputs(:)
+
+      associate (file => simulation%settings%file, scene => simulation%settings%scene)
+         allocate (character(len=max(len(file), len(scene%bodies_file), len(scene%packing))) :: inputs(3))
+         inputs(1) = file
+         inputs(2) = scene%bodies_file
+         inputs(3) = scene%packing
+      end associate
+   end function input_paths
+
+   !> Names of the files that a run can write, without segments
+   subroutine list_output_names(simulation, names)
+      type(simulation_t), intent(in) :: simulation
+      character(len=longest), allocatable, intent(out) :: names(:)
+      integer(ip) :: k
+
+      allocate (names(2))
+      names = [character(len=longest) :: name_in(log_path('')), name_in(profile_path(''))]
+      do k = 1_ip, n_checkpoints
+         names = [character(len=longest) :: names, name_in(checkpoint_path('', k))]
+      end do
+      associate (output => simulation%settings%output)
+         if (output%trace_steps > 0_ip) names = [character(len=longest) :: names, name_in(trace_path(''))]
+         if (output%step_profile) names = [character(len=longest) :: names, name_in(steps_path(''))]
+      end associate
+      if (has_deep_contacts(simulation)) names = [character(len=longest) :: names, name_in(overlaps_path(''))]
+   end subroutine list_output_names
+
+end module polydem_claim_folder

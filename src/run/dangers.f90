@@ -1,0 +1,190 @@
+!> Warnings about the initial state of a scene, the same for `check` and for the head of the log of a run.
+!>
+!> Each warning names a probable mistake of the input. The warnings cost no time in a step; the guards that a run
+!> evaluates during its steps are in `monitor`.
+module polydem_dangers
+   use polydem_body_sizes, only: thickness_of_bodies
+   use polydem_contact_depth, only: count_deeper, deepest_contact, depth_share, depth_text
+   use polydem_guards, only: greatest_displacement
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_log, only: log_t
+   use polydem_simulation, only: simulation_t
+   use polydem_strings, only: to_text
+   use polydem_survey, only: survey_scene, survey_t
+   implicit none
+   private
+   public :: warn_of_risks
+
+   !> Depth of an initial overlap, as a fraction of the thickness of the thinner body, above which there is a warning
+   real(wp), parameter :: deep_fraction = 0.05_wp
+   !> Warning limit of the distance that a body moves in a step, and of the overlap that an impact causes, as a fraction
+   !> of the thickness of the thinnest body
+   real(wp), parameter :: fast_fraction = 0.25_wp
+   !> Plausible range of the median diameter [m]
+   real(wp), parameter :: diameters(2) = [1.0e-6_wp, 1.0_wp]
+   !> Range of densities of solids, including foams [kg/m3]
+   real(wp), parameter :: densities(2) = [1.0_wp, 3.0e4_wp]
+   !> Gravity above that of any geotechnical centrifuge [m/s2]
+   real(wp), parameter :: strongest_gravity = 5.0e3_wp
+   !> Ratio of the pressure of the weight to the stiffness above which bodies at rest overlap deeply [1]
+   real(wp), parameter :: softest = 0.05_wp
+
+   !> Writer and counter of warnings
+   type :: warning_writer_t
+      !> Number of warnings so far
+      integer(lp) :: n = 0_lp
+   contains
+      procedure :: warn
+   end type warning_writer_t
+
+contains
+
+   !> Write a warning about each risk of the initial state.
+   subroutine warn_of_risks(simulation, log, n)
+      !> A simulation at time 0
+      type(simulation_t), intent(in) :: simulation
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Number of warnings
+      integer(lp), intent(out) :: n
+      type(warning_writer_t) :: writer
+      type(survey_t) :: survey
+
+      call survey_scene(simulation, survey)
+      if (size(simulation%bodies%free) > 0) call warn_of_units(simulation, survey, writer, log)
+      call warn_of_step(simulation, writer, log)
+      call warn_of_overlaps(simulation, survey, writer, log)
+      call warn_of_speeds(simulation, survey, writer, log)
+      call warn_of_law(simulation, writer, log)
+      n = writer%n
+   end subroutine warn_of_risks
+
+   !> Warn of lengths, densities and gravity that are implausible in SI units.
+   subroutine warn_of_units(simulation, survey, writer, log)
+      type(simulation_t), intent(in) :: simulation
+      type(survey_t), intent(in) :: survey
+      type(warning_writer_t), intent(inout) :: writer
+      type(log_t), intent(inout) :: log
+      real(wp) :: gravity
+
+      associate (median => survey%diameter(2), density => survey%density)
+         if (median > diameters(2) .or. median < diameters(1)) call writer%warn(log, &
+            'lengths are in metres: the median diameter of the free bodies is '//to_text(median, 3)// &
+            ' m; convert lengths that are given in other units')
+         if (density(2) > densities(2) .or. density(1) < densities(1)) call writer%warn(log, &
+            'masses are in kg per metre of depth, lengths in metres: free bodies have densities from '// &
+            to_text(density(1), 3)//' to '//to_text(density(2), 3)//' kg/m3, which no solid has; check the units')
+      end associate
+      associate (g => simulation%settings%forces%gravity)
+         gravity = hypot(g(1), g(2))
+      end associate
+      if (gravity > strongest_gravity) call writer%warn(log, &
+         'gravity is in m/s2: '//to_text(gravity, 3)//' m/s2 is '//to_text(gravity/9.81_wp, 3)// &
+         ' times that of the Earth; check the units')
+      if (survey%softness > softest) call writer%warn(log, &
+         'the pressure under the full height of the free bodies is '//to_text(survey%softness, 3)// &
+         ' of the stiffness: the lowest bodies overlap deeply. Increase stiffness in &forces, and check that '// &
+         'lengths are in metres')
+   end subroutine warn_of_units
+
+   !> Warn of a time step that is unstable as soon as bodies touch.
+   subroutine warn_of_step(simulation, writer, log)
+      type(simulation_t), intent(in) :: simulation
+      type(warning_writer_t), intent(inout) :: writer
+      type(log_t), intent(inout) :: log
+
+      associate (dt => simulation%dt, stable => simulation%expected_stable_step)
+         if (dt <= stable) return
+         call writer%warn(log, 'dt = '//to_text(dt)//' s is '//to_text(dt/stable, 3)//' times the stable time step '// &
+                          to_text(stable, 3)//' s estimated from the shapes: contacts of these bodies will be '// &
+                          'unstable. Reduce dt, or omit it')
+      end associate
+   end subroutine warn_of_step
+
+   !> Warn of initial overlaps whose elastic energy is large.
+   subroutine warn_of_overlaps(simulation, survey, writer, log)
+      type(simulation_t), intent(in) :: simulation
+      type(survey_t), intent(in) :: survey
+      type(warning_writer_t), intent(inout) :: writer
+      type(log_t), intent(inout) :: log
+      real(wp), allocatable :: thickness(:)
+      real(wp) :: share
+      integer(ip) :: c
+      logical :: is_energetic
+
+      associate (s => simulation)
+         thickness = thickness_of_bodies(s%bodies)
+         c = deepest_contact(s%contacts, thickness)
+         if (c == 0_ip) return
+         share = depth_share(s%contacts, thickness, c)
+         is_energetic = survey%stored > survey%kinetic + survey%potential .and. share > s%settings%guards%listed_depth
+         if (share <= deep_fraction .and. .not. is_energetic) return
+         call writer%warn(log, to_text(count_deeper(s%contacts, thickness, s%settings%guards%listed_depth))// &
+                          ' contacts are deep at the start: '//depth_text(s%bodies, s%contacts, thickness, c)// &
+                          '. All contacts store '//to_text(survey%stored, 3)//' J/m, which can accelerate all '// &
+                          'free bodies to '// &
+                          to_text(sqrt(2.0_wp*survey%stored/max(survey%mass(3), tiny(1.0_wp))), 3)// &
+                          ' m/s. Separate the bodies: set relaxed_depth in &guards')
+      end associate
+   end subroutine warn_of_overlaps
+
+   !> Warn of bodies that can pass through others: by moving too far in one step, or by their momentum.
+   subroutine warn_of_speeds(simulation, survey, writer, log)
+      type(simulation_t), intent(in) :: simulation
+      type(survey_t), intent(in) :: survey
+      type(warning_writer_t), intent(inout) :: writer
+      type(log_t), intent(inout) :: log
+      character(len=:), allocatable :: thinnest
+      real(wp) :: move, fastest
+      integer(ip) :: slot
+
+      associate (s => simulation)
+         thinnest = ' times the thickness of the thinnest body ('//to_text(survey%thickness, 3)//' m, body '// &
+            to_text(s%bodies%id(survey%thinnest))//')'
+         call greatest_displacement(s%guard, s%bodies, s%dt, move, slot)
+         if (move > fast_fraction*survey%thickness) call writer%warn(log, 'body '// &
+            to_text(s%bodies%id(slot))//' moves '//to_text(move/survey%thickness, 3)//thinnest// &
+            ' in one step: it may pass through other bodies undetected. Reduce dt')
+         fastest = max(survey%wall_speed, merge(survey%fall_speed, 0.0_wp, size(s%bodies%free) > 0))
+         if (move <= fast_fraction*survey%thickness .and. fastest*s%dt > fast_fraction*survey%thickness) &
+            call writer%warn(log, 'walls reach '//to_text(survey%wall_speed, 3)//' m/s, a fall through the extent '// &
+            to_text(survey%fall_speed, 3)//' m/s: this is '//to_text(fastest*s%dt/survey%thickness, 3)//thinnest// &
+            ' in one step. Reduce dt')
+         if (survey%impact > fast_fraction*survey%thickness) call writer%warn(log, 'body '// &
+            to_text(s%bodies%id(survey%fastest))//' is so fast that stopping it takes an overlap of '// &
+            'about '//to_text(survey%impact, 3)//' m, '//to_text(survey%impact/survey%thickness, 3)//thinnest// &
+            ': it may pass through other bodies. Increase stiffness in &forces, or use thicker bodies')
+      end associate
+   end subroutine warn_of_speeds
+
+   !> Warn of the area law without damping. The law is not conservative, and only damping removes the energy it adds.
+   subroutine warn_of_law(simulation, writer, log)
+      type(simulation_t), intent(in) :: simulation
+      type(warning_writer_t), intent(inout) :: writer
+      type(log_t), intent(inout) :: log
+
+      associate (forces => simulation%settings%forces)
+         if (forces%law /= 'area') return
+         if (forces%damping /= 'none') then
+            if (forces%restitution > 0.0_wp .and. forces%restitution < 1.0_wp) return
+            if (forces%restitution <= 0.0_wp .and. forces%damping_coefficient > 0.0_wp) return
+         end if
+      end associate
+      call writer%warn(log, 'the area law is not conservative: without damping it heats the bodies at any dt (the '// &
+                       'kinetic energy of a gas grew by a third in 0.2 s). Set law = ''conservative'' in &forces, '// &
+                       'or use damping')
+   end subroutine warn_of_law
+
+   !> Write a warning and count it.
+   subroutine warn(self, log, text)
+      class(warning_writer_t), intent(inout) :: self
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Text of the warning
+      character(len=*), intent(in) :: text
+
+      self%n = self%n + 1_lp
+      call log%write_line('warning: '//text)
+   end subroutine warn
+
+end module polydem_dangers

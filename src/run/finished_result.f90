@@ -1,0 +1,66 @@
+!> Detection of a finished result: a restart of a finished run does nothing.
+module polydem_finished_result
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: lp
+   use polydem_log, only: log_t
+   use polydem_log_tables, only: write_hash
+   use polydem_replaced_result, only: replaced_name
+   use polydem_restart, only: find_finished
+   use polydem_result_files, only: name_in, profile_path
+   use polydem_run, only: run_t
+   use polydem_settings, only: settings_t
+   use polydem_start, only: build_start
+   implicit none
+   private
+   public :: find_finished_result, is_finished
+
+contains
+
+   !> Check on the root rank whether the folder holds the finished result of this run. No file changes.
+   subroutine find_finished_result(settings, run, last_state, error)
+      !> Settings of the run
+      type(settings_t), intent(in) :: settings
+      !> The run; its manifest is read, and its simulation built if needed
+      type(run_t), intent(inout) :: run
+      !> Hash of the last state; unallocated unless the run is finished
+      character(len=:), allocatable, intent(out) :: last_state
+      !> Allocated if the finished result is damaged or the scene cannot be built
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      call run%manifest%read(run%folder)
+      k = run%manifest%place_of(name_in(profile_path(run%folder)))
+      if (k == 0 .or. allocated(run%manifest%problem) .or. run%manifest%owns(replaced_name)) return
+      if (.not. run%manifest%entry(k)%is_closed) return
+      call build_start(settings, run, error)
+      if (.not. allocated(error)) call find_finished(run%folder, settings, run%provenance%scene, run%manifest, &
+                                                     last_state, error)
+   end subroutine find_finished_result
+
+   !> Whether the root rank found a finished result, which it then reports; collective.
+   logical function is_finished(run, last_state)
+      !> The run
+      type(run_t), intent(inout) :: run
+      !> Hash of the last state; allocated on the root rank if the result is finished
+      character(len=:), allocatable, intent(in) :: last_state
+      integer(lp) :: found(1)
+
+      found = merge(1_lp, 0_lp, allocated(last_state))
+      call run%comm%broadcast(found)
+      is_finished = found(1) == 1_lp
+      if (is_finished .and. run%comm%is_root()) call report_finished(run%folder, last_state)
+   end function is_finished
+
+   !> Report on the screen that the result is finished, and its state hash.
+   subroutine report_finished(folder, last_state)
+      character(len=*), intent(in) :: folder, last_state
+      type(log_t) :: log
+      type(error_t), allocatable :: ignored
+
+      call log%open('', ignored)
+      call log%write_line(folder//' holds the finished result of these settings: nothing to do')
+      call write_hash(log, last_state)
+      call log%close()
+   end subroutine report_finished
+
+end module polydem_finished_result

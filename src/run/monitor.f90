@@ -1,0 +1,296 @@
+!> The monitor of a run: guards that check whole steps (depth of contacts, bodies passing through each other, energy,
+!> stable time step), and the warnings of all guards.
+!>
+!> A guard that is off takes no time and allocates no array.
+module polydem_monitor
+   use polydem_body_sizes, only: thickness_of_bodies
+   use polydem_contact_depth, only: any_deeper, deepest_contact, depth_share, depth_text
+   use polydem_contact_history, only: at_direction
+   use polydem_energy_guard, only: check_energy, energy_guard_t, open_energy_guard
+   use polydem_errors, only: error_t
+   use polydem_guards, only: place_of
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_log, only: log_t
+   use polydem_passing, only: find_passing, least_depth, passing_text
+   use polydem_serializer, only: serializer_t
+   use polydem_simulation, only: simulation_t
+   use polydem_stability_check, only: check_stability
+   use polydem_strings, only: to_text
+   use polydem_warning, only: warning_t
+   implicit none
+   private
+   public :: monitor_t, new_monitor, look, report_pending_warnings, write_warning_counts, serialize_monitor, &
+      warning_counts, set_warning_counts
+
+   !> Guards and their findings
+   type :: monitor_t
+      !> Thickness of each body, (slot) [m]; allocated only if the overlap or passing guard is on
+      real(wp), allocatable :: thickness(:)
+      !> Generation of the bodies that `thickness` belongs to
+      integer(ip), private :: generation = 0_ip
+      !> Warnings of deep contacts
+      type(warning_t) :: overlap
+      !> Warnings of bodies passing through each other
+      type(warning_t) :: passing
+      !> Number of warnings about the initial state
+      integer(lp) :: at_start = 0_lp
+      !> Guard against unexplained energy gain
+      type(energy_guard_t) :: energy
+      !> Number of checks at which dt exceeded half the stable time step
+      integer(lp) :: large_steps = 0_lp
+      !> Greatest dt / stable dt of a warning so far [1]
+      real(wp), private :: warned = 0.0_wp
+      !> Greatest dt / stable dt so far [1]
+      real(wp) :: greatest_share = 0.0_wp
+   end type monitor_t
+
+   !> Steps between checks of guards that do not run in every step
+   integer(lp), parameter :: interval = 100_lp
+
+contains
+
+   !> Prepare the guards that are switched on.
+   subroutine new_monitor(watch, simulation)
+      !> The monitor
+      type(monitor_t), intent(out) :: watch
+      !> A simulation at time 0
+      type(simulation_t), intent(in) :: simulation
+
+      associate (settings => simulation%settings%guards)
+         if (settings%overlap /= 'off' .or. settings%passing /= 'off') &
+            watch%thickness = thickness_of_bodies(simulation%bodies)
+         if (settings%energy /= 'off') call open_energy_guard(watch%energy, simulation%contacts)
+      end associate
+   end subroutine new_monitor
+
+   !> Serialize the findings of the guards.
+   subroutine serialize_monitor(watch, serializer)
+      !> The monitor
+      type(monitor_t), intent(inout) :: watch
+      !> Serializer
+      class(serializer_t), intent(inout) :: serializer
+
+      call serializer%field('/run/deep_steps', watch%overlap%count, '1', 'steps with a contact that was too deep')
+      call serializer%field('/run/passing_steps', watch%passing%count, '1', 'steps in which a body was passing '// &
+                        'through another')
+      call serializer%field('/run/energy_looks', watch%energy%warning%count, '1', &
+                        'checks that found an unexplained energy gain')
+      call serializer%field('/run/large_steps', watch%large_steps, '1', 'checks with dt above half the stable dt')
+      call serializer%field('/run/warned_share', watch%warned, '1', 'greatest dt / stable dt of a warning')
+      call serializer%field('/run/greatest_share', watch%greatest_share, '1', 'greatest dt / stable dt')
+   end subroutine serialize_monitor
+
+   !> Check a step with the guards, and write new warnings. Collective; all ranks get the error.
+   subroutine look(watch, simulation, is_last, log, error)
+      !> The monitor
+      type(monitor_t), intent(inout) :: watch
+      !> The simulation at the end of a step
+      type(simulation_t), intent(inout) :: simulation
+      !> Whether to run all guards regardless of the interval between checks
+      logical, intent(in) :: is_last
+      !> Log
+      type(log_t), intent(inout) :: log
+      !> Allocated if the run must stop; names body, position and step
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: check_all
+
+      check_all = is_last .or. mod(simulation%step, interval) == 0_lp
+      associate (settings => simulation%settings%guards)
+         if (settings%overlap /= 'off' .or. settings%passing /= 'off') &
+            call check_contact_guards(watch, simulation, error)
+         if (check_all .and. settings%step /= 'off') call check_time_step(watch, simulation, log, error)
+         if (check_all .and. settings%energy /= 'off') call check_energy(watch%energy, simulation, error)
+         if (check_all .or. settings%passing == 'stop') call simulation%comm%all_reduce_error(error)
+      end associate
+      if (check_all .or. simulation%comm%size == 1_ip) call report_pending_warnings(watch, simulation, log)
+      call write_pending(watch%energy%warning, log)
+   end subroutine look
+
+   !> Write the pending warnings of all ranks, and all-reduce their counts; collective.
+   subroutine report_pending_warnings(watch, simulation, log)
+      !> The monitor
+      type(monitor_t), intent(inout) :: watch
+      !> The simulation
+      type(simulation_t), intent(inout) :: simulation
+      !> Log
+      type(log_t), intent(inout) :: log
+      integer(lp) :: counts(3)
+
+      if (simulation%comm%size > 1_ip) then
+         counts = warning_counts(watch, simulation)
+         call simulation%comm%all_reduce_max(counts)
+         call set_warning_counts(watch, simulation, counts)
+      end if
+      call report_guard(simulation%guard%warning)
+      call report_guard(watch%overlap)
+      call report_guard(watch%passing)
+
+   contains
+
+      subroutine report_guard(warning)
+         type(warning_t), intent(inout) :: warning
+
+         call simulation%comm%all_reduce_text(warning%text, warning%weight)
+         call write_pending(warning, log)
+      end subroutine report_guard
+
+   end subroutine report_pending_warnings
+
+   !> Write the pending warning of a guard, if there is one.
+   subroutine write_pending(warning, log)
+      type(warning_t), intent(inout) :: warning
+      type(log_t), intent(inout) :: log
+      character(len=:), allocatable :: text
+
+      call warning%take(text)
+      if (allocated(text)) call log%write_line('warning: '//text)
+   end subroutine write_pending
+
+   !> Number of steps with a warning, for the guards that run on each rank independently: displacement, overlap,
+   !> passing. Once per step the counts become the greatest of all ranks, so a step counts once however many ranks warn.
+   pure function warning_counts(watch, simulation) result(counts)
+      !> The monitor
+      type(monitor_t), intent(in) :: watch
+      !> The simulation
+      type(simulation_t), intent(in) :: simulation
+      integer(lp) :: counts(3)
+
+      counts = [simulation%guard%warning%count, watch%overlap%count, watch%passing%count]
+   end function warning_counts
+
+   !> Set the counts to the greatest of all ranks.
+   pure subroutine set_warning_counts(watch, simulation, counts)
+      !> The monitor
+      type(monitor_t), intent(inout) :: watch
+      !> The simulation
+      type(simulation_t), intent(inout) :: simulation
+      !> Counts in the order of `warning_counts`, (3)
+      integer(lp), intent(in) :: counts(:)
+
+      simulation%guard%warning%count = counts(1)
+      watch%overlap%count = counts(2)
+      watch%passing%count = counts(3)
+   end subroutine set_warning_counts
+
+   !> Write the greatest dt / stable dt and the number of warnings of each guard.
+   subroutine write_warning_counts(watch, simulation, log)
+      !> The monitor
+      type(monitor_t), intent(in) :: watch
+      !> The simulation at the end of the run
+      type(simulation_t), intent(in) :: simulation
+      !> Log
+      type(log_t), intent(inout) :: log
+
+      if (watch%greatest_share > 0.0_wp) call log%write_line( &
+         'max dt / stable dt of the contacts: '//to_text(watch%greatest_share, 3))
+      call write_count(watch%at_start, 'about the initial state')
+      call write_count(simulation%guard%warning%count, 'steps in which a body moved too far')
+      call write_count(watch%overlap%count, 'steps with a contact that was too deep')
+      call write_count(watch%passing%count, 'steps in which a body was passing through another')
+      call write_count(watch%energy%warning%count, 'checks that found an unexplained energy gain')
+      call write_count(watch%large_steps, 'checks with dt above half the stable time step')
+
+   contains
+
+      subroutine write_count(n, what)
+         integer(lp), intent(in) :: n
+         character(len=*), intent(in) :: what
+
+         if (n > 0_lp) call log%write_line('warnings: '//to_text(n)//' '//what)
+      end subroutine write_count
+
+   end subroutine write_warning_counts
+
+   !> Check for deep contacts, and for bodies passing through each other.
+   subroutine check_contact_guards(watch, simulation, error)
+      type(monitor_t), intent(inout) :: watch
+      type(simulation_t), intent(inout) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: limit
+      integer(ip) :: found
+      logical :: any_deep
+
+      associate (s => simulation, settings => simulation%settings%guards)
+         if (watch%generation /= s%generation) watch%thickness = thickness_of_bodies(s%bodies)
+         watch%generation = s%generation
+         limit = huge(limit)
+         if (settings%overlap /= 'off') limit = settings%overlap_limit
+         found = 0_ip
+         if (settings%passing /= 'off') then
+            call find_passing(s%bodies, s%contacts, watch%thickness, s%guard%radius, limit, &
+                              s%memory%column(at_direction)%value, found, any_deep)
+         end if
+         ! The search for passing bodies skips contacts below `least_depth`.
+         if (settings%passing == 'off' .or. limit < least_depth) &
+            any_deep = any_deeper(s%contacts, watch%thickness, limit)
+         if (settings%overlap /= 'off') call respond_to_depth(watch, simulation, any_deep, error)
+         if (found > 0_ip .and. .not. allocated(error)) call respond_to_passing(watch, simulation, found, error)
+      end associate
+   end subroutine check_contact_guards
+
+   !> Respond to the deepest contact. The rank with the deepest contact of all ranks reports it, at once if it stops the
+   !> run.
+   subroutine respond_to_depth(watch, simulation, any_deep, error)
+      type(monitor_t), intent(inout) :: watch
+      type(simulation_t), intent(inout) :: simulation
+      logical, intent(in) :: any_deep
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: text
+      integer(ip) :: worst
+      real(dp) :: share
+
+      share = 0.0_dp
+      associate (s => simulation, settings => simulation%settings%guards)
+         if (any_deep) then
+            worst = deepest_contact(s%contacts, watch%thickness)
+            text = depth_text(s%bodies, s%contacts, watch%thickness, worst)
+            share = real(depth_share(s%contacts, watch%thickness, worst), dp)
+         end if
+         if (settings%overlap == 'stop') call s%comm%all_reduce_text(text, share)
+         if (.not. allocated(text)) return
+         call watch%overlap%respond(settings%overlap, 'step '//to_text(s%step)//': '//text// &
+                                    '. Reduce dt, increase stiffness in &forces, or remove deep initial '// &
+                                    'overlaps (relaxed_depth in &guards)', error, share)
+      end associate
+   end subroutine respond_to_depth
+
+   !> Respond to bodies passing through each other. The rank with the first such pair of all ranks reports it.
+   subroutine respond_to_passing(watch, simulation, found, error)
+      type(monitor_t), intent(inout) :: watch
+      type(simulation_t), intent(inout) :: simulation
+      !> Index of the contact
+      integer(ip), intent(in) :: found
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp) :: place
+
+      associate (s => simulation)
+         place = place_of(s%bodies, s%contacts%first(found), s%contacts%second(found))
+         call watch%passing%respond(s%settings%guards%passing, 'step '//to_text(s%step)//': '// &
+                                    passing_text(s%bodies, s%contacts, s%guard%radius, found), error, &
+                                    -real(place, dp))
+         if (allocated(error)) error%place = place
+      end associate
+   end subroutine respond_to_passing
+
+   !> Compare dt to the stable time step of the contacts. A further warning needs a ratio that is larger by a tenth.
+   subroutine check_time_step(watch, simulation, log, error)
+      type(monitor_t), intent(inout) :: watch
+      type(simulation_t), intent(inout) :: simulation
+      type(log_t), intent(inout) :: log
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: warning
+      real(wp) :: stable, share
+
+      call check_stability(simulation, stable, warning, error)
+      call simulation%comm%all_reduce_text(warning)
+      share = 0.0_wp
+      if (stable < huge(stable)) share = simulation%dt/stable
+      watch%greatest_share = max(watch%greatest_share, share)
+      if (.not. allocated(warning)) return
+      watch%large_steps = watch%large_steps + 1_lp
+      if (share <= 1.1_wp*watch%warned) return
+      watch%warned = share
+      call log%write_line('warning: '//warning)
+   end subroutine check_time_step
+
+end module polydem_monitor

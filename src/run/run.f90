@@ -1,0 +1,96 @@
+!> The state of a run: simulation, output files, monitor, checkpoints and time limit.
+module polydem_run
+   use polydem_checkpoint_fields, only: attempts_t
+   use polydem_checkpoint_schedule, only: checkpoints_t
+   use polydem_communicator, only: communicator_t
+   use polydem_energy_balance, only: balance_t
+   use polydem_folder_lock, only: folder_lock_t
+   use polydem_kinds, only: dp, lp
+   use polydem_log, only: log_t
+   use polydem_manifest, only: manifest_t
+   use polydem_monitor, only: monitor_t
+   use polydem_named_values, only: named_values_t
+   use polydem_provenance, only: provenance_t
+   use polydem_recorder, only: recorder_t
+   use polydem_restart, only: earlier_attempts_t
+   use polydem_result_files, only: default_folder
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: simulation_t
+   use polydem_trajectory_writer, only: trajectory_writer_t
+   implicit none
+   private
+   public :: run_t, attempt_t, result_folder
+
+   !> Options of an attempt: how to use the result of earlier attempts, and the time limit
+   type :: attempt_t
+      !> Whether to restart from the last checkpoint (--continue)
+      logical :: continues = .false.
+      !> Whether the settings may differ from those of that checkpoint (--changed)
+      logical :: may_change = .false.
+      !> Limit of the elapsed time of the attempt [s]; 0: no limit
+      real(dp) :: limit = 0.0_dp
+   end type attempt_t
+
+   !> State of a run
+   type :: run_t
+      !> Communicator of the run
+      class(communicator_t), allocatable :: comm
+      !> Options of this attempt
+      type(attempt_t) :: attempt
+      !> Warning if the ranks have more threads than there are processors; else empty
+      character(len=:), allocatable :: oversubscription
+      !> Start of the attempt, from `wall_seconds` [s]
+      real(dp) :: began = 0.0_dp
+      !> State of the result folder after earlier attempts
+      type(earlier_attempts_t) :: past
+      !> Scene hash and counts of all attempts
+      type(attempts_t) :: history
+      !> Schedule of checkpoints
+      type(checkpoints_t) :: checkpoints
+      !> The simulation
+      type(simulation_t) :: simulation
+      !> Writer of frames
+      type(trajectory_writer_t) :: trajectory
+      !> Recorder of boxes and of times of every step
+      type(recorder_t) :: recorder
+      !> Log on the screen and in the result folder
+      type(log_t) :: log
+      !> Provenance of the result
+      type(provenance_t) :: provenance
+      !> Energy balance at the last frame or line of the log, by name
+      type(named_values_t) :: row
+      !> Energy and momentum balance at the last frame or line of the log
+      type(balance_t) :: balance
+      !> Result folder
+      character(len=:), allocatable :: folder
+      !> Manifest of the result; only the root rank writes it
+      type(manifest_t) :: manifest
+      !> Lock of the result folder; the root rank acquires it
+      type(folder_lock_t) :: lock
+      !> Whether another run has taken over the result folder; the same on all ranks
+      logical :: has_lost_folder = .false.
+      !> Steps between frames; 0: no interval
+      integer(lp) :: frame_steps = 0_lp
+      !> Steps between lines of the log
+      integer(lp) :: log_steps = 0_lp
+      !> Monitor
+      type(monitor_t) :: watch
+      !> Step of the last frame; negative if there is none
+      integer(lp) :: last_frame = -1_lp
+      !> Reason to end the run early, set on the root rank only; unallocated while the run continues
+      character(len=:), allocatable :: reason
+   end type run_t
+
+contains
+
+   !> Result folder: the one in the settings, or results/<name of the input without path and suffix>
+   pure function result_folder(settings) result(folder)
+      !> Settings of the run
+      type(settings_t), intent(in) :: settings
+      character(len=:), allocatable :: folder
+
+      folder = settings%output%folder
+      if (folder == '') folder = default_folder(settings%file)
+   end function result_folder
+
+end module polydem_run

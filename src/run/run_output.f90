@@ -1,0 +1,211 @@
+!> Output of a run: frames, lines of the log, and the profile and summary at the end.
+module polydem_run_output
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use polydem_balance_values, only: name_terms
+   use polydem_counters, only: counters_t
+   use polydem_energy_report, only: write_energy_report
+   use polydem_errors, only: error_t, run_error
+   use polydem_global_hash, only: hash_all_bodies
+   use polydem_hash, only: hexadecimal
+   use polydem_host, only: resident_memory
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_log, only: log_t
+   use polydem_log_tables, only: write_counters, write_hash, write_ranks, write_timings
+   use polydem_monitor, only: look, write_warning_counts, report_pending_warnings
+   use polydem_profile_file, only: write_profile
+   use polydem_result_files, only: profile_path
+   use polydem_run, only: run_t
+   use polydem_simulation, only: simulation_t, time_of, compute_balance
+   use polydem_simulation_counters, only: count_contacts, report_counters
+   use polydem_strings, only: to_text
+   use polydem_timers, only: n_stages
+   use polydem_wall_forces, only: complete_wall_forces
+   implicit none
+   private
+   public :: choose_intervals, count_frames, end_step, finish
+
+   !> Number of lines of the log if the settings give no interval
+   integer(lp), parameter :: default_lines = 20_lp
+
+contains
+
+   !> Check the guards, and write a frame and a line of the log if they are due; collective.
+   subroutine end_step(run, error)
+      !> The run
+      type(run_t), intent(inout) :: run
+      !> Allocated if the run must stop; the same on all ranks
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: frame_due, line_due
+      integer(ip) :: n_contacts
+
+      associate (s => run%simulation)
+         frame_due = s%step == s%n_steps .or. is_due(s%step, run%frame_steps)
+         line_due = s%step == s%n_steps .or. is_due(s%step, run%log_steps)
+         call look(run%watch, s, line_due, run%log, error)
+         if (allocated(error)) return
+         if (frame_due .or. line_due) call update_balance(run)
+         if (line_due) then
+            call count_contacts(s, n_contacts)
+            call run%log%write_interval(s%step, s%n_steps, time_of(s), s%dt, run%balance%kinetic, &
+                                        run%balance%potential, n_contacts)
+         end if
+         if (frame_due) call write_frame(run, error)
+         call run%log%show_progress(s%step, s%n_steps)
+      end associate
+   end subroutine end_step
+
+   !> Evaluate the energy and momentum balance of this step if output.ledger is on; collective.
+   subroutine update_balance(run)
+      type(run_t), intent(inout) :: run
+
+      if (.not. run%simulation%settings%output%ledger) return
+      call compute_balance(run%simulation, run%balance)
+      call name_terms(run%balance, run%row)
+   end subroutine update_balance
+
+   !> Write a frame, unless an earlier attempt wrote it; collective.
+   subroutine write_frame(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (run%simulation%step <= run%past%last_frame) return
+      associate (s => run%simulation, output => run%simulation%settings%output)
+         call complete_wall_forces(run%comm, s%bodies, s%contacts)
+         if (output%contacts .and. output%ledger) then
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, row=run%row, &
+                                            manifest=run%manifest)
+         else if (output%contacts) then
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, &
+                                            manifest=run%manifest)
+         else if (output%ledger) then
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, row=run%row, &
+                                            manifest=run%manifest)
+         else
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, manifest=run%manifest)
+         end if
+         run%last_frame = s%step
+      end associate
+   end subroutine write_frame
+
+   !> After a numerical failure, write the state at which the run stopped as a last frame, unless the state of a body is
+   !> not finite; collective.
+   subroutine write_last_frame(run, code, error)
+      type(run_t), intent(inout) :: run
+      !> Exit code of the failure
+      integer, intent(in) :: code
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp) :: is_not_finite(1)
+
+      associate (s => run%simulation, bodies => run%simulation%bodies)
+         if (code /= run_error .or. run%last_frame == s%step) return
+         is_not_finite = merge(0_lp, 1_lp, all(ieee_is_finite(bodies%position)) &
+                               .and. all(ieee_is_finite(bodies%velocity)) .and. all(ieee_is_finite(bodies%angle)) &
+                               .and. all(ieee_is_finite(bodies%angular_velocity)))
+         call run%comm%all_reduce_max(is_not_finite)
+         if (is_not_finite(1) == 1_lp) return
+         call update_balance(run)
+      end associate
+      call write_frame(run, error)
+   end subroutine write_last_frame
+
+   !> End a run, also after a failure: close the trajectory, write the profile and the summary of the log; collective.
+   !> Nothing is written if another run has taken over the folder.
+   subroutine finish(run, seconds, error)
+      !> The run
+      type(run_t), intent(inout) :: run
+      !> Elapsed time of all attempts [s]
+      real(dp), intent(in) :: seconds
+      !> On entry the reason why the run did not finish; on return that, or a failure to write the end
+      type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: write_error
+      type(counters_t) :: counters
+      character(len=:), allocatable :: status
+      integer(lp) :: hash, memory
+
+      if (run%has_lost_folder) return
+      memory = resident_memory()
+      status = 'finished'
+      if (allocated(error)) status = error%message
+      associate (s => run%simulation)
+         call hash_all_bodies(run%comm, s%bodies, hash)
+         call report_counters(s, counters)
+         call report_pending_warnings(run%watch, s, run%log)
+         if (allocated(error)) call write_last_frame(run, error%code, write_error)
+         call run%trajectory%close(write_error, run%manifest)
+         call run%recorder%close(run%log, run%manifest, write_error)
+         call run%checkpoints%close(run%log)
+         if (run%comm%is_root()) call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, &
+                                                  status, write_error, memory)
+         call run%manifest%close_file(profile_path(run%folder), write_error)
+         call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n_all)
+         call write_rank_times(run, run%log)
+         call write_counters(run%log, counters)
+         if (s%settings%output%ledger) call write_energy_report(s, run%log)
+         call write_warning_counts(run%watch, s, run%log)
+      end associate
+      if (allocated(error)) call run%log%write_line('stopped: '//status)
+      call write_hash(run%log, hexadecimal(hash))
+      call run%log%close(write_error)
+      if (.not. allocated(error) .and. allocated(write_error)) call move_alloc(write_error, error)
+      call run%comm%all_reduce_error(error)
+   end subroutine finish
+
+   !> Write the distribution of the time of each stage over the ranks; collective.
+   subroutine write_rank_times(run, log)
+      type(run_t), intent(inout) :: run
+      type(log_t), intent(inout) :: log
+      real(dp), allocatable :: total(:)
+      integer(ip), allocatable :: counts(:)
+
+      if (run%comm%size == 1_ip) return
+      call run%comm%gather(run%simulation%timers%total, total, counts)
+      call write_ranks(log, reshape(total, [n_stages, int(run%comm%size)]))
+   end subroutine write_rank_times
+
+   !> Convert the intervals of frames and log lines to steps.
+   subroutine choose_intervals(run)
+      !> The run; `frame_steps` and `log_steps` are set
+      type(run_t), intent(inout) :: run
+
+      associate (s => run%simulation, output => run%simulation%settings%output)
+         run%frame_steps = in_steps(output%frame_interval, s%dt)
+         run%log_steps = in_steps(output%log_interval, s%dt)
+         if (run%log_steps == 0_lp) run%log_steps = max(1_lp, s%n_steps/default_lines)
+         if (abs(real(run%frame_steps, wp)*s%dt - output%frame_interval) > 1.0e-2_wp*output%frame_interval) then
+            call run%log%write_line('frames     every '//to_text(run%frame_steps)//' steps, '// &
+                                    to_text(real(run%frame_steps, wp)*s%dt)//' s')
+         end if
+      end associate
+   end subroutine choose_intervals
+
+   !> Number of frames of a complete run
+   pure integer(lp) function count_frames(simulation)
+      !> The simulation
+      type(simulation_t), intent(in) :: simulation
+      integer(lp) :: interval
+
+      associate (n => simulation%n_steps)
+         interval = in_steps(simulation%settings%output%frame_interval, simulation%dt)
+         if (interval == 0_lp) interval = n
+         ! The first and the last step always have a frame.
+         count_frames = 1_lp + (n + interval - 1_lp)/interval
+      end associate
+   end function count_frames
+
+   !> An interval in steps, at least one; 0: no interval
+   pure integer(lp) function in_steps(interval, dt)
+      real(wp), intent(in) :: interval, dt
+
+      in_steps = 0_lp
+      if (interval > 0.0_wp) in_steps = max(1_lp, nint(min(interval/dt, 1.0e15_wp), lp))
+   end function in_steps
+
+   !> Whether a step is a multiple of the interval; step 0 always is
+   pure logical function is_due(step, interval)
+      integer(lp), intent(in) :: step, interval
+
+      is_due = step == 0_lp
+      if (interval > 0_lp) is_due = mod(step, interval) == 0_lp
+   end function is_due
+
+end module polydem_run_output

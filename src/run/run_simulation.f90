@@ -1,0 +1,144 @@
+!> A complete run, from settings to result.
+module polydem_run_simulation
+   use polydem_checkpoint_fields, only: attempts_t
+   use polydem_clock, only: wall_seconds
+   use polydem_communicator, only: communicator_t
+   use polydem_errors, only: error_t, raise, stopped_early
+   use polydem_finished_result, only: find_finished_result, is_finished
+   use polydem_kinds, only: ip, lp
+   use polydem_monitor, only: look, set_warning_counts, report_pending_warnings, warning_counts
+   use polydem_oversubscription, only: oversubscription
+   use polydem_prepare, only: begin
+   use polydem_replacement, only: remove_replaced, restore_replaced
+   use polydem_run, only: attempt_t, run_t, result_folder
+   use polydem_run_output, only: end_step, finish
+   use polydem_serial_communicator, only: serial_communicator_t
+   use polydem_settings, only: settings_t
+   use polydem_start, only: check_ranks, join
+   use polydem_strings, only: to_text
+   use polydem_time_step, only: advance
+   use polydem_timers, only: stage_exchange, stage_output
+   implicit none
+   private
+   public :: run_simulation
+
+contains
+
+   !> Run a simulation, and write trajectory, profile and log to its result folder; collective.
+   subroutine run_simulation(settings, force, error, attempt, comm)
+      !> Checked settings
+      type(settings_t), intent(in) :: settings
+      !> Whether to replace an existing result (--force)
+      logical, intent(in) :: force
+      !> Allocated if the run fails, or if a signal or the time limit ends it early
+      type(error_t), allocatable, intent(inout) :: error
+      !> Options of this attempt; absent: a new run without a time limit
+      type(attempt_t), intent(in), optional :: attempt
+      !> Communicator of the run, absent: a serial one. Only its root rank writes files that the ranks do not share
+      class(communicator_t), intent(in), optional :: comm
+      type(run_t) :: run
+      character(len=:), allocatable :: last_state
+
+      run%began = wall_seconds()
+      if (present(attempt)) run%attempt = attempt
+      if (present(comm)) allocate (run%comm, source=comm)
+      if (.not. allocated(run%comm)) allocate (serial_communicator_t :: run%comm)
+      run%folder = result_folder(settings)
+      if (run%comm%is_root() .and. run%attempt%continues) call find_finished_result(settings, run, last_state, error)
+      if (is_finished(run, last_state)) return
+      run%oversubscription = oversubscription(run%comm)
+      call check_ranks(settings, run%comm, error)
+      if (run%comm%is_root() .and. .not. allocated(error)) call begin(settings, force, run, last_state, error)
+      call run%comm%all_reduce_error(error)
+      if (.not. allocated(error)) then
+         if (is_finished(run, last_state)) then
+            call run%lock%release()
+            return
+         end if
+         if (.not. run%comm%is_root()) call run%lock%join(run%folder)
+      end if
+      if (.not. allocated(error)) call join(settings, run, error)
+      if (.not. allocated(error)) call run_steps(run, error)
+      if (run%lock%is_held() .and. allocated(error) .and. .not. run%has_lost_folder) call restore_replaced(run%folder)
+      call run%lock%release()
+   end subroutine run_simulation
+
+   !> Write the first frame unless an earlier attempt wrote it, run all steps, and end the run; collective.
+   subroutine run_steps(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: is_due, must_stop
+
+      if (run%past%checkpoint == 0_ip) then
+         call end_step(run, error)
+         if (.not. allocated(error)) call remove_replaced(run, error)
+      end if
+      do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
+         call advance(run%simulation, error)
+         call synchronise_ranks(run, is_due, must_stop, error)
+         if (.not. allocated(error)) call end_step(run, error)
+         call run%simulation%timers%lap(stage_output)
+         call run%simulation%timers%end_step()
+         if (.not. allocated(error)) call run%recorder%record(run%simulation, run%manifest, error)
+         if (.not. allocated(error)) call write_due_checkpoint(run, is_due, must_stop, error)
+      end do
+      call finish(run, run%history%seconds + (wall_seconds() - run%began), error)
+   end subroutine run_steps
+
+   !> All-reduce the error of a step, and broadcast whether a checkpoint is due and whether the run must end, which the
+   !> root rank decides from its clock and signals; collective.
+   subroutine synchronise_ranks(run, is_due, must_stop, error)
+      type(run_t), intent(inout) :: run
+      !> Whether a checkpoint is due, and whether the run must end after it; the same on all ranks
+      logical, intent(out) :: is_due, must_stop
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp) :: flags(6)
+
+      is_due = .false.
+      if (run%comm%is_root()) then
+         call run%checkpoints%look(run%simulation%step, is_due, run%reason)
+         call run%lock%check(run%has_lost_folder, error)
+      end if
+      must_stop = allocated(run%reason)
+      call run%log%check(error)
+      if (run%comm%size == 1_ip) return
+      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), merge(1_lp, 0_lp, run%has_lost_folder), &
+               warning_counts(run%watch, run%simulation)]
+      call run%comm%all_reduce_error(error, flags)
+      is_due = flags(1) == 1_lp
+      must_stop = flags(2) == 1_lp
+      run%has_lost_folder = flags(3) == 1_lp
+      call set_warning_counts(run%watch, run%simulation, flags(4:))
+      call run%simulation%timers%lap(stage_exchange)
+   end subroutine synchronise_ranks
+
+   !> Write a checkpoint if one is due, and end the run early if it must stop; collective.
+   subroutine write_due_checkpoint(run, is_due, must_stop, error)
+      type(run_t), intent(inout) :: run
+      logical, intent(in) :: is_due, must_stop
+      type(error_t), allocatable, intent(inout) :: error
+      type(attempts_t) :: history
+
+      associate (s => run%simulation)
+         if (s%step == s%n_steps) return
+         if (is_due) then
+            call s%timers%start()
+            ! A checkpoint holds the number of warnings, not their text.
+            call report_pending_warnings(run%watch, s, run%log)
+            ! The frames up to the checkpoint are on disk before the checkpoint is.
+            call run%trajectory%close(error, run%manifest)
+            if (allocated(error)) return
+            history = run%history
+            history%segments = int(run%trajectory%number, lp)
+            history%seconds = history%seconds + (wall_seconds() - run%began)
+            call run%checkpoints%write(run%folder, run%provenance, run%comm, s, history, run%watch, error)
+            call s%timers%add_to_total(stage_output)
+         end if
+         if (.not. must_stop) return
+         if (.not. allocated(run%reason)) run%reason = 'the root rank'
+         call raise(error, stopped_early, 'interrupted by '//run%reason//' at step '//to_text(s%step)//' of '// &
+                    to_text(s%n_steps)//'; add --continue to resume')
+      end associate
+   end subroutine write_due_checkpoint
+
+end module polydem_run_simulation

@@ -1,0 +1,149 @@
+!> Start of a run: builds the simulation on all ranks, restores a checkpoint, and opens shared output files.
+module polydem_start
+   use polydem_bodies, only: bodies_t
+   use polydem_broadcast_scene, only: broadcaster_t
+   use polydem_checkpoint_fields, only: serialize_global, scene_hash
+   use polydem_communicator, only: communicator_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_hash, only: hexadecimal
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_parallel_start, only: start_on_all_ranks
+   use polydem_prescribed_motion, only: motion_t
+   use polydem_relaxation, only: relax_bodies, relaxation_t
+   use polydem_restart, only: restore
+   use polydem_result_files, only: checkpoint_path, n_checkpoints
+   use polydem_run, only: run_t
+   use polydem_run_output, only: choose_intervals
+   use polydem_scene, only: build_scene
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: simulation_t
+   use polydem_start_simulation, only: start_simulation
+   use polydem_strings, only: to_text
+   use polydem_timers, only: timers_t
+   implicit none
+   private
+   public :: new_simulation, join, check_ranks, build_start, recall
+
+contains
+
+   !> Build the scene and the simulation that the settings define.
+   subroutine new_simulation(settings, self, error)
+      !> Checked settings
+      type(settings_t), intent(in) :: settings
+      !> The simulation, ready to advance
+      type(simulation_t), intent(out) :: self
+      !> Allocated for bad input
+      type(error_t), allocatable, intent(inout) :: error
+      type(bodies_t) :: bodies
+      type(motion_t), allocatable :: motions(:)
+      type(relaxation_t) :: relaxation
+
+      call build_scene(settings, bodies, motions, error)
+      if (allocated(error)) return
+      if (settings%guards%relaxed_depth > 0.0_wp) call relax_bodies(settings, bodies, relaxation, error)
+      if (allocated(error)) return
+      call start_simulation(settings, bodies, motions, self, error)
+      self%relaxation = relaxation
+   end subroutine new_simulation
+
+   !> Broadcast the simulation and the restart state from the root rank, and open the shared output files; collective.
+   subroutine join(settings, run, error)
+      !> Settings of the run
+      type(settings_t), intent(in) :: settings
+      !> The run; prepared on the root rank
+      type(run_t), intent(inout) :: run
+      !> Allocated on failure; the same on all ranks
+      type(error_t), allocatable, intent(inout) :: error
+      type(broadcaster_t) :: broadcaster
+      integer(lp) :: longs(6)
+      real(dp) :: stored(1)
+
+      call start_on_all_ranks(settings, run%comm, run%simulation, error)
+      call run%comm%all_reduce_error(error)
+      if (allocated(error)) return
+      if (run%comm%size > 1_ip) then
+         longs = [run%history%scene, int(run%past%checkpoint, lp), run%past%step, int(run%past%segments, lp), &
+                  run%past%last_frame, int(run%checkpoints%next, lp)]
+         stored = real(run%watch%energy%stored, dp)
+         call run%comm%broadcast(longs)
+         call run%comm%broadcast(stored)
+         if (.not. run%comm%is_root()) then
+            run%history%scene = longs(1)
+            run%past%checkpoint = int(longs(2), ip)
+            run%past%step = longs(3)
+            run%past%segments = int(longs(4), ip)
+            run%past%last_frame = longs(5)
+            call run%checkpoints%open(settings%checkpoint, run%simulation%dt, run%began, 0.0_dp)
+            if (run%past%checkpoint > 0_ip) run%checkpoints%last_step = run%past%step
+            run%checkpoints%next = int(longs(6), ip)
+            run%watch%energy%stored = real(stored(1), wp)
+            call choose_intervals(run)
+         end if
+         allocate (broadcaster%comm, source=run%comm)
+         broadcaster%is_reading = .not. run%comm%is_root()
+         call serialize_global(broadcaster, run%simulation, run%history, run%watch)
+         if (allocated(broadcaster%error)) call move_alloc(broadcaster%error, error)
+         call run%comm%all_reduce_error(error)
+         if (allocated(error)) return
+         if (.not. run%comm%is_root()) then
+            run%simulation%sums = 0_lp
+            run%simulation%timers = timers_t()
+         end if
+      end if
+      call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error, &
+                               run%past%segments, run%comm)
+      if (run%comm%size == 1_ip .and. .not. allocated(error)) &
+         call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, run%manifest, error)
+   end subroutine join
+
+   !> Refuse settings that only a serial run supports.
+   subroutine check_ranks(settings, comm, error)
+      !> Settings of a run
+      type(settings_t), intent(in) :: settings
+      !> Communicator of the run
+      class(communicator_t), intent(in) :: comm
+      !> Names the entry; the same on all ranks
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (comm%size == 1_ip) return
+      if (settings%forces%friction == 'exact') call raise(error, input_error, settings%file// &
+         ': exact friction couples all contacts and needs a single rank; use threads instead of ranks, or set '// &
+         'friction = ''cundall_strack'' in &forces')
+      if (settings%output%trace_steps > 0_ip .or. settings%output%step_profile) call raise(error, input_error, &
+         settings%file//': trace_steps and step_profile in &output need a single rank; run without mpirun')
+   end subroutine check_ranks
+
+   !> Build the simulation at time 0 and hash its scene, unless an earlier call did.
+   subroutine build_start(settings, run, error)
+      !> Settings of the run
+      type(settings_t), intent(in) :: settings
+      !> The run; `simulation` and the scene hashes are set
+      type(run_t), intent(inout) :: run
+      !> Allocated for bad input
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(run%provenance%scene)) return
+      call new_simulation(settings, run%simulation, error)
+      if (allocated(error)) return
+      run%history%scene = scene_hash(run%simulation%bodies)
+      run%provenance%scene = hexadecimal(run%history%scene)
+   end subroutine build_start
+
+   !> Start the schedule of checkpoints, and restore the checkpoint of an earlier attempt if there is one.
+   subroutine recall(run, error)
+      !> The run, after `find_restart`
+      type(run_t), intent(inout) :: run
+      !> Allocated if the checkpoint cannot be restored
+      type(error_t), allocatable, intent(inout) :: error
+
+      call run%checkpoints%open(run%simulation%settings%checkpoint, run%simulation%dt, run%began, run%attempt%limit)
+      if (allocated(run%past%remark)) call run%log%write_line(run%past%remark)
+      if (run%past%checkpoint == 0_ip) return
+      run%provenance%parent = checkpoint_path(run%folder, run%past%checkpoint)//', step '//to_text(run%past%step)
+      call restore(run%folder, run%past, run%provenance%revision, run%simulation, run%history, run%watch, run%log, &
+         error)
+      run%checkpoints%last_step = run%past%step
+      run%checkpoints%next = modulo(run%past%checkpoint, n_checkpoints) + 1_ip
+   end subroutine recall
+
+end module polydem_start

@@ -1,0 +1,122 @@
+!> Guard against unexplained energy gain, the sign of too large a time step or of deep overlaps that are released.
+!>
+!> The sum of kinetic energy, gravitational potential energy and energy dissipated by damping and friction may increase
+!> only by the work of the walls and by the elastic energy that the contacts stored at the start of the energy balance,
+!> estimated as half of force times depth. Any further increase is unexplained. It is compared with the energy turned
+!> over. A non-conservative force law, such as the area law, contributes a few per cent of the work of a contact, with
+!> either sign.
+module polydem_energy_guard
+   use polydem_bodies, only: bodies_t
+   use polydem_communicator, only: communicator_t
+   use polydem_contacts, only: contacts_t
+   use polydem_energy_balance, only: balance_t
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_simulation, only: simulation_t, compute_balance
+   use polydem_strings, only: to_text
+   use polydem_warning, only: warning_t
+   implicit none
+   private
+   public :: energy_guard_t, open_energy_guard, check_energy, stored_energy
+
+   !> State of the guard
+   type :: energy_guard_t
+      !> Elastic energy of the contacts at the start [J/m]
+      real(wp) :: stored = 0.0_wp
+      !> Warnings of unexplained energy
+      type(warning_t) :: warning
+   end type energy_guard_t
+
+contains
+
+   !> Record the elastic energy of the contacts. Call it at the start of the energy balance, on a rank with all bodies.
+   subroutine open_energy_guard(guard, contacts)
+      !> The guard
+      type(energy_guard_t), intent(out) :: guard
+      !> Contacts at the start, with their forces
+      type(contacts_t), intent(in) :: contacts
+
+      guard%stored = stored_energy(contacts)
+   end subroutine open_energy_guard
+
+   !> Elastic energy of contacts, estimated as half of force times depth [J/m]
+   pure real(wp) function stored_energy(contacts)
+      !> Contacts, with their forces
+      type(contacts_t), intent(in) :: contacts
+      integer(ip) :: c
+
+      stored_energy = 0.0_wp
+      do c = 1_ip, contacts%n
+         stored_energy = stored_energy + 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)
+      end do
+   end function stored_energy
+
+   !> Warn or stop if the unexplained energy gain exceeds its limit. Collective; the result is the same on all ranks.
+   subroutine check_energy(guard, simulation, error)
+      !> The guard
+      type(energy_guard_t), intent(inout) :: guard
+      !> Simulation at the end of a step; `energy` and `energy_limit` of &guards define the action and the limit
+      type(simulation_t), intent(inout) :: simulation
+      !> Names the fastest body if the run must stop
+      type(error_t), allocatable, intent(inout) :: error
+      type(balance_t) :: balance
+      real(wp) :: growth, scale
+      real(dp) :: position(2)
+      integer(lp) :: id
+
+      call compute_balance(simulation, balance)
+      growth = balance%energy_residual + balance%elastic_work - guard%stored &
+         + max(0.0_wp, balance%damping_work) + max(0.0_wp, balance%friction_work)
+      scale = max(simulation%ledger%energy_scale, guard%stored)
+      associate (settings => simulation%settings%guards)
+         if (growth <= settings%energy_limit*scale) return
+         call find_fastest(simulation%comm, simulation%bodies, id, position)
+         call guard%warning%respond(settings%energy, 'step '//to_text(simulation%step)//': unexplained energy '// &
+                                    'gain of '//to_text(growth, 3)//' J/m, '//to_text(growth/scale, 3)// &
+                                    ' of the energy turned over; fastest body '//to_text(id)// &
+                                    ' at ('//to_text(real(position(1), wp))//', '//to_text(real(position(2), wp))// &
+                                    ') m. Reduce dt, or check for deep overlaps', error)
+      end associate
+   end subroutine check_energy
+
+   !> Find the free body with the greatest kinetic energy. A tie goes to the lowest identifier. Collective.
+   subroutine find_fastest(comm, bodies, id, position)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      !> Identifier of the body
+      integer(lp), intent(out) :: id
+      !> Position of the body [m]
+      real(dp), intent(out) :: position(2)
+      real(dp) :: energy, own, greatest(1)
+      integer(lp) :: lowest(1)
+      integer(ip) :: fastest, k, s
+
+      ! If all energies are NaN, the first body is the result. A rank without bodies never supplies it.
+      fastest = 0_ip
+      own = -2.0_dp
+      if (size(bodies%free) > 0) then
+         fastest = bodies%free(1)
+         own = -1.0_dp
+      end if
+      do k = 1_ip, size(bodies%free, kind=ip)
+         s = bodies%free(k)
+         energy = real(bodies%mass(s)*(bodies%velocity(1, s)**2 + bodies%velocity(2, s)**2) &
+                       + bodies%inertia(s)*bodies%angular_velocity(s)**2, dp)
+         if (.not. energy > own) cycle
+         own = energy
+         fastest = s
+      end do
+      greatest = own
+      call comm%all_reduce_max(greatest)
+      lowest = -huge(0_lp)
+      if (fastest > 0_ip .and. own >= greatest(1)) lowest = -int(bodies%id(fastest), lp)
+      call comm%all_reduce_max(lowest)
+      id = -lowest(1)
+      position = -huge(1.0_dp)
+      if (fastest > 0_ip) then
+         if (int(bodies%id(fastest), lp) == id) position = real(bodies%position(:, fastest), dp)
+      end if
+      call comm%all_reduce_max(position)
+   end subroutine find_fastest
+
+end module polydem_energy_guard

@@ -1,0 +1,316 @@
+!> Guards of a run: checks that warn or stop before the results become meaningless. They test for non-finite states,
+!> for displacements that are too large per step, for an unstable time step and for contacts without direction.
+module polydem_guards
+   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use polydem_bodies, only: bodies_t
+   use polydem_body_sizes, only: measure_body
+   use polydem_contacts, only: contacts_t, is_degenerate
+   use polydem_errors, only: error_t, raise, run_error
+   use polydem_kinds, only: far, dp, ip, lp, wp, min_parallel_size
+   use polydem_settings, only: guards_settings_t
+   use polydem_strings, only: to_text
+   use polydem_warning, only: warning_t
+   implicit none
+   private
+   public :: motion_guard_t, new_motion_guard, check_poses, check_motion, check_step, check_contacts, &
+      place_of, greatest_displacement
+
+   !> Guard of the displacement of bodies per step
+   type :: motion_guard_t
+      !> Maximum displacement of a point of a body per step [m]; huge if the displacement is not monitored
+      real(wp) :: limit = 0.0_wp
+      !> Entry `displacement` of &guards
+      character(len=:), allocatable :: choice
+      !> Warnings of too large displacements
+      type(warning_t) :: warning
+      !> Greatest distance of a vertex from the centre of each body, (slot) [m]
+      real(wp), allocatable :: radius(:)
+      !> Slots of the bodies that may move
+      integer(ip), allocatable :: moving(:)
+   end type motion_guard_t
+
+   !> Fraction of the stable time step above which a run warns
+   real(wp), parameter :: warn_share = 0.5_wp
+
+contains
+
+   !> Prepare the guard for the present bodies.
+   subroutine new_motion_guard(guard, settings, bodies, moving)
+      !> The guard
+      type(motion_guard_t), intent(out) :: guard
+      !> Group &guards
+      type(guards_settings_t), intent(in) :: settings
+      !> Bodies at the start
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the bodies that may move
+      integer(ip), intent(in) :: moving(:)
+      real(wp) :: thickness
+      integer(ip) :: s
+
+      guard%choice = settings%displacement
+      guard%moving = moving
+      guard%limit = huge(1.0_wp)
+      allocate (guard%radius(bodies%n))
+      do s = 1_ip, bodies%n
+         call measure_body(bodies, s, thickness, guard%radius(s))
+         if (guard%choice /= 'off') guard%limit = min(guard%limit, settings%displacement_limit*thickness)
+      end do
+   end subroutine new_motion_guard
+
+   !> Stop if a body has an invalid pose, before boxes and neighbours are computed from it.
+   subroutine check_poses(guard, bodies, step, error)
+      !> The guard
+      type(motion_guard_t), intent(in) :: guard
+      !> Bodies in the middle of a step
+      type(bodies_t), intent(in) :: bodies
+      !> Number of the step
+      integer(lp), intent(in) :: step
+      !> Names the body and the step
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: k
+      logical :: good
+
+      good = .true.
+      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
+      !$omp    shared(guard, bodies) private(k) reduction(.and.:good)
+      do k = 1_ip, size(guard%moving, kind=ip)
+         good = good .and. has_valid_pose(bodies, guard%moving(k))
+      end do
+      !$omp end parallel do
+      if (good) return
+      do k = 1_ip, size(guard%moving, kind=ip)
+         associate (s => guard%moving(k))
+            if (has_valid_pose(bodies, s)) cycle
+            call raise(error, run_error, 'step '//to_text(step)//': body '//to_text(bodies%id(s))//' at ('// &
+                       to_text(bodies%position(1, s))//', '//to_text(bodies%position(2, s))//') m with angle '// &
+                       to_text(bodies%angle(s))//' has an invalid pose: position and angle must be finite and '// &
+                       'at most '//to_text(far)//' in magnitude. Check its velocity and force in the previous step')
+            call place_error(error, bodies, s)
+         end associate
+         return
+      end do
+   end subroutine check_poses
+
+   !> Whether position and angle of a body are finite and small enough to compute boxes
+   pure logical function has_valid_pose(bodies, s)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+
+      has_valid_pose = ieee_is_finite(bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s))
+      if (has_valid_pose) has_valid_pose = abs(bodies%position(1, s)) <= far .and. abs(bodies%position(2, s)) <= far &
+                                       .and. abs(bodies%angle(s)) <= far
+   end function has_valid_pose
+
+   !> Stop if the state of a body is not finite. Stop or warn if a body moves too far in a step.
+   subroutine check_motion(guard, bodies, step, dt, error)
+      !> The guard
+      type(motion_guard_t), intent(inout) :: guard
+      !> Bodies at the end of a step
+      type(bodies_t), intent(in) :: bodies
+      !> Number of the step
+      integer(lp), intent(in) :: step
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Names the body, its position and velocity, and the step
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: k, s
+      logical :: good, is_first
+
+      good = .true.
+      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
+      !$omp    shared(guard, bodies, dt) private(k) reduction(.and.:good)
+      do k = 1_ip, size(guard%moving, kind=ip)
+         good = good .and. moves_within_limit(guard, bodies, guard%moving(k), dt)
+      end do
+      !$omp end parallel do
+      if (good) return
+      is_first = .true.
+      do k = 1_ip, size(guard%moving, kind=ip)
+         s = guard%moving(k)
+         if (moves_within_limit(guard, bodies, s, dt)) cycle
+         if (.not. is_finite(guard, bodies, s, dt)) then
+            call raise(error, run_error, motion_text(guard, bodies, s, step))
+         else if (is_first) then
+            call guard%warning%respond(guard%choice, motion_text(guard, bodies, s, step), error, weight_of(bodies, s))
+         end if
+         if (allocated(error)) then
+            call place_error(error, bodies, s)
+            return
+         end if
+         is_first = .false.
+      end do
+   end subroutine check_motion
+
+   !> Set the priority of an error among ranks from the body, or the pair, that it names. Of several failing ranks, the
+   !> error with the smallest place is reported.
+   pure subroutine place_error(error, bodies, first, second)
+      type(error_t), intent(inout) :: error
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: first
+      integer(ip), intent(in), optional :: second
+
+      error%place = place_of(bodies, first, second)
+   end subroutine place_error
+
+   !> Order of a body among all bodies of the run, or of a pair among all pairs; huge if unknown
+   pure integer(lp) function place_of(bodies, first, second)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body, or of the first body of the pair
+      integer(ip), intent(in) :: first
+      !> Slot of the second body of the pair
+      integer(ip), intent(in), optional :: second
+
+      place_of = huge(place_of)
+      if (.not. allocated(bodies%global_index)) return
+      place_of = shiftl(int(bodies%global_index(first), lp), 31)
+      if (present(second)) place_of = place_of + int(bodies%global_index(second), lp)
+   end function place_of
+
+   !> Weight of a warning of a body. Of several ranks, the warning with the greatest weight is reported. The order is
+   !> that of a serial run: free bodies before fixed ones, each in ascending order of global index.
+   pure real(dp) function weight_of(bodies, s)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+
+      weight_of = 0.0_dp
+      if (.not. allocated(bodies%global_index)) return
+      weight_of = -real(bodies%global_index(s), dp)
+      if (bodies%fixed(s)) weight_of = weight_of - real(bodies%n_all, dp)
+   end function weight_of
+
+   !> Message about a body that moves too far
+   function motion_text(guard, bodies, s, step) result(text)
+      type(motion_guard_t), intent(in) :: guard
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      integer(lp), intent(in) :: step
+      character(len=:), allocatable :: text
+
+      text = 'step '//to_text(step)//': body '//to_text(bodies%id(s))//' at ('// &
+         to_text(bodies%position(1, s))//', '//to_text(bodies%position(2, s))//') m has the velocity ('// &
+         to_text(bodies%velocity(1, s))//', '//to_text(bodies%velocity(2, s))// &
+         ') m/s and the angular velocity '//to_text(bodies%angular_velocity(s))// &
+         ' 1/s; no point of it may move more than '//to_text(guard%limit)// &
+         ' m in a step, otherwise bodies could pass through each other. Reduce dt, or check for deep '// &
+         'overlaps at the start'
+   end function motion_text
+
+   !> Whether the state of a body is finite and no point of it moves too far in a step; false for NaN
+   pure logical function moves_within_limit(guard, bodies, s, dt)
+      type(motion_guard_t), intent(in) :: guard
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      real(wp), intent(in) :: dt
+
+      moves_within_limit = is_finite(guard, bodies, s, dt)
+      if (moves_within_limit) moves_within_limit = move_of(guard, bodies, s, dt) <= guard%limit
+   end function moves_within_limit
+
+   !> Whether position, angle and velocities of a body are finite
+   pure logical function is_finite(guard, bodies, s, dt)
+      type(motion_guard_t), intent(in) :: guard
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      real(wp), intent(in) :: dt
+
+      is_finite = ieee_is_finite(move_of(guard, bodies, s, dt) &
+                                 + (bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s)))
+   end function is_finite
+
+   !> Greatest displacement per step of a point of any moving body, at the present velocities [m]
+   pure subroutine greatest_displacement(guard, bodies, dt, move, slot)
+      !> The guard
+      type(motion_guard_t), intent(in) :: guard
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> The displacement, 0 if no body moves [m]
+      real(wp), intent(out) :: move
+      !> Slot of the body, 0 if no body moves
+      integer(ip), intent(out) :: slot
+      integer(ip) :: k
+
+      move = 0.0_wp
+      slot = 0_ip
+      do k = 1_ip, size(guard%moving, kind=ip)
+         if (.not. move_of(guard, bodies, guard%moving(k), dt) > move) cycle
+         slot = guard%moving(k)
+         move = move_of(guard, bodies, slot, dt)
+      end do
+   end subroutine greatest_displacement
+
+   !> Upper bound of the displacement of a point of a body in a step [m]
+   pure real(wp) function move_of(guard, bodies, s, dt)
+      type(motion_guard_t), intent(in) :: guard
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      real(wp), intent(in) :: dt
+
+      move_of = dt*(abs(bodies%velocity(1, s)) + abs(bodies%velocity(2, s)) &
+                    + guard%radius(s)*abs(bodies%angular_velocity(s)))
+   end function move_of
+
+   !> Compare the time step with the stable time step of the contacts: warning above one half of it, error above it.
+   subroutine check_step(bodies, contacts, step, dt, stable, critical, warning, error)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts
+      type(contacts_t), intent(in) :: contacts
+      !> Number of the step
+      integer(lp), intent(in) :: step
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Stable time step [s]
+      real(wp), intent(in) :: stable
+      !> Index of the contact that determines it, 0 if there is none
+      integer(ip), intent(in) :: critical
+      !> Allocated if dt exceeds `warn_share` of the stable time step, but not the stable time step
+      character(len=:), allocatable, intent(out) :: warning
+      !> Names the contact if dt exceeds the stable time step
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: text
+
+      if (critical == 0_ip .or. dt <= warn_share*stable) return
+      associate (i => contacts%first(critical), j => contacts%second(critical))
+         text = 'step '//to_text(step)//': dt = '//to_text(dt)//' s is '//to_text(dt/stable, 3)// &
+            ' of the stable step, set by the contact of the bodies '//to_text(bodies%id(i))//' and '// &
+            to_text(bodies%id(j))//' at ('//to_text(bodies%position(1, i) + contacts%arm_first(1, critical))//', '// &
+            to_text(bodies%position(2, i) + contacts%arm_first(2, critical))//') m'
+      end associate
+      if (dt > stable) then
+         call raise(error, run_error, text//'. Reduce dt')
+      else
+         warning = text
+      end if
+   end subroutine check_step
+
+   !> Stop if a contact has no direction and `degenerate` is 'stop'.
+   subroutine check_contacts(degenerate, bodies, contacts, step, error)
+      !> Entry `degenerate` of &overlap: 'push' or 'stop'
+      character(len=*), intent(in) :: degenerate
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts
+      type(contacts_t), intent(in) :: contacts
+      !> Number of the step
+      integer(lp), intent(in) :: step
+      !> Names the bodies of the first such contact
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: c
+
+      if (contacts%n_degenerate == 0_ip .or. degenerate == 'push') return
+      do c = 1_ip, contacts%n
+         if (is_degenerate(contacts, c)) exit
+      end do
+      associate (i => contacts%first(c), j => contacts%second(c))
+         call raise(error, run_error, 'step '//to_text(step)//': the contact of the bodies '//to_text(bodies%id(i))// &
+                    ' and '//to_text(bodies%id(j))//' near ('//to_text(bodies%position(1, i))//', '// &
+                    to_text(bodies%position(2, i))//') m has no direction: one body is inside the other, or they '// &
+                    'cross. Set degenerate = ''push'' in &overlap to continue')
+         call place_error(error, bodies, i, j)
+      end associate
+   end subroutine check_contacts
+
+end module polydem_guards

@@ -1,0 +1,115 @@
+!> Parts of a simulation that depend on the bodies of a rank: force law, boxes, pair list with contact history, guards.
+module polydem_local_bodies
+   use polydem_box_maker, only: new_box_maker
+   use polydem_contact_history, only: at_direction, contact_memory_t
+   use polydem_contact_incidence, only: incidence_t
+   use polydem_errors, only: error_t, raise, run_error
+   use polydem_finder_statistics, only: finder_statistics_t
+   use polydem_force_law, only: new_force_law
+   use polydem_guards, only: motion_guard_t, new_motion_guard
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_neighbours, only: new_neighbours
+   use polydem_simulation, only: simulation_t
+   implicit none
+   private
+   public :: fit_to_bodies, rebuild_pairs
+
+contains
+
+   !> Rebuild the parts that depend on the bodies: force law, boxes, an empty pair list with contact history, guards.
+   subroutine fit_to_bodies(self, error, median_diameter)
+      !> The simulation, with its bodies and motions set
+      type(simulation_t), intent(inout) :: self
+      !> Allocated if the bodies or the settings are invalid
+      type(error_t), allocatable, intent(inout) :: error
+      !> Median diameter of all free bodies of the run [m]; default: median of the free bodies of this rank
+      real(wp), intent(in), optional :: median_diameter
+
+      call new_force_law(self%settings%forces, self%bodies, self%law)
+      self%contacts%area_is_effective = self%law%needs_effective_area
+      self%contacts%has_twist = self%law%needs_twist
+      self%contacts%n = 0_ip
+      self%incidence = incidence_t()
+      call list_moving(self)
+      call rebuild_guard(self)
+      associate (choice => self%settings%boxes)
+         call new_box_maker(self%maker, self%bodies, choice%largest_ratio, choice%margin, self%boxes, error, &
+            median_diameter)
+      end associate
+      if (allocated(error)) return
+      call rebuild_neighbours(self, error)
+      call allocate_history(self)
+      self%generation = self%generation + 1_ip
+   end subroutine fit_to_bodies
+
+   !> Rebuild the guard for the present bodies. Limit and warnings of the run are preserved.
+   subroutine rebuild_guard(self)
+      type(simulation_t), intent(inout) :: self
+      type(motion_guard_t) :: previous
+      integer :: n
+
+      previous = self%guard
+      n = size(self%moving) - count(self%bodies%in_halo)
+      call new_motion_guard(self%guard, self%settings%guards, self%bodies, self%moving(:n))
+      if (self%generation == 0_ip) return
+      self%guard%limit = previous%limit
+      self%guard%warning = previous%warning
+   end subroutine rebuild_guard
+
+   !> Start with an empty pair list. The finder statistics are preserved.
+   subroutine rebuild_neighbours(self, error)
+      type(simulation_t), intent(inout) :: self
+      type(error_t), allocatable, intent(inout) :: error
+      type(finder_statistics_t) :: statistics
+
+      if (allocated(self%neighbours%finder)) statistics = self%neighbours%finder%work
+      associate (choice => self%settings%neighbours)
+         call new_neighbours(self%neighbours, choice%finder, self%boxes, error, choice%skin)
+      end associate
+      if (allocated(error)) return
+      self%neighbours%finder%work%value = statistics%value
+      self%neighbours%finder%work%seconds = statistics%seconds
+   end subroutine rebuild_neighbours
+
+   !> Allocate the columns of the contact history that the force law and the guards need.
+   subroutine allocate_history(self)
+      type(simulation_t), intent(inout) :: self
+      integer :: k
+
+      self%memory = contact_memory_t()
+      allocate (self%memory%separating_edge(0))
+      do k = 1, size(self%memory%column)
+         if (self%law%needs(k)) allocate (self%memory%column(k)%value(0))
+      end do
+      if (self%settings%guards%passing /= 'off') allocate (self%memory%column(at_direction)%value(0))
+   end subroutine allocate_history
+
+   !> List the slots that may move: free bodies, bodies with prescribed motion, halo bodies.
+   subroutine list_moving(self)
+      type(simulation_t), intent(inout) :: self
+      integer :: k
+      integer(ip) :: s
+
+      self%moving = self%bodies%free
+      do k = 1, size(self%motions)
+         self%moving = [self%moving, self%motions(k)%slots]
+      end do
+      self%moving = [self%moving, pack([(s, s=1_ip, self%bodies%n)], self%bodies%in_halo)]
+   end subroutine list_moving
+
+   !> Rebuild the pair list from the boxes of the last search.
+   subroutine rebuild_pairs(s, error)
+      !> The simulation
+      type(simulation_t), intent(inout) :: s
+      !> Allocated if the finder fails
+      type(error_t), allocatable, intent(inout) :: error
+
+      call new_neighbours(s%neighbours, s%settings%neighbours%finder, s%boxes, error, s%settings%neighbours%skin)
+      if (allocated(error)) return
+      call s%neighbours%update(s%boxes)
+      if (s%neighbours%pairs%contradictions > 0_lp) call raise(error, run_error, 'finder '// &
+         s%settings%neighbours%finder//' reported contradictory pairs. This is a program error; use finder '// &
+         'all_pairs instead')
+   end subroutine rebuild_pairs
+
+end module polydem_local_bodies

@@ -1,0 +1,214 @@
+!> Redistributes the bodies over the ranks with their full state, and decides when this is necessary.
+!>
+!> A redistribution takes place in the middle of a step, when the bodies have the positions of the next pair search.
+!> Afterwards each rank has its own bodies, the halo (copies of nearby bodies of other ranks) and all fixed bodies, in
+!> ascending order of global index. The pair list is rebuilt from scratch, and the contact history of the pairs is
+!> restored. At the start of a run the root rank has all bodies; the first step distributes them.
+module polydem_redistribution
+   use polydem_bodies, only: turn_bodies
+   use polydem_body_fields, only: serialize_bodies
+   use polydem_energy_balance, only: serialize_contributions
+   use polydem_errors, only: error_t
+   use polydem_halo, only: new_halo
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_local_bodies, only: fit_to_bodies
+   use polydem_migration_buffer, only: migration_buffer_t
+   use polydem_packed_bodies, only: packed_bodies_t, join_packed, pack_bodies, all_to_all_bodies, unpack_bodies
+   use polydem_packed_history, only: receive_pairs, send_pairs
+   use polydem_rank_order, only: sort_by_rank
+   use polydem_redistribution_plan, only: divide, needs_repartition, list_needed, owners_of, padded_boxes, &
+      slots_of_global_indices, work_of_bodies
+   use polydem_serializer, only: serializer_t
+   use polydem_simulation, only: simulation_t
+   use polydem_timers, only: stage_boxes, stage_forces, stage_integrate, stage_neighbours, stage_overlap
+   implicit none
+   private
+   public :: redistribute, restore_history
+
+   !> Stages whose time is proportional to the work for the bodies of a rank
+   integer, parameter :: work_stages(*) = [stage_boxes, stage_neighbours, stage_overlap, stage_forces, stage_integrate]
+
+contains
+
+   !> Exchange errors between ranks, and redistribute the bodies if any rank requests it. Collective.
+   subroutine redistribute(self, error)
+      !> The simulation in the middle of a step, with the boxes of this step
+      type(simulation_t), intent(inout) :: self
+      !> On entry the error of this rank, if any; on return the same on all ranks
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp) :: request(1)
+
+      if (self%comm%size == 1_ip) return
+      request = 0_lp
+      if (.not. allocated(error)) then
+         associate (n => self%boxes%n)
+            if (self%domain%must_redistribute(self%boxes%bounds(:, :n), self%boxes%passive(:n))) request = 1_lp
+         end associate
+      end if
+      call self%comm%all_reduce_error(error, request)
+      if (allocated(error) .or. request(1) == 0_lp) return
+      call self%domain%adapt_margin(self%step)
+      call balance_work(self)
+      call migrate(self, error)
+   end subroutine redistribute
+
+   !> Partition space again if the work of the ranks is uneven.
+   subroutine balance_work(self)
+      type(simulation_t), intent(inout) :: self
+      real(dp), allocatable :: weight(:)
+      real(dp) :: seconds
+
+      associate (pairs => self%neighbours%pairs)
+         weight = work_of_bodies(self%bodies, pairs%n, pairs%first, pairs%second)
+      end associate
+      seconds = work_seconds(self)
+      if (needs_repartition(self%domain, self%comm, self%step, weight, seconds)) &
+         call divide(self%domain, self%comm, self%step, self%bodies, weight, seconds)
+   end subroutine balance_work
+
+   !> Restore the contact history of pairs after a redistribution. A no-op otherwise.
+   subroutine restore_history(self)
+      !> The simulation, directly after the pair search
+      type(simulation_t), intent(inout) :: self
+      integer(ip) :: n_known
+
+      if (.not. allocated(self%arrived)) return
+      associate (pairs => self%neighbours%pairs)
+         call receive_pairs(self%arrived, pairs%n, pairs%first, pairs%second, self%bodies%global_index, self%memory, &
+            n_known)
+         pairs%n_began = pairs%n_began - n_known
+      end associate
+      deallocate (self%arrived)
+   end subroutine restore_history
+
+   !> Time spent so far in the stages that depend on the bodies [s]
+   pure real(dp) function work_seconds(self)
+      type(simulation_t), intent(in) :: self
+
+      work_seconds = sum(self%timers%total(work_stages))
+   end function work_seconds
+
+   !> Migrate all bodies to their owners in the present partition, and rebuild the halo.
+   subroutine migrate(self, error)
+      type(simulation_t), intent(inout) :: self
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip), allocatable :: owner(:)
+      integer(ip) :: k
+
+      do k = 1_ip, size(self%motions, kind=ip)
+         self%motions(k)%slots = self%bodies%global_index(self%motions(k)%slots)
+      end do
+      owner = owners_of(self%domain, self%bodies)
+      call send_history(self, owner)
+      call send_bodies(self, owner)
+      call receive_halo(self)
+      do k = 1_ip, size(self%motions, kind=ip)
+         self%motions(k)%slots = slots_of_global_indices(self%bodies%global_index, self%motions(k)%slots)
+      end do
+      call self%domain%halo%follow(self%comm, self%bodies)
+      call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
+      call fit_to_bodies(self, error, self%domain%median_diameter)
+      call self%domain%set_reference(self%boxes%bounds(:, :self%boxes%n), self%step)
+      associate (domain => self%domain)
+         domain%redistributions = domain%redistributions + 1_lp
+         if (domain%redistributions > 1_lp) return
+         domain%first_migrations = domain%arrivals
+         domain%first_messages = self%comm%messages
+         domain%first_bytes = self%comm%bytes
+      end associate
+   end subroutine migrate
+
+   !> Send the contact history of the pairs that this rank owns. The owner of a pair is the owner of its leading body:
+   !> the first body, or the second if the first is fixed.
+   subroutine send_history(self, owner)
+      type(simulation_t), intent(inout) :: self
+      integer(ip), intent(in) :: owner(:)
+      logical, allocatable :: is_own(:)
+      integer(ip) :: p, leading
+
+      associate (pairs => self%neighbours%pairs, bodies => self%bodies)
+         allocate (is_own(pairs%n))
+         do p = 1_ip, pairs%n
+            leading = pairs%first(p)
+            if (bodies%fixed(leading)) leading = pairs%second(p)
+            is_own(p) = .not. bodies%in_halo(leading)
+         end do
+         allocate (self%arrived)
+         call send_pairs(self%comm, pairs%n, pairs%first, pairs%second, bodies%global_index, is_own, owner, &
+            self%memory, &
+                         self%arrived)
+      end associate
+   end subroutine send_history
+
+   !> Send the free bodies of this rank to their owners. Fixed bodies stay on all ranks.
+   subroutine send_bodies(self, owner)
+      type(simulation_t), intent(inout) :: self
+      integer(ip), intent(in) :: owner(:)
+      type(packed_bodies_t) :: packed
+      type(migration_buffer_t) :: buffer
+      integer(ip), allocatable :: counts(:), counts_received(:), slots(:), order(:)
+      integer(ip) :: s
+
+      associate (bodies => self%bodies)
+         slots = pack([(s, s=1_ip, bodies%n)],.not. bodies%in_halo)
+         call sort_by_rank(merge(owner(slots), self%comm%rank, owner(slots) >= 0_ip), self%comm%size, counts, order)
+         slots = slots(order)
+         call pack_bodies(bodies, slots, packed)
+      end associate
+      buffer%slots = slots
+      call serialize_columns(buffer, self)
+      call buffer%move(self%comm, counts)
+      call all_to_all_bodies(self%comm, counts, packed, counts_received)
+      self%domain%arrivals = self%domain%arrivals + &
+         int(sum(counts_received) - counts_received(lbound(counts_received, 1) + self%comm%rank), lp)
+      call unpack_bodies(packed, (self%bodies%n_all), self%bodies, buffer%slots)
+      call self%integrator%start(self%bodies)
+      call serialize_columns(buffer, self)
+      call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)])
+   end subroutine send_bodies
+
+   !> Publish the bounds of the bodies of this rank, and receive the nearby bodies of other ranks as the halo.
+   subroutine receive_halo(self)
+      type(simulation_t), intent(inout) :: self
+      type(packed_bodies_t) :: packed, packed_halo
+      type(migration_buffer_t) :: buffer
+      integer(ip), allocatable :: sent(:), counts(:), counts_received(:), slots(:)
+      real(wp), allocatable :: boxes(:, :)
+      integer(lp) :: n_halo(1)
+      integer(ip) :: s, n
+
+      n = self%bodies%n
+      boxes = padded_boxes(self%bodies, self%domain%margin + self%settings%boxes%margin)
+      call self%domain%regions%publish(self%comm, boxes)
+      call list_needed(self%domain, self%comm, self%bodies, boxes, sent, counts)
+      call pack_bodies(self%bodies, sent, packed_halo)
+      call all_to_all_bodies(self%comm, counts, packed_halo, counts_received)
+      buffer%slots = [(s, s=1_ip, n)]
+      call pack_bodies(self%bodies, buffer%slots, packed)
+      call serialize_columns(buffer, self)
+      buffer%is_reading = .true.
+      call join_packed(packed, packed_halo)
+      call unpack_bodies(packed, (self%bodies%n_all), self%bodies, slots)
+      self%bodies%in_halo(slots(n + 1_ip:)) = .true.
+      self%bodies%free = pack([(s, s=1_ip, self%bodies%n)],.not. (self%bodies%fixed .or. self%bodies%in_halo))
+      buffer%slots = slots(:n)
+      call self%integrator%start(self%bodies)
+      call serialize_columns(buffer, self)
+      call new_halo(self%domain%halo, counts, slots(sent), counts_received, slots(n + 1_ip:), &
+                      self%settings%forces%midstep_slip)
+      n_halo = int(self%bodies%n - n, lp)
+      call self%comm%all_reduce_sum(n_halo)
+      self%domain%halo_share = real(n_halo(1), wp)/real(self%bodies%n_all, wp)
+   end subroutine receive_halo
+
+   !> Serialize the variable state of the bodies, including data of the current step.
+   subroutine serialize_columns(serializer, self)
+      class(serializer_t), intent(inout) :: serializer
+      type(simulation_t), intent(inout) :: self
+
+      call serialize_bodies(serializer, self%bodies)
+      call self%integrator%serialize_step(serializer)
+      if (self%settings%output%ledger) call serialize_contributions(self%ledger, self%bodies%n, serializer)
+   end subroutine serialize_columns
+
+end module polydem_redistribution

@@ -1,0 +1,101 @@
+!> The complete state of a simulation.
+module polydem_simulation
+   use polydem_bodies, only: bodies_t
+   use polydem_box_maker, only: box_maker_t
+   use polydem_boxes, only: boxes_t
+   use polydem_communicator, only: communicator_t
+   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_incidence, only: incidence_t
+   use polydem_contacts, only: contacts_t
+   use polydem_domain, only: domain_t
+   use polydem_energy_balance, only: energy_balance_t, evaluate_balance, balance_t
+   use polydem_force_law, only: force_law_t
+   use polydem_guards, only: motion_guard_t
+   use polydem_integrator, only: integrator_t
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_neighbours, only: neighbours_t
+   use polydem_packed_history, only: packed_history_t
+   use polydem_prescribed_motion, only: motion_t
+   use polydem_relaxation, only: relaxation_t
+   use polydem_settings, only: settings_t
+   use polydem_timers, only: timers_t
+   implicit none
+   private
+   public :: simulation_t, time_of, compute_balance
+
+   !> The complete state of a simulation on one rank
+   type :: simulation_t
+      !> Settings of the run
+      type(settings_t) :: settings
+      !> Communicator of the ranks that share the bodies
+      class(communicator_t), allocatable :: comm
+      !> Part of space of this rank, and its halo
+      type(domain_t) :: domain
+      !> Number of times that the bodies of this rank were exchanged for others (calls of `fit_to_bodies`)
+      integer(ip) :: generation = 0_ip
+      !> Bodies
+      type(bodies_t) :: bodies
+      !> Prescribed motions of fixed bodies
+      type(motion_t), allocatable :: motions(:)
+      !> Maker of the bounding boxes
+      type(box_maker_t) :: maker
+      !> Bounding boxes
+      type(boxes_t) :: boxes
+      !> Pairs of bodies whose boxes overlap
+      type(neighbours_t) :: neighbours
+      !> Contacts of the last step
+      type(contacts_t) :: contacts
+      !> Contact history of the pairs
+      type(contact_memory_t) :: memory
+      !> Contact history received by a redistribution, until the pairs are found again; unallocated between steps
+      type(packed_history_t), allocatable :: arrived
+      !> Contacts of each body
+      type(incidence_t) :: incidence
+      !> Force law
+      type(force_law_t) :: law
+      !> Integration scheme
+      class(integrator_t), allocatable :: integrator
+      !> Energy and momentum balance
+      type(energy_balance_t) :: ledger
+      !> Timers of the stages
+      type(timers_t) :: timers
+      !> Number of steps done
+      integer(lp) :: step = 0_lp
+      !> Number of steps of the whole run
+      integer(lp) :: n_steps = 0_lp
+      !> Time step [s]
+      real(wp) :: dt = 0.0_wp
+      !> Stable time step estimated from the shapes [s]
+      real(wp) :: expected_stable_step = 0.0_wp
+      !> Guard of the displacement per step
+      type(motion_guard_t) :: guard
+      !> Summary of the relaxation before time 0
+      type(relaxation_t) :: relaxation
+      !> Slots that may move: free bodies, then bodies with prescribed motion, then halo bodies
+      integer(ip), allocatable :: moving(:)
+      !> Sums over all steps: 1 pairs, 2 contacts, 3 pairs that began, 4 pairs that ended, 5 contacts without direction
+      integer(lp) :: sums(5) = 0_lp
+   end type simulation_t
+
+contains
+
+   !> Simulated time [s]. It is a product, not a sum, and therefore has no accumulated rounding error.
+   pure real(wp) function time_of(self)
+      !> The simulation
+      type(simulation_t), intent(in) :: self
+
+      time_of = real(self%step, wp)*self%dt
+   end function time_of
+
+   !> Evaluate the energy and momentum balance; collective.
+   subroutine compute_balance(self, balance)
+      !> The simulation at the end of a step, with `output.ledger` on
+      type(simulation_t), intent(inout) :: self
+      !> Energy, momentum and their unexplained residuals
+      type(balance_t), intent(out) :: balance
+
+      call evaluate_balance(self%ledger, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
+                            self%incidence, self%contacts, balance)
+   end subroutine compute_balance
+
+end module polydem_simulation

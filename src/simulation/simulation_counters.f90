@@ -1,0 +1,100 @@
+!> Exact counters of a simulation, summed over all ranks.
+module polydem_simulation_counters
+   use polydem_communication_counters, only: report_communication
+   use polydem_contacts, only: is_degenerate
+   use polydem_counters, only: counters_t
+   use polydem_kinds, only: ip, lp
+   use polydem_ownership, only: owns_pair
+   use polydem_simulation, only: simulation_t
+   implicit none
+   private
+   public :: collect_counts, report_counters, count_own, count_contacts
+
+contains
+
+   !> Add up the counts of all ranks on the root rank, and reset them to zero on the other ranks. Collective.
+   subroutine collect_counts(self)
+      !> The simulation
+      type(simulation_t), intent(inout) :: self
+      integer(lp), allocatable :: counts(:)
+
+      if (self%comm%size == 1_ip) return
+      associate (value => self%neighbours%finder%work%value, n => size(self%sums))
+         counts = [self%sums, value]
+         call self%comm%all_reduce_sum(counts)
+         if (.not. self%comm%is_root()) counts = 0_lp
+         self%sums = counts(:n)
+         value = counts(n + 1:)
+      end associate
+   end subroutine collect_counts
+
+   !> Set the counters of the run so far. Pairs that began or ended and the finder statistics are summed over all ranks
+   !> that have the pair or ran the finder. All other items are counted once. Collective.
+   subroutine report_counters(self, counters)
+      !> The simulation
+      type(simulation_t), intent(inout) :: self
+      !> List of counters
+      type(counters_t), intent(inout) :: counters
+      integer(lp) :: counts(2)
+
+      counts = [int(self%boxes%n, lp), int(self%neighbours%pairs%n, lp)]
+      call self%comm%all_reduce_sum(counts)
+      call collect_counts(self)
+      call counters%set('steps', self%step)
+      call counters%set('bodies', int(self%bodies%n_all, lp))
+      call counters%set('boxes', counts(1))
+      call counters%set('pairs', self%sums(1))
+      call counters%set('pairs began', self%sums(3))
+      call counters%set('pairs ended', self%sums(4))
+      call counters%set('contacts', self%sums(2))
+      call counters%set('contacts without direction', self%sums(5))
+      call self%neighbours%report(counters)
+      call counters%set('pairs', counts(2))
+      if (allocated(self%law%constraint)) call self%law%constraint%report(counters)
+      call report_communication(self%comm, self%domain, size(self%bodies%free, kind=lp), &
+                           int(self%neighbours%pairs%n, lp), counters)
+   end subroutine report_counters
+
+   !> Add the pairs, the contacts and the contacts without direction that this rank owns to the sums over steps.
+   subroutine count_own(self)
+      !> The simulation, after the contacts of a step were found
+      type(simulation_t), intent(inout) :: self
+      integer(lp) :: n(3)
+      integer(ip) :: c, p
+
+      associate (pairs => self%neighbours%pairs, contacts => self%contacts, bodies => self%bodies)
+         n = int([pairs%n, contacts%n, contacts%n_degenerate], lp)
+         if (self%comm%size > 1_ip) then
+            do p = 1_ip, pairs%n
+               if (.not. owns_pair(bodies, pairs%first(p), pairs%second(p))) n(1) = n(1) - 1_lp
+            end do
+            do c = 1_ip, contacts%n
+               if (owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
+               n(2) = n(2) - 1_lp
+               if (contacts%n_degenerate > 0_ip) n(3) = n(3) - merge(1_lp, 0_lp, is_degenerate(contacts, c))
+            end do
+         end if
+      end associate
+      self%sums([1, 2, 5]) = self%sums([1, 2, 5]) + n
+   end subroutine count_own
+
+   !> Number of contacts on all ranks; collective.
+   subroutine count_contacts(simulation, n)
+      !> The simulation
+      type(simulation_t), intent(inout) :: simulation
+      !> Number of contacts
+      integer(ip), intent(out) :: n
+      integer(lp) :: counts(1)
+      integer(ip) :: c
+
+      counts = 0_lp
+      associate (contacts => simulation%contacts)
+         do c = 1_ip, contacts%n
+            if (owns_pair(simulation%bodies, contacts%first(c), contacts%second(c))) counts = counts + 1_lp
+         end do
+      end associate
+      call simulation%comm%all_reduce_sum(counts)
+      n = int(counts(1), ip)
+   end subroutine count_contacts
+
+end module polydem_simulation_counters

@@ -1,0 +1,116 @@
+!> Start of a simulation from given bodies: time step, forces and accelerations at time 0.
+module polydem_start_simulation
+   use polydem_bodies, only: bodies_t
+   use polydem_box_maker, only: update_boxes
+   use polydem_contact_history, only: at_area
+   use polydem_energy_balance, only: start_energy_balance
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_integrator_factory, only: new_integrator
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_local_bodies, only: fit_to_bodies
+   use polydem_prescribed_motion, only: motion_t
+   use polydem_serial_communicator, only: serial_communicator_t
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: simulation_t
+   use polydem_stable_step, only: stable_step_of_shapes
+   use polydem_strings, only: to_text
+   use polydem_time_step, only: compute_forces, move_walls
+   use polydem_timers, only: timers_t
+   implicit none
+   private
+   public :: start_simulation
+
+   !> Upper limit of the number of steps
+   real(wp), parameter :: most_steps = 1.0e15_wp
+
+contains
+
+   !> Set up a serial simulation with given bodies, and compute the forces at time 0.
+   subroutine start_simulation(settings, bodies, motions, self, error)
+      !> Checked settings; the group &scene is not used
+      type(settings_t), intent(in) :: settings
+      !> Bodies at the start
+      type(bodies_t), intent(in) :: bodies
+      !> Prescribed motions of fixed bodies
+      type(motion_t), intent(in) :: motions(:)
+      !> The simulation, ready to advance
+      type(simulation_t), intent(out) :: self
+      !> Allocated if bodies or settings are invalid
+      type(error_t), allocatable, intent(inout) :: error
+
+      allocate (serial_communicator_t :: self%comm)
+      self%settings = settings
+      self%bodies = bodies
+      self%motions = motions
+      call new_integrator(settings%integrate, self%integrator)
+      call choose_step(self, error)
+      if (.not. allocated(error)) call fit_to_bodies(self, error)
+      if (allocated(error)) return
+      call move_walls(self, 0.0_wp)
+      call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
+      call compute_forces(self, 0.0_wp, error)
+      if (allocated(error)) return
+      call start_integration(self)
+      if (settings%output%ledger) call start_energy_balance(self%ledger, self%comm, settings%forces%gravity, &
+                                                            self%bodies, self%incidence, self%contacts)
+      self%timers = timers_t()
+   end subroutine start_simulation
+
+   !> Set the accelerations at time 0: from the forces, or from gravity alone, depending on the integration scheme.
+   subroutine start_integration(self)
+      type(simulation_t), intent(inout) :: self
+      integer(ip) :: k
+
+      associate (bodies => self%bodies)
+         do k = 1_ip, size(bodies%free, kind=ip)
+            associate (s => bodies%free(k))
+               if (self%integrator%starts_from_forces) then
+                  bodies%acceleration(:, s) = bodies%force(:, s)*bodies%inverse_mass(s)
+                  bodies%angular_acceleration(s) = bodies%torque(s)*bodies%inverse_inertia(s)
+               else
+                  bodies%acceleration(:, s) = self%settings%forces%gravity
+                  bodies%angular_acceleration(s) = 0.0_wp
+               end if
+            end associate
+         end do
+         call self%integrator%start(bodies)
+      end associate
+      ! A scheme that ignores the forces at time 0 has no contact history before its first step.
+      associate (area => self%memory%column(at_area))
+         if (.not. self%integrator%starts_from_forces .and. allocated(area%value)) area%value = 0.0_wp
+      end associate
+   end subroutine start_integration
+
+   !> Use dt of the settings, or compute it: a fraction of the stable time step, reduced to divide the duration evenly.
+   subroutine choose_step(self, error)
+      type(simulation_t), intent(inout) :: self
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: critical
+      real(wp) :: steps
+
+      call stable_step_of_shapes(self%settings%forces, self%integrator%stability(), self%bodies, &
+                                 self%expected_stable_step, critical)
+      associate (settings => self%settings%integrate)
+         self%dt = settings%dt
+         if (self%dt <= 0.0_wp .and. (critical == 0_ip .or. .not. self%expected_stable_step > 0.0_wp)) then
+            call raise(error, input_error, self%settings%file//': cannot choose dt: there is no free body, or '// &
+                       'stiffness or mass is extreme. Set dt in &integrate')
+            return
+         end if
+         if (self%dt <= 0.0_wp) then
+            steps = settings%duration/(settings%fraction*self%expected_stable_step)
+            self%dt = settings%fraction*self%expected_stable_step
+            if (steps < most_steps) self%dt = settings%duration/real(max(1_lp, ceiling(steps, lp)), wp)
+         end if
+         steps = settings%duration/self%dt
+         if (.not. (steps >= 0.5_wp .and. steps < most_steps)) then
+            call raise(error, input_error, self%settings%file//': a duration of '//to_text(settings%duration)// &
+                       ' s with dt = '//to_text(self%dt)//' s requires '//to_text(steps)//' steps, but only 1 to '// &
+                       to_text(most_steps)//' are allowed. Change dt or duration in &integrate')
+            return
+         end if
+         self%n_steps = nint(steps, lp)
+      end associate
+   end subroutine choose_step
+
+end module polydem_start_simulation

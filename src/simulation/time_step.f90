@@ -1,0 +1,155 @@
+!> The time step of a simulation.
+module polydem_time_step
+   use polydem_assemble_forces, only: assemble_forces
+   use polydem_bodies, only: turn_bodies
+   use polydem_box_maker, only: update_boxes
+   use polydem_contact_incidence, only: index_contacts
+   use polydem_energy_balance, only: accumulate_step
+   use polydem_errors, only: error_t, raise, run_error
+   use polydem_find_contacts, only: find_contacts
+   use polydem_force_law, only: evaluate_law
+   use polydem_guards, only: check_contacts, check_motion, check_poses
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_prescribed_motion, only: move_bodies
+   use polydem_redistribution, only: restore_history, redistribute
+   use polydem_simulation, only: simulation_t, time_of
+   use polydem_simulation_counters, only: count_own
+   use polydem_strings, only: to_text
+   use polydem_timers, only: stage_boxes, stage_exchange, stage_forces, stage_integrate, stage_neighbours, stage_overlap
+   implicit none
+   private
+   public :: advance, compute_forces, move_walls
+
+contains
+
+   !> Advance by one time step. Collective. An error of one rank reaches all ranks within the step, or at the latest in
+   !> the all-reduce of errors after it.
+   subroutine advance(self, error)
+      !> The simulation
+      type(simulation_t), intent(inout) :: self
+      !> Allocated if the run must stop; names the body, its position and the step
+      type(error_t), allocatable, intent(inout) :: error
+
+      self%step = self%step + 1_lp
+      self%ledger%is_current = .false.
+      call self%timers%start()
+      call self%integrator%predict(self%dt, self%bodies)
+      call move_walls(self, time_of(self))
+      call check_poses(self%guard, self%bodies, self%step, error)
+      call self%timers%lap(stage_integrate)
+      call place_boxes(self, error)
+      if (allocated(error)) return
+      call compute_forces(self, self%dt, error)
+      ! A contact may stop the run here. Then no rank completes the step.
+      if (self%settings%overlap%degenerate == 'stop') call self%comm%all_reduce_error(error)
+      if (allocated(error)) return
+      call self%integrator%correct(self%dt, self%bodies)
+      call self%timers%lap(stage_integrate)
+      if (self%settings%output%ledger) then
+         call accumulate_step(self%ledger, self%settings%forces%gravity, self%bodies, self%incidence, self%contacts)
+         call self%timers%lap(stage_forces)
+      end if
+      call check_motion(self%guard, self%bodies, self%step, self%dt, error)
+      call self%timers%lap(stage_integrate)
+   end subroutine advance
+
+   !> Update halo, vertices and boxes from the predicted positions. Redistribute the bodies if necessary.
+   subroutine place_boxes(self, error)
+      type(simulation_t), intent(inout) :: self
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: is_parallel
+
+      is_parallel = self%comm%size > 1_ip
+      if (is_parallel) then
+         associate (domain => self%domain, comm => self%comm)
+            domain%step_messages = domain%step_messages - comm%messages
+            domain%step_bytes = domain%step_bytes - comm%bytes
+            call domain%halo%follow(comm, self%bodies)
+            domain%step_messages = domain%step_messages + comm%messages
+            domain%step_bytes = domain%step_bytes + comm%bytes
+         end associate
+         call self%timers%lap(stage_exchange)
+      end if
+      if (.not. allocated(error)) then
+         call turn_bodies(self%bodies, self%moving)
+         call self%timers%lap(stage_integrate)
+         call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
+         call self%timers%lap(stage_boxes)
+      end if
+      call redistribute(self, error)
+      if (.not. is_parallel) return
+      self%domain%halo_steps = self%domain%halo_steps + int(size(self%domain%halo%slots), lp)
+      call self%timers%lap(stage_exchange)
+   end subroutine place_boxes
+
+   !> Compute the forces on the bodies from their boxes: neighbours, contacts, force law. This is the middle of a step.
+   subroutine compute_forces(self, dt, error)
+      !> The simulation with updated boxes
+      type(simulation_t), intent(inout) :: self
+      !> Time step of the force law [s]; 0 at time 0
+      real(wp), intent(in) :: dt
+      !> Names the step and the contact or the finder that failed
+      type(error_t), allocatable, intent(inout) :: error
+
+      call self%neighbours%update(self%boxes)
+      if (self%neighbours%pairs%contradictions > 0_lp) then
+         call raise(error, run_error, 'step '//to_text(self%step)//': finder '// &
+                    self%settings%neighbours%finder//' reported changes that contradict its pair list. This is a '// &
+                    'program error; use finder all_pairs instead')
+         return
+      end if
+      call carry_history(self)
+      call restore_history(self)
+      call self%timers%lap(stage_neighbours)
+      associate (pairs => self%neighbours%pairs)
+         call find_contacts(self%bodies, pairs%n, pairs%first, pairs%second, self%memory, self%contacts)
+         self%sums(3:4) = self%sums(3:4) + int([pairs%n_began, pairs%n_ended], lp)
+      end associate
+      call count_own(self)
+      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%contacts, self%step, error)
+      call self%timers%lap(stage_overlap)
+      call evaluate_law(self%law, self%bodies, dt, self%contacts, self%memory)
+      call index_contacts(self%bodies%n, self%contacts, self%incidence)
+      call assemble_forces(self%settings%forces%gravity, self%incidence, self%contacts, self%bodies)
+      if (allocated(self%law%constraint)) call constrain(self, error)
+      call self%timers%lap(stage_forces)
+   end subroutine compute_forces
+
+   !> Add the forces of a velocity constraint.
+   subroutine constrain(self, error)
+      type(simulation_t), intent(inout) :: self
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(error)) return
+      call self%law%constraint%apply(self%dt, self%incidence, self%bodies, self%contacts, self%memory, error)
+      if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
+      call assemble_forces(self%settings%forces%gravity, self%incidence, self%contacts, self%bodies)
+   end subroutine constrain
+
+   !> Apply the moves of the pair list to the columns of the contact history.
+   subroutine carry_history(self)
+      type(simulation_t), intent(inout) :: self
+      integer :: k
+
+      associate (pairs => self%neighbours%pairs, memory => self%memory)
+         call pairs%carry(memory%separating_edge, 0_ip)
+         do k = 1, size(memory%column)
+            if (allocated(memory%column(k)%value)) call pairs%carry(memory%column(k)%value, 0.0_wp)
+         end do
+      end associate
+   end subroutine carry_history
+
+   !> Move the bodies with prescribed motion to their poses at a given time.
+   subroutine move_walls(self, time)
+      !> The simulation
+      type(simulation_t), intent(inout) :: self
+      !> Simulated time [s]
+      real(wp), intent(in) :: time
+      integer :: k
+
+      do k = 1, size(self%motions)
+         if (time >= self%motions(k)%start) call move_bodies(self%motions(k), time, self%bodies)
+      end do
+   end subroutine move_walls
+
+end module polydem_time_step

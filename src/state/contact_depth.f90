@@ -1,0 +1,108 @@
+!> Depth of contacts relative to the size of their bodies.
+!>
+!> The depth of a contact is its area over its length, which is the mean depth of the overlap. Its share is the depth
+!> over the thickness of the thinner body. A share of about 0.5 means that one body is passing through the other.
+module polydem_contact_depth
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contacts_t
+   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: depth_share, deepest_contact, any_deeper, count_deeper, depth_text
+
+contains
+
+   !> Depth of a contact as a share of the thinner body
+   pure real(wp) function depth_share(contacts, thickness, c)
+      !> Contacts
+      type(contacts_t), intent(in) :: contacts
+      !> Thickness of each body, (slot) [m]
+      real(wp), intent(in) :: thickness(:)
+      !> Index of the contact
+      integer(ip), intent(in) :: c
+
+      depth_share = contacts%area(c)/(contacts%length(c)*min(thickness(contacts%first(c)), &
+                                                             thickness(contacts%second(c))))
+   end function depth_share
+
+   !> The contact with the greatest share, 0 if there are no contacts
+   pure integer(ip) function deepest_contact(contacts, thickness)
+      !> Contacts
+      type(contacts_t), intent(in) :: contacts
+      !> Thickness of each body, (slot) [m]
+      real(wp), intent(in) :: thickness(:)
+      real(wp) :: share, greatest
+      integer(ip) :: c
+
+      deepest_contact = 0_ip
+      greatest = -1.0_wp
+      do c = 1_ip, contacts%n
+         share = depth_share(contacts, thickness, c)
+         if (share > greatest) then
+            greatest = share
+            deepest_contact = c
+         end if
+      end do
+   end function deepest_contact
+
+   !> Whether any contact is deeper than a share of the thinner body
+   logical function any_deeper(contacts, thickness, limit)
+      !> Contacts
+      type(contacts_t), intent(in) :: contacts
+      !> Thickness of each body, (slot) [m]
+      real(wp), intent(in) :: thickness(:)
+      !> Share of the thinner body
+      real(wp), intent(in) :: limit
+      integer(ip) :: c
+      logical :: deeper
+
+      deeper = .false.
+      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
+      !$omp    shared(contacts, thickness, limit) private(c) reduction(.or.:deeper)
+      do c = 1_ip, contacts%n
+         deeper = deeper .or. contacts%area(c) > limit*contacts%length(c) &
+            *min(thickness(contacts%first(c)), thickness(contacts%second(c)))
+      end do
+      !$omp end parallel do
+      any_deeper = deeper
+   end function any_deeper
+
+   !> Number of contacts deeper than a share of the thinner body
+   pure integer(ip) function count_deeper(contacts, thickness, limit)
+      !> Contacts
+      type(contacts_t), intent(in) :: contacts
+      !> Thickness of each body, (slot) [m]
+      real(wp), intent(in) :: thickness(:)
+      !> Share of the thinner body
+      real(wp), intent(in) :: limit
+      integer(ip) :: c
+
+      count_deeper = 0_ip
+      do c = 1_ip, contacts%n
+         if (depth_share(contacts, thickness, c) > limit) count_deeper = count_deeper + 1_ip
+      end do
+   end function count_deeper
+
+   !> Clause for a message: bodies, position and depth of a contact
+   function depth_text(bodies, contacts, thickness, c) result(text)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts
+      type(contacts_t), intent(in) :: contacts
+      !> Thickness of each body, (slot) [m]
+      real(wp), intent(in) :: thickness(:)
+      !> Index of the contact
+      integer(ip), intent(in) :: c
+      character(len=:), allocatable :: text
+
+      associate (i => contacts%first(c), j => contacts%second(c))
+         text = 'the bodies '//to_text(bodies%id(i))//' and '//to_text(bodies%id(j))//' at ('// &
+            to_text(bodies%position(1, i) + contacts%arm_first(1, c))//', '// &
+            to_text(bodies%position(2, i) + contacts%arm_first(2, c))//') m overlap by '// &
+            to_text(contacts%area(c)/contacts%length(c), 3)//' m, '// &
+            to_text(depth_share(contacts, thickness, c), 3)//' of the thinner body'
+      end associate
+   end function depth_text
+
+end module polydem_contact_depth

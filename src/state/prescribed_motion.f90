@@ -1,0 +1,185 @@
+!> Prescribed motion of fixed bodies: rotation about a pivot, translation, oscillation.
+!>
+!> The displacement is a closed function of time, never a sum over steps. Every motion starts smoothly: during
+!> the ramp the rate rises as s(u) = u^2 (3 - 2 u) with u = (t - start)/ramp; the integral of s is u^3 - u^4/2.
+module polydem_prescribed_motion
+   use polydem_bodies, only: bodies_t
+   use polydem_kinds, only: ip, wp
+   implicit none
+   private
+   public :: motion_t, new_motion, move_bodies, motion_names
+
+   !> Kinds of motion, as in the namelist
+   character(len=*), parameter :: motion_names(3) = &
+      [character(len=11) :: 'rotation', 'translation', 'oscillation']
+
+   !> Prescribed motion of a set of fixed bodies
+   type :: motion_t
+      !> One of motion_names
+      character(len=11) :: kind = ''
+      !> Centre of a rotation, (2) [m]
+      real(wp) :: pivot(2) = 0.0_wp
+      !> Angular velocity of a rotation, anticlockwise [rad/s]
+      real(wp) :: rate = 0.0_wp
+      !> Velocity of a translation, (2) [m/s]
+      real(wp) :: velocity(2) = 0.0_wp
+      !> Amplitude of an oscillation, (2) [m]
+      real(wp) :: amplitude(2) = 0.0_wp
+      !> Angular frequency of an oscillation [rad/s]
+      real(wp) :: frequency = 0.0_wp
+      !> Time at which the motion begins [s]
+      real(wp) :: start = 0.0_wp
+      !> Time from the start to the full rate [s]
+      real(wp) :: ramp = 0.0_wp
+      !> Slots of the bodies that it moves
+      integer(ip), allocatable :: slots(:)
+      !> Their positions before the motion, (2, :) [m]
+      real(wp), allocatable :: position(:, :)
+      !> Their angles before the motion [rad]
+      real(wp), allocatable :: angle(:)
+   end type motion_t
+
+contains
+
+   !> Make a motion of some bodies from their present positions and angles.
+   subroutine new_motion(motion, prescription, bodies, slots)
+      !> The motion with slots, positions and angles of its bodies
+      type(motion_t), intent(out) :: motion
+      !> Parameters of the motion; its `slots`, `position` and `angle` are ignored
+      type(motion_t), intent(in) :: prescription
+      !> All bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the bodies to move
+      integer(ip), intent(in) :: slots(:)
+
+      motion = prescription
+      motion%slots = slots
+      motion%position = bodies%position(:, slots)
+      motion%angle = bodies%angle(slots)
+   end subroutine new_motion
+
+   !> Set positions, angles, velocities and accelerations of the bodies of a motion at a time.
+   subroutine move_bodies(motion, time, bodies)
+      !> The motion
+      type(motion_t), intent(in) :: motion
+      !> Time since the start of the run [s]
+      real(wp), intent(in) :: time
+      !> Bodies; position, angle, velocities and accelerations of the bodies of the motion change
+      type(bodies_t), intent(inout) :: bodies
+
+      select case (motion%kind)
+      case ('rotation')
+         call rotate(motion, time, bodies)
+      case ('translation')
+         call translate(motion, time, bodies)
+      case default
+         call oscillate(motion, time, bodies)
+      end select
+   end subroutine move_bodies
+
+   subroutine rotate(motion, time, bodies)
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: time
+      type(bodies_t), intent(inout) :: bodies
+      real(wp) :: turn, rate, growth, c, s, arm(2)
+      integer(ip) :: k, slot
+
+      turn = motion%rate*elapsed(motion, time)
+      rate = motion%rate*ramp_factor(motion, time)
+      growth = motion%rate*ramp_growth(motion, time)
+      c = cos(turn)
+      s = sin(turn)
+      do k = 1_ip, size(motion%slots, kind=ip)
+         slot = motion%slots(k)
+         arm = motion%position(:, k) - motion%pivot
+         arm = [c*arm(1) - s*arm(2), s*arm(1) + c*arm(2)]
+         bodies%position(:, slot) = motion%pivot + arm
+         bodies%angle(slot) = motion%angle(k) + turn
+         bodies%velocity(:, slot) = [-rate*arm(2), rate*arm(1)]
+         bodies%angular_velocity(slot) = rate
+         bodies%acceleration(:, slot) = [-growth*arm(2), growth*arm(1)] - rate**2*arm
+         bodies%angular_acceleration(slot) = growth
+      end do
+   end subroutine rotate
+
+   subroutine translate(motion, time, bodies)
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: time
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: k
+
+      do k = 1_ip, size(motion%slots, kind=ip)
+         associate (slot => motion%slots(k))
+            bodies%position(:, slot) = motion%position(:, k) + motion%velocity*elapsed(motion, time)
+            bodies%velocity(:, slot) = motion%velocity*ramp_factor(motion, time)
+            bodies%acceleration(:, slot) = motion%velocity*ramp_growth(motion, time)
+         end associate
+      end do
+   end subroutine translate
+
+   !> x = x0 + a sin(w e(t)) with the ramped time e. The amplitude is full from the start; the frequency rises.
+   subroutine oscillate(motion, time, bodies)
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: time
+      type(bodies_t), intent(inout) :: bodies
+      real(wp) :: phase, rate, speed, change
+      integer(ip) :: k
+
+      phase = motion%frequency*elapsed(motion, time)
+      rate = motion%frequency*ramp_factor(motion, time)
+      speed = rate*cos(phase)
+      change = motion%frequency*ramp_growth(motion, time)*cos(phase) - rate**2*sin(phase)
+      do k = 1_ip, size(motion%slots, kind=ip)
+         associate (slot => motion%slots(k))
+            bodies%position(:, slot) = motion%position(:, k) + motion%amplitude*sin(phase)
+            bodies%velocity(:, slot) = motion%amplitude*speed
+            bodies%acceleration(:, slot) = motion%amplitude*change
+         end associate
+      end do
+   end subroutine oscillate
+
+   !> Fraction of the full rate at a time
+   pure real(wp) function ramp_factor(motion, time)
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: time
+      real(wp) :: u
+
+      if (time < motion%start) then
+         ramp_factor = 0.0_wp
+      else if (time - motion%start >= motion%ramp) then
+         ramp_factor = 1.0_wp
+      else
+         u = (time - motion%start)/motion%ramp
+         ramp_factor = u*u*(3.0_wp - 2.0_wp*u)
+      end if
+   end function ramp_factor
+
+   !> Derivative of the ramp factor [1/s]
+   pure real(wp) function ramp_growth(motion, time)
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: time
+      real(wp) :: u
+
+      ramp_growth = 0.0_wp
+      if (time <= motion%start .or. time - motion%start >= motion%ramp) return
+      u = (time - motion%start)/motion%ramp
+      ramp_growth = 6.0_wp*u*(1.0_wp - u)/motion%ramp
+   end function ramp_growth
+
+   !> Integral of the ramp factor from the start to a time [s]
+   pure real(wp) function elapsed(motion, time)
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: time
+      real(wp) :: u
+
+      if (time < motion%start) then
+         elapsed = 0.0_wp
+      else if (time - motion%start >= motion%ramp) then
+         elapsed = time - motion%start - 0.5_wp*motion%ramp
+      else
+         u = (time - motion%start)/motion%ramp
+         elapsed = motion%ramp*u*u*u*(1.0_wp - 0.5_wp*u)
+      end if
+   end function elapsed
+
+end module polydem_prescribed_motion

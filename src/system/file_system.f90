@@ -1,0 +1,357 @@
+!> Operations on files and folders (POSIX): create, rename, remove, reserve disk space, flush to disk.
+module polydem_file_system
+   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_int64_t, c_loc, c_null_char, c_ptr, c_size_t
+   use polydem_errors, only: error_t, io_error, raise
+   use polydem_kinds, only: lp
+   implicit none
+   private
+   public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_space, sync_file, overwrite_start
+   public :: check_access, last_failure, errno_message, disk_hint
+
+   !> Hint for messages about files that cannot be written
+   character(len=*), parameter :: disk_hint = &
+      '. Is the disk full, or the file size limited (ulimit -f)? Free space or choose another folder, and run '// &
+      'again; files that were closed earlier are complete'
+
+   !> F_OK of access(2)
+   integer(c_int), parameter :: existence = 0_c_int
+   !> R_OK of access(2)
+   integer(c_int), parameter :: may_read = 4_c_int
+   !> O_RDONLY of open(2)
+   integer(c_int), parameter :: read_only = 0_c_int
+   !> O_WRONLY and O_RDWR of open(2)
+   integer(c_int), parameter :: write_only = 1_c_int, read_and_write = 2_c_int
+   !> FALLOC_FL_KEEP_SIZE of fallocate(2): the length of the file does not change
+   integer(c_int), parameter :: keep_size = 1_c_int
+   !> SEEK_END of lseek(2)
+   integer(c_int), parameter :: to_end = 2_c_int
+   !> EIO, ENOSPC and EDQUOT of errno on Linux: disk fault, disk full, quota of the user exceeded
+   integer(c_int), parameter :: no_space(3) = [5_c_int, 28_c_int, 122_c_int]
+   !> Permissions of a new folder before umask: rwxrwxrwx
+   integer(c_int), parameter :: all_permissions = int(o'777', c_int)
+   !> Permissions of the owner: rwx------
+   integer(c_int), parameter :: of_owner = int(o'700', c_int)
+   !> User identifier of root, who may read and write everything
+   integer(c_int), parameter :: superuser = 0_c_int
+
+   interface
+      !> POSIX access(2)
+      integer(c_int) function c_access(path, mode) bind(C, name='access')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: mode
+      end function c_access
+
+      !> POSIX mkdir(2)
+      integer(c_int) function c_mkdir(path, mode) bind(C, name='mkdir')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: mode
+      end function c_mkdir
+
+      !> POSIX umask(2)
+      integer(c_int) function c_umask(mask) bind(C, name='umask')
+         import :: c_int
+         integer(c_int), value :: mask
+      end function c_umask
+
+      !> POSIX geteuid(2)
+      integer(c_int) function c_user() bind(C, name='geteuid')
+         import :: c_int
+      end function c_user
+
+      !> POSIX rename(2)
+      integer(c_int) function c_rename(from, to) bind(C, name='rename')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: from(*), to(*)
+      end function c_rename
+
+      !> POSIX unlink(2)
+      integer(c_int) function c_unlink(path) bind(C, name='unlink')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+      end function c_unlink
+
+      !> POSIX open(2) of an existing file; only new files need the mode
+      integer(c_int) function c_open(path, flags) bind(C, name='open')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: flags
+      end function c_open
+
+      !> POSIX write(2); ssize_t is as wide as size_t
+      integer(c_size_t) function c_write(descriptor, bytes, length) bind(C, name='write')
+         import :: c_int, c_ptr, c_size_t
+         integer(c_int), value :: descriptor
+         type(c_ptr), value :: bytes
+         integer(c_size_t), value :: length
+      end function c_write
+
+      !> POSIX fsync(2)
+      integer(c_int) function c_fsync(descriptor) bind(C, name='fsync')
+         import :: c_int
+         integer(c_int), value :: descriptor
+      end function c_fsync
+
+      !> POSIX lseek(2) with 64-bit offsets (GNU C library)
+      integer(c_int64_t) function c_lseek(descriptor, offset, from) bind(C, name='lseek64')
+         import :: c_int, c_int64_t
+         integer(c_int), value :: descriptor
+         integer(c_int64_t), value :: offset
+         integer(c_int), value :: from
+      end function c_lseek
+
+      !> Linux fallocate(2) with 64-bit offsets
+      integer(c_int) function c_fallocate(descriptor, mode, offset, length) bind(C, name='fallocate64')
+         import :: c_int, c_int64_t
+         integer(c_int), value :: descriptor, mode
+         integer(c_int64_t), value :: offset, length
+      end function c_fallocate
+
+      !> POSIX close(2)
+      integer(c_int) function c_close(descriptor) bind(C, name='close')
+         import :: c_int
+         integer(c_int), value :: descriptor
+      end function c_close
+
+      !> Address of errno (Linux)
+      type(c_ptr) function errno_location() bind(C, name='__errno_location')
+         import :: c_ptr
+      end function errno_location
+
+      !> POSIX strerror(3)
+      type(c_ptr) function c_strerror(number) bind(C, name='strerror')
+         import :: c_int, c_ptr
+         integer(c_int), value :: number
+      end function c_strerror
+
+      !> C strlen
+      integer(c_size_t) function c_strlen(text) bind(C, name='strlen')
+         import :: c_ptr, c_size_t
+         type(c_ptr), value :: text
+      end function c_strlen
+   end interface
+
+contains
+
+   !> Whether a file or folder exists
+   logical function exists(path)
+      !> Path of the file or folder
+      character(len=*), intent(in) :: path
+
+      exists = c_access(path//c_null_char, existence) == 0_c_int
+   end function exists
+
+   !> Whether a folder exists
+   logical function is_folder(path)
+      !> Path of the folder
+      character(len=*), intent(in) :: path
+
+      is_folder = exists(path//'/.')
+   end function is_folder
+
+   !> Create a folder and its missing parents, and flush their names to disk. An existing folder is not changed. If the
+   !> umask removes any permission of the owner from new files and folders, nothing is created and the call fails.
+   subroutine make_folder(path, error)
+      !> Path of the folder
+      character(len=*), intent(in) :: path
+      !> Allocated if the folder does not exist afterwards
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: reason
+      integer :: k
+
+      call check_umask(path, error)
+      if (allocated(error)) return
+      reason = ''
+      do k = 2, len(path) + 1
+         if (k <= len(path)) then
+            if (path(k:k) /= '/') cycle
+         end if
+         if (exists(path(:k - 1))) cycle
+         if (c_mkdir(path(:k - 1)//c_null_char, all_permissions) /= 0_c_int) then
+            reason = last_failure()
+         else
+            call sync_folder_of(path(:k - 1), error)
+         end if
+      end do
+      if (allocated(error)) return
+      if (is_folder(path)) return
+      if (exists(path)) reason = 'it is a file'
+      call raise(error, io_error, "cannot make the folder '"//path//"': "//reason)
+   end subroutine make_folder
+
+   !> Fail if the umask removes a permission of the owner.
+   subroutine check_umask(path, error)
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(inout) :: error
+      integer(c_int) :: mask, ignored
+      character(len=4) :: digits
+
+      ! The umask can only be read by setting it.
+      mask = c_umask(0_c_int)
+      ignored = c_umask(mask)
+      if (iand(mask, of_owner) == 0_c_int) return
+      if (c_user() == superuser) return
+      write (digits, '(o4.4)') mask
+      call raise(error, io_error, "'"//path//"': the umask "//digits//' removes your permission to read, write or '// &
+                 'enter new files and folders; nothing is created. Call umask 022 and run again')
+   end subroutine check_umask
+
+   !> Flush the directory entry of a new folder to disk. If its parent cannot be read, this is left to the operating
+   !> system.
+   subroutine sync_folder_of(path, error)
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: above
+
+      above = path(:index(path, '/', back=.true.))
+      if (above == '') above = '.'
+      if (c_access(above//c_null_char, may_read) == 0_c_int) call sync_file(above, error)
+   end subroutine sync_folder_of
+
+   !> Rename a file atomically. An existing file of the new name is replaced.
+   subroutine rename_file(from, to, error)
+      !> Current path
+      character(len=*), intent(in) :: from
+      !> New path, on the same file system
+      character(len=*), intent(in) :: to
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (c_rename(from//c_null_char, to//c_null_char) == 0_c_int) return
+      call raise(error, io_error, "cannot rename '"//from//"' to '"//to//"': "//last_failure())
+   end subroutine rename_file
+
+   !> Remove a file.
+   subroutine remove_file(path, error)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (c_unlink(path//c_null_char) == 0_c_int) return
+      call raise(error, io_error, "cannot remove '"//path//"': "//last_failure())
+   end subroutine remove_file
+
+   !> Reserve disk space for a file. Later writes within this space do not find the disk full. If the file system does
+   !> not support reservations, enough space is assumed.
+   subroutine reserve_space(path, bytes, error)
+      !> Path of the file, which must exist
+      character(len=*), intent(in) :: path
+      !> Space after the end of the file [B]; holes in the file are filled too
+      integer(lp), intent(in) :: bytes
+      !> Allocated if the space is not available
+      type(error_t), allocatable, intent(inout) :: error
+      integer(c_int) :: descriptor
+      integer(c_int), pointer :: number
+
+      descriptor = c_open(path//c_null_char, write_only)
+      if (descriptor < 0_c_int) then
+         call raise(error, io_error, "cannot open '"//path//"' for writing: "//last_failure())
+         return
+      end if
+      call c_f_pointer(errno_location(), number)
+      if (c_fallocate(descriptor, keep_size, 0_c_int64_t, &
+                      c_lseek(descriptor, 0_c_int64_t, to_end) + int(bytes, c_int64_t)) /= 0_c_int) then
+         if (any(no_space == number)) call raise(error, io_error, path//': '//last_failure()//disk_hint)
+      end if
+      if (c_close(descriptor) /= 0_c_int) call raise(error, io_error, path//': '//last_failure()//disk_hint)
+   end subroutine reserve_space
+
+   !> Check that a file can be opened for reading and writing.
+   subroutine check_access(path, error)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Allocated if it cannot be opened
+      type(error_t), allocatable, intent(inout) :: error
+      integer(c_int) :: descriptor
+
+      descriptor = c_open(path//c_null_char, read_and_write)
+      if (descriptor >= 0_c_int) then
+         if (c_close(descriptor) == 0_c_int) return
+      end if
+      call raise(error, io_error, path//': cannot be opened: '//last_failure())
+   end subroutine check_access
+
+   !> Overwrite the first bytes of a file with a text, and wait until it is on the disk. Every call is checked. Fortran
+   !> input/output does not report a failed flush.
+   subroutine overwrite_start(path, text, error)
+      !> Path of the file, which must exist
+      character(len=*), intent(in) :: path
+      !> The text
+      character(len=*), intent(in) :: text
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      character(kind=c_char), target :: bytes(len(text))
+      character(len=:), allocatable :: reason
+      integer(c_int) :: descriptor
+      integer(c_size_t) :: written
+      integer :: k, n
+
+      do k = 1, len(text)
+         bytes(k) = text(k:k)
+      end do
+      descriptor = c_open(path//c_null_char, write_only)
+      if (descriptor < 0_c_int) reason = last_failure()
+      n = 0
+      do while (n < len(text) .and. .not. allocated(reason))
+         written = c_write(descriptor, c_loc(bytes(n + 1)), int(len(text) - n, c_size_t))
+         if (written <= 0_c_size_t) reason = last_failure()
+         n = n + int(written)
+      end do
+      if (.not. allocated(reason)) then
+         if (c_fsync(descriptor) /= 0_c_int) reason = last_failure()
+      end if
+      if (descriptor >= 0_c_int) then
+         if (c_close(descriptor) /= 0_c_int .and. .not. allocated(reason)) reason = last_failure()
+      end if
+      if (allocated(reason)) call raise(error, io_error, path//': cannot be written: '//reason//disk_hint)
+   end subroutine overwrite_start
+
+   !> Wait until a closed file, or the list of names of a folder, is on the disk.
+   subroutine sync_file(path, error)
+      !> Path of the file or folder
+      character(len=*), intent(in) :: path
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      integer(c_int) :: descriptor, status
+      character(len=:), allocatable :: reason
+
+      descriptor = c_open(path//c_null_char, read_only)
+      if (descriptor < 0_c_int) then
+         call raise(error, io_error, "cannot open '"//path//"' to flush it to disk: "//last_failure())
+         return
+      end if
+      status = c_fsync(descriptor)
+      if (status /= 0_c_int) reason = last_failure()
+      if (c_close(descriptor) /= 0_c_int .and. status == 0_c_int) reason = last_failure()
+      if (allocated(reason)) call raise(error, io_error, "cannot flush '"//path//"' to disk: "//reason)
+   end subroutine sync_file
+
+   !> Error message of the operating system for its last failed call
+   function last_failure() result(reason)
+      character(len=:), allocatable :: reason
+      integer(c_int), pointer :: number
+
+      call c_f_pointer(errno_location(), number)
+      reason = errno_message(number)
+   end function last_failure
+
+   !> Error message of the operating system for a value of errno
+   function errno_message(number) result(reason)
+      !> Value of errno
+      integer(c_int), intent(in) :: number
+      character(len=:), allocatable :: reason
+      character(kind=c_char), pointer :: letters(:)
+      type(c_ptr) :: text
+      integer :: k
+
+      text = c_strerror(number)
+      call c_f_pointer(text, letters, [c_strlen(text)])
+      allocate (character(len=size(letters)) :: reason)
+      do k = 1, size(letters)
+         reason(k:k) = letters(k)
+      end do
+   end function errno_message
+
+end module polydem_file_system

@@ -1,0 +1,183 @@
+!> Contents of folders (POSIX, GNU C library on Linux): lists of names, links, canonical paths, and the bytes of small
+!> files.
+module polydem_folders
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_null_char, c_null_ptr, c_ptr, &
+      c_size_t
+   use polydem_errors, only: error_t, io_error, raise
+   use polydem_file_system, only: last_failure
+   implicit none
+   private
+   public :: link_exists, list_names, read_bytes, remove_folder, canonical_path
+
+   !> AT_FDCWD of openat(2): paths are relative to the working directory
+   integer(c_int), parameter :: working_directory = -100_c_int
+   !> AT_SYMLINK_NOFOLLOW of openat(2)
+   integer(c_int), parameter :: link_itself = 256_c_int
+   !> F_OK of access(2)
+   integer(c_int), parameter :: existence = 0_c_int
+   !> Offset of d_name in struct dirent of 64-bit Linux, after inode number, offset, length and type [B]
+   integer, parameter :: name_offset = 19
+   !> Maximum length of a file name (NAME_MAX of Linux)
+   integer, parameter :: max_name_length = 255
+
+   interface
+      !> POSIX faccessat(2)
+      integer(c_int) function c_faccessat(folder, path, mode, flags) bind(C, name='faccessat')
+         import :: c_char, c_int
+         integer(c_int), value :: folder
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: mode, flags
+      end function c_faccessat
+
+      !> POSIX opendir(3)
+      type(c_ptr) function c_opendir(path) bind(C, name='opendir')
+         import :: c_char, c_ptr
+         character(kind=c_char), intent(in) :: path(*)
+      end function c_opendir
+
+      !> POSIX readdir(3)
+      type(c_ptr) function c_readdir(stream) bind(C, name='readdir')
+         import :: c_ptr
+         type(c_ptr), value :: stream
+      end function c_readdir
+
+      !> POSIX closedir(3)
+      integer(c_int) function c_closedir(stream) bind(C, name='closedir')
+         import :: c_int, c_ptr
+         type(c_ptr), value :: stream
+      end function c_closedir
+
+      !> POSIX rmdir(2)
+      integer(c_int) function c_rmdir(path) bind(C, name='rmdir')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+      end function c_rmdir
+
+      !> POSIX realpath(3), which allocates its result if `resolved` is null
+      type(c_ptr) function c_realpath(path, resolved) bind(C, name='realpath')
+         import :: c_char, c_ptr
+         character(kind=c_char), intent(in) :: path(*)
+         type(c_ptr), value :: resolved
+      end function c_realpath
+
+      !> C strlen
+      integer(c_size_t) function c_strlen(text) bind(C, name='strlen')
+         import :: c_ptr, c_size_t
+         type(c_ptr), value :: text
+      end function c_strlen
+
+      !> C free
+      subroutine c_free(memory) bind(C, name='free')
+         import :: c_ptr
+         type(c_ptr), value :: memory
+      end subroutine c_free
+   end interface
+
+contains
+
+   !> Whether a file, folder or link exists, including a link without a target
+   logical function link_exists(path)
+      !> Path of a file, folder or link
+      character(len=*), intent(in) :: path
+
+      link_exists = c_faccessat(working_directory, path//c_null_char, existence, link_itself) == 0_c_int
+   end function link_exists
+
+   !> List the names in a folder, in no particular order. The list is empty if the folder does not exist.
+   subroutine list_names(folder, names, error)
+      !> Path of the folder
+      character(len=*), intent(in) :: folder
+      !> Names, blank-padded
+      character(len=max_name_length), allocatable, intent(out) :: names(:)
+      !> Allocated if the folder exists but cannot be read
+      type(error_t), allocatable, intent(inout) :: error
+      type(c_ptr) :: stream, entry
+      integer(c_int) :: ignored
+      character(len=max_name_length) :: name
+
+      allocate (names(0))
+      if (.not. link_exists(folder)) return
+      stream = c_opendir(folder//c_null_char)
+      if (.not. c_associated(stream)) then
+         call raise(error, io_error, "cannot list the folder '"//folder//"': "//last_failure())
+         return
+      end if
+      do
+         entry = c_readdir(stream)
+         if (.not. c_associated(entry)) exit
+         name = name_of(entry)
+         if (name /= '.' .and. name /= '..') names = [names, name]
+      end do
+      ignored = c_closedir(stream)
+   end subroutine list_names
+
+   !> Name in a directory entry
+   function name_of(entry) result(name)
+      type(c_ptr), intent(in) :: entry
+      character(len=max_name_length) :: name
+      character(kind=c_char), pointer :: letters(:)
+      integer :: k
+
+      call c_f_pointer(entry, letters, [name_offset + max_name_length + 1])
+      name = ''
+      do k = 1, max_name_length
+         if (letters(name_offset + k) == c_null_char) exit
+         name(k:k) = letters(name_offset + k)
+      end do
+   end function name_of
+
+   !> Read all bytes of a small file.
+   subroutine read_bytes(path, text, problem)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Bytes of the file
+      character(len=:), allocatable, intent(out) :: text
+      !> Reason why the file cannot be read; not allocated on success
+      character(len=:), allocatable, intent(out) :: problem
+      character(len=256) :: reason
+      integer :: bytes, status, unit
+
+      text = ''
+      open (newunit=unit, file=path, access='stream', form='unformatted', action='read', status='old', &
+            iostat=status, iomsg=reason)
+      if (status == 0) then
+         inquire (unit=unit, size=bytes)
+         deallocate (text)
+         allocate (character(len=max(0, bytes)) :: text)
+         if (bytes > 0) read (unit, iostat=status, iomsg=reason) text
+         close (unit)
+      end if
+      if (status /= 0) problem = 'cannot be read: '//trim(reason)
+   end subroutine read_bytes
+
+   !> Remove an empty folder. A folder that is not empty is kept.
+   subroutine remove_folder(path)
+      !> Path of the folder
+      character(len=*), intent(in) :: path
+      integer(c_int) :: ignored
+
+      ignored = c_rmdir(path//c_null_char)
+   end subroutine remove_folder
+
+   !> Canonical path of a file or folder, without links, '.' and '..'; empty if it does not exist
+   function canonical_path(path) result(resolved)
+      !> Any path of the file or folder
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: resolved
+      character(kind=c_char), pointer :: letters(:)
+      type(c_ptr) :: text
+      integer :: k
+
+      resolved = ''
+      text = c_realpath(path//c_null_char, c_null_ptr)
+      if (.not. c_associated(text)) return
+      call c_f_pointer(text, letters, [c_strlen(text)])
+      deallocate (resolved)
+      allocate (character(len=size(letters)) :: resolved)
+      do k = 1, size(letters)
+         resolved(k:k) = letters(k)
+      end do
+      call c_free(text)
+   end function canonical_path
+
+end module polydem_folders

@@ -1,0 +1,192 @@
+!> Unbuffered text output to a file or to the screen.
+!>
+!> Every written line survives a crash of the program, and every failure is detected. The Fortran `flush` statement does
+!> not report a full disk.
+module polydem_line_writer
+   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_loc, c_new_line, c_null_char, c_ptr, c_size_t
+   use, intrinsic :: iso_fortran_env, only: output_unit
+   use polydem_errors, only: error_t, io_error, raise
+   use polydem_file_system, only: exists, last_failure
+   implicit none
+   private
+   public :: line_writer_t
+
+   !> An open text file, or the screen. Writing has no effect if it is closed or after a failure. It is no failure if
+   !> the screen is a pipe whose reader has stopped, as with `| head`.
+   type :: line_writer_t
+      private
+      !> File descriptor; negative if closed
+      integer(c_int) :: descriptor = -1_c_int
+      !> Path of the file, or name of the stream, for messages
+      character(len=:), allocatable :: name
+      !> Reason of the first failed write
+      character(len=:), allocatable :: failure
+   contains
+      procedure :: open => open_writer
+      procedure :: open_screen
+      procedure :: open_errors
+      procedure :: put
+      procedure :: put_line
+      procedure :: check
+      procedure :: close => close_writer
+      procedure, private :: is_screen
+   end type line_writer_t
+
+   !> Descriptor of standard output
+   integer(c_int), parameter :: standard_output = 1_c_int
+   !> Descriptor of standard error
+   integer(c_int), parameter :: standard_error = 2_c_int
+   !> EPIPE of errno on Linux: the reader of the pipe has closed it
+   integer(c_int), parameter :: broken_pipe = 32_c_int
+   !> Permissions of a new file before umask: rw-rw-rw-
+   integer(c_int), parameter :: read_and_write = int(o'666', c_int)
+   !> O_WRONLY and O_APPEND of Linux
+   integer(c_int), parameter :: write_and_append = int(o'2001', c_int)
+
+   interface
+      !> POSIX creat(2)
+      integer(c_int) function c_creat(path, mode) bind(C, name='creat')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: mode
+      end function c_creat
+
+      !> POSIX open(2) of an existing file
+      integer(c_int) function c_open(path, flags) bind(C, name='open')
+         import :: c_char, c_int
+         character(kind=c_char), intent(in) :: path(*)
+         integer(c_int), value :: flags
+      end function c_open
+
+      !> POSIX write(2); ssize_t is as wide as size_t
+      integer(c_size_t) function c_write(descriptor, bytes, length) bind(C, name='write')
+         import :: c_int, c_ptr, c_size_t
+         integer(c_int), value :: descriptor
+         type(c_ptr), value :: bytes
+         integer(c_size_t), value :: length
+      end function c_write
+
+      !> POSIX close(2)
+      integer(c_int) function c_close(descriptor) bind(C, name='close')
+         import :: c_int
+         integer(c_int), value :: descriptor
+      end function c_close
+
+      !> Address of errno (Linux)
+      type(c_ptr) function errno_location() bind(C, name='__errno_location')
+         import :: c_ptr
+      end function errno_location
+   end interface
+
+contains
+
+   !> Open a file for writing. An existing file is replaced unless `appended` is true.
+   subroutine open_writer(self, path, error, appended)
+      class(line_writer_t), intent(inout) :: self
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Allocated on failure
+      type(error_t), allocatable, intent(inout) :: error
+      !> Whether to append to an existing file; false if absent
+      logical, intent(in), optional :: appended
+      logical :: appends
+
+      self%name = path
+      if (allocated(self%failure)) deallocate (self%failure)
+      appends = exists(path)
+      if (appends) appends = present(appended)
+      if (appends) appends = appended
+      if (appends) self%descriptor = c_open(path//c_null_char, write_and_append)
+      if (.not. appends) self%descriptor = c_creat(path//c_null_char, read_and_write)
+      if (self%descriptor < 0_c_int) call raise(error, io_error, path//': cannot be written: '//last_failure())
+   end subroutine open_writer
+
+   !> Open standard output. Its previous Fortran output is flushed before each write.
+   subroutine open_screen(self)
+      class(line_writer_t), intent(inout) :: self
+
+      self%name = 'standard output'
+      if (allocated(self%failure)) deallocate (self%failure)
+      self%descriptor = standard_output
+   end subroutine open_screen
+
+   !> Open standard error.
+   subroutine open_errors(self)
+      class(line_writer_t), intent(inout) :: self
+
+      self%name = 'standard error'
+      if (allocated(self%failure)) deallocate (self%failure)
+      self%descriptor = standard_error
+   end subroutine open_errors
+
+   !> Write a text unchanged. A failure is stored and reported by `check` and `close`.
+   subroutine put(self, text)
+      class(line_writer_t), intent(inout) :: self
+      !> The text
+      character(len=*), intent(in) :: text
+      character(kind=c_char), target :: bytes(len(text))
+      integer(c_size_t) :: written
+      integer(c_int), pointer :: number
+      integer :: k, n, ignored
+
+      if (self%descriptor < 0_c_int .or. allocated(self%failure)) return
+      if (self%descriptor == standard_output) flush (output_unit, iostat=ignored)
+      do k = 1, len(text)
+         bytes(k) = text(k:k)
+      end do
+      n = 0
+      do while (n < len(text))
+         written = c_write(self%descriptor, c_loc(bytes(n + 1)), int(len(text) - n, c_size_t))
+         if (written <= 0_c_size_t) then
+            call c_f_pointer(errno_location(), number)
+            if (self%is_screen() .and. number == broken_pipe) then
+               self%descriptor = -1_c_int
+            else
+               self%failure = last_failure()
+            end if
+            return
+         end if
+         n = n + int(written)
+      end do
+   end subroutine put
+
+   !> Write a text and a line feed.
+   subroutine put_line(self, text)
+      class(line_writer_t), intent(inout) :: self
+      !> The line
+      character(len=*), intent(in) :: text
+
+      call self%put(text//c_new_line)
+   end subroutine put_line
+
+   !> Report a failed write while the file is open.
+   subroutine check(self, error)
+      class(line_writer_t), intent(in) :: self
+      !> Allocated if a text could not be written
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(self%failure)) call raise(error, io_error, self%name//': cannot be written: '//self%failure)
+   end subroutine check
+
+   !> Close the file and report a failed write. A stream of the screen stays open.
+   subroutine close_writer(self, error)
+      class(line_writer_t), intent(inout) :: self
+      !> Allocated if a write failed
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (self%descriptor < 0_c_int) return
+      if (.not. self%is_screen()) then
+         if (c_close(self%descriptor) /= 0_c_int .and. .not. allocated(self%failure)) self%failure = last_failure()
+      end if
+      self%descriptor = -1_c_int
+      call self%check(error)
+   end subroutine close_writer
+
+   !> Whether the writer uses standard output or standard error
+   pure logical function is_screen(self)
+      class(line_writer_t), intent(in) :: self
+
+      is_screen = self%descriptor == standard_output .or. self%descriptor == standard_error
+   end function is_screen
+
+end module polydem_line_writer

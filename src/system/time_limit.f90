@@ -1,0 +1,176 @@
+!> A time limit for calls that may never return (Linux).
+!>
+!> Ranks that write a file in parallel wait for each other inside HDF5 and MPI. If one rank fails there without
+!> returning, for example because only this rank cannot open the file, the others wait for ever. Only a timer can detect
+!> this. The operating system runs the timer. When it expires, a thread prints a message and ends this process; MPI then
+!> ends the other ranks.
+module polydem_time_limit
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_funloc, c_funptr, c_int, c_long, c_new_line, &
+      c_null_char, c_null_ptr, c_ptr, c_size_t
+   use polydem_errors, only: io_error
+   use polydem_kinds, only: dp, ip, lp
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: time_limit_t, patience_variable
+
+   !> Name of the environment variable that sets the time limit without the time for writing [s]
+   character(len=*), parameter :: patience_variable = 'POLYDEM_PATIENCE'
+   !> Default of that time [s]; it is longer than file systems need to recover from the loss of a server
+   real(dp), parameter :: default_patience = 600.0_dp
+   !> Minimum write rate of any disk [B/s]
+   real(dp), parameter :: min_rate = 1.0e6_dp
+   !> CLOCK_MONOTONIC and SIGEV_THREAD of Linux, and the descriptor of standard error
+   integer(c_int), parameter :: monotonic_clock = 1_c_int, by_thread = 2_c_int, standard_error = 2_c_int
+
+   !> A time limit, which may be set or not
+   type :: time_limit_t
+      private
+      !> The timer of the operating system
+      type(c_ptr) :: timer = c_null_ptr
+      !> The message as a C string; null if no limit is set
+      type(c_ptr) :: message = c_null_ptr
+   contains
+      procedure :: set
+      procedure :: lift
+   end type time_limit_t
+
+   !> struct sigevent of the GNU C library, 64 bytes
+   type, bind(C) :: event_t
+      !> Argument of the procedure
+      type(c_ptr) :: value
+      !> Number of a signal; not used
+      integer(c_int) :: signal
+      !> Kind of the notification, here a thread
+      integer(c_int) :: notify
+      !> Procedure that is called when the timer expires
+      type(c_funptr) :: procedure
+      !> Attributes of the thread
+      type(c_ptr) :: attributes
+      !> Reserved for the library
+      integer(c_int) :: rest(8)
+   end type event_t
+
+   !> POSIX struct itimerspec
+   type, bind(C) :: times_t
+      !> Period of a repeated timer [s, ns]; zero here
+      integer(c_long) :: period(2)
+      !> Time until the timer expires [s, ns]
+      integer(c_long) :: first(2)
+   end type times_t
+
+   interface
+      !> POSIX timer_create(2)
+      integer(c_int) function timer_create(clock, event, timer) bind(C, name='timer_create')
+         import :: c_int, c_ptr, event_t
+         integer(c_int), value :: clock
+         type(event_t), intent(in) :: event
+         type(c_ptr), intent(out) :: timer
+      end function timer_create
+
+      !> POSIX timer_settime(2)
+      integer(c_int) function timer_settime(timer, flags, new, old) bind(C, name='timer_settime')
+         import :: c_int, c_ptr, times_t
+         type(c_ptr), value :: timer
+         integer(c_int), value :: flags
+         type(times_t), intent(in) :: new
+         type(c_ptr), value :: old
+      end function timer_settime
+
+      !> POSIX timer_delete(2)
+      integer(c_int) function timer_delete(timer) bind(C, name='timer_delete')
+         import :: c_int, c_ptr
+         type(c_ptr), value :: timer
+      end function timer_delete
+
+      !> POSIX strdup(3)
+      type(c_ptr) function c_strdup(text) bind(C, name='strdup')
+         import :: c_char, c_ptr
+         character(kind=c_char), intent(in) :: text(*)
+      end function c_strdup
+
+      !> C strlen
+      integer(c_size_t) function c_strlen(text) bind(C, name='strlen')
+         import :: c_ptr, c_size_t
+         type(c_ptr), value :: text
+      end function c_strlen
+
+      !> C free
+      subroutine c_free(memory) bind(C, name='free')
+         import :: c_ptr
+         type(c_ptr), value :: memory
+      end subroutine c_free
+
+      !> POSIX write(2); ssize_t is as wide as size_t
+      integer(c_size_t) function c_write(descriptor, bytes, length) bind(C, name='write')
+         import :: c_int, c_ptr, c_size_t
+         integer(c_int), value :: descriptor
+         type(c_ptr), value :: bytes
+         integer(c_size_t), value :: length
+      end function c_write
+
+      !> POSIX _exit(2)
+      subroutine c_exit_now(code) bind(C, name='_exit')
+         import :: c_int
+         integer(c_int), value :: code
+      end subroutine c_exit_now
+   end interface
+
+contains
+
+   !> Start the time limit. It ends this process unless `lift` is called in time.
+   subroutine set(self, path, rank, bytes)
+      class(time_limit_t), intent(inout) :: self
+      !> Path of the file that will be written
+      character(len=*), intent(in) :: path
+      !> Rank of this process
+      integer(ip), intent(in) :: rank
+      !> Maximum number of bytes that will be written [B]
+      integer(lp), intent(in) :: bytes
+      real(dp) :: patience
+      character(len=32) :: text
+      integer :: status
+      integer(lp) :: seconds
+
+      call self%lift()
+      call get_environment_variable(patience_variable, text)
+      read (text, *, iostat=status) patience
+      if (status /= 0) patience = default_patience
+      seconds = ceiling(min(max(1.0_dp, patience) + real(bytes, dp)/min_rate, 1.0e9_dp), lp)
+      self%message = c_strdup('polydem: '//path//': rank '//to_text(rank)//' has not finished writing this file '// &
+                              'after '//to_text(seconds)//' s: the disk or another rank does not respond. This '// &
+                              'rank ends the run. Check that all ranks can write there. Run the same command with '// &
+                              '--continue to resume; set '//patience_variable//'=SECONDS in the environment to '// &
+                              'wait longer'//c_new_line//c_null_char)
+      if (timer_create(monotonic_clock, event_t(value=self%message, signal=0_c_int, notify=by_thread, &
+                                                procedure=c_funloc(end_process), attributes=c_null_ptr, &
+                                                rest=0_c_int), self%timer) == 0_c_int) then
+         if (timer_settime(self%timer, 0_c_int, times_t(period=0_c_long, first=[int(seconds, c_long), 0_c_long]), &
+                           c_null_ptr) == 0_c_int) return
+         if (timer_delete(self%timer) /= 0_c_int) self%timer = c_null_ptr
+      end if
+      ! If no timer is available, the run continues without a limit.
+      call c_free(self%message)
+      self%message = c_null_ptr
+   end subroutine set
+
+   !> Cancel the time limit; nothing happens if none is set.
+   subroutine lift(self)
+      class(time_limit_t), intent(inout) :: self
+
+      if (.not. c_associated(self%message)) return
+      if (timer_delete(self%timer) == 0_c_int) self%timer = c_null_ptr
+      call c_free(self%message)
+      self%message = c_null_ptr
+   end subroutine lift
+
+   !> Print the message and end this process.
+   subroutine end_process(message) bind(C)
+      type(c_ptr), value :: message
+      integer(c_size_t) :: written
+
+      written = c_write(standard_error, message, c_strlen(message))
+      call c_exit_now(int(io_error, c_int))
+   end subroutine end_process
+
+end module polydem_time_limit

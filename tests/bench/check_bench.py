@@ -1,0 +1,93 @@
+"""A bench that is killed at any time resumes where it stopped.
+
+usage: check_bench.py PROGRAM
+
+The test starts and kills a bench of two tiny scenes until one call ends by itself. The files must be those of an
+undisturbed bench, and no sample may be taken twice.
+"""
+
+import os
+import random
+import re
+import subprocess
+import sys
+import tempfile
+
+SCENE = """\
+&scene name = 'gas' bodies = 200 fraction = 0.35 speed = 2 /
+&forces gravity = 0, 0 /
+&integrate dt = 2e-5 duration = 1.2e-3 /
+&output trace_steps = 40 trace_start = 2e-4 /
+"""
+BENCH = """\
+&bench
+   scenes = 'gas.nml', 'gas.nml scene.bodies=50'
+   names = 'many', 'few'
+   finders = 'quadtree', 'sort_and_sweep'
+   threads = 1, 2
+   repeats = 5
+/
+"""
+SAMPLES = 2 * 2 * 2 * 6
+MOST_KILLS = 200
+
+
+def call(program, folder, seconds=None):
+    """Start the bench in a folder; kill it after `seconds`, unless None. Return its exit code and output."""
+    arguments = [program, "bench", "bench.nml", "--set", f"bench.folder={folder}"]
+    environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
+    with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+                          env=environment) as process:
+        try:
+            output, _ = process.communicate(timeout=seconds)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            output, _ = process.communicate()
+    return process.returncode, output
+
+
+def files_of(folder):
+    """Traces, reference lists and samples in a folder. A kill may truncate the other files of a run."""
+    paths = (os.path.relpath(os.path.join(top, name), folder) for top, _, names in os.walk(folder) for name in names)
+    return sorted(path for path in paths if not path.startswith("traces") or path.endswith("trace.h5"))
+
+
+def hash_of(path):
+    """The texts of 16 hexadecimal digits in a file: hashes of boxes or states, and of pairs."""
+    with open(path, "rb") as file:
+        return sorted(set(re.findall(rb"(?<![0-9a-f])[0-9a-f]{16}", file.read())))
+
+
+def main():
+    program = os.path.abspath(sys.argv[1])
+    chance = random.Random(3)
+    with tempfile.TemporaryDirectory() as work:
+        os.chdir(work)
+        for name, text in (("gas.nml", SCENE), ("bench.nml", BENCH)):
+            with open(name, "w", encoding="utf-8") as file:
+                file.write(text)
+        code, output = call(program, "whole")
+        assert code == 0, output
+        assert len(re.findall(r" of 48 ", output)) == SAMPLES == 48, output
+
+        taken, killed, code = 0, 0, -9
+        while code == -9:
+            code, output = call(program, "killed", chance.uniform(0.05, 0.3) if killed < MOST_KILLS else None)
+            taken += len(re.findall(r" of 48 ", output))
+            killed += code == -9
+        assert code == 0, output
+        assert killed >= 3, f"killed only {killed} times: the bench is too short for this test"
+        # A kill between the renaming of a sample and its line on the screen hides one line.
+        assert SAMPLES - killed <= taken <= SAMPLES, (taken, killed)
+        assert files_of("killed") == files_of("whole"), (files_of("killed"), files_of("whole"))
+        for name in files_of("whole"):
+            if name.startswith(("samples", "oracle")):
+                assert len(hash_of(f"whole/{name}")) >= 2, name
+                assert hash_of(f"killed/{name}") == hash_of(f"whole/{name}"), name
+
+        code, output = call(program, "killed")
+        assert code == 0 and " of 48 " not in output, output
+
+
+if __name__ == "__main__":
+    main()

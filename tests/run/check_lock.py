@@ -1,0 +1,238 @@
+"""Runs that need the folder of another run, which is alive, dead, stopped, or on another machine.
+
+usage: check_lock.py PROGRAM CONTENDED_SYSTEM
+
+CONTENDED_SYSTEM is the library of contended_system.c. It makes the clock run 20 times as fast, so no test takes
+a minute.
+"""
+
+import contextlib
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+
+from check_continue import BAD_INPUT, EARLY, NO_FILE, Case, wait_for
+from check_faults import environment
+from continued_run import start, write_scene
+
+#: Options of a run that does not end by itself
+ENDLESS = ("--set", "integrate.duration=100", "--set", "checkpoint.steps=0", "--set", "checkpoint.elapsed=0.2",
+           "--set", "output.frame_interval=1", "--set", "output.contacts=.false.")
+KEY = "0123456789abcdef"
+
+
+def lock_of(folder):
+    """Path of the lock of a folder."""
+    return os.path.join(folder, "running.lock")
+
+
+def read(path):
+    """Text of a file; empty if it is not there."""
+    with contextlib.suppress(FileNotFoundError):
+        with open(path, encoding="utf-8") as file:
+            return file.read()
+    return ""
+
+
+def words_of(process, host, kernel, guard="lock", count=0):
+    """Text of a lock as a run leaves it"""
+    return (f"{process} {host}\nsince then\nkernel {kernel}\nguard {guard}\nkey {KEY}\n"
+            f"renewed {count:010}\n")
+
+
+def write(folder, words):
+    """Write a lock as another process leaves it."""
+    with open(lock_of(folder), "w", encoding="utf-8") as file:
+        file.write(words)
+
+
+@contextlib.contextmanager
+def held(case, folder, *options):
+    """A run that does not end by itself, after its first checkpoint; the context always ends it."""
+    with start(case.program, folder, *ENDLESS, *options) as process:
+        try:
+            wait_for(lambda: os.path.exists(os.path.join(folder, "checkpoint_1.h5")))
+            yield process
+        finally:
+            process.kill()
+
+
+def end(process):
+    """End a run that holds a folder, with a checkpoint."""
+    process.send_signal(signal.SIGTERM)
+    _, message = process.communicate(timeout=60)
+    assert process.returncode == EARLY, message
+
+
+def assert_refused(case, folder, process):
+    """Check that no other run may continue or overwrite a live run, and that the message names its process."""
+    for options in ("--continue",), ("--force",):
+        code, _, message = case.run(folder, *options)
+        assert code == BAD_INPUT, (code, message)
+        assert f"another run (process {process}" in message and "choose another folder" in message, message
+
+
+def states_of(folder):
+    """Sizes and times of all files but the segment being written."""
+    return {name: (os.stat(os.path.join(folder, name)).st_size, os.stat(os.path.join(folder, name)).st_mtime_ns)
+            for name in os.listdir(folder) if not name.endswith((".open", ".lock"))}
+
+
+def a_living_run_keeps_others_out_also_when_it_stands_still(case, _):
+    with held(case, "living") as process:
+        assert_refused(case, "living", process.pid)
+        process.send_signal(signal.SIGSTOP)
+        assert_refused(case, "living", process.pid)
+        process.send_signal(signal.SIGCONT)
+        end(process)
+    assert not os.path.exists(lock_of("living"))
+
+
+def a_killed_run_keeps_nobody_out(case, _):
+    # The test waits for the dead process only after the next run, so it stays a zombie until then.
+    with start(case.program, "killed") as process:
+        wait_for(lambda: os.path.exists("killed/checkpoint_2.h5"))
+        process.kill()
+        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+        assert f"of process {process.pid}, which has ended" in case.finish("killed")
+
+
+def a_process_number_that_another_one_has_now_keeps_nobody_out(case, _):
+    with open("/proc/sys/kernel/random/boot_id", encoding="utf-8") as file:
+        kernel = file.read().strip()
+    host = os.uname().nodename
+    with held(case, "other") as other:
+        for words in words_of(1, host, kernel), words_of(other.pid, host, kernel), f"{os.getpid()} {host}\n":
+            case.interrupt("reused")
+            write("reused", words)
+            assert f"of process {words.split()[0]}, which has ended" in case.finish("reused")
+            shutil.rmtree("reused")
+        # Only a process with the name of the program can be an older version of it.
+        case.interrupt("reused")
+        write("reused", f"{other.pid} {host}\n")
+        assert_refused(case, "reused", other.pid)
+    case.finish("reused")
+
+
+def processes_of_other_namespaces_keep_each_other_out(case, _):
+    command = ["unshare", "--pid", "--fork", "--kill-child"]
+    if subprocess.run([*command, "true"], capture_output=True).returncode != 0:
+        print("  skipped: no namespace of process numbers may be made here")
+        return
+    options = ["run", "scene.nml", "--set", "output.folder=spaces", *ENDLESS]
+    with subprocess.Popen([*command, case.program, *options], stdout=subprocess.DEVNULL) as holder:
+        try:
+            wait_for(lambda: os.path.exists("spaces/checkpoint_1.h5"))
+            assert read(lock_of("spaces")).startswith("1 "), "the process has the number 1"
+            code, _, message = case.run("spaces", "--continue")
+            assert code == BAD_INPUT and "another run (process 1)" in message, (code, message)
+            inside = subprocess.run([*command, case.program, *options, "--continue"], capture_output=True, text=True,
+                                    timeout=60)
+            assert inside.returncode == BAD_INPUT and "another run (process 1)" in inside.stderr, inside
+        finally:
+            holder.kill()
+    code, output, message = case.run("spaces", *ENDLESS, "--continue", "--walltime", "00:00:10")
+    assert code == EARLY and "took over spaces/running.lock of process 1, which has ended" in output, (output, message)
+
+
+def another_machine_is_refused_while_it_gives_signs_of_life(case, _):
+    case.interrupt("far")
+    write("far", words_of(4711, "far.away", "another-kernel"))
+    done = threading.Event()
+
+    def live():
+        count = 0
+        while not done.wait(0.3):
+            count += 1
+            with open(lock_of("far"), "r+", encoding="utf-8") as file:
+                file.write(words_of(4711, "far.away", "another-kernel", count=count))
+
+    thread = threading.Thread(target=live)
+    thread.start()
+    try:
+        assert_refused(case, "far", "4711 on the machine far.away")
+    finally:
+        done.set()
+        thread.join()
+
+
+def another_machine_without_signs_of_life_is_taken_over_with_a_sentence(case, library):
+    with environment(LD_PRELOAD=library, POLYDEM_HOSTILE="haste"):
+        case.interrupt("gone")
+        write("gone", words_of(4711, "far.away", "another-kernel"))
+        began = time.monotonic()
+        output = case.finish("gone")
+        seconds = time.monotonic() - began
+        note = "of process 4711 on the machine far.away, which gave no sign of life for 60 s"
+        assert output.count(note) == 1 and seconds >= 3.0, (output, seconds)
+        assert "waiting up to 60 s for a sign of life" in output and note in read("gone/log.txt")
+
+
+def a_run_whose_folder_was_taken_over_ends_and_writes_nothing_more(case, library):
+    with environment(LD_PRELOAD=library, POLYDEM_HOSTILE="haste"):
+        for words in words_of(4711, "far.away", "another-kernel"), None:
+            with held(case, "lost", "--set", "checkpoint.elapsed=20", "--set", "output.log_interval=1") as process:
+                process.send_signal(signal.SIGSTOP)
+                # The pause exceeds the timeout of the lock; the run detects this before it writes.
+                time.sleep(1.5)
+                os.remove(lock_of("lost"))
+                if words is not None:
+                    write("lost", words)
+                before = states_of("lost")
+                process.send_signal(signal.SIGCONT)
+                _, message = process.communicate(timeout=30)
+            assert process.returncode == NO_FILE and "is gone or belongs to another run" in message, message
+            assert states_of("lost") == before, (before, states_of("lost"))
+            assert read(lock_of("lost")) == (words or "")
+            shutil.rmtree("lost")
+
+
+def where_nothing_can_be_locked_signs_of_life_decide(case, library):
+    with environment(LD_PRELOAD=library, POLYDEM_HOSTILE="locks haste", HDF5_USE_FILE_LOCKING="FALSE"):
+        with held(case, "unlocked") as process:
+            assert "guard heartbeat\n" in read(lock_of("unlocked"))
+            with environment(POLYDEM_HOSTILE="locks"):
+                assert_refused(case, "unlocked", process.pid)
+        code, output, message = case.run("unlocked", *ENDLESS, "--continue", "--walltime", "00:01:30")
+    assert code == EARLY, (code, message)
+    assert f"of process {process.pid}, which gave no sign of life for 60 s" in output, output
+    assert not os.path.exists(lock_of("unlocked"))
+
+
+def no_other_program_gets_the_descriptor(case, _):
+    with held(case, "closed") as process:
+        flags = [re.search(r"^flags:\s*(\d+)", read(f"/proc/{process.pid}/fdinfo/{name}"), re.MULTILINE).group(1)
+                 for name in os.listdir(f"/proc/{process.pid}/fd")
+                 if os.readlink(f"/proc/{process.pid}/fd/{name}").endswith("running.lock")]
+        assert len(flags) == 1 and int(flags[0], 8) & os.O_CLOEXEC, flags
+        end(process)
+
+
+TESTS = (a_living_run_keeps_others_out_also_when_it_stands_still, a_killed_run_keeps_nobody_out,
+         a_process_number_that_another_one_has_now_keeps_nobody_out, processes_of_other_namespaces_keep_each_other_out,
+         another_machine_is_refused_while_it_gives_signs_of_life,
+         another_machine_without_signs_of_life_is_taken_over_with_a_sentence,
+         a_run_whose_folder_was_taken_over_ends_and_writes_nothing_more,
+         where_nothing_can_be_locked_signs_of_life_decide, no_other_program_gets_the_descriptor)
+
+
+def main():
+    program, library = (os.path.abspath(word) for word in sys.argv[1:3])
+    with tempfile.TemporaryDirectory() as work:
+        os.chdir(work)
+        write_scene()
+        case = Case(program)
+        for test in TESTS:
+            began = time.monotonic()
+            test(case, library)
+            print(f"{test.__name__.replace('_', ' ')}: {time.monotonic() - began:.1f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()

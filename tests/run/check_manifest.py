@@ -1,0 +1,342 @@
+"""The manifest: damage is found, files of other origin stay, and `--force` always leaves one complete result.
+
+usage: check_manifest.py PROGRAM HOSTILE_SYSTEM [all]
+
+HOSTILE_SYSTEM is the library of hostile_system.c. With `all`, a run with `--force` is disturbed at every single call to
+the system; otherwise at all calls before its first frame and at some of the later ones.
+"""
+
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+#: Few bodies, so a run takes some milliseconds; they overlap, so a run writes overlaps.csv
+SCENE = """\
+&scene name = 'gas' bodies = 6 fraction = 0.8 overlap = .true. speed = 0.5 spin = 20 /
+&forces stiffness = 1e6 /
+&integrate dt = 1e-5 duration = 1.2e-4 /
+&output frame_interval = 2e-5 frames_per_segment = 3 /
+&guards listed_depth = 1e-9 /
+&checkpoint steps = 5 /
+"""
+#: Enough bodies for the packing of another scene
+BED = "&scene name = 'bed' bodies = 700 / &integrate duration = 5e-4 /\n"
+#: Options that record boxes and steps
+RECORDED = ("--set", "output.trace_steps=3", "--set", "output.step_profile=.true.")
+#: Options of another run, whose files differ
+OTHER = ("--set", "forces.friction_coefficient=0.5")
+#: Names that files of a result have
+NAMES = ("trace.h5", "steps.h5", "overlaps.csv", "profile.h5", "trajectory_0001.h5", "trajectory_0007.h5", "log.txt",
+         "checkpoint_1.h5", "checkpoint_2.h5", "manifest.txt")
+ENDINGS = ("", ".unfinished", ".open")
+#: Exit codes of a run, as README.md lists them
+BAD_INPUT, NO_FILE = 2, 3
+WAYS = ((), ("--continue",), ("--force",))
+
+
+class Program:
+    """The program, and an undisturbed result."""
+
+    def __init__(self, path, library):
+        self.path = path
+        self.library = library
+        write("scene.nml", SCENE.encode())
+        write("bed.nml", BED.encode())
+        code, output, message = self.run("whole", *RECORDED)
+        assert code == 0, message
+        self.hash = output.splitlines()[-1]
+        assert self.check("whole")[0] == 0, self.check("whole")
+
+    def call(self, *words, **hostile):
+        environment = {**os.environ, "OMP_NUM_THREADS": "1", **hostile}
+        done = subprocess.run([self.path, *words], capture_output=True, text=True, env=environment, check=False)
+        return done.returncode, done.stdout, done.stderr
+
+    def run(self, folder, *options, scene="scene.nml", **hostile):
+        return self.call("run", scene, "--threads", "1", "--set", f"output.folder={folder}", *options, **hostile)
+
+    def check(self, folder):
+        code, output, message = self.call("info", "--check", folder)
+        assert (code == 0) == ("WRONG" not in output), (code, output, message)
+        return code, output, message
+
+
+def contents(folder):
+    """Bytes of all files below a folder, by path."""
+    found = {}
+    for place, _, names in os.walk(folder):
+        for name in names:
+            path = os.path.join(place, name)
+            with open(path, "rb") as file:
+                found[os.path.relpath(path, folder)] = file.read()
+    return found
+
+
+def write(path, data):
+    with open(path, "wb") as file:
+        file.write(data)
+
+
+def segments(folder):
+    return sorted(name for name in os.listdir(folder) if re.fullmatch(r"trajectory_\d{4}\.h5", name))
+
+
+def copy(name, source="whole"):
+    shutil.rmtree(name, ignore_errors=True)
+    shutil.copytree(source, name)
+    return name
+
+
+def every_file_is_listed_with_its_checksum(program):
+    code, output, _ = program.check("whole")
+    files = sorted(os.listdir("whole"))
+    assert code == 0 and sorted(re.findall(r"^ok +(\S+)", output, re.MULTILINE)) == files, (output, files)
+    assert {"trace.h5", "steps.h5", "overlaps.csv", "profile.h5", "trajectory_0002.h5", "checkpoint_2.h5"} <= {*files}
+
+
+def flipped_bits_are_found(program):
+    chance = random.Random(4)
+    folder = copy("flipped")
+    n_tried = 0
+    for name, n_flips in (("trajectory_0001.h5", 40), ("trajectory_0003.h5", 20), ("profile.h5", 40),
+                          ("manifest.txt", 60), ("trace.h5", 10), ("steps.h5", 10), ("overlaps.csv", 10),
+                          ("checkpoint_1.h5", 10)):
+        with open(f"whole/{name}", "rb") as file:
+            good = file.read()
+        for k in range(n_flips):
+            # Spread over the whole file, the first and the last byte among them
+            place = k * (len(good) - 1) // (n_flips - 1)
+            bad = bytearray(good)
+            bad[place] ^= 1 << chance.randrange(8)
+            write(f"{folder}/{name}", bad)
+            code, output, _ = program.check(folder)
+            assert code == NO_FILE and f"WRONG  {name}" in output, (name, place, output)
+            if k % 4 == 0 and not name.startswith("checkpoint"):
+                code, _, message = program.run(folder, "--continue", *RECORDED)
+                assert code != 0 and f"{folder}/{name}" in message, (name, place, code, message)
+            n_tried += 1
+        write(f"{folder}/{name}", good)
+    assert program.check(folder)[0] == 0
+    print(f"  {n_tried} bits")
+
+
+def missing_cut_and_exchanged_files_are_found(program):
+    code, _, message = program.run("other", *RECORDED, *OTHER)
+    assert code == 0, message
+    names = [*segments("whole"), "profile.h5", "trace.h5", "overlaps.csv"]
+    assert len(names) == 6, names
+
+    def expect(name, folder):
+        code, output, _ = program.check(folder)
+        assert code == NO_FILE and f"WRONG  {name}" in output, (name, output)
+        before = contents(folder)
+        code, _, message = program.run(folder, "--continue", *RECORDED)
+        assert code == NO_FILE and f"{folder}/{name}" in message and "--force" in message, (name, code, message)
+        assert contents(folder) == before
+
+    for name in names:
+        folder = copy("missing")
+        os.remove(f"{folder}/{name}")
+        expect(name, folder)
+        for length in (0, 100, os.path.getsize(f"whole/{name}") - 1):
+            folder = copy("cut")
+            os.truncate(f"{folder}/{name}", length)
+            expect(name, folder)
+        if name == "overlaps.csv":
+            continue  # the same in both results
+        folder = copy("exchanged")
+        shutil.copy(f"other/{name}", folder)
+        expect(name, folder)
+    folder = copy("swapped")
+    os.rename(f"{folder}/{names[0]}", "aside")
+    os.rename(f"{folder}/{names[1]}", f"{folder}/{names[0]}")
+    os.rename("aside", f"{folder}/{names[1]}")
+    expect(names[0], folder)
+    # A truncated manifest of any length is detected.
+    with open("whole/manifest.txt", "rb") as file:
+        good = file.read()
+    folder = copy("cut")
+    for length in range(0, len(good), 23):
+        write(f"{folder}/manifest.txt", good[:length])
+        code, output, _ = program.check(folder)
+        assert code == NO_FILE, (length, output)
+
+
+def files_of_somebody_else_stay(program):
+    for name in NAMES:
+        for ending in ENDINGS:
+            for way in WAYS:
+                shutil.rmtree("foreign", ignore_errors=True)
+                os.makedirs("foreign")
+                write(f"foreign/{name}{ending}", b"foreign")
+                code, _, message = program.run("foreign", *way, *RECORDED)
+                if (name, ending) == ("manifest.txt", ".open"):
+                    assert code == 0, message  # nothing ever has this name
+                else:
+                    assert code == BAD_INPUT and f"foreign/{name}{ending}" in message, (name, ending, way, message)
+                    assert "Move the file away" in message and os.listdir("foreign") == [name + ending], message
+                assert contents("foreign")[name + ending] == b"foreign", (name, ending, way)
+    # Beside a result that has no such file
+    code, _, message = program.run("plain", "--set", "guards.listed_depth=1")
+    assert code == 0, message
+    for name in ("trace.h5", "steps.h5", "overlaps.csv", "mine.txt", "replaced.h5"):
+        for ending in ENDINGS:
+            for way in WAYS:
+                folder = copy("beside", "plain")
+                write(f"{folder}/{name}{ending}", b"foreign")
+                code, _, message = program.run(folder, *way, "--set", "guards.listed_depth=1")
+                assert code == (0 if way else BAD_INPUT), (name, way, message)
+                assert contents(folder)[name + ending] == b"foreign", (name, ending, way)
+                assert program.check(folder)[0] == 0, (name, ending, way)
+    # A file in the way of another run also protects the result.
+    folder = copy("beside", "plain")
+    write(f"{folder}/trace.h5", b"foreign")
+    before = contents(folder)
+    code, _, message = program.run(folder, "--force", *RECORDED)
+    assert code == BAD_INPUT and f"{folder}/trace.h5 blocks a file of the result" in message, message
+    assert contents(folder) == before
+    # A folder with the name of the backup does so, too.
+    folder = copy("beside", "plain")
+    os.makedirs(f"{folder}/replaced")
+    write(f"{folder}/replaced/log.txt", b"foreign")
+    before = contents(folder)
+    code, _, message = program.run(folder, "--force")
+    assert code == BAD_INPUT and f"{folder}/replaced blocks a file of the result" in message, message
+    assert contents(folder) == before
+
+
+def a_result_without_a_manifest_is_left_alone(program):
+    folder = copy("older")
+    os.remove(f"{folder}/manifest.txt")
+    before = contents(folder)
+    for way in WAYS:
+        code, _, message = program.run(folder, *way, *RECORDED)
+        assert code == BAD_INPUT and "Results of older versions" in message, (way, message)
+        assert contents(folder) == before
+    code, _, message = program.call("info", "--check", folder)
+    assert code == NO_FILE and "has no manifest.txt" in message, message
+
+
+def force_does_not_replace_its_own_input(program):
+    code, _, message = program.run("packed", scene="bed.nml")
+    assert code == 0, message
+    os.symlink("packed", "link")
+    os.symlink("packed/trajectory_0001.h5", "segment")
+    shutil.copy("scene.nml", "packed/log.txt")
+    os.symlink("packed/log.txt", "log.nml")
+    before = contents("packed")
+    packings = ("packed", "./packed/../packed", "link", "packed/trajectory_0001.h5", "segment")
+    calls = [("bed.nml", ("--set", f"scene.packing={path}", "--set", "scene.bodies=20")) for path in packings]
+    calls += [("packed/log.txt", ()), ("log.nml", ())]
+    for scene, options in calls:
+        for folder in ("packed", "link"):
+            code, _, message = program.run(folder, "--force", *options, scene=scene)
+            assert code == BAD_INPUT and "--force would replace" in message, (scene, options, code, message)
+            assert contents("packed") == before
+    code, _, message = program.run("unpacked", "--force", *calls[0][1], scene="bed.nml")
+    assert code == 0, message
+
+
+def other_bodies_are_not_taken_for_the_finished_run(program):
+    bed = ("--set", "scene.packing=grains", "--set", "scene.bodies=20")
+    for seed in (1, 2):
+        code, _, message = program.run(f"grains_{seed}", "--set", f"scene.seed={seed}", scene="bed.nml")
+        assert code == 0, message
+    shutil.copytree("grains_1", "grains")
+    for checkpoints in (("--set", "checkpoint.steps=4"), ("--set", "checkpoint.steps=0")):
+        shutil.rmtree("poured", ignore_errors=True)
+        copy("grains", "grains_1")
+        code, _, message = program.run("poured", *bed, *checkpoints, scene="bed.nml")
+        assert code == 0, message
+        code, output, message = program.run("poured", *bed, *checkpoints, "--continue", scene="bed.nml")
+        assert code == 0 and "nothing to do" in output, message
+        before = contents("poured")
+        copy("grains", "grains_2")
+        for changed in ((), ("--changed",)):
+            code, _, message = program.run("poured", *bed, *checkpoints, "--continue", *changed, scene="bed.nml")
+            assert code == BAD_INPUT and "the initial bodies differ" in message, (code, message)
+            assert contents("poured") == before
+
+
+def a_disturbed_force_leaves_a_whole_result(program, thoroughly):
+    old = {name: data for name, data in contents("whole").items() if name != "manifest.txt"}
+    code, output, message = program.run("new", *OTHER)
+    assert code == 0, message
+    new_hash = output.splitlines()[-1]
+    assert new_hash != program.hash
+    mark = os.path.abspath("mark")
+    for kind in ("fail", "kill"):
+        ends = {"old": 0, "new": 0}
+        at = 0
+        while True:
+            # After the first frame of the new run, every seventh call is enough.
+            at += 1 if thoroughly or ends["new"] < 25 else 7
+            folder = copy("disturbed")
+            write(f"{folder}/mine.txt", b"mine")
+            code, output, message = program.run(folder, "--force", *OTHER, LD_PRELOAD=program.library,
+                                                POLYDEM_HOSTILE=kind, POLYDEM_HOSTILE_AT=str(at),
+                                                POLYDEM_HOSTILE_PLACE="disturbed", POLYDEM_HOSTILE_MARK=mark)
+            if not os.path.exists(mark):
+                break
+            os.remove(mark)
+            assert kind == "fail" or code == -9, (at, code, message)
+            tried = (kind, at, code, output, message)
+            # The next run reports the state of the folder and repairs it.
+            code, output, message = program.run(folder)
+            assert code == BAD_INPUT and "holds a result" in message, (tried, output, message)
+            after = contents(folder)
+            assert after.pop("mine.txt") == b"mine", tried
+            assert not [name for name in after if name.startswith("replaced")], (tried, after.keys())
+            if after.get("profile.h5") == old["profile.h5"]:
+                ends["old"] += 1
+                assert {name: data for name, data in after.items() if name in old} == old, (tried, after.keys())
+                assert program.check(folder)[0] == 0, (tried, program.check(folder))
+                code, output, message = program.run(folder, "--continue", *RECORDED)
+                assert code == 0 and "nothing to do" in output, (tried, message)
+            else:
+                ends["new"] += 1
+                assert not {"trace.h5", "steps.h5"} & {*after}, (tried, after.keys())
+                code, output, message = program.run(folder, "--continue", *OTHER)
+                assert code == 0, (tried, message)
+                assert output.splitlines()[-1] == new_hash, (tried, output)
+                assert program.check(folder)[0] == 0, (tried, program.check(folder))
+        print(f"  {kind}: {sum(ends.values())} of {at - 1} calls, the old result was whole after {ends['old']}, the "
+              f"new one after {ends['new']}")
+        assert ends["old"] > 30 and ends["new"] > 20, ends
+
+
+def a_force_that_fails_at_its_start_puts_the_result_back(program):
+    folder = copy("failed")
+    before = contents(folder)
+    code, output, message = program.run(folder, "--force", "--set", "guards.overlap=stop", "--set",
+                                        "guards.overlap_limit=1e-9", *RECORDED)
+    assert code == 1 and "step 0" in message and "restored the old result in failed" in output, (code, output, message)
+    after = contents(folder)
+    assert program.check(folder)[0] == 0
+    assert before.pop("manifest.txt") in after.pop("manifest.txt") and before == after, after.keys()
+
+
+def main():
+    program_path, library = (os.path.abspath(word) for word in sys.argv[1:3])
+    thoroughly = sys.argv[3:] == ["all"]
+    with tempfile.TemporaryDirectory() as work:
+        os.chdir(work)
+        program = Program(program_path, library)
+        tests = (every_file_is_listed_with_its_checksum, flipped_bits_are_found,
+                 missing_cut_and_exchanged_files_are_found, files_of_somebody_else_stay,
+                 a_result_without_a_manifest_is_left_alone, force_does_not_replace_its_own_input,
+                 other_bodies_are_not_taken_for_the_finished_run, a_force_that_fails_at_its_start_puts_the_result_back,
+                 a_disturbed_force_leaves_a_whole_result)
+        for test in tests:
+            began = time.monotonic()
+            test(program, *([thoroughly] if test is a_disturbed_force_leaves_a_whole_result else []))
+            print(f"{test.__name__.replace('_', ' ')}: {time.monotonic() - began:.1f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()

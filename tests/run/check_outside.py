@@ -1,0 +1,364 @@
+"""The environment of the program: threads, stacks, file size limits, pipes, closed streams, umasks, new folders.
+
+usage: check_outside.py PROGRAM TRACE WATCHED_SYSTEM
+
+WATCHED_SYSTEM is the library of watched_system.c. The program must never end by a signal or with a message of a
+library: it reports each problem in one line of its own, and a reported success is one. tests/faults.md lists all
+faults.
+"""
+
+import os
+import re
+import resource
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+SCENE = """\
+&scene name = 'gas' bodies = 60 fraction = 0.8 overlap = .true. speed = 0.5 spin = 20 /
+&forces stiffness = 1e6 /
+&integrate dt = 1e-5 duration = 6e-4 /
+&output frame_interval = 3e-5 frames_per_segment = 15 log_interval = 1e-4 contacts = .true. /
+&checkpoint steps = 20 /
+"""
+
+BENCH = """\
+&bench
+   scenes = 'scene.nml integrate.duration=1e-4 output.trace_steps=4'
+   names = 'gas'
+   finders = 'quadtree'
+   threads = 1
+   repeats = 1
+/
+"""
+
+#: Exit codes, as README.md lists them
+GOOD, BAD_INPUT, NO_FILE = 0, 2, 3
+
+#: A user without privileges
+NOBODY = 65534
+
+UNLIMITED = resource.RLIM_INFINITY
+
+
+class Case:
+    """The program, a trace to replay, and the expected output of an undisturbed run."""
+
+    def __init__(self, program, trace):
+        self.program = program
+        self.trace = trace
+        code, output, message = self.call("run", "scene.nml", "--set", "output.folder=whole")
+        assert (code, message) == (GOOD, ""), message
+        self.expected = hash_of(output)
+
+    def call(self, *words, before=None, **streams):
+        """Exit code, output and message of a call; its process first executes `before`."""
+        environment = {**os.environ, "OMP_WAIT_POLICY": "passive", **streams.pop("env", {})}
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **streams}
+        done = subprocess.run([self.program, *words], env=environment, preexec_fn=before, text=True, errors="replace",
+                              timeout=60, check=False, **pipes)
+        return done.returncode, done.stdout, done.stderr
+
+    def run_words(self, folder, *options):
+        shutil.rmtree(folder, ignore_errors=True)
+        return ["run", "scene.nml", "--set", f"output.folder={folder}", *options]
+
+    def calls(self, threads):
+        """Command line arguments for each verb."""
+        bench = ["bench", "bench.nml", "--set", "bench.folder=bench", "--set", f"bench.threads={threads}"]
+        return {"run": ["run", "scene.nml", "--set", "output.folder=result", "--threads", str(threads)],
+                "check": ["check", "scene.nml", "--threads", str(threads)],
+                "replay": ["replay", self.trace, "--threads", str(threads)],
+                "bench": bench, "info": ["info", "whole"], "help": ["--help"], "version": ["--version"]}
+
+    def assert_good(self, folder):
+        """Check that a result of the scene is complete."""
+        code, output, message = self.call("info", folder)
+        assert code == GOOD and self.expected in output, (code, output, message)
+        assert sum(int(n) for n in re.findall(r"frames +(\d+) of", output)) == 21, output
+
+
+def hash_of(output):
+    return re.search(r"^state hash: (\S+)$", output, re.MULTILINE).group(1)
+
+
+def clear():
+    for folder in ("result", "bench"):
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def limit(kind, value):
+    return lambda: resource.setrlimit(kind, (value, value))
+
+
+def assert_one_sentence(code, message, expected, *parts):
+    assert code == expected and message.startswith("polydem: ") and message.count("\n") == 1, (code, message)
+    for part in parts:
+        assert part in message, (part, message)
+
+
+def too_many_threads_are_refused_before_anything_is_written(case):
+    processors = len(os.sched_getaffinity(0))
+    for threads in 64*processors + 1, 20000, 100000, 999999:
+        for verb in "run", "check", "replay", "bench":
+            if verb == "bench" and threads > 9999:
+                continue
+            code, _, message = case.call(*case.calls(threads)[verb])
+            assert_one_sentence(code, message, BAD_INPUT, f"{threads} threads are too many", f"{processors} processors")
+        for verb in "run", "check", "bench":
+            words = [word for word in case.calls(1)[verb] if word not in ("--threads", "1")]
+            code, _, message = case.call(*words, env={"OMP_NUM_THREADS": str(threads)})
+            assert_one_sentence(code, message, BAD_INPUT, f"{threads} threads are too many")
+    assert not os.path.exists("result") and not os.path.exists("bench")
+    # These use none of them.
+    for verb in "info", "replay", "help", "version":
+        words = [word for word in case.calls(1)[verb] if word not in ("--threads", "1")]
+        assert case.call(*words, env={"OMP_NUM_THREADS": "100000"})[0] == GOOD, verb
+
+
+def threads_that_openmp_or_the_system_do_not_grant_are_refused(case):
+    words = ["run", "scene.nml", "--set", "output.folder=result"]
+    code, _, message = case.call(*words, "--threads", "3", env={"OMP_THREAD_LIMIT": "2"})
+    assert_one_sentence(code, message, BAD_INPUT, "OMP_THREAD_LIMIT allows 2")
+    for size in "16k", "63", "20000b":
+        code, _, message = case.call(*words, "--threads", "2", env={"OMP_STACKSIZE": size})
+        assert_one_sentence(code, message, BAD_INPUT, "OMP_STACKSIZE gives each thread")
+    code, _, message = case.call(*words, "--threads", "2", env={"OMP_STACKSIZE": "100000G"})
+    assert_one_sentence(code, message, BAD_INPUT, "only 1 of 2 threads can be made", "OMP_STACKSIZE")
+    code, _, message = case.call(*words, "--threads", "100", before=limit(resource.RLIMIT_AS, 600_000_000))
+    assert_one_sentence(code, message, BAD_INPUT, " of 100 threads can be made", "ulimit -v")
+    assert not os.path.exists("result")
+    code, output, _ = case.call(*case.run_words("limited"), env={"OMP_THREAD_LIMIT": "1", "OMP_NUM_THREADS": "5"})
+    assert code == GOOD and "threads    1 on" in output and hash_of(output) == case.expected, output
+
+
+def threads_that_take_turns_draw_a_warning(case):
+    processors = len(os.sched_getaffinity(0))
+    for threads in processors, processors + 1, 8*processors:
+        told = f"warning: more threads than processors ({threads} on {processors})"
+        for verb, words in case.calls(threads).items():
+            if verb not in ("run", "check", "replay", "bench"):
+                continue
+            clear()
+            code, output, message = case.call(*words)
+            assert code == GOOD, (verb, threads, message)
+            place = message if verb == "replay" else output
+            assert (told in place) == (threads > processors), (verb, threads, place)
+            if verb == "run":
+                assert hash_of(output) == case.expected
+                with open("result/log.txt", encoding="utf-8") as file:
+                    assert (told in file.read()) == (threads > processors)
+    one = {min(os.sched_getaffinity(0))}
+    code, output, _ = case.call("check", "scene.nml", "--threads", "2", before=lambda: os.sched_setaffinity(0, one))
+    assert code == GOOD and "more threads than processors (2 on 1)" in output, output
+
+
+def a_small_stack_is_refused(case):
+    """For all stack sizes, verbs and threads: no crash, and no refusal above the documented size."""
+    processors = len(os.sched_getaffinity(0))
+    for kilobytes in 16, 24, 32, 64, 128, 255, 256, 257, 288, 512, 1024, 8192, None:
+        size = UNLIMITED if kilobytes is None else 1024*kilobytes
+        for threads in 1, 2, 4, 64*processors:
+            for verb, words in case.calls(threads).items():
+                # Where nothing is refused each call takes its time.
+                few = kilobytes is None or kilobytes >= 256
+                if threads > 4 and (verb != "run" or few and kilobytes != 512):
+                    continue
+                if few and kilobytes != 257 and (threads != 2 or verb != "run") and threads <= 4:
+                    continue
+                if verb in ("help", "version", "info") and threads != 1:
+                    continue
+                clear()
+                code, _, message = case.call(*words, before=limit(resource.RLIMIT_STACK, size))
+                needed = 256 + (threads//4 if verb not in ("help", "version", "info") else 0)
+                if kilobytes is not None and kilobytes < needed:
+                    assert_one_sentence(code, message, BAD_INPUT, f"{kilobytes} KiB only", "ulimit -s")
+                    assert not os.path.exists("result") and not os.path.exists("bench")
+                else:
+                    assert code == GOOD, (kilobytes, threads, verb, code, message)
+
+
+def files_that_may_not_grow_are_named(case):
+    """Limits of the file size, from zero to sufficient."""
+    ends = set()
+    for blocks in 0, 1, 2, 4, 8, 16, 32, 64, 128, 256, 512, 4096:
+        size = 1024*blocks
+        for verb in "run", "bench", "check", "replay", "info":
+            if verb == "bench" and blocks not in (0, 1, 8, 512, 4096):
+                continue
+            clear()
+            code, output, message = case.call(*case.calls(1)[verb], before=limit(resource.RLIMIT_FSIZE, size))
+            ends.add((verb, code))
+            if code == GOOD:
+                assert message == "", message
+                if verb == "run":
+                    assert hash_of(output) == case.expected
+                    case.assert_good("result")
+                continue
+            assert verb in ("run", "bench"), (verb, blocks, code, message)
+            assert_one_sentence(code, message, NO_FILE, "result/" if verb == "run" else "bench/")
+            if verb == "run":
+                assert not os.path.exists("result/running.lock")
+                for name in os.listdir("result"):
+                    if name.startswith("trajectory") and name.endswith(".h5"):
+                        assert " 15 of " in case.call("info", f"result/{name}")[1], name
+                # What is left is continued, or begun again.
+                code, output, message = case.call("run", "scene.nml", "--set", "output.folder=result", "--continue")
+                assert code == GOOD and hash_of(output) == case.expected, (blocks, message)
+                case.assert_good("result")
+    assert {("run", GOOD), ("run", NO_FILE), ("bench", GOOD), ("bench", NO_FILE)} <= ends, ends
+    # The output may also go to a file.
+    for verb in "check", "replay", "info", "help", "version":
+        with open("screen", "wb") as screen:
+            code, _, message = case.call(*case.calls(1)[verb], stdout=screen, before=limit(resource.RLIMIT_FSIZE, 0))
+        assert_one_sentence(code, message, NO_FILE, "standard output: cannot be written: File too large")
+
+
+def nobody_need_read_what_is_printed(case):
+    """Pipes whose readers have ended, for output, for messages, for both."""
+    for closed in ("stdout",), ("stderr",), ("stdout", "stderr"):
+        for verb, words in case.calls(1).items():
+            clear()
+            reader, writer = os.pipe()
+            os.close(reader)
+            code, _, message = case.call(*words, **{name: writer for name in closed})
+            os.close(writer)
+            assert code == GOOD and not message, (closed, verb, code, message)
+            if verb == "run":
+                case.assert_good("result")
+                with open("result/log.txt", encoding="utf-8") as file:
+                    assert hash_of(file.read()) == case.expected
+        reader, writer = os.pipe()
+        os.close(reader)
+        code, _, _ = case.call("run", "nothing.nml", **{name: writer for name in closed})
+        os.close(writer)
+        assert code == BAD_INPUT, code
+    # A reader who stops after the first line.
+    line = subprocess.run(f"{{ '{case.program}' {' '.join(case.run_words('headed'))}; echo $? >code; }} | head -n 1",
+                          shell=True, capture_output=True, text=True, check=True)
+    assert line.stdout.startswith("polydem") and line.stderr == "", line
+    with open("code", encoding="utf-8") as file:
+        assert file.read() == "0\n"
+    case.assert_good("headed")
+
+
+def closed_streams_leave_files_alone(case):
+    """All combinations of closed standard input, output and error."""
+    def close(descriptors):
+        for descriptor in descriptors:
+            os.close(descriptor)
+
+    for k in range(8):
+        closed = [descriptor for descriptor in range(3) if k & 1 << descriptor]
+        for verb, words in case.calls(2).items():
+            if verb == "bench" and k not in (2, 7):
+                continue
+            clear()
+            code, output, message = case.call(*words, before=lambda: close(closed))
+            assert code == GOOD and message == "", (closed, verb, code, message)
+            assert (output == "") == (1 in closed), (closed, verb, output)
+            if verb != "run":
+                continue
+            case.assert_good("result")
+            assert not os.path.exists("result/running.lock")
+            with open("result/log.txt", encoding="utf-8") as file:
+                lines = file.read().splitlines()
+            assert lines[0].startswith("polydem ") and sum(line.startswith("state hash") for line in lines) == 1, lines
+            for name in os.listdir("result"):
+                if name.endswith(".h5"):
+                    with open(f"result/{name}", "rb") as file:
+                        head = file.read(8)
+                    assert head in (b"\x89HDF\r\n\x1a\n", b"polydem ") or name.startswith("checkpoint"), (name, head)
+        code, _, message = case.call("fly", before=lambda: close(closed))
+        assert code == BAD_INPUT and ("unknown verb" in message) == (2 not in closed), (closed, code, message)
+
+
+def a_umask_that_takes_ones_own_rights_is_refused(case):
+    """Run as a user without privileges, since a umask does not restrict root."""
+    if os.getuid() != 0:
+        user = lambda: None
+    else:
+        def user():
+            os.setgroups([])
+            os.setgid(NOBODY)
+            os.setuid(NOBODY)
+    here = os.getcwd()
+    os.chmod(here, 0o755)
+    copy = os.path.join(here, "copy_of_polydem")
+    shutil.copy(case.program, copy)
+    os.chmod(copy, 0o755)
+    other = Case.__new__(Case)
+    other.program, other.trace, other.expected = copy, case.trace, case.expected
+    for mask in 0o777, 0o100, 0o200, 0o300, 0o400, 0o500, 0o600, 0o700, 0o277, 0o077, 0o022, 0o000:
+        folder = f"umask_{mask:o}"
+        os.mkdir(folder)
+        os.chmod(folder, 0o777)
+        os.mkdir(f"{folder}/made")
+        os.chmod(f"{folder}/made", 0o777)
+        for target in "made", "new", "new/below":
+            def before():
+                user()
+                os.umask(mask)
+            words = ["run", "scene.nml", "--force", "--set", f"output.folder={folder}/{target}", "--threads", "1"]
+            code, output, message = other.call(*words, before=before)
+            if mask & 0o700:
+                assert_one_sentence(code, message, NO_FILE, f"{folder}/{target}", f"umask 0{mask:o} ")
+                assert os.listdir(folder) == ["made"] and os.listdir(f"{folder}/made") == []
+            else:
+                assert code == GOOD and hash_of(output) == case.expected, (mask, message)
+        if mask not in (0o777, 0o300, 0o022):
+            continue
+        code, _, message = other.call("bench", "bench.nml", "--set", f"bench.folder={folder}/bench", before=before)
+        if mask & 0o700:
+            assert_one_sentence(code, message, NO_FILE, f"umask 0{mask:o} ")
+            assert os.listdir(folder) == ["made"]
+        else:
+            assert code == GOOD, message
+
+
+def the_parents_of_new_folders_are_brought_to_disk(case, library):
+    environment = {"LD_PRELOAD": library, "POLYDEM_WATCHED": os.path.abspath("watched")}
+    here = os.path.realpath(".")
+    os.makedirs("above", exist_ok=True)
+    for folder in "above/one/two", "alone", os.path.join(here, "above/three"):
+        if os.path.exists("watched"):
+            os.remove("watched")
+        code, _, message = case.call(*case.run_words(folder), env=environment)
+        assert code == GOOD, message
+        with open("watched", encoding="utf-8") as file:
+            lines = file.read().splitlines()
+        made = [k for k, line in enumerate(lines) if line.startswith("mkdir ")]
+        assert len(made) == (2 if folder == "above/one/two" else 1), lines
+        for k in made:
+            parent = os.path.dirname(os.path.join(here, lines[k].split(" ", 1)[1]))
+            assert lines[k + 1] == f"fsync {parent}", (folder, lines[k:k + 2])
+
+
+TESTS = (too_many_threads_are_refused_before_anything_is_written,
+         threads_that_openmp_or_the_system_do_not_grant_are_refused, threads_that_take_turns_draw_a_warning,
+         a_small_stack_is_refused, files_that_may_not_grow_are_named, nobody_need_read_what_is_printed,
+         closed_streams_leave_files_alone, a_umask_that_takes_ones_own_rights_is_refused)
+
+
+def main():
+    program, trace, library = (os.path.abspath(word) for word in sys.argv[1:4])
+    for name in [name for name in os.environ if name.startswith(("OMP_", "GOMP_"))]:
+        del os.environ[name]
+    with tempfile.TemporaryDirectory() as work:
+        os.chdir(work)
+        shutil.copy(trace, "trace.h5")
+        for name, text in (("scene.nml", SCENE), ("bench.nml", BENCH)):
+            with open(name, "w", encoding="utf-8") as file:
+                file.write(text)
+        case = Case(program, "trace.h5")
+        for test in (*TESTS, the_parents_of_new_folders_are_brought_to_disk):
+            began = time.monotonic()
+            test(case, *([library] if test is the_parents_of_new_folders_are_brought_to_disk else []))
+            clear()
+            print(f"{test.__name__.replace('_', ' ')}: {time.monotonic() - began:.1f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,306 @@
+"""Each write call of a small run to its result folder fails once, and the run restarts afterwards.
+
+usage: check_writes.py PROGRAM LIBRARY [--ranks R] [--full] [--part K/N] [--how HOW] [--error NUMBER] [--seconds S]
+                       [--memory FILE]
+
+PROGRAM is the one without MPI, LIBRARY that of failing_writes.c. With --ranks, the run in which a call fails is one of
+R processes of the program that POLYDEM_MPI_PROGRAM names, and it happens to each rank in turn; without that variable
+the test is skipped (code 77). A run without a failure counts the calls. After a failed call
+
+* the run ends, within a minute or two on a busy machine, with code 3 and a message that names a file of its folder, and
+  the rank if several processes write that file; or the call does not matter, and the result is complete;
+* every checkpoint with its final name is valid;
+* --continue ends with the hash, frames and contacts of an undisturbed run, and leaves no unfinished file.
+
+By default a sample is tried, of all kinds of calls and files in turn, until S seconds are over (15; 50 with ranks); it
+depends on the programs only. --full tries all calls, with --part the K-th of N parts of them. HOW is that of
+failing_writes.c, once by default. --memory names a file of calls that passed, which are not tried again by the same
+programs.
+"""
+
+import argparse
+import contextlib
+import hashlib
+import json
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+#: Frames with contacts in several segments, and a checkpoint after each step but the last
+SCENE = """\
+&scene name = 'stack' bodies = 9 width = 0.01 height = 0.01 /
+&forces stiffness = 1e5 midstep_slip = .true. tilt_damping = 0.5 /
+&integrate dt = 1e-5 duration = {duration} /
+&output frame_interval = 1e-5 frames_per_segment = 2 contacts = .true. /
+&checkpoint steps = 1 /
+"""
+#: Exit codes: of a test that is skipped, and of a run that could not write a file
+SKIPPED, NO_FILE = 77, 3
+#: Time within which a run must have ended [s]; the message comes at once, but machines may be busy or stand still
+PATIENCE = 100.0
+#: How long ranks wait for each other where nobody knows that a call has failed [s]
+WAITING = "5"
+#: Steps: without ranks, so many that the oldest checkpoint is replaced
+STEPS, STEPS_OF_RANKS = 4, 3
+#: Calls whose failure may be of no consequence: nothing is lost by them that was not brought to disk before, or HDF5 or
+#: another rank does the same again. The result is compared all the same.
+HARMLESS = {"close", "unlink", "link", "symlink", "open", "fallocate", "ftruncate"}
+#: Calls that are tried first
+FIRST = {name: k for k, name in enumerate(("ftruncate", "pwrite", "fsync", "write", "rename"))}
+
+
+class Broken(Exception):
+    """A violated requirement."""
+
+
+class Case:
+    """The programs, how to start them, and the expected output of an undisturbed run."""
+
+    def __init__(self, program, library, ranks, how, error):
+        self.program, self.library = os.path.abspath(program), os.path.abspath(library)
+        self.ranks, self.how, self.error = ranks, how, error
+        self.work = Path.cwd()
+        duration = f"{STEPS_OF_RANKS if ranks else STEPS}e-5"
+        self.work.joinpath("scene.nml").write_text(SCENE.format(duration=duration), encoding="utf-8")
+        code, output, message, _ = self.run("whole")
+        if code != 0:
+            raise Broken(message)
+        self.hash, self.frames = hash_of(output), frames("whole")
+
+    def run(self, folder, *options, ranks=None, **environment):
+        """Run the scene; return exit code, standard output, standard error and seconds."""
+        command = ["mpirun", "-n", str(ranks), os.environ["POLYDEM_MPI_PROGRAM"]] if ranks else [self.program]
+        command += ["run", "scene.nml", "--threads", "1", "--set", f"output.folder={folder}", *options]
+        began = time.monotonic()
+        with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+                              text=True, errors="replace", env={**SURROUNDINGS, **environment},
+                              start_new_session=True) as process:
+            try:
+                output, message = process.communicate(timeout=PATIENCE)
+            except subprocess.TimeoutExpired as late:
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
+                process.communicate()
+                raise Broken(f"hangs: not ended after {PATIENCE:.0f} s") from late
+        return process.returncode, output, message, time.monotonic() - began
+
+    def watched(self, folder, rank, **environment):
+        """Run it with the library in front, which counts or fails calls of a rank; give what `run` does and its log."""
+        log = self.work / "calls"
+        log.unlink(missing_ok=True)
+        told = self.run(folder, ranks=self.ranks, LD_PRELOAD=self.library, POLYDEM_FAIL_FOLDER=str(self.work / folder),
+                        POLYDEM_FAIL_RANK=str(rank), POLYDEM_FAIL_LOG=str(log), **environment)
+        lines = log.read_text(encoding="utf-8").splitlines() if log.exists() else []
+        return told, [Call(rank, *line.split(" ", 2)) for line in lines]
+
+    def count(self, rank):
+        """All calls of a rank in a run in which none fails."""
+        shutil.rmtree("failed", ignore_errors=True)
+        (code, output, message, _), calls = self.watched("failed", rank)
+        if code != 0 or hash_of(output) != self.hash or not calls:
+            raise Broken(f"the run in which nothing fails: code {code}, {len(calls)} calls\n{message}")
+        seen = Counter()
+        for call in calls:
+            call.before = seen[call.name, call.path]
+            seen[call.name, call.path] += 1
+        return calls
+
+    def attempt(self, call):
+        """Let a call fail, and go on; give what happened, in a word, and the seconds it took to end."""
+        shutil.rmtree("failed", ignore_errors=True)
+        (code, output, message, seconds), calls = self.watched(
+            "failed", call.rank, POLYDEM_FAIL_CALL=str(call.number), POLYDEM_FAIL_HOW=self.how,
+            POLYDEM_FAIL_ERROR=str(self.error), POLYDEM_PATIENCE=WAITING)
+        met = [other for other in calls if other.number == call.number]
+        said = f"code {code}\n{message}"
+        if not met and (code != 0 or call.number <= len(calls)):
+            raise Broken(f"it is not reached: {said}")
+        if code == 0:
+            if met and self.how != "short" and met[0].name not in HARMLESS:
+                raise Broken(f"it goes unnoticed: {said}")
+            if hash_of(output) != self.hash or frames("failed") != self.frames:
+                raise Broken(f"the result is wrong, without a word: {said}")
+        else:
+            self.check_message(code, message, met[0])
+        for path in Path("failed").glob("checkpoint_?.h5"):
+            if not is_sealed(path):
+                raise Broken(f"{path} is damaged: {said}")
+        again, output, late = self.go_on()
+        if again != 0:
+            raise Broken(f"cannot be continued, code {again}:\n{late}\nafter {said}")
+        if hash_of(output) != self.hash or frames("failed") != self.frames:
+            raise Broken(f"the continued result is wrong, after {said}")
+        # If nothing could be removed any more, the lock of the dead run stays where a finished result needs none.
+        rest = [name for name in os.listdir("failed") if name.endswith((".open", ".unfinished"))
+                or name.endswith(".lock") and self.how != "on"]
+        if rest and code != 0:
+            raise Broken(f"{rest} are left after {said}")
+        # Runs differ by a few lines of the log.
+        return ("told" if code != 0 else "harmless" if met else "not reached"), seconds
+
+    def go_on(self):
+        """Continue a run; mpirun may end a moment before its ranks."""
+        for _ in range(100):
+            code, output, message, _ = self.run("failed", "--continue")
+            if "another run (process" not in message:
+                break
+            time.sleep(0.1)
+        unsigned = re.search(r"If there is no such run, remove '(\S+)'", message)
+        if unsigned and self.how == "on":
+            # The lock could neither be signed nor removed: the message says what to do.
+            os.remove(unsigned.group(1))
+            code, output, message, _ = self.run("failed", "--continue")
+        return code, output, message
+
+    def check_message(self, code, message, call):
+        """The run has said what failed, and on which rank if several processes write the file."""
+        said = [line for line in message.splitlines() if line.startswith("polydem: ")]
+        if code != NO_FILE or not said:
+            raise Broken(f"code {code}, and no word of it:\n{message}")
+        if not any("failed" in line for line in said):
+            raise Broken(f"the message names no file:\n{message}")
+        # Where none comes back from a call of MPI, the first one to say so need not be the one that failed.
+        rank = r"\d" if call.name == "open" else str(call.rank)
+        if call.rank > 0 and not any(re.search(f"rank {rank}", line) for line in said):
+            raise Broken(f"the message does not name the rank:\n{message}")
+
+
+class Call:
+    """A call of a rank that writes: number, name and path, and how often it was called so for this file before."""
+
+    def __init__(self, rank, number, name, path):
+        self.rank, self.number, self.name, self.path = int(rank), int(number), name, os.path.basename(path)
+        self.before = 0
+
+    def kind(self):
+        """Rank, name, and kind of file; files are opened for several purposes"""
+        return self.rank, self.name, re.sub(r"\d+", "N", self.path), self.before if self.name == "open" else 0
+
+    def __str__(self):
+        return f"rank {self.rank}, call {self.number}: {self.name} of {self.path}"
+
+
+def hash_of(output):
+    """The hash that a run prints at its end; empty if there is none"""
+    found = re.findall(r"^state hash: (\S+)", output, re.MULTILINE)
+    return found[-1] if found else ""
+
+
+def is_sealed(path):
+    """Whether the checksum of a checkpoint is correct."""
+    before = path.read_bytes()
+    seal(path)
+    return path.read_bytes() == before
+
+
+def in_order(calls, seed):
+    """The k-th call of every kind before any k+1-th; what loses data comes first."""
+    chance = random.Random(seed)
+    kinds = {}
+    for call in calls:
+        kinds.setdefault(call.kind(), []).append(call)
+    turns = []
+    for members in kinds.values():
+        chance.shuffle(members)
+        turns += [(turn, FIRST.get(call.name, len(FIRST)), chance.random(), call) for turn, call in enumerate(members)]
+    return [entry[-1] for entry in sorted(turns, key=lambda entry: entry[:-1])]
+
+
+class Memory:
+    """Calls that passed, in a file of one line each, as long as the programs are the same."""
+
+    def __init__(self, path, words):
+        self.path, self.passed = path, {}
+        self.key = hashlib.sha256(b"".join(Path(word).read_bytes() for word in words)).hexdigest()[:16]
+        if path and os.path.exists(path):
+            with open(path, encoding="utf-8") as file:
+                lines = [json.loads(line) for line in file if line.endswith("\n")]
+            self.passed = {tuple(line["point"]): line for line in lines if line["key"] == self.key}
+
+    def keep(self, point, outcome, seconds):
+        self.passed[point] = {"key": self.key, "point": point, "outcome": outcome, "seconds": round(seconds, 2)}
+        if self.path:
+            with open(self.path, "a", encoding="utf-8") as file:
+                file.write(json.dumps(self.passed[point]) + "\n")
+
+
+def try_calls(case, options, memory):
+    """Let calls fail, as many as there is time for; give those that went wrong."""
+    began = time.monotonic()
+    calls = [call for rank in range(options.ranks or 1) for call in case.count(rank)]
+    part, parts = (int(word) for word in options.part.split("/"))
+    print(f"calls that write, by rank: {dict(Counter(call.rank for call in calls))}; "
+          f"{len({call.kind() for call in calls})} kinds", flush=True)
+    seconds = options.seconds or (50.0 if options.ranks else 15.0)
+    broken, outcomes, longest = [], Counter(), 0.0
+    for call in in_order(calls, memory.key)[part - 1::parts]:
+        point = (options.ranks, options.how, options.error, call.rank, call.number)
+        if point not in memory.passed:
+            if not options.full and time.monotonic() - began > seconds:
+                continue
+            try:
+                memory.keep(point, *case.attempt(call))
+            except Broken as problem:
+                broken.append(call)
+                print(f"{call}: {problem}", flush=True)
+                continue
+        outcomes[call.rank, memory.passed[point]["outcome"]] += 1
+        longest = max(longest, memory.passed[point]["seconds"])
+    for (rank, outcome), n in sorted(outcomes.items()):
+        print(f"rank {rank}: {n} {outcome}")
+    print(f"{sum(outcomes.values())} of {len(calls)} calls passed ({options.how}, error {options.error}), the longest "
+          f"took {longest:.1f} s to end; {len(broken)} did not")
+    return broken
+
+
+def parse(words):
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("program")
+    parser.add_argument("library")
+    parser.add_argument("--ranks", type=int, default=0)
+    parser.add_argument("--full", action="store_true")
+    parser.add_argument("--part", default="1/1")
+    parser.add_argument("--how", choices=("once", "on", "short"), default="once")
+    parser.add_argument("--error", type=int, default=5)
+    parser.add_argument("--seconds", type=float)
+    parser.add_argument("--memory", type=os.path.abspath)
+    return parser.parse_args(words)
+
+
+def main(words):
+    options = parse(words)
+    programs = [options.program, options.library]
+    if options.ranks:
+        programs.append(os.environ["POLYDEM_MPI_PROGRAM"])
+    memory = Memory(options.memory, programs)
+    with tempfile.TemporaryDirectory() as work:
+        programs = [os.path.abspath(word) for word in programs]
+        os.chdir(os.path.realpath(work))
+        return 1 if try_calls(Case(*programs[:2], options.ranks, options.how, options.error), options, memory) else 0
+
+
+if __name__ == "__main__":
+    if "--ranks" in sys.argv and not os.environ.get("POLYDEM_MPI_PROGRAM"):
+        print("skipped: POLYDEM_MPI_PROGRAM does not name a program with MPI")
+        sys.exit(SKIPPED)
+    PYTHON = ROOT / ".venv" / "bin" / "python"
+    if PYTHON.exists() and Path(sys.prefix) != PYTHON.parents[1]:
+        os.execv(PYTHON, [str(PYTHON), *sys.argv])
+    os.environ["POLYDEM_PROGRAM"] = os.path.abspath(sys.argv[1])
+    os.environ["POLYDEM_MPI_PROGRAM"] = os.path.abspath(os.environ.get("POLYDEM_MPI_PROGRAM", sys.argv[1]))
+    sys.dont_write_bytecode = True
+    sys.path[:0] = [str(ROOT / "tests" / "ranks"), str(ROOT / "postproc" / "src")]
+    from runs import ENVIRONMENT as SURROUNDINGS
+    from runs import frames
+    from seals import seal
+
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,188 @@
+/* A library for LD_PRELOAD that disturbs processes competing for locks. POLYDEM_HOSTILE selects its behaviour:
+ *
+ *   locks   no file can be locked, as on some network file systems
+ *   haste   the monotonic clock runs 20 times as fast
+ *   slow    each call to a file first waits a short time, sometimes 30 ms, so that processes interleave
+ *
+ * POLYDEM_KILL_AT=n kills the process before its n-th call to a file or folder whose path contains POLYDEM_KILL_IN. With
+ * n = 0 the process ends with a line on standard error that gives the number of these calls.
+ */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <sys/time.h>
+#include <time.h>
+#include <unistd.h>
+
+/* The hidden function of this name */
+#define REAL(type, name, ...) ((type (*)(__VA_ARGS__))dlsym(RTLD_NEXT, name))
+
+static int does(const char *what)
+{
+   const char *all = getenv("POLYDEM_HOSTILE");
+
+   return all != NULL && strstr(all, what) != NULL;
+}
+
+int clock_gettime(clockid_t clock, struct timespec *now)
+{
+   int status = REAL(int, "clock_gettime", clockid_t, struct timespec *)(clock, now);
+
+   if (status == 0 && clock == CLOCK_MONOTONIC && does("haste")) {
+      long long nanoseconds = 20 * (now->tv_sec * 1000000000LL + now->tv_nsec);
+
+      now->tv_sec = nanoseconds / 1000000000;
+      now->tv_nsec = nanoseconds % 1000000000;
+   }
+   return status;
+}
+
+/* Number of calls to the files in question */
+static long asked = 0;
+
+__attribute__((destructor)) static void tell(void)
+{
+   const char *when = getenv("POLYDEM_KILL_AT");
+
+   if (when != NULL && strcmp(when, "0") == 0) fprintf(stderr, "asked %ld times\n", asked);
+}
+
+/* Before a call to this file: wait or kill, as selected. */
+static void ask(const char *path)
+{
+   const char *word = getenv("POLYDEM_KILL_IN"), *when = getenv("POLYDEM_KILL_AT");
+
+   if (does("slow")) {
+      struct timespec now;
+
+      REAL(int, "clock_gettime", clockid_t, struct timespec *)(CLOCK_MONOTONIC, &now);
+      usleep(now.tv_nsec / 64 % 10 == 0 ? 30000 : now.tv_nsec / 64 % 500);
+   }
+   if (word == NULL || when == NULL || strstr(path, word) == NULL) return;
+   if (__atomic_add_fetch(&asked, 1, __ATOMIC_RELAXED) == atol(when)) kill(getpid(), SIGKILL);
+}
+
+static void ask_open(int file)
+{
+   char link[40], path[PATH_MAX] = "";
+
+   snprintf(link, sizeof link, "/proc/self/fd/%d", file);
+   if (readlink(link, path, sizeof path - 1) > 0) ask(path);
+}
+
+int flock(int file, int operation)
+{
+   ask_open(file);
+   if (!does("locks")) return REAL(int, "flock", int, int)(file, operation);
+   errno = ENOLCK;
+   return -1;
+}
+
+static int open_really(const char *name, const char *path, int flags, mode_t mode)
+{
+   ask(path);
+   return REAL(int, name, const char *, int, ...)(path, flags, mode);
+}
+
+int open(const char *path, int flags, ...)
+{
+   va_list more;
+   mode_t mode;
+
+   va_start(more, flags);
+   mode = flags & O_CREAT ? va_arg(more, mode_t) : 0;
+   va_end(more);
+   return open_really("open", path, flags, mode);
+}
+
+int open64(const char *path, int flags, ...)
+{
+   va_list more;
+   mode_t mode;
+
+   va_start(more, flags);
+   mode = flags & O_CREAT ? va_arg(more, mode_t) : 0;
+   va_end(more);
+   return open_really("open64", path, flags, mode);
+}
+
+int creat(const char *path, mode_t mode)
+{
+   ask(path);
+   return REAL(int, "creat", const char *, mode_t)(path, mode);
+}
+
+int mkdir(const char *path, mode_t mode)
+{
+   ask(path);
+   return REAL(int, "mkdir", const char *, mode_t)(path, mode);
+}
+
+int unlink(const char *path)
+{
+   ask(path);
+   return REAL(int, "unlink", const char *)(path);
+}
+
+int rename(const char *from, const char *to)
+{
+   ask(from);
+   return REAL(int, "rename", const char *, const char *)(from, to);
+}
+
+int close(int file)
+{
+   ask_open(file);
+   return REAL(int, "close", int)(file);
+}
+
+int fsync(int file)
+{
+   ask_open(file);
+   return REAL(int, "fsync", int)(file);
+}
+
+int ftruncate64(int file, off64_t length)
+{
+   ask_open(file);
+   return REAL(int, "ftruncate64", int, off64_t)(file, length);
+}
+
+int ftruncate(int file, off_t length)
+{
+   ask_open(file);
+   return REAL(int, "ftruncate", int, off_t)(file, length);
+}
+
+int fallocate64(int file, int mode, off64_t from, off64_t length)
+{
+   ask_open(file);
+   return REAL(int, "fallocate64", int, int, off64_t, off64_t)(file, mode, from, length);
+}
+
+ssize_t write(int file, const void *bytes, size_t length)
+{
+   ask_open(file);
+   return REAL(ssize_t, "write", int, const void *, size_t)(file, bytes, length);
+}
+
+ssize_t pwrite64(int file, const void *bytes, size_t length, off64_t from)
+{
+   ask_open(file);
+   return REAL(ssize_t, "pwrite64", int, const void *, size_t, off64_t)(file, bytes, length, from);
+}
+
+ssize_t pwrite(int file, const void *bytes, size_t length, off_t from)
+{
+   ask_open(file);
+   return REAL(ssize_t, "pwrite", int, const void *, size_t, off_t)(file, bytes, length, from);
+}

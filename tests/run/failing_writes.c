@@ -1,0 +1,269 @@
+/* A library for LD_PRELOAD that simulates a failing file system: the n-th call that writes to files of a folder fails.
+ * Each process counts the calls of all its threads, from 1.
+ *
+ *   POLYDEM_FAIL_FOLDER   the folder, as an absolute path without links
+ *   POLYDEM_FAIL_RANK     the rank of Open MPI that fails; all processes if it is not set
+ *   POLYDEM_FAIL_CALL     number of the call that fails; none if it is not set
+ *   POLYDEM_FAIL_HOW      once; on: all later calls fail, too; short: a write writes half of its data and succeeds
+ *   POLYDEM_FAIL_ERROR    number of the error; EIO if it is not set
+ *   POLYDEM_FAIL_LOG      a file to which each call adds a line: number, name, path
+ *
+ * A failing call does nothing, except close, which still closes the file.
+ */
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <errno.h>
+#include <fcntl.h>
+#include <limits.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/types.h>
+#include <sys/uio.h>
+#include <unistd.h>
+
+/* The system function that a function of this file hides */
+#define SYSTEM(type, name, ...) type (*name)(__VA_ARGS__) = (type (*)(__VA_ARGS__))dlsym(RTLD_NEXT, __func__)
+
+static const char *setting(const char *name, const char *otherwise)
+{
+   const char *text = getenv(name);
+
+   return text != NULL ? text : otherwise;
+}
+
+static int is_inside(const char *path)
+{
+   const char *folder = setting("POLYDEM_FAIL_FOLDER", "");
+   size_t n = strlen(folder);
+
+   return n > 0 && strncmp(path, folder, n) == 0 && (path[n] == '/' || path[n] == '\0');
+}
+
+/* Count a call to the folder: 0 to pass it on, 1 to fail, -1 for a short write */
+static int judge(const char *call, const char *path)
+{
+   static int calls = 0;
+   const char *own = setting("OMPI_COMM_WORLD_RANK", "0");
+   const char *rank = setting("POLYDEM_FAIL_RANK", own), *how = setting("POLYDEM_FAIL_HOW", "once");
+   const char *log = setting("POLYDEM_FAIL_LOG", "");
+   int number, chosen = atoi(setting("POLYDEM_FAIL_CALL", "0")), before = errno;
+
+   if (!is_inside(path) || strcmp(rank, own) != 0) return 0;
+   number = __atomic_add_fetch(&calls, 1, __ATOMIC_RELAXED);
+   if (*log != '\0') {
+      char line[PATH_MAX + 64];
+      int length = snprintf(line, sizeof line, "%d %s %s\n", number, call, path);
+      int (*open_log)(const char *, int, ...) = (int (*)(const char *, int, ...))dlsym(RTLD_NEXT, "open");
+      ssize_t (*put)(int, const void *, size_t) = (ssize_t (*)(int, const void *, size_t))dlsym(RTLD_NEXT, "write");
+      int (*close_log)(int) = (int (*)(int))dlsym(RTLD_NEXT, "close");
+      int file = open_log(log, O_WRONLY | O_CREAT | O_APPEND, 0666);
+
+      if (file < 0 || put(file, line, (size_t)length) != length || close_log(file) != 0) abort();
+   }
+   errno = before;
+   if (chosen == 0 || number < chosen || (number > chosen && strcmp(how, "on") != 0)) return 0;
+   if (strcmp(how, "short") == 0) return strstr(call, "write") != NULL ? -1 : 0;
+   errno = atoi(setting("POLYDEM_FAIL_ERROR", "5"));
+   return 1;
+}
+
+static int judge_file(const char *call, int file)
+{
+   char link[64], path[PATH_MAX];
+   int before = errno;
+   ssize_t length;
+
+   snprintf(link, sizeof link, "/proc/self/fd/%d", file);
+   length = readlink(link, path, sizeof path - 1);
+   errno = before;
+   if (length <= 0) return 0;
+   path[length] = '\0';
+   return judge(call, path);
+}
+
+static int judge_path(const char *call, const char *path)
+{
+   char absolute[2 * PATH_MAX];
+
+   if (path[0] == '/') return judge(call, path);
+   if (getcwd(absolute, PATH_MAX) == NULL) return 0;
+   strcat(absolute, "/");
+   strncat(absolute, path, PATH_MAX - 1);
+   return judge(call, absolute);
+}
+
+static int may_write(int flags)
+{
+   return (flags & O_ACCMODE) != O_RDONLY || (flags & (O_CREAT | O_TRUNC)) != 0;
+}
+
+#define OPEN(name)                                                            \
+   int name(const char *path, int flags, ...)                                 \
+   {                                                                          \
+      SYSTEM(int, real, const char *, int, ...);                              \
+      va_list rest;                                                           \
+      mode_t mode;                                                            \
+      va_start(rest, flags);                                                  \
+      mode = (flags & (O_CREAT | O_TMPFILE)) ? va_arg(rest, mode_t) : 0;      \
+      va_end(rest);                                                           \
+      if (may_write(flags) && judge_path("open", path) > 0) return -1;        \
+      return real(path, flags, mode);                                         \
+   }
+OPEN(open)
+OPEN(open64)
+
+#define OPENAT(name)                                                          \
+   int name(int folder, const char *path, int flags, ...)                     \
+   {                                                                          \
+      SYSTEM(int, real, int, const char *, int, ...);                         \
+      va_list rest;                                                           \
+      mode_t mode;                                                            \
+      va_start(rest, flags);                                                  \
+      mode = (flags & (O_CREAT | O_TMPFILE)) ? va_arg(rest, mode_t) : 0;      \
+      va_end(rest);                                                           \
+      if (may_write(flags) && judge_path("open", path) > 0) return -1;        \
+      return real(folder, path, flags, mode);                                 \
+   }
+OPENAT(openat)
+OPENAT(openat64)
+
+#define CREAT(name)                                                           \
+   int name(const char *path, mode_t mode)                                    \
+   {                                                                          \
+      SYSTEM(int, real, const char *, mode_t);                                \
+      return judge_path("creat", path) > 0 ? -1 : real(path, mode);           \
+   }
+CREAT(creat)
+CREAT(creat64)
+
+ssize_t write(int file, const void *bytes, size_t length)
+{
+   SYSTEM(ssize_t, real, int, const void *, size_t);
+   int verdict = judge_file("write", file);
+
+   return verdict > 0 ? -1 : real(file, bytes, verdict < 0 && length > 1 ? length / 2 : length);
+}
+
+#define PWRITE(name)                                                                                          \
+   ssize_t name(int file, const void *bytes, size_t length, off64_t place)                                    \
+   {                                                                                                          \
+      SYSTEM(ssize_t, real, int, const void *, size_t, off64_t);                                              \
+      int verdict = judge_file("pwrite", file);                                                               \
+      return verdict > 0 ? -1 : real(file, bytes, verdict < 0 && length > 1 ? length / 2 : length, place);    \
+   }
+PWRITE(pwrite)
+PWRITE(pwrite64)
+
+/* A short write writes only the first of its pieces, or half of a single piece. */
+static struct iovec half(const struct iovec *pieces, int n)
+{
+   struct iovec first = pieces[0];
+
+   if (n == 1 && first.iov_len > 1) first.iov_len /= 2;
+   return first;
+}
+
+ssize_t writev(int file, const struct iovec *pieces, int n)
+{
+   SYSTEM(ssize_t, real, int, const struct iovec *, int);
+   int verdict = judge_file("writev", file);
+   struct iovec first = half(pieces, n);
+
+   if (verdict > 0) return -1;
+   return verdict < 0 ? real(file, &first, 1) : real(file, pieces, n);
+}
+
+#define PWRITEV(name)                                                               \
+   ssize_t name(int file, const struct iovec *pieces, int n, off64_t place)         \
+   {                                                                                \
+      SYSTEM(ssize_t, real, int, const struct iovec *, int, off64_t);               \
+      int verdict = judge_file("pwritev", file);                                    \
+      struct iovec first = half(pieces, n);                                         \
+      if (verdict > 0) return -1;                                                   \
+      return verdict < 0 ? real(file, &first, 1, place) : real(file, pieces, n, place); \
+   }
+PWRITEV(pwritev)
+PWRITEV(pwritev64)
+
+#define OF_A_FILE(name, label)                                                \
+   int name(int file)                                                         \
+   {                                                                          \
+      SYSTEM(int, real, int);                                                 \
+      return judge_file(label, file) > 0 ? -1 : real(file);                   \
+   }
+OF_A_FILE(fsync, "fsync")
+OF_A_FILE(fdatasync, "fdatasync")
+
+int close(int file)
+{
+   SYSTEM(int, real, int);
+   int before = errno, flags = fcntl(file, F_GETFL), verdict, error, status;
+
+   errno = before;
+   verdict = flags >= 0 && may_write(flags) ? judge_file("close", file) : 0;
+   error = errno;
+   status = real(file);
+   if (verdict <= 0) return status;
+   errno = error;
+   return -1;
+}
+
+#define FTRUNCATE(name)                                                       \
+   int name(int file, off64_t length)                                         \
+   {                                                                          \
+      SYSTEM(int, real, int, off64_t);                                        \
+      return judge_file("ftruncate", file) > 0 ? -1 : real(file, length);     \
+   }
+FTRUNCATE(ftruncate)
+FTRUNCATE(ftruncate64)
+
+#define TRUNCATE(name)                                                        \
+   int name(const char *path, off64_t length)                                 \
+   {                                                                          \
+      SYSTEM(int, real, const char *, off64_t);                               \
+      return judge_path("truncate", path) > 0 ? -1 : real(path, length);      \
+   }
+TRUNCATE(truncate)
+TRUNCATE(truncate64)
+
+#define FALLOCATE(name)                                                       \
+   int name(int file, int mode, off64_t offset, off64_t length)               \
+   {                                                                          \
+      SYSTEM(int, real, int, int, off64_t, off64_t);                          \
+      return judge_file("fallocate", file) > 0 ? -1 : real(file, mode, offset, length); \
+   }
+FALLOCATE(fallocate)
+FALLOCATE(fallocate64)
+
+#define POSIX_FALLOCATE(name)                                                 \
+   int name(int file, off64_t offset, off64_t length)                         \
+   {                                                                          \
+      SYSTEM(int, real, int, off64_t, off64_t);                               \
+      return judge_file("fallocate", file) > 0 ? errno : real(file, offset, length); \
+   }
+POSIX_FALLOCATE(posix_fallocate)
+POSIX_FALLOCATE(posix_fallocate64)
+
+#define OF_TWO_PATHS(name)                                                    \
+   int name(const char *from, const char *to)                                 \
+   {                                                                          \
+      SYSTEM(int, real, const char *, const char *);                          \
+      return judge_path(#name, to) > 0 ? -1 : real(from, to);                 \
+   }
+OF_TWO_PATHS(rename)
+OF_TWO_PATHS(link)
+OF_TWO_PATHS(symlink)
+
+int unlink(const char *path)
+{
+   SYSTEM(int, real, const char *);
+   return judge_path("unlink", path) > 0 ? -1 : real(path);
+}
+
+int mkdir(const char *path, mode_t mode)
+{
+   SYSTEM(int, real, const char *, mode_t);
+   return judge_path("mkdir", path) > 0 ? -1 : real(path, mode);
+}
