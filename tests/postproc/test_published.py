@@ -11,19 +11,23 @@ ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])
 
 #: Pages with numbers that a run of the program made, and files beside tables that have no room for words
 PAGES = [
-    "README.md",
-    "inputs/README.md",
+    "inputs/bench/README.md",
+    "inputs/performance.md",
     "postproc/verdicts/README.md",
     "postproc/verdicts/precision/README.md",
     "postproc/verdicts/scale/README.md",
     "postproc/verdicts/tables/revision.txt",
     "tests/ranks/equality.md",
+    "tests/verification/README.md",
     "tests/verification/results.md",
 ]
 
 #: Pages whose tables hold no measured numbers of one run: manuals, and lists of cases with the tests that check them
 OTHERS = {
+    "inputs/README.md",
+    "inputs/getting_started.md",
     "src/README.md",
+    "src/algorithms.md",
     "tests/README.md",
     "tests/faults.md",
     "tests/hard_cases.md",

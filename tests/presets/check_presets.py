@@ -85,12 +85,12 @@ class Presets(unittest.TestCase):
                     continue
                 self.assertEqual(complaints(SOURCES, entries, FOLDER / names[0]), [])
 
-    def test_every_preset_can_be_built_and_is_named_in_the_readme(self):
+    def test_every_preset_can_be_built_and_is_named_in_the_manual(self):
         listed = json.loads((SOURCES / "CMakePresets.json").read_text(encoding="utf-8"))
         self.assertEqual([preset["name"] for preset in listed["buildPresets"]], list(presets()))
-        readme = (SOURCES / "README.md").read_text(encoding="utf-8")
+        manual = (SOURCES / "inputs" / "getting_started.md").read_text(encoding="utf-8")
         for words in ["./polydem build ", *(f"`{name}`" for name in presets())]:
-            self.assertTrue(words in readme, f"README.md does not have: {words}")
+            self.assertTrue(words in manual, f"inputs/getting_started.md does not have: {words}")
 
     def test_planted_faults_are_found(self):
         copy = FOLDER / "copy"

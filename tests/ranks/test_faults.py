@@ -30,7 +30,7 @@ CROSSING = """&scene name = 'file', bodies_file = '{bodies}' /
 &overlap degenerate = 'stop' /
 &output frame_interval = 1e-3, contacts = .true. /
 """
-#: Exit codes, as the README of the repository lists them
+#: Exit codes, as inputs/getting_started.md lists them
 FAILED, BAD_INPUT, NO_FILE = 1, 2, 3
 
 

@@ -15,7 +15,7 @@ import time
 
 from continued_run import assert_whole, totals_of, closed_segments, frames_of, run, start, write_scene
 
-#: Exit codes of a run, as README.md lists them
+#: Exit codes of a run, as inputs/getting_started.md lists them
 FAILED, BAD_INPUT, NO_FILE, EARLY = 1, 2, 3, 75
 
 

@@ -34,7 +34,7 @@ OTHER = ("--set", "forces.friction_coefficient=0.5")
 NAMES = ("trace.h5", "steps.h5", "overlaps.csv", "profile.h5", "trajectory_0001.h5", "trajectory_0007.h5", "log.txt",
          "checkpoint_1.h5", "checkpoint_2.h5", "manifest.txt")
 ENDINGS = ("", ".unfinished", ".open")
-#: Exit codes of a run, as README.md lists them
+#: Exit codes of a run, as inputs/getting_started.md lists them
 BAD_INPUT, NO_FILE = 2, 3
 WAYS = ((), ("--continue",), ("--force",))
 

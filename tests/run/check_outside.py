@@ -34,7 +34,7 @@ BENCH = """\
 /
 """
 
-#: Exit codes, as README.md lists them
+#: Exit codes, as inputs/getting_started.md lists them
 GOOD, BAD_INPUT, NO_FILE = 0, 2, 3
 
 #: A user without privileges
