@@ -3,13 +3,12 @@
 !> `quadtree_called` is the quadtree compiled without inlining; `quadtree_o2` and `sort_and_sweep_o2` are compiled at
 !> -O2.
 module polydem_finder_variants
-   use polydem_errors, only: error_t, input_error, raise
+   use polydem_errors, only: error_t
    use polydem_finder, only: finder_t
-   use polydem_finder_factory, only: finder_names, new_finder
+   use polydem_finder_factory, only: new_finder
    use polydem_quadtree_called, only: quadtree_called_t => quadtree_t
    use polydem_quadtree_o2, only: quadtree_o2_t => quadtree_t
    use polydem_sort_and_sweep_o2, only: sort_and_sweep_o2_t => sort_and_sweep_t
-   use polydem_strings, only: join
    implicit none
    private
    public :: new_finder_or_variant, variant_names
@@ -24,7 +23,7 @@ contains
    subroutine new_finder_or_variant(finder, name, error)
       !> The new finder
       class(finder_t), allocatable, intent(out) :: finder
-      !> One of `finder_names` or `variant_names`
+      !> Name as in &neighbours, or one of `variant_names`
       character(len=*), intent(in) :: name
       !> Allocated if there is no finder of this name
       type(error_t), allocatable, intent(inout) :: error
@@ -37,12 +36,7 @@ contains
       case ('sort_and_sweep_o2')
          allocate (sort_and_sweep_o2_t :: finder)
       case default
-         if (any(finder_names == name)) then
-            call new_finder(finder, name, error)
-         else
-            call raise(error, input_error, "there is no finder '"//trim(name)//"'; choose one of "// &
-                       join([finder_names, variant_names], ', '))
-         end if
+         call new_finder(finder, name, error)
       end select
    end subroutine new_finder_or_variant
 

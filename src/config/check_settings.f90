@@ -69,19 +69,7 @@ contains
          call raise(error, input_error, values(first_row('guards', 'energy'))%place// &
             ': ''energy'' in &guards needs ''ledger'' = .true. in &output')
       end if
-      call check_friction(settings, values, error)
    end subroutine check_settings
-
-   !> Reject exact friction with schemes that have no velocity at mid-step.
-   pure subroutine check_friction(settings, values, error)
-      type(settings_t), intent(in) :: settings
-      type(value_t), intent(in) :: values(:)
-      type(error_t), allocatable, intent(inout) :: error
-
-      if (settings%forces%friction /= 'exact' .or. settings%integrate%scheme == 'velocity_verlet') return
-      call raise(error, input_error, values(first_row('integrate', 'scheme'))%place//': ''scheme'' in &integrate '// &
-                 'must be velocity_verlet, because ''friction'' in &forces is exact')
-   end subroutine check_friction
 
    !> Reject containers that are too large for the grains. The length is 0 if its entry is not in use.
    pure subroutine check_container(length, key, scene, values, error)

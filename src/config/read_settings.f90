@@ -50,6 +50,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(source_t) :: source
       type(value_t), allocatable :: values(:)
+      integer :: k
 
       source%name = trim(file_name)
       source%text = text
@@ -60,6 +61,11 @@ contains
       settings%file = trim(file_name)
       settings%text = normalise_line_ends(text)
       settings%resolved = resolved_text(values)
+      allocate (settings%places(size(values)))
+      do k = 1, size(values)
+         settings%places(k)%text = settings%file
+         if (allocated(values(k)%place)) settings%places(k)%text = values(k)%place
+      end do
       call fill_settings(values, settings)
       call check_settings(settings, values, error)
    end subroutine read_settings_text

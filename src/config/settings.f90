@@ -3,10 +3,13 @@
 !> The defaults are in `namelist_entries`.
 module polydem_settings
    use polydem_kinds, only: ip, wp
+   use polydem_namelist_entries, only: first_row
+   use polydem_strings, only: text_t
    implicit none
    private
    public :: settings_t, scene_settings_t, boxes_settings_t, neighbours_settings_t, overlap_settings_t
    public :: exchange_settings_t
+   public :: place_of
    public :: forces_settings_t, integrate_settings_t, guards_settings_t, output_settings_t, checkpoint_settings_t
 
    !> Group &scene: bodies, walls and motions at the start
@@ -107,9 +110,9 @@ module polydem_settings
       real(wp) :: gravity(2)
       !> Young's modulus E in two dimensions [N/m2]
       real(wp) :: stiffness
-      !> Elastic force: 'area' or 'conservative'
+      !> Elastic force: a choice of the entry `law`
       character(len=:), allocatable :: law
-      !> Normal damping: 'rate', 'hunt_crossley', 'book' or 'none'
+      !> Normal damping: a choice of the entry `damping`
       character(len=:), allocatable :: damping
       !> Dimensionless damping coefficient gamma
       real(wp) :: damping_coefficient
@@ -119,7 +122,7 @@ module polydem_settings
       real(wp) :: restitution
       !> Damping of tilting in units of sqrt(k I_eff)
       real(wp) :: tilt_damping = 0.0_wp
-      !> Friction: 'cundall_strack', 'exact' or 'none'
+      !> Friction: a choice of the entry `friction`
       character(len=:), allocatable :: friction
       !> Friction coefficient mu
       real(wp) :: friction_coefficient
@@ -225,6 +228,8 @@ module polydem_settings
       character(len=:), allocatable :: text
       !> Every entry in use with its value, one per line, as namelist text
       character(len=:), allocatable :: resolved
+      !> Where each entry was given, (rows of the table); not allocated in settings that no text gave
+      type(text_t), allocatable :: places(:)
       !> Group &scene
       type(scene_settings_t) :: scene
       !> Group &boxes
@@ -246,5 +251,21 @@ module polydem_settings
       !> Group &checkpoint
       type(checkpoint_settings_t) :: checkpoint
    end type settings_t
+
+contains
+
+   !> Where an entry was given, for the beginning of a message: file:line, --set group.key=value, or the file alone
+   pure function place_of(settings, group, key) result(place)
+      !> All settings
+      type(settings_t), intent(in) :: settings
+      !> Namelist group
+      character(len=*), intent(in) :: group
+      !> Name in the group; the entry must exist
+      character(len=*), intent(in) :: key
+      character(len=:), allocatable :: place
+
+      place = settings%file
+      if (allocated(settings%places)) place = settings%places(first_row(group, key))%text
+   end function place_of
 
 end module polydem_settings

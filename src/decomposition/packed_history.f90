@@ -15,7 +15,7 @@ module polydem_packed_history
       integer(lp), allocatable :: key(:)
       !> Edge that separated the pair last, (pair)
       integer(ip), allocatable :: edge(:)
-      !> Columns of the contact history, zero if not allocated, (column, pair)
+      !> Columns of the contact history, or one of zeros if there is none, (column, pair)
       real(wp), allocatable :: value(:, :)
    end type packed_history_t
 
@@ -45,8 +45,10 @@ contains
       real(wp), allocatable :: value_sent(:, :), value_received(:, :)
       integer(ip), allocatable :: pair(:), rank(:), counts(:), counts_received(:), order(:)
       integer(ip) :: p, k, m, to(2)
-      integer :: j
+      integer :: j, n_columns
 
+      n_columns = 0
+      if (allocated(memory%column)) n_columns = size(memory%column)
       allocate (pair(2_ip*n), rank(2_ip*n))
       m = 0_ip
       do p = 1_ip, n
@@ -60,14 +62,14 @@ contains
          end do
       end do
       call sort_by_rank(rank(:m), comm%size, counts, order)
-      allocate (sent(2, m), value_sent(size(memory%column), m))
+      allocate (sent(2, m), value_sent(max(1, n_columns), m))
       value_sent = 0.0_wp
       do k = 1_ip, m
          p = pair(order(k))
          sent(1, k) = key_of(row, first(p), second(p))
          sent(2, k) = int(memory%separating_edge(p), lp)
-         do j = 1, size(memory%column)
-            if (allocated(memory%column(j)%value)) value_sent(j, k) = memory%column(j)%value(p)
+         do j = 1, n_columns
+            value_sent(j, k) = memory%column(j)%value(p)
          end do
       end do
       call comm%all_to_all(sent, counts, received, counts_received)
@@ -127,8 +129,10 @@ contains
       integer(ip), intent(out) :: n_known
       integer(lp) :: key
       integer(ip) :: p, k
-      integer :: j
+      integer :: j, n_columns
 
+      n_columns = 0
+      if (allocated(memory%column)) n_columns = size(memory%column)
       n_known = 0_ip
       k = 1_ip
       do p = 1_ip, n
@@ -141,8 +145,8 @@ contains
          if (packed%key(k) /= key) cycle
          n_known = n_known + 1_ip
          memory%separating_edge(p) = packed%edge(k)
-         do j = 1, size(memory%column)
-            if (allocated(memory%column(j)%value)) memory%column(j)%value(p) = packed%value(j, k)
+         do j = 1, n_columns
+            memory%column(j)%value(p) = packed%value(j, k)
          end do
       end do
    end subroutine receive_pairs

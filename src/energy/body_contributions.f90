@@ -13,8 +13,8 @@ module polydem_body_contributions
    private
    public :: n_channels, n_wall_channels, n_motions, add_rates, elastic_energy_of, motion_of
 
-   !> Number of channels of a body: powers of the elastic normal forces, of the damping of normal motion and of tilts,
-   !> and of the tangential forces [W/m]
+   !> Number of channels of a body: powers of the elastic normal forces with cohesion, of the other normal forces with
+   !> the damping of tilts, and of the tangential forces [W/m]
    integer, parameter :: n_channels = 3
    !> Number of wall channels, the action of fixed bodies on a body: power [W/m]; force along x and y [N/m]; torque
    !> about the origin [N]; sums over contacts of the absolute values of forces [N/m] and torques [N]
@@ -122,6 +122,7 @@ contains
       approach = contacts%direction(1, c)*vx + contacts%direction(2, c)*vy + contacts%lever(c)*w
       power(1) = power(1) + contacts%elastic(c)*approach
       power(2) = power(2) + (contacts%normal_force(c) - contacts%elastic(c))*approach
+      if (contacts%has_cohesion) power(1:2) = power(1:2) + contacts%cohesion(c)*approach*[1.0_wp, -1.0_wp]
       if (contacts%has_twist) power(2) = power(2) + contacts%twist(c)*w
       power(3) = power(3) + contacts%tangential_force(c)*(contacts%direction(1, c)*vy - contacts%direction(2, c)*vx)
    end subroutine add_power

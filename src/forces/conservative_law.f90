@@ -21,42 +21,64 @@
 !> degenerate = 'stop' in &overlap.
 module polydem_conservative_law
    use polydem_bodies, only: bodies_t
+   use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_memory_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: force_part_t
+   use polydem_force_part, only: acts_elastic, force_part_t
    use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_settings, only: forces_settings_t
    implicit none
    private
-   public :: conservative_law_t, new_conservative_law
+   public :: conservative_law_t
 
    !> The conservative law
    type, extends(force_part_t) :: conservative_law_t
       !> Young's modulus in two dimensions E [N/m2]
-      real(wp) :: stiffness
+      real(wp) :: stiffness = 0.0_wp
       !> Reciprocal side 1/s of the square of each body's area, (bodies) [1/m]
       real(wp), allocatable :: inverse_size(:)
    contains
+      procedure :: choose
+      procedure :: measure
       procedure :: add
+      procedure :: stiffen
+      procedure :: static_depth
    end type conservative_law_t
+
+   !> Greatest stiffness of a contact over that of a face of the same length
+   real(wp), parameter :: steepening = 1.5_wp
 
 contains
 
+   !> It is the law 'conservative'.
+   subroutine choose(self, settings, chosen)
+      class(conservative_law_t), intent(inout) :: self
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+      !> Whether it belongs to the law
+      logical, intent(out) :: chosen
+
+      chosen = settings%law == 'conservative'
+      if (.not. chosen) return
+      self%name = 'conservative law'
+      self%stage = acts_elastic
+      self%needs_effective_area = .true.
+      self%stiffness = settings%stiffness
+   end subroutine choose
+
    !> Measure the bodies.
-   subroutine new_conservative_law(stiffness, bodies, part)
-      !> Young's modulus in two dimensions E [N/m2]
-      real(wp), intent(in) :: stiffness
+   subroutine measure(self, bodies)
+      class(conservative_law_t), intent(inout) :: self
       !> Bodies, for their shapes
       type(bodies_t), intent(in) :: bodies
-      !> The law
-      type(conservative_law_t), intent(out) :: part
       integer(ip) :: s
 
-      part%stiffness = stiffness
-      allocate (part%inverse_size(bodies%n))
+      if (allocated(self%inverse_size)) deallocate (self%inverse_size)
+      allocate (self%inverse_size(bodies%n))
       do s = 1_ip, bodies%n
-         part%inverse_size(s) = 1.0_wp/sqrt(area_of(bodies, s))
+         self%inverse_size(s) = 1.0_wp/sqrt(area_of(bodies, s))
       end do
-   end subroutine new_conservative_law
+   end subroutine measure
 
    !> Area of a body [m2]
    pure real(wp) function area_of(bodies, s)
@@ -102,6 +124,78 @@ contains
       end do
       !$omp end parallel do
    end subroutine add
+
+   !> Add the stiffness. With K_n = E L/l, where l is l b/L here:
+   !>
+   !> The force steepens as L grows with the depth. The root of the effective area G is a concave function of the
+   !> displacement of convex bodies: it is the least, over all linear maps of determinant 1, of a multiple of the fourth
+   !> root of the polar moment of inertia, which is concave (H. Hadwiger, Comment. Math. Helv. 30 (1956) 285). So
+   !> G'' <= G'^2/(2 G), and the stiffness is at most 3/2 of K_n. The law also resists tilts, like a face:
+   !> K = K_n L^2/12. (No bound for rotations, but of 2600 random contacts of all kinds none had a frequency more
+   !> than 8 % above.)
+   !>
+   !> An expected contact is a face on the longest edge of two equal bodies, where l b is the area.
+   subroutine stiffen(self, bodies, contacts, element)
+      class(conservative_law_t), intent(in) :: self
+      !> Bodies, for the shape of one whose contact is only expected
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with their lengths
+      type(contacts_t), intent(in) :: contacts
+      !> The contact; stiffness against approach and tilts change, and its ratio if it is only expected
+      type(contact_element_t), intent(inout) :: element
+
+      if (element%contact == 0_ip) then
+         element%ratio = longest_edge_over_area(bodies, element%body)
+         element%normal_stiffness = element%normal_stiffness + self%stiffness*element%ratio
+      else
+         element%normal_stiffness = element%normal_stiffness + steepening*(self%stiffness*element%ratio)
+         element%tilt_stiffness = element%tilt_stiffness &
+            + steepening*face_tilt_stiffness(self%stiffness, contacts, element%contact)
+      end if
+   end subroutine stiffen
+
+   !> Square of the longest edge of a body over its area
+   pure real(wp) function longest_edge_over_area(bodies, s) result(ratio)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      real(wp) :: dx, dy, length, distance, longest, area
+      integer(ip) :: v, w
+
+      longest = 0.0_wp
+      area = 0.0_wp
+      w = bodies%vertex_start(s + 1_ip) - 1_ip
+      do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
+         dx = bodies%shape(1, v) - bodies%shape(1, w)
+         dy = bodies%shape(2, v) - bodies%shape(2, w)
+         length = sqrt(dx*dx + dy*dy)
+         distance = abs(dx*bodies%shape(2, w) - dy*bodies%shape(1, w))/length
+         longest = max(longest, length)
+         area = area + 0.5_wp*length*distance
+         w = v
+      end do
+      ratio = longest*longest/area
+   end function longest_edge_over_area
+
+   !> Depth at which a flat contact of width w carries a load, F l/(E w) [m]: l = 2 s1 s2 min(s1, s2)/((s1 + s2) w),
+   !> where s is the side of the square of a body's area.
+   real(wp) function static_depth(self, load, block, support, offset) result(depth)
+      class(conservative_law_t), intent(in) :: self
+      !> Normal load per unit depth of the plane [N/m]
+      real(wp), intent(in) :: load
+      !> Width and height of the block, (2) [m]
+      real(wp), intent(in) :: block(2)
+      !> Width and thickness of the support, (2) [m]
+      real(wp), intent(in) :: support(2)
+      !> Distance of the two centres along the contact [m] (not used)
+      real(wp), intent(in) :: offset
+      real(wp) :: s1, s2
+
+      associate (unused_offset => offset)
+      end associate
+      s1 = sqrt(block(1)*block(2))
+      s2 = sqrt(support(1)*support(2))
+      depth = load/(self%stiffness*block(1))*(2.0_wp*s1*s2*min(s1, s2)/((s1 + s2)*block(1)))
+   end function static_depth
 
    !> Moment of N about the force point [m2], from the nearer centre, from which it is rounded least
    pure real(wp) function moment_about_force_point(contacts, c) result(moment)

@@ -4,15 +4,21 @@
 !> force changes by -k_t v_t dt and is cut at mu F_n, as is its sum with the damping -d sqrt(k_t m_t) v_t,
 !> 1/m_t = 1/m1 + 1/m2 + r1^2/I1 + r2^2/I2 (p. 144). The cut spring is what is remembered.
 !>
+!> Coulomb's limit is one of contacts under pressure, F_n >= 0. Where another part pulls the bodies together, F_n < 0,
+!> the limit is zero: there is no friction, and the spring is unloaded, so that it starts from zero when the contact
+!> is pressed again. A cohesive part that wants friction under tension brings its own.
+!>
 !> With v_t at the end of the step, as in the book, the spring is of first order in the step whatever the integrator,
 !> and an undamped one is unstable from w dt = 1.41 on. With v_t in the middle of the step its extension is that
 !> of a spring tied to the positions: of second order, and stable to w dt = 2 with velocity Verlet.
 module polydem_cundall_strack
    use polydem_bodies, only: bodies_t
-   use polydem_contact_history, only: at_tangential, contact_memory_t
+   use polydem_contact_element, only: contact_element_t
+   use polydem_contact_history, only: contact_memory_t, memory_kind_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: force_part_t
+   use polydem_force_part, only: acts_last, force_part_t
    use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: cundall_strack_t
@@ -20,18 +26,49 @@ module polydem_cundall_strack
    !> Friction by a spring with memory
    type, extends(force_part_t) :: cundall_strack_t
       !> Friction coefficient mu
-      real(wp) :: coefficient
+      real(wp) :: coefficient = 0.0_wp
       !> Stiffness of the spring k_t [N/m2]
-      real(wp) :: stiffness
+      real(wp) :: stiffness = 0.0_wp
       !> Damping as a share of sqrt(k_t m_t)
-      real(wp) :: damping
+      real(wp) :: damping = 0.0_wp
       !> Whether the slip velocity in the middle of the step extends the spring, not that at its end
       logical :: midstep = .false.
    contains
+      procedure :: choose
+      procedure :: stored
       procedure :: add
+      procedure :: stiffen
    end type cundall_strack_t
 
 contains
+
+   !> It is the friction 'cundall_strack'.
+   subroutine choose(self, settings, chosen)
+      class(cundall_strack_t), intent(inout) :: self
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+      !> Whether it belongs to the law
+      logical, intent(out) :: chosen
+
+      chosen = settings%friction == 'cundall_strack'
+      if (.not. chosen) return
+      self%name = 'Cundall-Strack friction'
+      self%stage = acts_last
+      self%coefficient = settings%friction_coefficient
+      self%stiffness = settings%tangential_stiffness*settings%stiffness
+      self%damping = settings%tangential_damping
+      self%midstep = settings%midstep_slip
+   end subroutine choose
+
+   !> It stores the force of the spring.
+   function stored(self) result(kinds)
+      class(cundall_strack_t), intent(in) :: self
+      type(memory_kind_t), allocatable :: kinds(:)
+
+      associate (unused_self => self)
+      end associate
+      kinds = [memory_kind_t('tangential', 'N/m', 'tangential force remembered')]
+   end function stored
 
    !> Add the tangential force and remember the spring.
    subroutine add(self, bodies, dt, contacts, memory)
@@ -42,7 +79,7 @@ contains
       real(wp), intent(in) :: dt
       !> Contacts; `tangential_force` changes
       type(contacts_t), intent(inout) :: contacts
-      !> Memory of the pairs; `tangential` is read and set
+      !> Memory of the pairs; the spring is read and set
       type(contact_memory_t), intent(inout) :: memory
       real(wp) :: slip, mean, limit, spring
       integer(ip) :: c
@@ -55,10 +92,10 @@ contains
          mean = slip
          if (self%midstep) mean = slip &
             - 0.5_wp*dt*slip_of(bodies%acceleration, bodies%angular_acceleration, contacts, c)
-         limit = self%coefficient*contacts%normal_force(c)
-         spring = memory%column(at_tangential)%value(contacts%pair(c)) - self%stiffness*mean*dt
+         limit = self%coefficient*max(0.0_wp, contacts%normal_force(c))
+         spring = memory%column(self%first_column)%value(contacts%pair(c)) - self%stiffness*mean*dt
          spring = max(-limit, min(limit, spring))
-         memory%column(at_tangential)%value(contacts%pair(c)) = spring
+         memory%column(self%first_column)%value(contacts%pair(c)) = spring
          if (self%damping > 0.0_wp) then
             spring = spring - self%damping*sqrt(self%stiffness/tangential_mobility(bodies, contacts, c))*slip
             spring = max(-limit, min(limit, spring))
@@ -67,6 +104,23 @@ contains
       end do
       !$omp end parallel do
    end subroutine add
+
+   !> Add the spring and its dashpot.
+   subroutine stiffen(self, bodies, contacts, element)
+      class(cundall_strack_t), intent(in) :: self
+      !> Bodies (not used)
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts (not used)
+      type(contacts_t), intent(in) :: contacts
+      !> The contact; tangential stiffness and dashpot change
+      type(contact_element_t), intent(inout) :: element
+
+      associate (unused_bodies => bodies, unused_contacts => contacts)
+      end associate
+      element%tangential_stiffness = element%tangential_stiffness + self%stiffness
+      element%tangential_dashpot = element%tangential_dashpot &
+         + self%damping*sqrt(element%tangential_mass*self%stiffness)
+   end subroutine stiffen
 
    !> Velocity (or acceleration) of the first body against the second at the force point, along (-direction_y,
    !> direction_x) [m/s]; that of the rotating arm itself has no place in the extension of the spring

@@ -8,21 +8,48 @@
 !> begins without a jump and needs no weight; theirs, between 1/2 and 1, does not change the order.)
 module polydem_damping_onset
    use polydem_bodies, only: bodies_t
-   use polydem_contact_history, only: at_area, contact_memory_t
+   use polydem_contact_history, only: contact_memory_t, memory_kind_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: force_part_t
+   use polydem_force_part, only: acts_on_damping, force_part_t
    use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: damping_onset_t
 
-   !> Weighs the damping of the parts before it in the step of first touch
+   !> Weighs the normal damping in the step of first touch
    type, extends(force_part_t) :: damping_onset_t
    contains
+      procedure :: choose
+      procedure :: stored
       procedure :: add
    end type damping_onset_t
 
 contains
+
+   !> It is the choice `damping_from_touch`.
+   subroutine choose(self, settings, chosen)
+      class(damping_onset_t), intent(inout) :: self
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+      !> Whether it belongs to the law
+      logical, intent(out) :: chosen
+
+      chosen = settings%damping_from_touch
+      if (.not. chosen) return
+      self%name = 'from first touch'
+      self%stage = acts_on_damping
+   end subroutine choose
+
+   !> It stores the area of the last step.
+   function stored(self) result(kinds)
+      class(damping_onset_t), intent(in) :: self
+      type(memory_kind_t), allocatable :: kinds(:)
+
+      associate (unused_self => self)
+      end associate
+      kinds = [memory_kind_t('area', 'm2', 'area of the overlap at the last step', zero_is_new=.true.)]
+   end function stored
 
    !> Weigh the damping of new contacts, limit the sum to repulsion and remember the areas.
    subroutine add(self, bodies, dt, contacts, memory)
@@ -33,22 +60,22 @@ contains
       real(wp), intent(in) :: dt
       !> Contacts; `normal_force` changes
       type(contacts_t), intent(inout) :: contacts
-      !> Memory of the pairs; `area` is read and set
+      !> Memory of the pairs; the area is read and set
       type(contact_memory_t), intent(inout) :: memory
       real(wp) :: growth, damping
       integer(ip) :: c
 
-      associate (unused_self => self, unused_bodies => bodies)
+      associate (unused_bodies => bodies)
       end associate
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(dt, contacts, memory) private(c, growth, damping)
+      !$omp    shared(self, dt, contacts, memory) private(c, growth, damping)
       do c = 1_ip, contacts%n
          growth = contacts%rate(c)*dt
-         if (memory%column(at_area)%value(contacts%pair(c)) <= 0.0_wp .and. contacts%area(c) < growth) then
+         if (memory%column(self%first_column)%value(contacts%pair(c)) <= 0.0_wp .and. contacts%area(c) < growth) then
             damping = contacts%normal_force(c) - contacts%elastic(c)
             contacts%normal_force(c) = max(0.0_wp, contacts%elastic(c) + (contacts%area(c)/growth + 0.5_wp)*damping)
          end if
-         memory%column(at_area)%value(contacts%pair(c)) = contacts%area(c)
+         memory%column(self%first_column)%value(contacts%pair(c)) = contacts%area(c)
       end do
       !$omp end parallel do
    end subroutine add

@@ -30,13 +30,14 @@
 module polydem_exact_friction
    use polydem_bodies, only: bodies_t
    use polydem_box_qp, only: box_qp_t, reserve_box_qp, solve_box_qp
-   use polydem_contact_history, only: at_tangential, contact_memory_t
+   use polydem_contact_history, only: contact_memory_t, memory_kind_t
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
    use polydem_counters, only: counters_t
-   use polydem_errors, only: error_t, raise, run_error
+   use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_friction_network, only: build_network, free_velocities, friction_network_t, within
    use polydem_kinds, only: ip, lp, wp
+   use polydem_settings, only: forces_settings_t, place_of, settings_t
    use polydem_strings, only: to_text
    use polydem_velocity_constraint, only: velocity_constraint_t
    implicit none
@@ -46,9 +47,9 @@ module polydem_exact_friction
    !> Coulomb friction without a spring
    type, extends(velocity_constraint_t) :: exact_friction_t
       !> Friction coefficient mu
-      real(wp) :: coefficient
+      real(wp) :: coefficient = 0.0_wp
       !> Slip that may remain, as a share of the greatest slip velocity that friction takes from a contact in a step
-      real(wp) :: tolerance
+      real(wp) :: tolerance = 0.0_wp
       !> Contacts of the last step
       type(friction_network_t) :: network
       !> Forces and velocities of the last step
@@ -58,6 +59,9 @@ module polydem_exact_friction
       !> Greatest slip so far, as a share like `tolerance`
       real(wp), private :: greatest_residual = 0.0_wp
    contains
+      procedure :: choose
+      procedure :: check
+      procedure :: stored
       procedure :: apply
       procedure :: report
    end type exact_friction_t
@@ -66,6 +70,50 @@ module polydem_exact_friction
    real(wp), parameter :: residual_unit = 1.0e-15_wp
 
 contains
+
+   !> It is the friction 'exact'.
+   subroutine choose(self, settings, chosen)
+      class(exact_friction_t), intent(inout) :: self
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+      !> Whether it belongs to the law
+      logical, intent(out) :: chosen
+
+      chosen = settings%friction == 'exact'
+      if (.not. chosen) return
+      self%name = 'exact friction'
+      self%coefficient = settings%friction_coefficient
+      self%tolerance = settings%friction_tolerance
+   end subroutine choose
+
+   !> Refuse schemes that know no velocity in the middle of a step, and several processes.
+   subroutine check(self, settings, n_processes, error)
+      class(exact_friction_t), intent(in) :: self
+      !> All settings of the run
+      type(settings_t), intent(in) :: settings
+      !> Number of processes that share the bodies
+      integer(ip), intent(in) :: n_processes
+      !> Names the entry and says what to do
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (unused_self => self)
+      end associate
+      if (settings%integrate%scheme /= 'velocity_verlet') call raise(error, input_error, &
+         place_of(settings, 'integrate', 'scheme')//': ''scheme'' in &integrate must be velocity_verlet, since '// &
+         '''friction'' in &forces is exact')
+      if (n_processes > 1_ip) call raise(error, input_error, settings%file//': exact friction couples all contacts '// &
+         'and needs a process of its own; use threads instead of ranks, or friction = ''cundall_strack'' in &forces')
+   end subroutine check
+
+   !> It stores the force that the next search starts from.
+   function stored(self) result(kinds)
+      class(exact_friction_t), intent(in) :: self
+      type(memory_kind_t), allocatable :: kinds(:)
+
+      associate (unused_self => self)
+      end associate
+      kinds = [memory_kind_t('tangential', 'N/m', 'tangential force remembered')]
+   end function stored
 
    !> Find the friction of all contacts.
    subroutine apply(self, dt, incidence, bodies, contacts, memory, error)
@@ -78,7 +126,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Contacts; `tangential_force` changes
       type(contacts_t), intent(inout) :: contacts
-      !> Memory of the pairs: `tangential` is what the search starts from
+      !> Memory of the pairs: the force that the search starts from
       type(contact_memory_t), intent(inout) :: memory
       !> Says how much slip is left
       type(error_t), allocatable, intent(inout) :: error
@@ -91,12 +139,12 @@ contains
          call free_velocities(dt, bodies, programme%free)
          programme%tolerance = self%tolerance
          do c = 1_ip, contacts%n
-            programme%force(c) = within(network%limit(c), memory%column(at_tangential)%value(contacts%pair(c)))
+            programme%force(c) = within(network%limit(c), memory%column(self%first_column)%value(contacts%pair(c)))
          end do
          call solve_box_qp(programme, network, incidence, solved)
          do c = 1_ip, contacts%n
             contacts%tangential_force(c) = contacts%tangential_force(c) + programme%force(c)
-            memory%column(at_tangential)%value(contacts%pair(c)) = programme%force(c)
+            memory%column(self%first_column)%value(contacts%pair(c)) = programme%force(c)
          end do
          if (contacts%n > 0_ip) self%n_solved = self%n_solved + 1_lp
          self%greatest_residual = max(self%greatest_residual, programme%residual)

@@ -1,29 +1,31 @@
-!> The force law of a run: the list of its parts. The only file that knows all parts by name.
+!> The force law of a run: its parts, and the factory, the only file that lists all of them.
 !>
-!> To add a part: write it as a `force_part_t` in a file of its own, add its name to the choices of the
-!> namelist, and append it here in the order in which parts must act (elastic, damping, friction). A law may end with a
-!> constraint on velocities, which acts when all other forces on the bodies are known.
+!> To add a part: write it as a `force_part_t` in a file of its own, and name it here by a `use` and an `offer`. The
+!> order of the offers does not matter, as parts say when they act. A law may have a constraint on velocities, which
+!> acts when all other forces on the bodies are known.
 module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
-   use polydem_conservative_law, only: conservative_law_t, new_conservative_law
-   use polydem_contact_history, only: at_area, at_tangential, contact_memory_t, memory_kinds
+   use polydem_conservative_law, only: conservative_law_t
+   use polydem_contact_element, only: contact_element_t
+   use polydem_contact_history, only: contact_memory_t, memory_kind_t
    use polydem_contacts, only: contacts_t
    use polydem_cundall_strack, only: cundall_strack_t
    use polydem_damping_onset, only: damping_onset_t
+   use polydem_errors, only: error_t
    use polydem_exact_friction, only: exact_friction_t
-   use polydem_force_part, only: force_part_t
+   use polydem_force_part, only: acts_on_damping, force_part_t
    use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
    use polydem_matuttis_chen_damping, only: book_damping_t
    use polydem_rate_damping, only: rate_damping_t
-   use polydem_restitution_damping, only: damping_ratio_of, restitution_damping_t
-   use polydem_settings, only: forces_settings_t
+   use polydem_restitution_damping, only: restitution_damping_t
+   use polydem_settings, only: forces_settings_t, settings_t
    use polydem_tilt_damping, only: tilt_damping_t
    use polydem_velocity_constraint, only: velocity_constraint_t
    implicit none
    private
-   public :: force_law_t, new_force_law, evaluate_law
+   public :: force_law_t, new_force_law, choose_parts, check_law, evaluate_law
 
    !> A part of any type
    type :: part_holder_t
@@ -31,19 +33,31 @@ module polydem_force_law
       class(force_part_t), allocatable :: part
    end type part_holder_t
 
-   !> Parts in the order in which they act, and which columns of memory they need
+   !> Parts in the order in which they act, and what they need
    type :: force_law_t
       type(part_holder_t), allocatable, private :: parts(:)
       !> What acts after all parts; unallocated if there is none
       class(velocity_constraint_t), allocatable :: constraint
-      !> Whether a part needs a column of memory, in the order of `memory_kinds`
-      logical :: needs(size(memory_kinds)) = .false.
+      !> What is stored of each pair: the first columns of memory, in this order; not allocated before `choose_parts`
+      type(memory_kind_t), allocatable :: stored(:)
       !> Whether the law asks for the effective area of overlaps
       logical :: needs_effective_area = .false.
+      !> Whether a part adds to the column `cohesion`
+      logical :: needs_cohesion = .false.
       !> Whether a part adds torques of its own
       logical :: needs_twist = .false.
       !> Names of the parts, for `check` and the log
       character(len=:), allocatable :: description
+   contains
+      procedure, private :: offer_part
+      procedure, private :: offer_constraint
+      !> Offer the settings to a part or a constraint
+      generic :: offer => offer_part, offer_constraint
+      procedure :: collect_needs
+      procedure :: measure
+      procedure :: stiffen
+      procedure :: static_depth
+      procedure :: undamped_warning
    end type force_law_t
 
 contains
@@ -56,69 +70,137 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> The law
       type(force_law_t), intent(out) :: law
-      type(conservative_law_t) :: conservative
 
-      allocate (law%parts(0))
-      law%description = settings%law//' law'
-      if (settings%law == 'conservative') then
-         call new_conservative_law(settings%stiffness, bodies, conservative)
-         call append(law, conservative)
-         law%needs_effective_area = .true.
-      else
-         call append(law, area_law_t(stiffness=settings%stiffness))
-      end if
-      call append_damping(settings, law)
-      if (settings%damping_from_touch) then
-         call append(law, damping_onset_t())
-         law%description = law%description//' from first touch'
-         law%needs(at_area) = .true.
-      end if
-      if (settings%tilt_damping > 0.0_wp) then
-         call append(law, tilt_damping_t(stiffness=settings%stiffness, share=settings%tilt_damping))
-         law%description = law%description//', damping of tilts'
-         law%needs_twist = .true.
-      end if
-      select case (settings%friction)
-      case ('cundall_strack')
-         call append(law, cundall_strack_t(coefficient=settings%friction_coefficient, &
-                                           stiffness=settings%tangential_stiffness*settings%stiffness, &
-                                           damping=settings%tangential_damping, &
-                                           midstep=settings%midstep_slip))
-         law%description = law%description//', Cundall-Strack friction'
-         law%needs(at_tangential) = .true.
-      case ('exact')
-         law%constraint = exact_friction_t(coefficient=settings%friction_coefficient, &
-                                           tolerance=settings%friction_tolerance)
-         law%description = law%description//', exact friction'
-         law%needs(at_tangential) = .true.
-      end select
+      call choose_parts(settings, law)
+      call law%measure(bodies)
    end subroutine new_force_law
 
-   subroutine append_damping(settings, law)
+   !> Choose the parts that the settings ask for: the list of all there are. The law computes forces after `measure`; it
+   !> knows everything else already.
+   subroutine choose_parts(settings, law)
+      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      type(force_law_t), intent(inout) :: law
+      !> The law
+      type(force_law_t), intent(out) :: law
 
-      associate (stiffness => settings%stiffness, coefficient => settings%damping_coefficient)
-         select case (settings%damping)
-         case ('rate')
-            if (settings%restitution > 0.0_wp) then
-               call append(law, restitution_damping_t(stiffness=stiffness, &
-                                                      ratio=damping_ratio_of(settings%restitution)))
-               law%description = law%description//', damping of given restitution'
-            else
-               call append(law, rate_damping_t(stiffness=stiffness, coefficient=coefficient))
-               law%description = law%description//', rate damping'
-            end if
-         case ('hunt_crossley')
-            call append(law, hunt_crossley_t(stiffness=stiffness, coefficient=coefficient))
-            law%description = law%description//', Hunt-Crossley damping'
-         case ('book')
-            call append(law, book_damping_t(stiffness=stiffness, coefficient=coefficient))
-            law%description = law%description//', book damping'
-            law%needs(at_area) = .true.
-         end select
-      end associate
-   end subroutine append_damping
+      call law%offer(area_law_t(), settings)
+      call law%offer(conservative_law_t(), settings)
+      call law%offer(rate_damping_t(), settings)
+      call law%offer(restitution_damping_t(), settings)
+      call law%offer(hunt_crossley_t(), settings)
+      call law%offer(book_damping_t(), settings)
+      call law%offer(damping_onset_t(), settings)
+      call law%offer(tilt_damping_t(), settings)
+      call law%offer(cundall_strack_t(), settings)
+      call law%offer(exact_friction_t(), settings)
+      call law%collect_needs()
+   end subroutine choose_parts
+
+   !> Offer the settings to a part; if they ask for it, it joins the law, behind all parts that act before it.
+   subroutine offer_part(law, offered, settings)
+      !> The law; `collect_needs` must follow the last offer
+      class(force_law_t), intent(inout) :: law
+      !> A part as its type makes it
+      class(force_part_t), intent(in) :: offered
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+      type(part_holder_t), allocatable :: longer(:)
+      class(force_part_t), allocatable :: part
+      logical :: chosen
+      integer :: k, n, place
+
+      if (.not. allocated(law%parts)) allocate (law%parts(0))
+      allocate (part, source=offered)
+      call part%choose(settings, chosen)
+      if (.not. chosen) return
+      n = size(law%parts)
+      place = 1
+      do k = 1, n
+         if (law%parts(k)%part%stage <= part%stage) place = k + 1
+      end do
+      allocate (longer(n + 1))
+      do k = 1, n
+         call move_alloc(law%parts(k)%part, longer(merge(k, k + 1, k < place))%part)
+      end do
+      call move_alloc(part, longer(place)%part)
+      call move_alloc(longer, law%parts)
+   end subroutine offer_part
+
+   !> Offer the settings to a constraint; there is at most one that they ask for.
+   subroutine offer_constraint(law, offered, settings)
+      !> The law
+      class(force_law_t), intent(inout) :: law
+      !> A constraint as its type makes it
+      class(velocity_constraint_t), intent(in) :: offered
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+      class(velocity_constraint_t), allocatable :: constraint
+      logical :: chosen
+
+      allocate (constraint, source=offered)
+      call constraint%choose(settings, chosen)
+      if (chosen) call move_alloc(constraint, law%constraint)
+   end subroutine offer_constraint
+
+   !> Collect what the parts need and store, and their names.
+   subroutine collect_needs(law)
+      !> The law
+      class(force_law_t), intent(inout) :: law
+      integer :: k
+
+      if (allocated(law%stored)) deallocate (law%stored)
+      allocate (law%stored(0))
+      law%description = ''
+      do k = 1, size(law%parts)
+         associate (part => law%parts(k)%part)
+            law%needs_effective_area = law%needs_effective_area .or. part%needs_effective_area
+            law%needs_cohesion = law%needs_cohesion .or. part%needs_cohesion
+            law%needs_twist = law%needs_twist .or. part%needs_twist
+            part%first_column = size(law%stored) + 1
+            law%stored = [law%stored, part%stored()]
+            if (k > 1 .and. part%stage /= acts_on_damping) law%description = law%description//','
+            law%description = law%description//' '//trim(part%name)
+         end associate
+      end do
+      if (allocated(law%constraint)) then
+         law%constraint%first_column = size(law%stored) + 1
+         law%stored = [law%stored, law%constraint%stored()]
+         law%description = law%description//', '//trim(law%constraint%name)
+      end if
+      law%description = trim(adjustl(law%description))
+   end subroutine collect_needs
+
+   !> Let the parts measure the bodies.
+   subroutine measure(law, bodies)
+      !> The law
+      class(force_law_t), intent(inout) :: law
+      !> Bodies, for their shapes
+      type(bodies_t), intent(in) :: bodies
+      integer :: k
+
+      do k = 1, size(law%parts)
+         call law%parts(k)%part%measure(bodies)
+      end do
+      if (allocated(law%constraint)) call law%constraint%measure(bodies)
+   end subroutine measure
+
+   !> Refuse settings that the law does not go with.
+   subroutine check_law(settings, n_processes, error)
+      !> All settings of the run
+      type(settings_t), intent(in) :: settings
+      !> Number of processes that share the bodies
+      integer(ip), intent(in) :: n_processes
+      !> Names the entry and says what to do
+      type(error_t), allocatable, intent(inout) :: error
+      type(force_law_t) :: law
+      integer :: k
+
+      call choose_parts(settings%forces, law)
+      do k = 1, size(law%parts)
+         call law%parts(k)%part%check(settings, n_processes, error)
+      end do
+      if (allocated(law%constraint)) call law%constraint%check(settings, n_processes, error)
+   end subroutine check_law
 
    !> Compute the normal and tangential forces of all contacts.
    subroutine evaluate_law(law, bodies, dt, contacts, memory)
@@ -128,7 +210,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0 at the start of a run
       real(wp), intent(in) :: dt
-      !> Contacts; `elastic`, `normal_force`, `tangential_force` and `twist` are set
+      !> Contacts; `elastic`, `cohesion`, `normal_force`, `tangential_force` and `twist` are set
       type(contacts_t), intent(inout) :: contacts
       !> What is remembered of the pairs
       type(contact_memory_t), intent(inout) :: memory
@@ -137,25 +219,65 @@ contains
       contacts%elastic(1:contacts%n) = 0.0_wp
       contacts%normal_force(1:contacts%n) = 0.0_wp
       contacts%tangential_force(1:contacts%n) = 0.0_wp
+      if (contacts%has_cohesion) contacts%cohesion(1:contacts%n) = 0.0_wp
       if (contacts%has_twist) contacts%twist(1:contacts%n) = 0.0_wp
       do k = 1, size(law%parts)
          call law%parts(k)%part%add(bodies, dt, contacts, memory)
       end do
    end subroutine evaluate_law
 
-   subroutine append(law, part)
-      type(force_law_t), intent(inout) :: law
-      class(force_part_t), intent(in) :: part
-      type(part_holder_t), allocatable :: longer(:)
-      integer(ip) :: k, n
+   !> Add the springs and dashpots of all parts to those of a contact.
+   subroutine stiffen(law, bodies, contacts, element)
+      !> The law
+      class(force_law_t), intent(in) :: law
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with their forces, or none if the contact is only expected
+      type(contacts_t), intent(in) :: contacts
+      !> The contact
+      type(contact_element_t), intent(inout) :: element
+      integer :: k
 
-      n = size(law%parts, kind=ip)
-      allocate (longer(n + 1_ip))
-      do k = 1_ip, n
-         call move_alloc(law%parts(k)%part, longer(k)%part)
+      do k = 1, size(law%parts)
+         call law%parts(k)%part%stiffen(bodies, contacts, element)
       end do
-      allocate (longer(n + 1_ip)%part, source=part)
-      call move_alloc(longer, law%parts)
-   end subroutine append
+      if (allocated(law%constraint)) call law%constraint%stiffen(bodies, contacts, element)
+   end subroutine stiffen
+
+   !> Depth at which a flat contact carries a load at rest [m]; 0 if no part knows one
+   real(wp) function static_depth(law, load, block, support, offset) result(depth)
+      !> The law
+      class(force_law_t), intent(in) :: law
+      !> Normal load per unit depth of the plane [N/m]
+      real(wp), intent(in) :: load
+      !> Width and height of the block, (2) [m]
+      real(wp), intent(in) :: block(2)
+      !> Width and thickness of the support, (2) [m]
+      real(wp), intent(in) :: support(2)
+      !> Distance of the two centres along the contact [m]
+      real(wp), intent(in) :: offset
+      integer :: k
+
+      depth = 0.0_wp
+      do k = 1, size(law%parts)
+         depth = depth + law%parts(k)%part%static_depth(load, block, support, offset)
+      end do
+   end function static_depth
+
+   !> What is wrong with the law because nothing dissipates; blank: nothing
+   function undamped_warning(law) result(warning)
+      !> The law
+      class(force_law_t), intent(in) :: law
+      character(len=:), allocatable :: warning
+      integer :: k
+
+      warning = ''
+      do k = 1, size(law%parts)
+         if (law%parts(k)%part%dissipates) return
+      end do
+      do k = 1, size(law%parts)
+         if (warning == '') warning = law%parts(k)%part%undamped_warning()
+      end do
+   end function undamped_warning
 
 end module polydem_force_law

@@ -39,7 +39,7 @@ module polydem_friction_network
       real(wp), allocatable :: row(:, :)
       !> Change of the slip velocity by a unit force within a step, h W_cc [m/s per N/m]
       real(wp), allocatable :: mobility(:)
-      !> Greatest force mu F_n [N/m]
+      !> Greatest force mu F_n [N/m], never negative: a contact that is pulled together has no friction
       real(wp), allocatable :: limit(:)
       !> What a slip velocity may be by the rounding errors of the forces on the bodies [m/s]
       real(wp), allocatable :: noise(:)

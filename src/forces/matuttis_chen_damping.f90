@@ -5,22 +5,21 @@
 !> Meant for comparison; `rate_damping` is the same law without the artefacts of the difference.
 module polydem_matuttis_chen_damping
    use polydem_bodies, only: bodies_t
-   use polydem_contact_history, only: at_area, contact_memory_t
+   use polydem_contact_history, only: contact_memory_t, memory_kind_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: force_part_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
+   use polydem_normal_damping, only: block_size, normal_damping_t
+   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: book_damping_t
 
    !> Damping by the backward difference of the area
-   type, extends(force_part_t) :: book_damping_t
-      !> Young's modulus in two dimensions E [N/m2]
-      real(wp) :: stiffness
-      !> Dimensionless damping coefficient gamma
-      real(wp) :: coefficient
+   type, extends(normal_damping_t) :: book_damping_t
    contains
-      procedure :: add
+      procedure :: choose
+      procedure :: stored
+      procedure :: find_forces
    end type book_damping_t
 
    !> Greatest damping on approach, as a multiple of the elastic force
@@ -28,35 +27,61 @@ module polydem_matuttis_chen_damping
 
 contains
 
-   !> Add the damping, limit the sum to repulsion and remember the area.
-   subroutine add(self, bodies, dt, contacts, memory)
+   !> It is the damping 'book'.
+   subroutine choose(self, settings, chosen)
+      class(book_damping_t), intent(inout) :: self
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+      !> Whether it belongs to the law
+      logical, intent(out) :: chosen
+
+      chosen = settings%damping == 'book'
+      if (.not. chosen) return
+      self%name = 'book damping'
+      call self%take_coefficients(settings)
+   end subroutine choose
+
+   !> It stores the area of the last step.
+   function stored(self) result(kinds)
+      class(book_damping_t), intent(in) :: self
+      type(memory_kind_t), allocatable :: kinds(:)
+
+      associate (unused_self => self)
+      end associate
+      kinds = [memory_kind_t('area', 'm2', 'area of the overlap at the last step', zero_is_new=.true.)]
+   end function stored
+
+   !> Find the damping of some contacts, and remember the area.
+   subroutine find_forces(self, bodies, dt, contacts, memory, low, high, force)
       class(book_damping_t), intent(in) :: self
       !> Bodies, for their masses
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0: no rate is known, no damping
       real(wp), intent(in) :: dt
-      !> Contacts; `normal_force` changes
-      type(contacts_t), intent(inout) :: contacts
-      !> Memory of the pairs; `area` is read and set
+      !> Contacts with their elastic forces
+      type(contacts_t), intent(in) :: contacts
+      !> Memory of the pairs; the area is read and set
       type(contact_memory_t), intent(inout) :: memory
-      real(wp) :: mobility, force
+      !> First and last of the contacts
+      integer(ip), intent(in) :: low, high
+      !> Damping of contact c at c - low + 1 [N/m]
+      real(wp), intent(inout) :: force(block_size)
+      real(wp) :: mobility, difference
       integer(ip) :: c
 
-      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, dt, contacts, memory) &
-      !$omp    private(c, mobility, force)
-      do c = 1_ip, contacts%n
-         force = 0.0_wp
-         if (dt > 0.0_wp) then
-            mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
-            force = self%coefficient*sqrt(self%stiffness/mobility)*contacts%inverse_length(c) &
-               *((contacts%area(c) - memory%column(at_area)%value(contacts%pair(c)))/dt)
-            force = min(force, approach_limit*contacts%elastic(c))
-         end if
-         contacts%normal_force(c) = max(0.0_wp, contacts%normal_force(c) + force)
-         memory%column(at_area)%value(contacts%pair(c)) = contacts%area(c)
-      end do
-      !$omp end parallel do
-   end subroutine add
+      associate (area => memory%column(self%first_column)%value)
+         do c = low, high
+            difference = 0.0_wp
+            if (dt > 0.0_wp) then
+               mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
+               difference = self%coefficient*sqrt(self%stiffness/mobility)*contacts%inverse_length(c) &
+                  *((contacts%area(c) - area(contacts%pair(c)))/dt)
+               difference = min(difference, approach_limit*contacts%elastic(c))
+            end if
+            force(c - low + 1_ip) = difference
+            area(contacts%pair(c)) = contacts%area(c)
+         end do
+      end associate
+   end subroutine find_forces
 
 end module polydem_matuttis_chen_damping

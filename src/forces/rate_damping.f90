@@ -1,54 +1,67 @@
 !> Normal damping by the exact rate of the overlap area: F = gamma sqrt(m_eff E) (dA/dt)/l.
 !>
 !> Matuttis & Chen 2014, Eq. 7.13, with dA/dt taken from positions and velocities instead of a backward
-!> difference: no memory, no lag of half a step, no jump at the first step of a contact. The sum of the
-!> normal forces is not allowed to become attractive.
+!> difference: no memory, no lag of half a step, no jump at the first step of a contact.
 module polydem_rate_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_memory_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: force_part_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
+   use polydem_normal_damping, only: block_size, normal_damping_t
+   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: rate_damping_t
 
    !> Damping by the rate of the area
-   type, extends(force_part_t) :: rate_damping_t
-      !> Young's modulus in two dimensions E [N/m2]
-      real(wp) :: stiffness
-      !> Dimensionless damping coefficient gamma
-      real(wp) :: coefficient
+   type, extends(normal_damping_t) :: rate_damping_t
    contains
-      procedure :: add
+      procedure :: choose
+      procedure :: find_forces
    end type rate_damping_t
 
 contains
 
-   !> Add the damping and limit the sum to repulsion.
-   subroutine add(self, bodies, dt, contacts, memory)
+   !> It is the damping 'rate' where no restitution is given.
+   subroutine choose(self, settings, chosen)
+      class(rate_damping_t), intent(inout) :: self
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+      !> Whether it belongs to the law
+      logical, intent(out) :: chosen
+
+      chosen = settings%damping == 'rate'
+      if (chosen) chosen = .not. settings%restitution > 0.0_wp
+      if (.not. chosen) return
+      self%name = 'rate damping'
+      call self%take_coefficients(settings)
+   end subroutine choose
+
+   !> Find the damping of some contacts.
+   subroutine find_forces(self, bodies, dt, contacts, memory, low, high, force)
       class(rate_damping_t), intent(in) :: self
       !> Bodies, for their masses
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
-      !> Contacts; `normal_force` changes
-      type(contacts_t), intent(inout) :: contacts
+      !> Contacts
+      type(contacts_t), intent(in) :: contacts
       !> Memory of the pairs (not used)
       type(contact_memory_t), intent(inout) :: memory
-      real(wp) :: mobility, force
+      !> First and last of the contacts
+      integer(ip), intent(in) :: low, high
+      !> Damping of contact c at c - low + 1 [N/m]
+      real(wp), intent(inout) :: force(block_size)
+      real(wp) :: mobility
       integer(ip) :: c
 
       associate (unused_dt => dt, unused_memory => memory)
       end associate
-      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, contacts) private(c, mobility, force)
-      do c = 1_ip, contacts%n
+      do c = low, high
          mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
-         force = self%coefficient*sqrt(self%stiffness/mobility)*contacts%rate(c)*contacts%inverse_length(c)
-         contacts%normal_force(c) = max(0.0_wp, contacts%normal_force(c) + force)
+         force(c - low + 1_ip) = self%coefficient*sqrt(self%stiffness/mobility)*contacts%rate(c) &
+            *contacts%inverse_length(c)
       end do
-      !$omp end parallel do
-   end subroutine add
+   end subroutine find_forces
 
 end module polydem_rate_damping

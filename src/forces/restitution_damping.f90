@@ -14,53 +14,89 @@
 !> central impact; eccentric ones lose more.
 module polydem_restitution_damping
    use polydem_bodies, only: bodies_t
+   use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_memory_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: force_part_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
+   use polydem_normal_damping, only: block_size, normal_damping_t
+   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: restitution_damping_t, restitution_of, damping_ratio_of
 
-   !> Damping with one ratio for all contacts
-   type, extends(force_part_t) :: restitution_damping_t
-      !> Young's modulus in two dimensions E [N/m2]
-      real(wp) :: stiffness
+   !> Damping with one ratio for all contacts; the coefficient is not used
+   type, extends(normal_damping_t) :: restitution_damping_t
       !> Damping ratio zeta
-      real(wp) :: ratio
+      real(wp) :: ratio = 0.0_wp
    contains
-      procedure :: add
+      procedure :: choose
+      procedure :: find_forces
+      procedure :: stiffen
    end type restitution_damping_t
 
 contains
 
-   !> Add the damping and limit the sum to repulsion.
-   subroutine add(self, bodies, dt, contacts, memory)
+   !> It is the damping 'rate' where a restitution is given.
+   subroutine choose(self, settings, chosen)
+      class(restitution_damping_t), intent(inout) :: self
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+      !> Whether it belongs to the law
+      logical, intent(out) :: chosen
+
+      chosen = settings%damping == 'rate'
+      if (chosen) chosen = settings%restitution > 0.0_wp
+      if (.not. chosen) return
+      self%name = 'damping of given restitution'
+      call self%take_coefficients(settings)
+      self%ratio = damping_ratio_of(settings%restitution)
+      self%dissipates = self%ratio > 0.0_wp
+   end subroutine choose
+
+   !> Find the damping of some contacts.
+   subroutine find_forces(self, bodies, dt, contacts, memory, low, high, force)
       class(restitution_damping_t), intent(in) :: self
       !> Bodies, for their masses
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
-      !> Contacts; `normal_force` changes
-      type(contacts_t), intent(inout) :: contacts
+      !> Contacts
+      type(contacts_t), intent(in) :: contacts
       !> Memory of the pairs (not used)
       type(contact_memory_t), intent(inout) :: memory
-      real(wp) :: mobility, reach, force
+      !> First and last of the contacts
+      integer(ip), intent(in) :: low, high
+      !> Damping of contact c at c - low + 1 [N/m]
+      real(wp), intent(inout) :: force(block_size)
+      real(wp) :: mobility, reach
       integer(ip) :: c
 
       associate (unused_dt => dt, unused_memory => memory)
       end associate
-      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, contacts) private(c, mobility, reach, force)
-      do c = 1_ip, contacts%n
+      do c = low, high
          mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
          ! Bars that nearly cross turn without approach: L is not taken shorter than the side of a square of the area.
          reach = max(contacts%length(c), sqrt(contacts%area(c)))
-         force = 2.0_wp*self%ratio*sqrt(self%stiffness/mobility)*sqrt(contacts%inverse_length(c)/reach)*contacts%rate(c)
-         contacts%normal_force(c) = max(0.0_wp, contacts%normal_force(c) + force)
+         force(c - low + 1_ip) = 2.0_wp*self%ratio*sqrt(self%stiffness/mobility) &
+            *sqrt(contacts%inverse_length(c)/reach)*contacts%rate(c)
       end do
-      !$omp end parallel do
-   end subroutine add
+   end subroutine find_forces
+
+   !> Add the dashpot 2 zeta sqrt(m k).
+   subroutine stiffen(self, bodies, contacts, element)
+      class(restitution_damping_t), intent(in) :: self
+      !> Bodies (not used)
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts (not used)
+      type(contacts_t), intent(in) :: contacts
+      !> The contact; its normal dashpot changes
+      type(contact_element_t), intent(inout) :: element
+
+      associate (unused_bodies => bodies, unused_contacts => contacts)
+      end associate
+      element%normal_dashpot = element%normal_dashpot &
+         + 2.0_wp*self%ratio*sqrt(element%normal_mass*self%stiffness)*sqrt(element%ratio)
+   end subroutine stiffen
 
    !> Restitution of a damped spring that is let go when its force vanishes
    elemental real(wp) function restitution_of(ratio) result(restitution)

@@ -11,12 +11,13 @@ module polydem_velocity_constraint
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
+   use polydem_law_part, only: law_part_t
    implicit none
    private
    public :: velocity_constraint_t
 
    !> Forces of contacts that follow from a demand on velocities
-   type, abstract :: velocity_constraint_t
+   type, abstract, extends(law_part_t) :: velocity_constraint_t
    contains
       !> Find the forces of all contacts
       procedure(apply), deferred :: apply

@@ -1,4 +1,6 @@
 !> Makes finders by name. Only this module uses all finders.
+!>
+!> To add a finder, write it as a `finder_t` in a file of its own, and name it here by a `use` and a `case`.
 module polydem_finder_factory
    use polydem_all_pairs, only: all_pairs_t
    use polydem_errors, only: error_t, input_error, raise
@@ -9,16 +11,10 @@ module polydem_finder_factory
    use polydem_partitioned_sweep, only: partitioned_sweep_t
    use polydem_quadtree_inlined, only: quadtree_t
    use polydem_sort_and_sweep, only: sort_and_sweep_t
-   use polydem_strings, only: join
    use polydem_verlet, only: verlet_t
    implicit none
    private
-   public :: new_finder, finder_names
-
-   !> Names of all finders, as in the namelist and in results
-   character(len=*), parameter :: finder_names(*) = &
-      [character(len=17) :: 'all_pairs', 'sort_and_sweep', 'unsorted_sweep', 'partitioned_sweep', 'quadtree', &
-       'pruned_quadtree', 'binary_tree', 'linked_cells', 'verlet', 'hierarchical_grid']
+   public :: new_finder
 
 contains
 
@@ -26,7 +22,7 @@ contains
    subroutine new_finder(finder, name, error, skin)
       !> Finder to make
       class(finder_t), allocatable, intent(out) :: finder
-      !> One of `finder_names`
+      !> Name as in the namelist, of any length
       character(len=*), intent(in) :: name
       !> Allocated if there is no such finder
       type(error_t), allocatable, intent(inout) :: error
@@ -61,8 +57,7 @@ contains
       case ('hierarchical_grid')
          allocate (hierarchical_grid_t :: finder)
       case default
-         call raise(error, input_error, "unknown finder '"//trim(name)//"'; choose one of "// &
-            join(finder_names, ', '))
+         call raise(error, input_error, "unknown finder '"//trim(name)//"'; choose one that &neighbours lists")
       end select
    end subroutine new_finder
 

@@ -126,9 +126,9 @@ contains
       integer :: k
 
       if (allocated(history%separating_edge)) history%separating_edge(p) = overlap%separating_edge
-      if (overlap%area > 0.0_wp) return
+      if (overlap%area > 0.0_wp .or. .not. allocated(history%column)) return
       do k = 1, size(history%column)
-         if (allocated(history%column(k)%value)) history%column(k)%value(p) = 0.0_wp
+         history%column(k)%value(p) = 0.0_wp
       end do
    end subroutine update_history
 

@@ -8,7 +8,7 @@
 module polydem_checkpoint_fields
    use polydem_bodies, only: bodies_t, state_hash, turn_bodies
    use polydem_body_fields, only: serialize_bodies
-   use polydem_contact_history, only: contact_memory_t, memory_kinds
+   use polydem_contact_history, only: contact_memory_t
    use polydem_energy_balance, only: serialize_contributions, serialize_balance
    use polydem_errors, only: input_error, raise
    use polydem_hash, only: mix_word
@@ -143,8 +143,9 @@ contains
       if (serializer%is_reading) memory%separating_edge = spread(0_ip, 1, n)
       call serializer%field('/pairs/separating_edge', memory%separating_edge(:n), '1', &
                         'last edge that separated the pair: +k of the first body, -k of the second, 0 unknown')
-      do k = 1, size(memory_kinds)
-         associate (kind => memory_kinds(k))
+      if (.not. allocated(memory%column)) return
+      do k = 1, size(memory%column)
+         associate (kind => memory%column(k)%kind)
             call serialize_column(serializer, '/pairs/'//trim(kind%name), n, memory%column(k)%value, trim(kind%unit), &
                              trim(kind%meaning))
          end associate
@@ -172,14 +173,13 @@ contains
       end associate
    end subroutine expect_edges
 
-   !> Serialize a column over pairs if it is allocated.
+   !> Serialize a column over pairs.
    subroutine serialize_column(serializer, name, n, column, unit, meaning)
       class(serializer_t), intent(inout) :: serializer
       character(len=*), intent(in) :: name, unit, meaning
       integer(ip), intent(in) :: n
       real(wp), allocatable, intent(inout) :: column(:)
 
-      if (.not. allocated(column)) return
       if (serializer%is_reading) column = spread(0.0_wp, 1, n)
       call serializer%field(name, column(:n), unit, meaning)
    end subroutine serialize_column

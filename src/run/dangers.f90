@@ -157,22 +157,15 @@ contains
       end associate
    end subroutine warn_of_speeds
 
-   !> Warn of the area law without damping. The law is not conservative, and only damping removes the energy it adds.
+   !> Warn of a force law that is not conservative and has no damping, which removes the energy that the law adds.
    subroutine warn_of_law(simulation, writer, log)
       type(simulation_t), intent(in) :: simulation
       type(warning_writer_t), intent(inout) :: writer
       type(log_t), intent(inout) :: log
+      character(len=:), allocatable :: warning
 
-      associate (forces => simulation%settings%forces)
-         if (forces%law /= 'area') return
-         if (forces%damping /= 'none') then
-            if (forces%restitution > 0.0_wp .and. forces%restitution < 1.0_wp) return
-            if (forces%restitution <= 0.0_wp .and. forces%damping_coefficient > 0.0_wp) return
-         end if
-      end associate
-      call writer%warn(log, 'the area law is not conservative: without damping it heats the bodies at any dt (the '// &
-                       'kinetic energy of a gas grew by a third in 0.2 s). Set law = ''conservative'' in &forces, '// &
-                       'or use damping')
+      warning = simulation%law%undamped_warning()
+      if (warning /= '') call writer%warn(log, warning)
    end subroutine warn_of_law
 
    !> Write a warning and count it.

@@ -114,7 +114,7 @@ contains
       integer(ip) :: critical
 
       associate (s => simulation)
-         call stable_step_of_contacts(s%settings%forces, s%integrator%stability(), s%bodies, &
+         call stable_step_of_contacts(s%law, s%integrator%stability(), s%bodies, &
                                       contact_numbers(s%bodies%n, s%incidence), s%contacts, stable, critical)
          text = to_text(s%dt/stable, 3)//' of the stable time step '//to_text(stable)//' s of the initial contacts'
       end associate

@@ -5,7 +5,7 @@
 module polydem_monitor
    use polydem_body_sizes, only: thickness_of_bodies
    use polydem_contact_depth, only: any_deeper, deepest_contact, depth_share, depth_text
-   use polydem_contact_history, only: at_direction
+   use polydem_contact_history, only: column_of
    use polydem_energy_guard, only: check_energy, energy_guard_t, open_energy_guard
    use polydem_errors, only: error_t
    use polydem_guards, only: place_of
@@ -218,7 +218,7 @@ contains
          found = 0_ip
          if (settings%passing /= 'off') then
             call find_passing(s%bodies, s%contacts, watch%thickness, s%guard%radius, limit, &
-                              s%memory%column(at_direction)%value, found, any_deep)
+                              s%memory%column(column_of(s%memory, 'direction'))%value, found, any_deep)
          end if
          ! The search for passing bodies skips contacts below `least_depth`.
          if (settings%passing == 'off' .or. limit < least_depth) &

@@ -1,5 +1,6 @@
 !> A complete run, from settings to result.
 module polydem_run_simulation
+   use polydem_check_ranks, only: check_ranks
    use polydem_checkpoint_fields, only: attempts_t
    use polydem_clock, only: wall_seconds
    use polydem_communicator, only: communicator_t
@@ -14,7 +15,7 @@ module polydem_run_simulation
    use polydem_run_output, only: end_step, finish
    use polydem_serial_communicator, only: serial_communicator_t
    use polydem_settings, only: settings_t
-   use polydem_start, only: check_ranks, join
+   use polydem_start, only: join
    use polydem_strings, only: to_text
    use polydem_time_step, only: advance
    use polydem_timers, only: stage_exchange, stage_output

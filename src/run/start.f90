@@ -3,8 +3,8 @@ module polydem_start
    use polydem_bodies, only: bodies_t
    use polydem_broadcast_scene, only: broadcaster_t
    use polydem_checkpoint_fields, only: serialize_global, scene_hash
-   use polydem_communicator, only: communicator_t
-   use polydem_errors, only: error_t, input_error, raise
+   use polydem_errors, only: error_t
+   use polydem_force_law, only: check_law
    use polydem_hash, only: hexadecimal
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_parallel_start, only: start_on_all_ranks
@@ -22,7 +22,7 @@ module polydem_start
    use polydem_timers, only: timers_t
    implicit none
    private
-   public :: new_simulation, join, check_ranks, build_start, recall
+   public :: new_simulation, join, build_start, recall
 
 contains
 
@@ -38,6 +38,8 @@ contains
       type(motion_t), allocatable :: motions(:)
       type(relaxation_t) :: relaxation
 
+      call check_law(settings, 1_ip, error)
+      if (allocated(error)) return
       call build_scene(settings, bodies, motions, error)
       if (allocated(error)) return
       if (settings%guards%relaxed_depth > 0.0_wp) call relax_bodies(settings, bodies, relaxation, error)
@@ -95,23 +97,6 @@ contains
       if (run%comm%size == 1_ip .and. .not. allocated(error)) &
          call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, run%manifest, error)
    end subroutine join
-
-   !> Refuse settings that only a serial run supports.
-   subroutine check_ranks(settings, comm, error)
-      !> Settings of a run
-      type(settings_t), intent(in) :: settings
-      !> Communicator of the run
-      class(communicator_t), intent(in) :: comm
-      !> Names the entry; the same on all ranks
-      type(error_t), allocatable, intent(inout) :: error
-
-      if (comm%size == 1_ip) return
-      if (settings%forces%friction == 'exact') call raise(error, input_error, settings%file// &
-         ': exact friction couples all contacts and needs a single rank; use threads instead of ranks, or set '// &
-         'friction = ''cundall_strack'' in &forces')
-      if (settings%output%trace_steps > 0_ip .or. settings%output%step_profile) call raise(error, input_error, &
-         settings%file//': trace_steps and step_profile in &output need a single rank; run without mpirun')
-   end subroutine check_ranks
 
    !> Build the simulation at time 0 and hash its scene, unless an earlier call did.
    subroutine build_start(settings, run, error)

@@ -1,7 +1,7 @@
 !> Parts of a simulation that depend on the bodies of a rank: force law, boxes, pair list with contact history, guards.
 module polydem_local_bodies
    use polydem_box_maker, only: new_box_maker
-   use polydem_contact_history, only: at_direction, contact_memory_t
+   use polydem_contact_history, only: contact_memory_t, add_column
    use polydem_contact_incidence, only: incidence_t
    use polydem_errors, only: error_t, raise, run_error
    use polydem_finder_statistics, only: finder_statistics_t
@@ -9,7 +9,7 @@ module polydem_local_bodies
    use polydem_guards, only: motion_guard_t, new_motion_guard
    use polydem_kinds, only: ip, lp, wp
    use polydem_neighbours, only: new_neighbours
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: simulation_t, former_direction
    implicit none
    private
    public :: fit_to_bodies, rebuild_pairs
@@ -27,6 +27,7 @@ contains
 
       call new_force_law(self%settings%forces, self%bodies, self%law)
       self%contacts%area_is_effective = self%law%needs_effective_area
+      self%contacts%has_cohesion = self%law%needs_cohesion
       self%contacts%has_twist = self%law%needs_twist
       self%contacts%n = 0_ip
       self%incidence = incidence_t()
@@ -71,17 +72,18 @@ contains
       self%neighbours%finder%work%seconds = statistics%seconds
    end subroutine rebuild_neighbours
 
-   !> Allocate the columns of the contact history that the force law and the guards need.
+   !> Allocate the columns of the contact history: those of the force law, at the places known to its parts, then those
+   !> of the guards.
    subroutine allocate_history(self)
       type(simulation_t), intent(inout) :: self
       integer :: k
 
       self%memory = contact_memory_t()
       allocate (self%memory%separating_edge(0))
-      do k = 1, size(self%memory%column)
-         if (self%law%needs(k)) allocate (self%memory%column(k)%value(0))
+      do k = 1, size(self%law%stored)
+         call add_column(self%memory, self%law%stored(k), 0_ip)
       end do
-      if (self%settings%guards%passing /= 'off') allocate (self%memory%column(at_direction)%value(0))
+      if (self%settings%guards%passing /= 'off') call add_column(self%memory, former_direction, 0_ip)
    end subroutine allocate_history
 
    !> List the slots that may move: free bodies, bodies with prescribed motion, halo bodies.

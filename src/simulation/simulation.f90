@@ -4,7 +4,7 @@ module polydem_simulation
    use polydem_box_maker, only: box_maker_t
    use polydem_boxes, only: boxes_t
    use polydem_communicator, only: communicator_t
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_memory_t, memory_kind_t
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
    use polydem_domain, only: domain_t
@@ -21,7 +21,7 @@ module polydem_simulation
    use polydem_timers, only: timers_t
    implicit none
    private
-   public :: simulation_t, time_of, compute_balance
+   public :: simulation_t, former_direction, time_of, compute_balance
 
    !> The complete state of a simulation on one rank
    type :: simulation_t
@@ -76,6 +76,10 @@ module polydem_simulation
       !> Sums over all steps: 1 pairs, 2 contacts, 3 pairs that began, 4 pairs that ended, 5 contacts without direction
       integer(lp) :: sums(5) = 0_lp
    end type simulation_t
+
+   !> What the guard against passing bodies remembers
+   type(memory_kind_t), parameter :: former_direction = &
+      memory_kind_t('direction', '1', 'direction at the last step, packed')
 
 contains
 

@@ -29,8 +29,8 @@ contains
 
       numbers = contact_numbers(self%bodies%n, self%incidence)
       call self%domain%halo%exchange_column(self%comm, numbers)
-      call stable_step_of_contacts(self%settings%forces, self%integrator%stability(), self%bodies, numbers, &
-                                   self%contacts, stable, critical)
+      call stable_step_of_contacts(self%law, self%integrator%stability(), self%bodies, numbers, self%contacts, &
+                                   stable, critical)
       least(1) = -real(stable, dp)
       call self%comm%all_reduce_max(least)
       if (stable > real(-least(1), wp)) critical = 0_ip

@@ -2,9 +2,9 @@
 module polydem_start_simulation
    use polydem_bodies, only: bodies_t
    use polydem_box_maker, only: update_boxes
-   use polydem_contact_history, only: at_area
    use polydem_energy_balance, only: start_energy_balance
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_force_law, only: check_law, choose_parts, force_law_t
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, lp, wp
    use polydem_local_bodies, only: fit_to_bodies
@@ -38,6 +38,8 @@ contains
       !> Allocated if bodies or settings are invalid
       type(error_t), allocatable, intent(inout) :: error
 
+      call check_law(settings, 1_ip, error)
+      if (allocated(error)) return
       allocate (serial_communicator_t :: self%comm)
       self%settings = settings
       self%bodies = bodies
@@ -60,6 +62,7 @@ contains
    subroutine start_integration(self)
       type(simulation_t), intent(inout) :: self
       integer(ip) :: k
+      integer :: c
 
       associate (bodies => self%bodies)
          do k = 1_ip, size(bodies%free, kind=ip)
@@ -76,20 +79,22 @@ contains
          call self%integrator%start(bodies)
       end associate
       ! A scheme that ignores the forces at time 0 has no contact history before its first step.
-      associate (area => self%memory%column(at_area))
-         if (.not. self%integrator%starts_from_forces .and. allocated(area%value)) area%value = 0.0_wp
-      end associate
+      if (self%integrator%starts_from_forces .or. .not. allocated(self%memory%column)) return
+      do c = 1, size(self%memory%column)
+         if (self%memory%column(c)%kind%zero_is_new) self%memory%column(c)%value = 0.0_wp
+      end do
    end subroutine start_integration
 
    !> Use dt of the settings, or compute it: a fraction of the stable time step, reduced to divide the duration evenly.
    subroutine choose_step(self, error)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
+      type(force_law_t) :: law
       integer(ip) :: critical
       real(wp) :: steps
 
-      call stable_step_of_shapes(self%settings%forces, self%integrator%stability(), self%bodies, &
-                                 self%expected_stable_step, critical)
+      call choose_parts(self%settings%forces, law)
+      call stable_step_of_shapes(law, self%integrator%stability(), self%bodies, self%expected_stable_step, critical)
       associate (settings => self%settings%integrate)
          self%dt = settings%dt
          if (self%dt <= 0.0_wp .and. (critical == 0_ip .or. .not. self%expected_stable_step > 0.0_wp)) then

@@ -133,8 +133,9 @@ contains
 
       associate (pairs => self%neighbours%pairs, memory => self%memory)
          call pairs%carry(memory%separating_edge, 0_ip)
+         if (.not. allocated(memory%column)) return
          do k = 1, size(memory%column)
-            if (allocated(memory%column(k)%value)) call pairs%carry(memory%column(k)%value, 0.0_wp)
+            call pairs%carry(memory%column(k)%value, 0.0_wp)
          end do
       end associate
    end subroutine carry_history

@@ -1,40 +1,79 @@
-!> Contact history: values that force models and the search for contacts store per pair from step to step.
+!> Contact history: the values that force parts, the search for contacts and the guards store per pair of bodies.
+!>
+!> The history follows the list of pairs: entry `p` belongs to pair `p`, moves with it when the list changes, and is set to
+!> zero when the polygons separate. Force parts and guards declare the columns that they need; there are no others.
 module polydem_contact_history
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: contact_memory_t, memory_kinds, at_tangential, at_area, at_direction
+   public :: contact_memory_t, memory_kind_t, add_column, column_of
 
    !> Description of a column of the contact history
    type :: memory_kind_t
       !> Name in checkpoints, and unit
       character(len=16) :: name, unit
-      !> Its meaning, for the reader of a checkpoint
+      !> Meaning of the values
       character(len=48) :: meaning
+      !> Whether zero marks a new contact. A scheme that does not use the forces at time 0 clears such a column after it
+      !> has computed them
+      logical :: zero_is_new = .false.
    end type memory_kind_t
 
-   !> A column of the contact history
+   !> Column of the contact history
    type :: memory_column_t
-      !> Value of each pair, zero if its bodies do not overlap; not allocated if no model needs it, (pair)
+      !> Description
+      type(memory_kind_t) :: kind
+      !> Value of each pair, zero if its bodies do not overlap, (pair)
       real(wp), allocatable :: value(:)
    end type memory_column_t
 
-   !> Indices of the columns
-   integer, parameter :: at_tangential = 1, at_area = 2, at_direction = 3
-   !> All columns. The tangential force is that of the spring or of exact friction. The area is for the backward
-   !> difference of Matuttis & Chen and for the detection of new contacts. The direction, packed in one number, is for a
-   !> monitor.
-   type(memory_kind_t), parameter :: memory_kinds(*) = [ &
-      memory_kind_t('tangential', 'N/m', 'tangential force remembered'), &
-      memory_kind_t('area', 'm2', 'area of the overlap at the last step'), &
-      memory_kind_t('direction', '1', 'direction at the last step, packed')]
-
-   !> Contact history of all pairs: the columns have the order of the pair list and follow its changes
+   !> Contact history of all pairs
    type :: contact_memory_t
-      !> Edge that separated the pair last: +k of the first body, -k of the second, 0 unknown
+      !> Last edge that separated the pair: +k of the first body, -k of the second, 0 unknown
       integer(ip), allocatable :: separating_edge(:)
-      !> Columns in the order of `memory_kinds`
-      type(memory_column_t) :: column(size(memory_kinds))
+      !> Columns: those of the force law in the order of its parts, then those of the guards; not allocated if there is
+      !> none
+      type(memory_column_t), allocatable :: column(:)
    end type contact_memory_t
+
+contains
+
+   !> Add a column of zeros behind the others.
+   subroutine add_column(memory, kind, n_pairs)
+      !> Contact history
+      type(contact_memory_t), intent(inout) :: memory
+      !> Description of the column
+      type(memory_kind_t), intent(in) :: kind
+      !> Number of pairs
+      integer(ip), intent(in) :: n_pairs
+      type(memory_column_t), allocatable :: longer(:)
+      integer :: k, n
+
+      n = 0
+      if (allocated(memory%column)) n = size(memory%column)
+      allocate (longer(n + 1))
+      do k = 1, n
+         longer(k)%kind = memory%column(k)%kind
+         call move_alloc(memory%column(k)%value, longer(k)%value)
+      end do
+      longer(n + 1)%kind = kind
+      allocate (longer(n + 1)%value(n_pairs), source=0.0_wp)
+      call move_alloc(longer, memory%column)
+   end subroutine add_column
+
+   !> Index of a column, 0 if there is none of that name
+   pure integer function column_of(memory, name)
+      !> Contact history
+      type(contact_memory_t), intent(in) :: memory
+      !> Name of the column, as in its description
+      character(len=*), intent(in) :: name
+      integer :: k
+
+      column_of = 0
+      if (.not. allocated(memory%column)) return
+      do k = 1, size(memory%column)
+         if (memory%column(k)%kind%name == name) column_of = k
+      end do
+   end function column_of
 
 end module polydem_contact_history

@@ -1,7 +1,8 @@
 !> Contacts: pairs of bodies whose polygons overlap.
 !>
 !> Contacts are in ascending order of their pairs: of the first body, then of the second. The first body has the lower
-!> identifier. All vectors are in world coordinates. `twist` is allocated only if a force model of the run needs it.
+!> identifier. All vectors are in world coordinates. `cohesion` and `twist` are allocated only if a force part of the run
+!> needs them.
 module polydem_contacts
    use polydem_kinds, only: ip, wp
    implicit none
@@ -19,7 +20,9 @@ module polydem_contacts
       !> Whether `area` and the columns derived from it (`rate`, `normal`, `moment`, `direction`, `length`) are those of
       !> the effective area (see `polydem_effective_area`)
       logical :: area_is_effective = .false.
-      !> Whether the force model needs the column `twist`
+      !> Whether a force part needs the column `cohesion`
+      logical :: has_cohesion = .false.
+      !> Whether a force part needs the column `twist`
       logical :: has_twist = .false.
       !> Index in the pair list
       integer(ip), allocatable :: pair(:)
@@ -48,9 +51,11 @@ module polydem_contacts
       real(wp), allocatable :: inverse_length(:)
       !> Torque of the normal force about the centroid of the overlap, on the first body, per unit of force [m]
       real(wp), allocatable :: lever(:)
-      !> Elastic part of the normal force, positive in repulsion [N/m]
+      !> Elastic repulsion of the overlap, a part of the normal force: not negative [N/m]
       real(wp), allocatable :: elastic(:)
-      !> Normal force, positive in repulsion [N/m]
+      !> Part of the normal force whose work is elastic, too, but which may attract: negative in attraction [N/m]
+      real(wp), allocatable :: cohesion(:)
+      !> Normal force, positive in repulsion: `elastic`, `cohesion` and all other normal forces [N/m]
       real(wp), allocatable :: normal_force(:)
       !> Tangential force on the first body along (-direction_y, direction_x) [N/m]
       real(wp), allocatable :: tangential_force(:)
@@ -86,6 +91,7 @@ contains
                      contacts%normal, contacts%moment, contacts%arm_first, contacts%arm_second, &
                      contacts%direction, contacts%length, contacts%inverse_length, contacts%lever, &
                      contacts%elastic, contacts%normal_force, contacts%tangential_force, contacts%force)
+         if (allocated(contacts%cohesion)) deallocate (contacts%cohesion)
          if (allocated(contacts%twist)) deallocate (contacts%twist)
       end if
       m = capacity + capacity/4_ip + 16_ip
@@ -94,6 +100,7 @@ contains
                 contacts%arm_first(2, m), contacts%arm_second(2, m), contacts%direction(2, m), &
                 contacts%length(m), contacts%inverse_length(m), contacts%lever(m), &
                 contacts%elastic(m), contacts%normal_force(m), contacts%tangential_force(m), contacts%force(2, m))
+      if (contacts%has_cohesion) allocate (contacts%cohesion(m))
       if (contacts%has_twist) allocate (contacts%twist(m))
    end subroutine reserve_contacts
 

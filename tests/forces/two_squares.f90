@@ -2,13 +2,13 @@
 module two_squares
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_contact_history, only: at_area, at_tangential, contact_memory_t
+   use polydem_contact_history, only: contact_memory_t, memory_kind_t, add_column
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: make_contact, width, depth, mass
+   public :: make_contact, width, depth, mass, at_tangential, at_area
 
    !> Side of the squares [m]
    real(wp), parameter :: width = 0.01_wp
@@ -16,6 +16,9 @@ module two_squares
    real(wp), parameter :: depth = 1.0e-6_wp
    !> Mass of each [kg/m]
    real(wp), parameter :: mass = 2500.0_wp*width**2
+
+   !> Columns of the memory
+   integer, parameter :: at_tangential = 1, at_area = 2
 
 contains
 
@@ -54,8 +57,8 @@ contains
       contacts%elastic(1) = 0.0_wp
       contacts%normal_force(1) = 0.0_wp
       contacts%tangential_force(1) = 0.0_wp
-      memory%column(at_tangential)%value = [0.0_wp]
-      memory%column(at_area)%value = [0.0_wp]
+      call add_column(memory, memory_kind_t('tangential', 'N/m', ''), 1_ip)
+      call add_column(memory, memory_kind_t('area', 'm2', ''), 1_ip)
    end subroutine make_contact
 
 end module two_squares

@@ -2,8 +2,8 @@
 module crowd
    use polydem_boxes, only: boxes_t
    use polydem_errors, only: error_t
-   use polydem_finder_factory, only: finders => finder_names
    use polydem_kinds, only: ip, wp
+   use polydem_namelist_entries, only: choices_of
    use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_random, only: random_t, new_random
    implicit none
@@ -91,9 +91,11 @@ contains
       type(boxes_t), intent(in) :: boxes
       !> Bounds, (4, box, step)
       real(wp), intent(in) :: frames(:, :, :)
+      character(len=200), allocatable :: finders(:)
       integer :: f
 
       wrong_steps = 0_ip
+      finders = choices_of('neighbours', 'finder')
       do f = 1, size(finders)
          wrong_steps = wrong_steps + count_wrong(trim(finders(f)), boxes, frames)
       end do

@@ -80,6 +80,8 @@ def of_any(statement, room):
             yield f"the real number {literal} has no kind"
     if re.search(r"\b(integer|real|logical|complex)\s*\(\s*(kind\s*=\s*)?\d|_[48]\b|\bdouble\s+precision\b", code):
         yield "kinds come from base/kinds.f90"
+    if re.search(r"%(law|damping|friction)\s*(==|/=)", code) and statement.scopes[-1].name != "choose":
+        yield "only `choose` of a force part knows its word in the namelist"
 
 
 def of_declaration(statement):

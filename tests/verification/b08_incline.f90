@@ -13,7 +13,7 @@ module b08_incline
    use trial, only: begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
-   use polydem_contact_history, only: at_tangential
+   use polydem_contact_history, only: column_of
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_simulation, only: simulation_t
@@ -88,7 +88,7 @@ contains
       call table%expect_relative('rests at 0.1 rad: sag of the spring [m]', load/(2.0_wp/7.0_wp*young), &
                                  downhill(slope, middle - start) + 0.5_wp*size(2)*simulation%bodies%angle(2), 0.01_wp)
       call table%expect_relative('rests: force of the spring [N/m]', load, &
-                                 abs(simulation%memory%column(at_tangential)%value(1)), &
+                                 abs(simulation%memory%column(column_of(simulation%memory, 'tangential'))%value(1)), &
                                  1.0e-6_wp)
       call steps(simulation, n, error)
       call table%note_error(error)

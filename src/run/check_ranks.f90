@@ -1,0 +1,29 @@
+!> Settings that the force law or several ranks do not support.
+module polydem_check_ranks
+   use polydem_communicator, only: communicator_t
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_force_law, only: check_law
+   use polydem_kinds, only: ip
+   use polydem_settings, only: settings_t
+   implicit none
+   private
+   public :: check_ranks
+
+contains
+
+   !> Refuse settings that the force law does not support, and those that only a serial run supports.
+   subroutine check_ranks(settings, comm, error)
+      !> Settings of a run
+      type(settings_t), intent(in) :: settings
+      !> Communicator of the run
+      class(communicator_t), intent(in) :: comm
+      !> Names the entry; the same on all ranks
+      type(error_t), allocatable, intent(inout) :: error
+
+      call check_law(settings, comm%size, error)
+      if (comm%size == 1_ip) return
+      if (settings%output%trace_steps > 0_ip .or. settings%output%step_profile) call raise(error, input_error, &
+         settings%file//': trace_steps and step_profile in &output need a single rank; run without mpirun')
+   end subroutine check_ranks
+
+end module polydem_check_ranks

@@ -1,0 +1,94 @@
+!> Two parts of a force law that pull, for tests: one that stores energy, one that does not.
+module pulls
+   use polydem_bodies, only: bodies_t
+   use polydem_contact_history, only: contact_memory_t
+   use polydem_contacts, only: contacts_t
+   use polydem_force_part, only: acts_normal, force_part_t
+   use polydem_kinds, only: ip, wp
+   use polydem_settings, only: forces_settings_t
+   implicit none
+   private
+   public :: cohesion_t, drag_t
+
+   !> A constant attraction, whose work is elastic
+   type, extends(force_part_t) :: cohesion_t
+      !> Attraction [N/m]
+      real(wp) :: pull = 0.0_wp
+   contains
+      procedure :: choose => choose_cohesion
+      procedure :: add => add_cohesion
+   end type cohesion_t
+
+   !> A constant force against opening, whose work is that of damping
+   type, extends(force_part_t) :: drag_t
+      !> Attraction [N/m]
+      real(wp) :: pull = 0.0_wp
+   contains
+      procedure :: choose => choose_drag
+      procedure :: add => add_drag
+   end type drag_t
+
+contains
+
+   !> It always belongs to the law.
+   subroutine choose_cohesion(self, settings, chosen)
+      class(cohesion_t), intent(inout) :: self
+      type(forces_settings_t), intent(in) :: settings
+      logical, intent(out) :: chosen
+
+      associate (unused => settings)
+      end associate
+      chosen = .true.
+      self%name = 'cohesion'
+      self%stage = acts_normal
+      self%needs_cohesion = .true.
+   end subroutine choose_cohesion
+
+   !> Add the attraction.
+   subroutine add_cohesion(self, bodies, dt, contacts, memory)
+      class(cohesion_t), intent(in) :: self
+      type(bodies_t), intent(in) :: bodies
+      real(wp), intent(in) :: dt
+      type(contacts_t), intent(inout) :: contacts
+      type(contact_memory_t), intent(inout) :: memory
+      integer(ip) :: c
+
+      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => memory)
+      end associate
+      contacts%energy_is_quadratic = .false.
+      do c = 1_ip, contacts%n
+         contacts%cohesion(c) = contacts%cohesion(c) - self%pull
+         contacts%normal_force(c) = contacts%normal_force(c) - self%pull
+      end do
+   end subroutine add_cohesion
+
+   !> It always belongs to the law.
+   subroutine choose_drag(self, settings, chosen)
+      class(drag_t), intent(inout) :: self
+      type(forces_settings_t), intent(in) :: settings
+      logical, intent(out) :: chosen
+
+      associate (unused => settings)
+      end associate
+      chosen = .true.
+      self%name = 'drag'
+      self%stage = acts_normal
+   end subroutine choose_drag
+
+   !> Add the attraction.
+   subroutine add_drag(self, bodies, dt, contacts, memory)
+      class(drag_t), intent(in) :: self
+      type(bodies_t), intent(in) :: bodies
+      real(wp), intent(in) :: dt
+      type(contacts_t), intent(inout) :: contacts
+      type(contact_memory_t), intent(inout) :: memory
+      integer(ip) :: c
+
+      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => memory)
+      end associate
+      do c = 1_ip, contacts%n
+         contacts%normal_force(c) = contacts%normal_force(c) - self%pull
+      end do
+   end subroutine add_drag
+
+end module pulls

@@ -1,0 +1,105 @@
+!> Runs of the force part and of the finder that the manual takes as examples; numbers go to check_recipes.py.
+program try_recipes
+   use trial, only: begin, block_at, steps
+   use polydem_bodies, only: state_hash
+   use polydem_body_list, only: body_list_t
+   use polydem_contact_history, only: column_of
+   use polydem_energy_balance, only: balance_t
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: ip, wp
+   use polydem_read_settings, only: read_settings_text
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: simulation_t, compute_balance
+   use polydem_start, only: new_simulation
+   use polydem_time_step, only: advance
+   implicit none
+
+   !> Side of a square [m], and speed against a plate [m/s]
+   real(wp), parameter :: side = 0.01_wp, speed = 0.1_wp
+
+   call hit_plate('area')
+   call hit_plate('conservative')
+   call compare_stiffness()
+   call run_gas('all_pairs')
+   call run_gas('plain_loop')
+
+contains
+
+   !> Let a square hit a plate face to face, and print its restitution and the share of its energy that damping took.
+   subroutine hit_plate(law)
+      character(len=*), intent(in) :: law
+      type(simulation_t) :: simulation
+      type(balance_t) :: balance
+      type(error_t), allocatable :: error
+      real(wp) :: energy, stored
+      integer :: k
+
+      call start(law, 'damping = ''walton_braun'' damping_coefficient = 3', simulation, error)
+      if (failed(error)) return
+      energy = 0.5_wp*simulation%bodies%mass(1)*speed**2
+      stored = 0.0_wp
+      do k = 1, 20000
+         call advance(simulation, error)
+         if (failed(error)) return
+         if (simulation%neighbours%pairs%n > 0_ip) stored = &
+            max(stored, simulation%memory%column(column_of(simulation%memory, 'greatest_area'))%value(1))
+         if (simulation%contacts%n == 0_ip .and. simulation%bodies%velocity(2, 1) > 0.0_wp) exit
+      end do
+      call compute_balance(simulation, balance)
+      print '(a, es24.16)', law//'_restitution ', simulation%bodies%velocity(2, 1)/speed
+      print '(a, es24.16)', law//'_damping_work ', balance%damping_work/energy
+      print '(a, es24.16)', law//'_greatest_area ', stored
+   end subroutine hit_plate
+
+   !> Print by how much the expected stable step is shorter.
+   subroutine compare_stiffness()
+      type(simulation_t) :: simple, stiff
+      type(error_t), allocatable :: error
+
+      call start('area', 'damping = ''none''', simple, error)
+      call start('area', 'damping = ''walton_braun'' damping_coefficient = 3', stiff, error)
+      if (failed(error)) return
+      print '(a, es24.16)', 'stable_step_share ', stiff%expected_stable_step/simple%expected_stable_step
+   end subroutine compare_stiffness
+
+   !> A square above a fixed plate.
+   subroutine start(law, damping, simulation, error)
+      character(len=*), intent(in) :: law, damping
+      type(simulation_t), intent(out) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+      type(body_list_t) :: list
+
+      call list%append(block_at(0.0_wp, 0.5_wp*side + 1.0e-6_wp, side, side, 0.0_wp), velocity=[0.0_wp, -speed])
+      call list%append(block_at(0.0_wp, -side, 10.0_wp*side, 2.0_wp*side, 0.0_wp), fixed=.true.)
+      call begin('&forces gravity = 0, 0 friction = ''none'' law = '''//law//''' '//damping//' / '// &
+                 '&integrate duration = 1 fraction = 0.002 /', list, simulation, error)
+   end subroutine start
+
+   !> Print hash and pairs of a gas whose pairs a finder finds.
+   subroutine run_gas(finder)
+      character(len=*), intent(in) :: finder
+      character(len=*), parameter :: text = '&scene name = ''gas'' bodies = 60 fraction = 0.35 speed = 1 / '// &
+         '&forces stiffness = 2e5 / &integrate duration = 0.1 / '
+      character(len=1) :: no_overrides(0)
+      type(settings_t) :: settings
+      type(simulation_t) :: simulation
+      type(error_t), allocatable :: error
+
+      call read_settings_text('gas.nml', text//'&neighbours finder = '''//finder//''' /', no_overrides, settings, error)
+      if (failed(error)) return
+      call new_simulation(settings, simulation, error)
+      if (failed(error)) return
+      call steps(simulation, 400, error)
+      if (failed(error)) return
+      print '(a, z16.16, 3(1x, i0))', finder//'_result ', state_hash(simulation%bodies), simulation%sums(1:3)
+   end subroutine run_gas
+
+   !> Print an error.
+   logical function failed(error)
+      type(error_t), allocatable, intent(in) :: error
+
+      failed = allocated(error)
+      if (failed) print '(a)', 'error '//error%message
+   end function failed
+
+end program try_recipes
