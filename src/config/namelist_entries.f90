@@ -44,7 +44,8 @@ module polydem_namelist_entries
    character(len=*), parameter :: grains = 'name: drum hopper gas bed heap channel'
    character(len=*), parameter :: moving = 'motion: rotation translation oscillation'
 
-   !> Names of the finders, which `new_finder` of the room neighbours makes, and of their variants, as in `variant_names`
+   !> Names of the finders, which `new_finder` of the room neighbours makes, and of their variants, as in
+   !> `variant_names`
    !> of the room bench
    character(len=*), parameter :: finders = 'all_pairs sort_and_sweep unsorted_sweep partitioned_sweep quadtree '// &
       'pruned_quadtree binary_tree linked_cells verlet hierarchical_grid'

@@ -1,7 +1,7 @@
 !> Transfer of the contact history of pairs to the ranks that have these pairs after a redistribution.
 module polydem_packed_history
    use polydem_communicator, only: communicator_t
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_rank_order, only: sort_by_rank
    use polydem_sort, only: sort_keys
@@ -24,7 +24,7 @@ contains
    !> Send the history of each pair to the ranks that will move one of its bodies. Collective.
    !>
    !> The sender is the rank that owned the leading body: the first body, or the second one if the first is fixed.
-   subroutine send_pairs(comm, n, first, second, row, lead_is_mine, owner, memory, packed)
+   subroutine send_pairs(comm, n, first, second, row, lead_is_mine, owner, history, packed)
       !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Number of pairs
@@ -38,7 +38,7 @@ contains
       !> Rank that will move each body, negative for fixed bodies, (slot)
       integer(ip), intent(in) :: owner(:)
       !> Contact history of the pairs
-      type(contact_memory_t), intent(in) :: memory
+      type(contact_history_t), intent(in) :: history
       !> Received history: pairs of which this rank will move a body, in ascending order
       type(packed_history_t), intent(out) :: packed
       integer(lp), allocatable :: sent(:, :), received(:, :)
@@ -48,7 +48,7 @@ contains
       integer :: j, n_columns
 
       n_columns = 0
-      if (allocated(memory%column)) n_columns = size(memory%column)
+      if (allocated(history%column)) n_columns = size(history%column)
       allocate (pair(2_ip*n), rank(2_ip*n))
       m = 0_ip
       do p = 1_ip, n
@@ -67,9 +67,9 @@ contains
       do k = 1_ip, m
          p = pair(order(k))
          sent(1, k) = key_of(row, first(p), second(p))
-         sent(2, k) = int(memory%separating_edge(p), lp)
+         sent(2, k) = int(history%separating_edge(p), lp)
          do j = 1, n_columns
-            value_sent(j, k) = memory%column(j)%value(p)
+            value_sent(j, k) = history%column(j)%value(p)
          end do
       end do
       call comm%all_to_all(sent, counts, received, counts_received)
@@ -114,7 +114,7 @@ contains
    end subroutine sort_pairs
 
    !> Restore the history of the pairs of a new list.
-   subroutine receive_pairs(packed, n, first, second, row, memory, n_known)
+   subroutine receive_pairs(packed, n, first, second, row, history, n_known)
       !> Received history, in ascending order
       type(packed_history_t), intent(in) :: packed
       !> Number of pairs in the list
@@ -124,7 +124,7 @@ contains
       !> Global index of each body, (slot)
       integer(ip), intent(in) :: row(:)
       !> Contact history of the list, zero on entry; received values are set
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       !> Number of pairs of the list with received history
       integer(ip), intent(out) :: n_known
       integer(lp) :: key
@@ -132,7 +132,7 @@ contains
       integer :: j, n_columns
 
       n_columns = 0
-      if (allocated(memory%column)) n_columns = size(memory%column)
+      if (allocated(history%column)) n_columns = size(history%column)
       n_known = 0_ip
       k = 1_ip
       do p = 1_ip, n
@@ -144,9 +144,9 @@ contains
          if (k > size(packed%key)) return
          if (packed%key(k) /= key) cycle
          n_known = n_known + 1_ip
-         memory%separating_edge(p) = packed%edge(k)
+         history%separating_edge(p) = packed%edge(k)
          do j = 1, n_columns
-            memory%column(j)%value(p) = packed%value(j, k)
+            history%column(j)%value(p) = packed%value(j, k)
          end do
       end do
    end subroutine receive_pairs

@@ -6,7 +6,7 @@
 module polydem_area_law
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_force_part, only: acts_elastic, force_part_t
    use polydem_kinds, only: ip, wp, min_parallel_size
@@ -49,7 +49,7 @@ contains
    end subroutine choose
 
    !> Set the characteristic length and add the elastic force, which acts at the centroid of the overlap.
-   subroutine add(self, bodies, dt, contacts, memory)
+   subroutine add(self, bodies, dt, contacts, history)
       class(area_law_t), intent(in) :: self
       !> Bodies (not used: all that matters is in the contacts)
       type(bodies_t), intent(in) :: bodies
@@ -58,11 +58,11 @@ contains
       !> Contacts; `inverse_length`, `lever`, `elastic` and `normal_force` change
       type(contacts_t), intent(inout) :: contacts
       !> Memory of the pairs (not used)
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       real(wp) :: r1, r2, length, force
       integer(ip) :: c
 
-      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => memory)
+      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => history)
       end associate
       contacts%energy_is_quadratic = .false.
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &

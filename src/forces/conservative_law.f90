@@ -22,7 +22,7 @@
 module polydem_conservative_law
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_elastic, force_part_t
    use polydem_kinds, only: ip, wp, min_parallel_size
@@ -95,7 +95,7 @@ contains
    end function area_of
 
    !> Add the elastic force and set its lever and the characteristic length, which is l b/L here.
-   subroutine add(self, bodies, dt, contacts, memory)
+   subroutine add(self, bodies, dt, contacts, history)
       class(conservative_law_t), intent(in) :: self
       !> Bodies (not used: all that matters is in the contacts)
       type(bodies_t), intent(in) :: bodies
@@ -104,11 +104,11 @@ contains
       !> Contacts with the effective area; `inverse_length`, `lever`, `elastic` and `normal_force` change
       type(contacts_t), intent(inout) :: contacts
       !> Memory of the pairs (not used)
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       real(wp) :: p, q, force
       integer(ip) :: c
 
-      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => memory)
+      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => history)
       end associate
       contacts%energy_is_quadratic = .true.
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &

@@ -14,7 +14,7 @@
 module polydem_cundall_strack
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
-   use polydem_contact_history, only: contact_memory_t, memory_kind_t
+   use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_last, force_part_t
    use polydem_kinds, only: ip, wp, min_parallel_size
@@ -63,15 +63,15 @@ contains
    !> It stores the force of the spring.
    function stored(self) result(kinds)
       class(cundall_strack_t), intent(in) :: self
-      type(memory_kind_t), allocatable :: kinds(:)
+      type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
-      kinds = [memory_kind_t('tangential', 'N/m', 'tangential force remembered')]
+      kinds = [history_kind_t('tangential', 'N/m', 'tangential force remembered')]
    end function stored
 
    !> Add the tangential force and remember the spring.
-   subroutine add(self, bodies, dt, contacts, memory)
+   subroutine add(self, bodies, dt, contacts, history)
       class(cundall_strack_t), intent(in) :: self
       !> Bodies, for their masses and velocities
       type(bodies_t), intent(in) :: bodies
@@ -80,12 +80,12 @@ contains
       !> Contacts; `tangential_force` changes
       type(contacts_t), intent(inout) :: contacts
       !> Memory of the pairs; the spring is read and set
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       real(wp) :: slip, mean, limit, spring
       integer(ip) :: c
 
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, dt, contacts, memory) &
+      !$omp    shared(self, bodies, dt, contacts, history) &
       !$omp    private(c, slip, mean, limit, spring)
       do c = 1_ip, contacts%n
          slip = slip_of(bodies%velocity, bodies%angular_velocity, contacts, c)
@@ -93,9 +93,9 @@ contains
          if (self%midstep) mean = slip &
             - 0.5_wp*dt*slip_of(bodies%acceleration, bodies%angular_acceleration, contacts, c)
          limit = self%coefficient*max(0.0_wp, contacts%normal_force(c))
-         spring = memory%column(self%first_column)%value(contacts%pair(c)) - self%stiffness*mean*dt
+         spring = history%column(self%first_column)%value(contacts%pair(c)) - self%stiffness*mean*dt
          spring = max(-limit, min(limit, spring))
-         memory%column(self%first_column)%value(contacts%pair(c)) = spring
+         history%column(self%first_column)%value(contacts%pair(c)) = spring
          if (self%damping > 0.0_wp) then
             spring = spring - self%damping*sqrt(self%stiffness/tangential_mobility(bodies, contacts, c))*slip
             spring = max(-limit, min(limit, spring))

@@ -8,7 +8,7 @@
 !> begins without a jump and needs no weight; theirs, between 1/2 and 1, does not change the order.)
 module polydem_damping_onset
    use polydem_bodies, only: bodies_t
-   use polydem_contact_history, only: contact_memory_t, memory_kind_t
+   use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_on_damping, force_part_t
    use polydem_kinds, only: ip, wp, min_parallel_size
@@ -44,15 +44,15 @@ contains
    !> It stores the area of the last step.
    function stored(self) result(kinds)
       class(damping_onset_t), intent(in) :: self
-      type(memory_kind_t), allocatable :: kinds(:)
+      type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
-      kinds = [memory_kind_t('area', 'm2', 'area of the overlap at the last step', zero_is_new=.true.)]
+      kinds = [history_kind_t('area', 'm2', 'area of the overlap at the last step', zero_is_new=.true.)]
    end function stored
 
    !> Weigh the damping of new contacts, limit the sum to repulsion and remember the areas.
-   subroutine add(self, bodies, dt, contacts, memory)
+   subroutine add(self, bodies, dt, contacts, history)
       class(damping_onset_t), intent(in) :: self
       !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
@@ -61,21 +61,21 @@ contains
       !> Contacts; `normal_force` changes
       type(contacts_t), intent(inout) :: contacts
       !> Memory of the pairs; the area is read and set
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       real(wp) :: growth, damping
       integer(ip) :: c
 
       associate (unused_bodies => bodies)
       end associate
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, dt, contacts, memory) private(c, growth, damping)
+      !$omp    shared(self, dt, contacts, history) private(c, growth, damping)
       do c = 1_ip, contacts%n
          growth = contacts%rate(c)*dt
-         if (memory%column(self%first_column)%value(contacts%pair(c)) <= 0.0_wp .and. contacts%area(c) < growth) then
+         if (history%column(self%first_column)%value(contacts%pair(c)) <= 0.0_wp .and. contacts%area(c) < growth) then
             damping = contacts%normal_force(c) - contacts%elastic(c)
             contacts%normal_force(c) = max(0.0_wp, contacts%elastic(c) + (contacts%area(c)/growth + 0.5_wp)*damping)
          end if
-         memory%column(self%first_column)%value(contacts%pair(c)) = contacts%area(c)
+         history%column(self%first_column)%value(contacts%pair(c)) = contacts%area(c)
       end do
       !$omp end parallel do
    end subroutine add

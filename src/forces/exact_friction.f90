@@ -30,7 +30,7 @@
 module polydem_exact_friction
    use polydem_bodies, only: bodies_t
    use polydem_box_qp, only: box_qp_t, reserve_box_qp, solve_box_qp
-   use polydem_contact_history, only: contact_memory_t, memory_kind_t
+   use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
    use polydem_counters, only: counters_t
@@ -108,15 +108,15 @@ contains
    !> It stores the force that the next search starts from.
    function stored(self) result(kinds)
       class(exact_friction_t), intent(in) :: self
-      type(memory_kind_t), allocatable :: kinds(:)
+      type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
-      kinds = [memory_kind_t('tangential', 'N/m', 'tangential force remembered')]
+      kinds = [history_kind_t('tangential', 'N/m', 'tangential force remembered')]
    end function stored
 
    !> Find the friction of all contacts.
-   subroutine apply(self, dt, incidence, bodies, contacts, memory, error)
+   subroutine apply(self, dt, incidence, bodies, contacts, history, error)
       class(exact_friction_t), intent(inout) :: self
       !> Step [s]
       real(wp), intent(in) :: dt
@@ -127,7 +127,7 @@ contains
       !> Contacts; `tangential_force` changes
       type(contacts_t), intent(inout) :: contacts
       !> Memory of the pairs: the force that the search starts from
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       !> Says how much slip is left
       type(error_t), allocatable, intent(inout) :: error
       logical :: solved
@@ -139,12 +139,12 @@ contains
          call free_velocities(dt, bodies, programme%free)
          programme%tolerance = self%tolerance
          do c = 1_ip, contacts%n
-            programme%force(c) = within(network%limit(c), memory%column(self%first_column)%value(contacts%pair(c)))
+            programme%force(c) = within(network%limit(c), history%column(self%first_column)%value(contacts%pair(c)))
          end do
          call solve_box_qp(programme, network, incidence, solved)
          do c = 1_ip, contacts%n
             contacts%tangential_force(c) = contacts%tangential_force(c) + programme%force(c)
-            memory%column(self%first_column)%value(contacts%pair(c)) = programme%force(c)
+            history%column(self%first_column)%value(contacts%pair(c)) = programme%force(c)
          end do
          if (contacts%n > 0_ip) self%n_solved = self%n_solved + 1_lp
          self%greatest_residual = max(self%greatest_residual, programme%residual)

@@ -8,7 +8,7 @@ module polydem_force_law
    use polydem_bodies, only: bodies_t
    use polydem_conservative_law, only: conservative_law_t
    use polydem_contact_element, only: contact_element_t
-   use polydem_contact_history, only: contact_memory_t, memory_kind_t
+   use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contacts, only: contacts_t
    use polydem_cundall_strack, only: cundall_strack_t
    use polydem_damping_onset, only: damping_onset_t
@@ -17,7 +17,7 @@ module polydem_force_law
    use polydem_force_part, only: acts_on_damping, force_part_t
    use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
-   use polydem_matuttis_chen_damping, only: book_damping_t
+   use polydem_matuttis_chen_damping, only: matuttis_chen_damping_t
    use polydem_rate_damping, only: rate_damping_t
    use polydem_restitution_damping, only: restitution_damping_t
    use polydem_settings, only: forces_settings_t, settings_t
@@ -39,7 +39,7 @@ module polydem_force_law
       !> What acts after all parts; unallocated if there is none
       class(velocity_constraint_t), allocatable :: constraint
       !> What is stored of each pair: the first columns of memory, in this order; not allocated before `choose_parts`
-      type(memory_kind_t), allocatable :: stored(:)
+      type(history_kind_t), allocatable :: stored(:)
       !> Whether the law asks for the effective area of overlaps
       logical :: needs_effective_area = .false.
       !> Whether a part adds to the column `cohesion`
@@ -88,7 +88,7 @@ contains
       call law%offer(rate_damping_t(), settings)
       call law%offer(restitution_damping_t(), settings)
       call law%offer(hunt_crossley_t(), settings)
-      call law%offer(book_damping_t(), settings)
+      call law%offer(matuttis_chen_damping_t(), settings)
       call law%offer(damping_onset_t(), settings)
       call law%offer(tilt_damping_t(), settings)
       call law%offer(cundall_strack_t(), settings)
@@ -203,7 +203,7 @@ contains
    end subroutine check_law
 
    !> Compute the normal and tangential forces of all contacts.
-   subroutine evaluate_law(law, bodies, dt, contacts, memory)
+   subroutine evaluate_law(law, bodies, dt, contacts, history)
       !> The law
       type(force_law_t), intent(in) :: law
       !> Bodies with the positions and velocities of this step
@@ -213,7 +213,7 @@ contains
       !> Contacts; `elastic`, `cohesion`, `normal_force`, `tangential_force` and `twist` are set
       type(contacts_t), intent(inout) :: contacts
       !> What is remembered of the pairs
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       integer :: k
 
       contacts%elastic(1:contacts%n) = 0.0_wp
@@ -222,7 +222,7 @@ contains
       if (contacts%has_cohesion) contacts%cohesion(1:contacts%n) = 0.0_wp
       if (contacts%has_twist) contacts%twist(1:contacts%n) = 0.0_wp
       do k = 1, size(law%parts)
-         call law%parts(k)%part%add(bodies, dt, contacts, memory)
+         call law%parts(k)%part%add(bodies, dt, contacts, history)
       end do
    end subroutine evaluate_law
 

@@ -17,7 +17,7 @@
 !> ride on the pair list.
 module polydem_force_part
    use polydem_bodies, only: bodies_t
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: wp
    use polydem_law_part, only: law_part_t
@@ -53,8 +53,8 @@ module polydem_force_part
 
    abstract interface
       !> Add this part to the forces of all contacts.
-      subroutine add(self, bodies, dt, contacts, memory)
-         import :: bodies_t, contact_memory_t, contacts_t, force_part_t, wp
+      subroutine add(self, bodies, dt, contacts, history)
+         import :: bodies_t, contact_history_t, contacts_t, force_part_t, wp
          class(force_part_t), intent(in) :: self
          !> Bodies with the positions and velocities of this step
          type(bodies_t), intent(in) :: bodies
@@ -63,7 +63,7 @@ module polydem_force_part
          !> Contacts of this step
          type(contacts_t), intent(inout) :: contacts
          !> What is remembered of the pairs
-         type(contact_memory_t), intent(inout) :: memory
+         type(contact_history_t), intent(inout) :: history
       end subroutine add
    end interface
 

@@ -7,7 +7,7 @@
 module polydem_hunt_crossley
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: block_size, normal_damping_t
@@ -41,7 +41,7 @@ contains
    end subroutine choose
 
    !> Find the damping of some contacts.
-   subroutine find_forces(self, bodies, dt, contacts, memory, low, high, force)
+   subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
       class(hunt_crossley_t), intent(in) :: self
       !> Bodies, for their masses
       type(bodies_t), intent(in) :: bodies
@@ -50,7 +50,7 @@ contains
       !> Contacts with their elastic forces
       type(contacts_t), intent(in) :: contacts
       !> Memory of the pairs (not used)
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       !> First and last of the contacts
       integer(ip), intent(in) :: low, high
       !> Damping of contact c at c - low + 1 [N/m]
@@ -58,7 +58,7 @@ contains
       real(wp) :: mobility, share
       integer(ip) :: c
 
-      associate (unused_dt => dt, unused_memory => memory)
+      associate (unused_dt => dt, unused_memory => history)
       end associate
       do c = low, high
          mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))

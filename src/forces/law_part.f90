@@ -6,7 +6,7 @@
 module polydem_law_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
-   use polydem_contact_history, only: memory_kind_t
+   use polydem_contact_history, only: history_kind_t
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip
@@ -76,7 +76,7 @@ contains
    !> `contact_memory_t`; as it is here, nothing. Names must differ from those of other members of the same law.
    function stored(self) result(kinds)
       class(law_part_t), intent(in) :: self
-      type(memory_kind_t), allocatable :: kinds(:)
+      type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate

@@ -5,22 +5,22 @@
 !> Meant for comparison; `rate_damping` is the same law without the artefacts of the difference.
 module polydem_matuttis_chen_damping
    use polydem_bodies, only: bodies_t
-   use polydem_contact_history, only: contact_memory_t, memory_kind_t
+   use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: block_size, normal_damping_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
-   public :: book_damping_t
+   public :: matuttis_chen_damping_t
 
    !> Damping by the backward difference of the area
-   type, extends(normal_damping_t) :: book_damping_t
+   type, extends(normal_damping_t) :: matuttis_chen_damping_t
    contains
       procedure :: choose
       procedure :: stored
       procedure :: find_forces
-   end type book_damping_t
+   end type matuttis_chen_damping_t
 
    !> Greatest damping on approach, as a multiple of the elastic force
    real(wp), parameter :: approach_limit = 4.0_wp
@@ -29,7 +29,7 @@ contains
 
    !> It is the damping 'book'.
    subroutine choose(self, settings, chosen)
-      class(book_damping_t), intent(inout) :: self
+      class(matuttis_chen_damping_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
       !> Whether it belongs to the law
@@ -43,17 +43,17 @@ contains
 
    !> It stores the area of the last step.
    function stored(self) result(kinds)
-      class(book_damping_t), intent(in) :: self
-      type(memory_kind_t), allocatable :: kinds(:)
+      class(matuttis_chen_damping_t), intent(in) :: self
+      type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
-      kinds = [memory_kind_t('area', 'm2', 'area of the overlap at the last step', zero_is_new=.true.)]
+      kinds = [history_kind_t('area', 'm2', 'area of the overlap at the last step', zero_is_new=.true.)]
    end function stored
 
    !> Find the damping of some contacts, and remember the area.
-   subroutine find_forces(self, bodies, dt, contacts, memory, low, high, force)
-      class(book_damping_t), intent(in) :: self
+   subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
+      class(matuttis_chen_damping_t), intent(in) :: self
       !> Bodies, for their masses
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0: no rate is known, no damping
@@ -61,7 +61,7 @@ contains
       !> Contacts with their elastic forces
       type(contacts_t), intent(in) :: contacts
       !> Memory of the pairs; the area is read and set
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       !> First and last of the contacts
       integer(ip), intent(in) :: low, high
       !> Damping of contact c at c - low + 1 [N/m]
@@ -69,7 +69,7 @@ contains
       real(wp) :: mobility, difference
       integer(ip) :: c
 
-      associate (area => memory%column(self%first_column)%value)
+      associate (area => history%column(self%first_column)%value)
          do c = low, high
             difference = 0.0_wp
             if (dt > 0.0_wp) then

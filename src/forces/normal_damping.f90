@@ -6,7 +6,7 @@
 module polydem_normal_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_damping, force_part_t
    use polydem_kinds, only: ip, wp, min_parallel_size
@@ -34,8 +34,8 @@ module polydem_normal_damping
 
    abstract interface
       !> Find the damping of some contacts, without any limit to repulsion.
-      subroutine find_forces(self, bodies, dt, contacts, memory, low, high, force)
-         import :: block_size, bodies_t, contact_memory_t, contacts_t, ip, normal_damping_t, wp
+      subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
+         import :: block_size, bodies_t, contact_history_t, contacts_t, ip, normal_damping_t, wp
          class(normal_damping_t), intent(in) :: self
          !> Bodies with the positions and velocities of this step
          type(bodies_t), intent(in) :: bodies
@@ -44,7 +44,7 @@ module polydem_normal_damping
          !> Contacts of this step with their elastic forces
          type(contacts_t), intent(in) :: contacts
          !> What is remembered of the pairs; only pairs of these contacts may change
-         type(contact_memory_t), intent(inout) :: memory
+         type(contact_history_t), intent(inout) :: history
          !> First and last of the contacts, at most `block_size`
          integer(ip), intent(in) :: low, high
          !> Damping of contact c at c - low + 1, positive in repulsion [N/m]
@@ -55,7 +55,7 @@ module polydem_normal_damping
 contains
 
    !> Add the damping, limited so that the sum with the elastic repulsion does not attract.
-   subroutine add(self, bodies, dt, contacts, memory)
+   subroutine add(self, bodies, dt, contacts, history)
       class(normal_damping_t), intent(in) :: self
       !> Bodies, for their masses
       type(bodies_t), intent(in) :: bodies
@@ -64,15 +64,15 @@ contains
       !> Contacts; `normal_force` changes
       type(contacts_t), intent(inout) :: contacts
       !> What is remembered of the pairs
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       real(wp) :: force(block_size)
       integer(ip) :: c, low, high
 
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, dt, contacts, memory) private(c, low, high, force)
+      !$omp    shared(self, bodies, dt, contacts, history) private(c, low, high, force)
       do low = 1_ip, contacts%n, block_size
          high = min(low + block_size - 1_ip, contacts%n)
-         call self%find_forces(bodies, dt, contacts, memory, low, high, force)
+         call self%find_forces(bodies, dt, contacts, history, low, high, force)
          do c = low, high
             contacts%normal_force(c) = contacts%normal_force(c) + max(-contacts%elastic(c), force(c - low + 1_ip))
          end do

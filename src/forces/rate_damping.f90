@@ -4,7 +4,7 @@
 !> difference: no memory, no lag of half a step, no jump at the first step of a contact.
 module polydem_rate_damping
    use polydem_bodies, only: bodies_t
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: block_size, normal_damping_t
@@ -38,7 +38,7 @@ contains
    end subroutine choose
 
    !> Find the damping of some contacts.
-   subroutine find_forces(self, bodies, dt, contacts, memory, low, high, force)
+   subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
       class(rate_damping_t), intent(in) :: self
       !> Bodies, for their masses
       type(bodies_t), intent(in) :: bodies
@@ -47,7 +47,7 @@ contains
       !> Contacts
       type(contacts_t), intent(in) :: contacts
       !> Memory of the pairs (not used)
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       !> First and last of the contacts
       integer(ip), intent(in) :: low, high
       !> Damping of contact c at c - low + 1 [N/m]
@@ -55,7 +55,7 @@ contains
       real(wp) :: mobility
       integer(ip) :: c
 
-      associate (unused_dt => dt, unused_memory => memory)
+      associate (unused_dt => dt, unused_memory => history)
       end associate
       do c = low, high
          mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))

@@ -11,7 +11,7 @@
 module polydem_tilt_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_last, force_part_t
    use polydem_kinds, only: ip, wp, min_parallel_size
@@ -52,7 +52,7 @@ contains
    end subroutine choose
 
    !> Add the torque; the normal forces must be complete.
-   subroutine add(self, bodies, dt, contacts, memory)
+   subroutine add(self, bodies, dt, contacts, history)
       class(tilt_damping_t), intent(in) :: self
       !> Bodies, for their moments of inertia
       type(bodies_t), intent(in) :: bodies
@@ -61,11 +61,11 @@ contains
       !> Contacts; `twist` changes
       type(contacts_t), intent(inout) :: contacts
       !> Memory of the pairs (not used)
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       real(wp) :: mobility, limit, torque
       integer(ip) :: c
 
-      associate (unused_dt => dt, unused_memory => memory)
+      associate (unused_dt => dt, unused_memory => history)
       end associate
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(self, bodies, contacts) private(c, mobility, limit, torque)

@@ -5,7 +5,7 @@
 !> forces of contacts. What it remembers lies in the columns of `contact_memory_t`; what it needs to work is its own.
 module polydem_velocity_constraint
    use polydem_bodies, only: bodies_t
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
    use polydem_counters, only: counters_t
@@ -27,8 +27,8 @@ module polydem_velocity_constraint
 
    abstract interface
       !> Find the forces of all contacts.
-      subroutine apply(self, dt, incidence, bodies, contacts, memory, error)
-         import :: bodies_t, contact_memory_t, contacts_t, error_t, incidence_t, velocity_constraint_t, wp
+      subroutine apply(self, dt, incidence, bodies, contacts, history, error)
+         import :: bodies_t, contact_history_t, contacts_t, error_t, incidence_t, velocity_constraint_t, wp
          class(velocity_constraint_t), intent(inout) :: self
          !> Step [s]
          real(wp), intent(in) :: dt
@@ -40,7 +40,7 @@ module polydem_velocity_constraint
          !> Contacts of this step; `tangential_force` changes
          type(contacts_t), intent(inout) :: contacts
          !> What is remembered of the pairs
-         type(contact_memory_t), intent(inout) :: memory
+         type(contact_history_t), intent(inout) :: history
          !> The forces were not found
          type(error_t), allocatable, intent(inout) :: error
       end subroutine apply

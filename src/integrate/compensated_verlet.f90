@@ -121,12 +121,12 @@ contains
    pure subroutine add(number, total, lost)
       real(wp), intent(in) :: number
       real(wp), intent(inout) :: total, lost
-      real(wp) :: addend, rounded, arrived
+      real(wp) :: addend, rounded, received_history
 
       addend = number + lost
       rounded = total + addend
-      arrived = rounded - total
-      lost = (total - (rounded - arrived)) + (addend - arrived)
+      received_history = rounded - total
+      lost = (total - (rounded - received_history)) + (addend - received_history)
       total = rounded
    end subroutine add
 

@@ -8,7 +8,7 @@
 module polydem_find_contacts
    use omp_lib, only: omp_get_max_threads, omp_get_num_threads, omp_get_thread_num
    use polydem_bodies, only: bodies_t
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_convex_overlap, only: overlap_polygons, overlap_t
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
@@ -52,7 +52,7 @@ contains
       integer(ip), intent(in) :: second(:)
       !> Contact history of the pairs: `separating_edge` is updated, and the other columns are cleared for pairs whose
       !> polygons do not overlap; any column may be absent
-      type(contact_memory_t), intent(inout) :: history
+      type(contact_history_t), intent(inout) :: history
       !> Contacts; `area_is_effective` must be set. The columns that the forces fill are not changed
       type(contacts_t), intent(inout) :: contacts
       type(run_t) :: runs(0:most_threads - 1_ip)
@@ -86,7 +86,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: first(:)
       integer(ip), intent(in) :: second(:)
-      type(contact_memory_t), intent(inout) :: history
+      type(contact_history_t), intent(inout) :: history
       type(contacts_t), intent(inout) :: contacts
       type(run_t), intent(inout) :: run
       type(overlap_t) :: overlap
@@ -122,7 +122,7 @@ contains
    subroutine update_history(p, overlap, history)
       integer(ip), intent(in) :: p
       type(overlap_t), intent(in) :: overlap
-      type(contact_memory_t), intent(inout) :: history
+      type(contact_history_t), intent(inout) :: history
       integer :: k
 
       if (allocated(history%separating_edge)) history%separating_edge(p) = overlap%separating_edge

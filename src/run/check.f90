@@ -59,15 +59,15 @@ contains
       type(simulation_t), intent(inout) :: simulation
       type(log_t), intent(inout) :: log
       type(error_t), allocatable, intent(inout) :: error
-      type(monitor_t) :: watch
+      type(monitor_t) :: monitor
 
-      call new_monitor(watch, simulation)
-      call warn_of_risks(simulation, log, watch%at_start)
-      call look(watch, simulation, .true., log, error)
+      call new_monitor(monitor, simulation)
+      call warn_of_risks(simulation, log, monitor%at_start)
+      call look(monitor, simulation, .true., log, error)
       if (allocated(error)) return
       ! A body that is too fast at the start moves too far in the first step.
       call check_motion(simulation%guard, simulation%bodies, simulation%step, simulation%dt, error)
-      call report_pending_warnings(watch, simulation, log)
+      call report_pending_warnings(monitor, simulation, log)
    end subroutine warn_at_start
 
    !> Size of a frame [B]: bodies, and the initial contacts if contacts are written

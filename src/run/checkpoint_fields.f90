@@ -8,7 +8,7 @@
 module polydem_checkpoint_fields
    use polydem_bodies, only: bodies_t, state_hash, turn_bodies
    use polydem_body_fields, only: serialize_bodies
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_energy_balance, only: serialize_contributions, serialize_balance
    use polydem_errors, only: input_error, raise
    use polydem_hash, only: mix_word
@@ -37,18 +37,18 @@ module polydem_checkpoint_fields
 contains
 
    !> Write the state of a run to a serializer, or restore it from there.
-   subroutine serialize_run(serializer, simulation, history, watch)
+   subroutine serialize_run(serializer, simulation, attempts, monitor)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       !> Written: the simulation at the end of a step. Restored: on entry any state of the same scene, on return the
       !> stored state without contacts, which the next step computes
       type(simulation_t), intent(inout) :: simulation
       !> Attempts of the run
-      type(attempts_t), intent(inout) :: history
+      type(attempts_t), intent(inout) :: attempts
       !> Monitor
-      type(monitor_t), intent(inout) :: watch
+      type(monitor_t), intent(inout) :: monitor
 
-      call serialize_global(serializer, simulation, history, watch)
+      call serialize_global(serializer, simulation, attempts, monitor)
       associate (s => simulation)
          call serialize_bodies(serializer, s%bodies)
          call s%integrator%serialize(serializer)
@@ -64,21 +64,21 @@ contains
    end subroutine serialize_run
 
    !> Serialize the global fields: those of the whole run, not of bodies, boxes or pairs.
-   subroutine serialize_global(serializer, simulation, history, watch)
+   subroutine serialize_global(serializer, simulation, attempts, monitor)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       !> The simulation
       type(simulation_t), intent(inout) :: simulation
       !> Attempts of the run
-      type(attempts_t), intent(inout) :: history
+      type(attempts_t), intent(inout) :: attempts
       !> Monitor
-      type(monitor_t), intent(inout) :: watch
+      type(monitor_t), intent(inout) :: monitor
 
-      call serialize_progress(serializer, simulation%step, history)
-      call serialize_monitor(watch, serializer)
+      call serialize_progress(serializer, simulation%step, attempts)
+      call serialize_monitor(monitor, serializer)
       associate (s => simulation)
          call serializer%match('/run/time_step', s%dt, 's', 'time step')
-         call serializer%match('/run/scene', [history%scene], '1', 'hash of the bodies at the start')
+         call serializer%match('/run/scene', [attempts%scene], '1', 'hash of the bodies at the start')
          call serializer%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call serializer%field('/run/sums', s%sums, '1', 'sums over steps: pairs, contacts, pairs that began, '// &
                            'pairs that ended, contacts without direction')
@@ -92,21 +92,21 @@ contains
    end subroutine serialize_global
 
    !> Serialize the progress of a run. This part of `serialize_run` needs no simulation.
-   subroutine serialize_progress(serializer, step, history)
+   subroutine serialize_progress(serializer, step, attempts)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
       !> Number of completed steps
       integer(lp), intent(inout) :: step
       !> Attempts of the run
-      type(attempts_t), intent(inout) :: history
+      type(attempts_t), intent(inout) :: attempts
       real(dp) :: seconds(1)
 
       call serializer%field('/run/step', step, '1', 'completed steps')
-      call serializer%field('/run/attempts', history%attempts, '1', 'attempts, including the present one')
-      call serializer%field('/run/segments', history%segments, '1', 'closed segments of the trajectory')
-      seconds = history%seconds
+      call serializer%field('/run/attempts', attempts%attempts, '1', 'attempts, including the present one')
+      call serializer%field('/run/segments', attempts%segments, '1', 'closed segments of the trajectory')
+      seconds = attempts%seconds
       call serializer%seconds_field('/run/seconds', seconds, 'elapsed time of the run, without repeated steps')
-      history%seconds = seconds(1)
+      attempts%seconds = seconds(1)
    end subroutine serialize_progress
 
    !> Serialize the pairs and their contact history. A restart rebuilds the pairs and compares them to the file.
@@ -125,7 +125,7 @@ contains
             'lower identifier of each pair')
          call serializer%match('/pairs/second', int(s%bodies%id(pairs%second(:n)), lp), '1', &
             'higher identifier of each pair')
-         call serialize_history(serializer, n, s%memory)
+         call serialize_history(serializer, n, s%history)
          call expect_edges(serializer, s)
          call serializer%field('/run/finder_counts', work%value, '1', 'statistics of the finder so far')
          call serializer%seconds_field('/run/finder_seconds', work%seconds, 'time of each phase of the finder')
@@ -133,20 +133,20 @@ contains
    end subroutine serialize_pairs
 
    !> Serialize the columns of the contact history that the force models of the scene use.
-   subroutine serialize_history(serializer, n, memory)
+   subroutine serialize_history(serializer, n, history)
       class(serializer_t), intent(inout) :: serializer
       !> Number of pairs
       integer(ip), intent(in) :: n
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       integer :: k
 
-      if (serializer%is_reading) memory%separating_edge = spread(0_ip, 1, n)
-      call serializer%field('/pairs/separating_edge', memory%separating_edge(:n), '1', &
+      if (serializer%is_reading) history%separating_edge = spread(0_ip, 1, n)
+      call serializer%field('/pairs/separating_edge', history%separating_edge(:n), '1', &
                         'last edge that separated the pair: +k of the first body, -k of the second, 0 unknown')
-      if (.not. allocated(memory%column)) return
-      do k = 1, size(memory%column)
-         associate (kind => memory%column(k)%kind)
-            call serialize_column(serializer, '/pairs/'//trim(kind%name), n, memory%column(k)%value, trim(kind%unit), &
+      if (.not. allocated(history%column)) return
+      do k = 1, size(history%column)
+         associate (kind => history%column(k)%kind)
+            call serialize_column(serializer, '/pairs/'//trim(kind%name), n, history%column(k)%value, trim(kind%unit), &
                              trim(kind%meaning))
          end associate
       end do
@@ -161,7 +161,7 @@ contains
       if (.not. serializer%is_reading .or. allocated(serializer%error)) return
       associate (pairs => s%neighbours%pairs, start => s%bodies%vertex_start)
          do k = 1_ip, pairs%n
-            edge = s%memory%separating_edge(k)
+            edge = s%history%separating_edge(k)
             if (edge <= start(pairs%first(k) + 1_ip) - start(pairs%first(k)) .and. &
                 -edge <= start(pairs%second(k) + 1_ip) - start(pairs%second(k))) cycle
             call raise(serializer%error, input_error, '/pairs/separating_edge of the bodies '// &

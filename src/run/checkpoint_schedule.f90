@@ -110,7 +110,7 @@ contains
    end subroutine look
 
    !> Write a checkpoint over the older of the last two; collective.
-   subroutine write_checkpoint(self, folder, provenance, comm, simulation, history, watch, error)
+   subroutine write_checkpoint(self, folder, provenance, comm, simulation, attempts, monitor, error)
       class(checkpoints_t), intent(inout) :: self
       !> Result folder
       character(len=*), intent(in) :: folder
@@ -121,9 +121,9 @@ contains
       !> The simulation at the end of a step
       type(simulation_t), intent(inout) :: simulation
       !> Attempts of the run
-      type(attempts_t), intent(inout) :: history
+      type(attempts_t), intent(inout) :: attempts
       !> Monitor
-      type(monitor_t), intent(inout) :: watch
+      type(monitor_t), intent(inout) :: monitor
       !> Allocated if the checkpoint cannot be written; the last two are then unchanged
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
@@ -136,7 +136,7 @@ contains
       if (.not. allocated(file%error)) call lay_out_rows(comm, simulation, file)
       call complete_wall_forces(comm, simulation%bodies, simulation%contacts)
       call collect_counts(simulation)
-      call serialize_run(file, simulation, history, watch)
+      call serialize_run(file, simulation, attempts, monitor)
       call file%complete(error)
       call limit%lift()
       if (allocated(error)) return

@@ -50,40 +50,40 @@ module polydem_monitor
 contains
 
    !> Prepare the guards that are switched on.
-   subroutine new_monitor(watch, simulation)
+   subroutine new_monitor(monitor, simulation)
       !> The monitor
-      type(monitor_t), intent(out) :: watch
+      type(monitor_t), intent(out) :: monitor
       !> A simulation at time 0
       type(simulation_t), intent(in) :: simulation
 
       associate (settings => simulation%settings%guards)
          if (settings%overlap /= 'off' .or. settings%passing /= 'off') &
-            watch%thickness = thickness_of_bodies(simulation%bodies)
-         if (settings%energy /= 'off') call open_energy_guard(watch%energy, simulation%contacts)
+            monitor%thickness = thickness_of_bodies(simulation%bodies)
+         if (settings%energy /= 'off') call open_energy_guard(monitor%energy, simulation%contacts)
       end associate
    end subroutine new_monitor
 
    !> Serialize the findings of the guards.
-   subroutine serialize_monitor(watch, serializer)
+   subroutine serialize_monitor(monitor, serializer)
       !> The monitor
-      type(monitor_t), intent(inout) :: watch
+      type(monitor_t), intent(inout) :: monitor
       !> Serializer
       class(serializer_t), intent(inout) :: serializer
 
-      call serializer%field('/run/deep_steps', watch%overlap%count, '1', 'steps with a contact that was too deep')
-      call serializer%field('/run/passing_steps', watch%passing%count, '1', 'steps in which a body was passing '// &
+      call serializer%field('/run/deep_steps', monitor%overlap%count, '1', 'steps with a contact that was too deep')
+      call serializer%field('/run/passing_steps', monitor%passing%count, '1', 'steps in which a body was passing '// &
                         'through another')
-      call serializer%field('/run/energy_looks', watch%energy%warning%count, '1', &
+      call serializer%field('/run/energy_looks', monitor%energy%warning%count, '1', &
                         'checks that found an unexplained energy gain')
-      call serializer%field('/run/large_steps', watch%large_steps, '1', 'checks with dt above half the stable dt')
-      call serializer%field('/run/warned_share', watch%warned, '1', 'greatest dt / stable dt of a warning')
-      call serializer%field('/run/greatest_share', watch%greatest_share, '1', 'greatest dt / stable dt')
+      call serializer%field('/run/large_steps', monitor%large_steps, '1', 'checks with dt above half the stable dt')
+      call serializer%field('/run/warned_share', monitor%warned, '1', 'greatest dt / stable dt of a warning')
+      call serializer%field('/run/greatest_share', monitor%greatest_share, '1', 'greatest dt / stable dt')
    end subroutine serialize_monitor
 
    !> Check a step with the guards, and write new warnings. Collective; all ranks get the error.
-   subroutine look(watch, simulation, is_last, log, error)
+   subroutine look(monitor, simulation, is_last, log, error)
       !> The monitor
-      type(monitor_t), intent(inout) :: watch
+      type(monitor_t), intent(inout) :: monitor
       !> The simulation at the end of a step
       type(simulation_t), intent(inout) :: simulation
       !> Whether to run all guards regardless of the interval between checks
@@ -97,19 +97,19 @@ contains
       check_all = is_last .or. mod(simulation%step, interval) == 0_lp
       associate (settings => simulation%settings%guards)
          if (settings%overlap /= 'off' .or. settings%passing /= 'off') &
-            call check_contact_guards(watch, simulation, error)
-         if (check_all .and. settings%step /= 'off') call check_time_step(watch, simulation, log, error)
-         if (check_all .and. settings%energy /= 'off') call check_energy(watch%energy, simulation, error)
+            call check_contact_guards(monitor, simulation, error)
+         if (check_all .and. settings%step /= 'off') call check_time_step(monitor, simulation, log, error)
+         if (check_all .and. settings%energy /= 'off') call check_energy(monitor%energy, simulation, error)
          if (check_all .or. settings%passing == 'stop') call simulation%comm%all_reduce_error(error)
       end associate
-      if (check_all .or. simulation%comm%size == 1_ip) call report_pending_warnings(watch, simulation, log)
-      call write_pending(watch%energy%warning, log)
+      if (check_all .or. simulation%comm%size == 1_ip) call report_pending_warnings(monitor, simulation, log)
+      call write_pending(monitor%energy%warning, log)
    end subroutine look
 
    !> Write the pending warnings of all ranks, and all-reduce their counts; collective.
-   subroutine report_pending_warnings(watch, simulation, log)
+   subroutine report_pending_warnings(monitor, simulation, log)
       !> The monitor
-      type(monitor_t), intent(inout) :: watch
+      type(monitor_t), intent(inout) :: monitor
       !> The simulation
       type(simulation_t), intent(inout) :: simulation
       !> Log
@@ -117,13 +117,13 @@ contains
       integer(lp) :: counts(3)
 
       if (simulation%comm%size > 1_ip) then
-         counts = warning_counts(watch, simulation)
+         counts = warning_counts(monitor, simulation)
          call simulation%comm%all_reduce_max(counts)
-         call set_warning_counts(watch, simulation, counts)
+         call set_warning_counts(monitor, simulation, counts)
       end if
       call report_guard(simulation%guard%warning)
-      call report_guard(watch%overlap)
-      call report_guard(watch%passing)
+      call report_guard(monitor%overlap)
+      call report_guard(monitor%passing)
 
    contains
 
@@ -148,47 +148,47 @@ contains
 
    !> Number of steps with a warning, for the guards that run on each rank independently: displacement, overlap,
    !> passing. Once per step the counts become the greatest of all ranks, so a step counts once however many ranks warn.
-   pure function warning_counts(watch, simulation) result(counts)
+   pure function warning_counts(monitor, simulation) result(counts)
       !> The monitor
-      type(monitor_t), intent(in) :: watch
+      type(monitor_t), intent(in) :: monitor
       !> The simulation
       type(simulation_t), intent(in) :: simulation
       integer(lp) :: counts(3)
 
-      counts = [simulation%guard%warning%count, watch%overlap%count, watch%passing%count]
+      counts = [simulation%guard%warning%count, monitor%overlap%count, monitor%passing%count]
    end function warning_counts
 
    !> Set the counts to the greatest of all ranks.
-   pure subroutine set_warning_counts(watch, simulation, counts)
+   pure subroutine set_warning_counts(monitor, simulation, counts)
       !> The monitor
-      type(monitor_t), intent(inout) :: watch
+      type(monitor_t), intent(inout) :: monitor
       !> The simulation
       type(simulation_t), intent(inout) :: simulation
       !> Counts in the order of `warning_counts`, (3)
       integer(lp), intent(in) :: counts(:)
 
       simulation%guard%warning%count = counts(1)
-      watch%overlap%count = counts(2)
-      watch%passing%count = counts(3)
+      monitor%overlap%count = counts(2)
+      monitor%passing%count = counts(3)
    end subroutine set_warning_counts
 
    !> Write the greatest dt / stable dt and the number of warnings of each guard.
-   subroutine write_warning_counts(watch, simulation, log)
+   subroutine write_warning_counts(monitor, simulation, log)
       !> The monitor
-      type(monitor_t), intent(in) :: watch
+      type(monitor_t), intent(in) :: monitor
       !> The simulation at the end of the run
       type(simulation_t), intent(in) :: simulation
       !> Log
       type(log_t), intent(inout) :: log
 
-      if (watch%greatest_share > 0.0_wp) call log%write_line( &
-         'max dt / stable dt of the contacts: '//to_text(watch%greatest_share, 3))
-      call write_count(watch%at_start, 'about the initial state')
+      if (monitor%greatest_share > 0.0_wp) call log%write_line( &
+         'max dt / stable dt of the contacts: '//to_text(monitor%greatest_share, 3))
+      call write_count(monitor%at_start, 'about the initial state')
       call write_count(simulation%guard%warning%count, 'steps in which a body moved too far')
-      call write_count(watch%overlap%count, 'steps with a contact that was too deep')
-      call write_count(watch%passing%count, 'steps in which a body was passing through another')
-      call write_count(watch%energy%warning%count, 'checks that found an unexplained energy gain')
-      call write_count(watch%large_steps, 'checks with dt above half the stable time step')
+      call write_count(monitor%overlap%count, 'steps with a contact that was too deep')
+      call write_count(monitor%passing%count, 'steps in which a body was passing through another')
+      call write_count(monitor%energy%warning%count, 'checks that found an unexplained energy gain')
+      call write_count(monitor%large_steps, 'checks with dt above half the stable time step')
 
    contains
 
@@ -202,8 +202,8 @@ contains
    end subroutine write_warning_counts
 
    !> Check for deep contacts, and for bodies passing through each other.
-   subroutine check_contact_guards(watch, simulation, error)
-      type(monitor_t), intent(inout) :: watch
+   subroutine check_contact_guards(monitor, simulation, error)
+      type(monitor_t), intent(inout) :: monitor
       type(simulation_t), intent(inout) :: simulation
       type(error_t), allocatable, intent(inout) :: error
       real(wp) :: limit
@@ -211,27 +211,27 @@ contains
       logical :: any_deep
 
       associate (s => simulation, settings => simulation%settings%guards)
-         if (watch%generation /= s%generation) watch%thickness = thickness_of_bodies(s%bodies)
-         watch%generation = s%generation
+         if (monitor%generation /= s%generation) monitor%thickness = thickness_of_bodies(s%bodies)
+         monitor%generation = s%generation
          limit = huge(limit)
          if (settings%overlap /= 'off') limit = settings%overlap_limit
          found = 0_ip
          if (settings%passing /= 'off') then
-            call find_passing(s%bodies, s%contacts, watch%thickness, s%guard%radius, limit, &
-                              s%memory%column(column_of(s%memory, 'direction'))%value, found, any_deep)
+            call find_passing(s%bodies, s%contacts, monitor%thickness, s%guard%radius, limit, &
+                              s%history%column(column_of(s%history, 'direction'))%value, found, any_deep)
          end if
          ! The search for passing bodies skips contacts below `least_depth`.
          if (settings%passing == 'off' .or. limit < least_depth) &
-            any_deep = any_deeper(s%contacts, watch%thickness, limit)
-         if (settings%overlap /= 'off') call respond_to_depth(watch, simulation, any_deep, error)
-         if (found > 0_ip .and. .not. allocated(error)) call respond_to_passing(watch, simulation, found, error)
+            any_deep = any_deeper(s%contacts, monitor%thickness, limit)
+         if (settings%overlap /= 'off') call respond_to_depth(monitor, simulation, any_deep, error)
+         if (found > 0_ip .and. .not. allocated(error)) call respond_to_passing(monitor, simulation, found, error)
       end associate
    end subroutine check_contact_guards
 
    !> Respond to the deepest contact. The rank with the deepest contact of all ranks reports it, at once if it stops the
    !> run.
-   subroutine respond_to_depth(watch, simulation, any_deep, error)
-      type(monitor_t), intent(inout) :: watch
+   subroutine respond_to_depth(monitor, simulation, any_deep, error)
+      type(monitor_t), intent(inout) :: monitor
       type(simulation_t), intent(inout) :: simulation
       logical, intent(in) :: any_deep
       type(error_t), allocatable, intent(inout) :: error
@@ -242,21 +242,21 @@ contains
       share = 0.0_dp
       associate (s => simulation, settings => simulation%settings%guards)
          if (any_deep) then
-            worst = deepest_contact(s%contacts, watch%thickness)
-            text = depth_text(s%bodies, s%contacts, watch%thickness, worst)
-            share = real(depth_share(s%contacts, watch%thickness, worst), dp)
+            worst = deepest_contact(s%contacts, monitor%thickness)
+            text = depth_text(s%bodies, s%contacts, monitor%thickness, worst)
+            share = real(depth_share(s%contacts, monitor%thickness, worst), dp)
          end if
          if (settings%overlap == 'stop') call s%comm%all_reduce_text(text, share)
          if (.not. allocated(text)) return
-         call watch%overlap%respond(settings%overlap, 'step '//to_text(s%step)//': '//text// &
+         call monitor%overlap%respond(settings%overlap, 'step '//to_text(s%step)//': '//text// &
                                     '. Reduce dt, increase stiffness in &forces, or remove deep initial '// &
                                     'overlaps (relaxed_depth in &guards)', error, share)
       end associate
    end subroutine respond_to_depth
 
    !> Respond to bodies passing through each other. The rank with the first such pair of all ranks reports it.
-   subroutine respond_to_passing(watch, simulation, found, error)
-      type(monitor_t), intent(inout) :: watch
+   subroutine respond_to_passing(monitor, simulation, found, error)
+      type(monitor_t), intent(inout) :: monitor
       type(simulation_t), intent(inout) :: simulation
       !> Index of the contact
       integer(ip), intent(in) :: found
@@ -265,7 +265,7 @@ contains
 
       associate (s => simulation)
          place = place_of(s%bodies, s%contacts%first(found), s%contacts%second(found))
-         call watch%passing%respond(s%settings%guards%passing, 'step '//to_text(s%step)//': '// &
+         call monitor%passing%respond(s%settings%guards%passing, 'step '//to_text(s%step)//': '// &
                                     passing_text(s%bodies, s%contacts, s%guard%radius, found), error, &
                                     -real(place, dp))
          if (allocated(error)) error%place = place
@@ -273,8 +273,8 @@ contains
    end subroutine respond_to_passing
 
    !> Compare dt to the stable time step of the contacts. A further warning needs a ratio that is larger by a tenth.
-   subroutine check_time_step(watch, simulation, log, error)
-      type(monitor_t), intent(inout) :: watch
+   subroutine check_time_step(monitor, simulation, log, error)
+      type(monitor_t), intent(inout) :: monitor
       type(simulation_t), intent(inout) :: simulation
       type(log_t), intent(inout) :: log
       type(error_t), allocatable, intent(inout) :: error
@@ -285,11 +285,11 @@ contains
       call simulation%comm%all_reduce_text(warning)
       share = 0.0_wp
       if (stable < huge(stable)) share = simulation%dt/stable
-      watch%greatest_share = max(watch%greatest_share, share)
+      monitor%greatest_share = max(monitor%greatest_share, share)
       if (.not. allocated(warning)) return
-      watch%large_steps = watch%large_steps + 1_lp
-      if (share <= 1.1_wp*watch%warned) return
-      watch%warned = share
+      monitor%large_steps = monitor%large_steps + 1_lp
+      if (share <= 1.1_wp*monitor%warned) return
+      monitor%warned = share
       call log%write_line('warning: '//warning)
    end subroutine check_time_step
 

@@ -87,9 +87,9 @@ contains
       run%provenance%scene = scene
       run%provenance%processes = run%comm%size
       if (run%manifest%is_found .and. run%attempt%continues) &
-         call find_restart(run%folder, run%manifest, settings, scene, run%attempt%may_change, run%past, error)
+         call find_restart(run%folder, run%manifest, settings, scene, run%attempt%may_change, run%earlier, error)
       if (allocated(error)) return
-      is_restart = run%past%checkpoint > 0_ip .or. run%past%segments > 0_ip
+      is_restart = run%earlier%checkpoint > 0_ip .or. run%earlier%segments > 0_ip
       call claim_folder(run%simulation, run%folder, force, is_restart, run%manifest, error)
       if (.not. allocated(error)) call run%log%open(run%folder, error, appended=is_restart)
       if (allocated(error)) return
@@ -98,12 +98,13 @@ contains
       if (allocated(lock_note)) call run%log%write_line(lock_note)
       call describe(run%simulation, run%log)
       call write_overlaps(run, error)
-      call new_monitor(run%watch, run%simulation)
-      call warn_of_risks(run%simulation, run%log, run%watch%at_start)
+      call new_monitor(run%monitor, run%simulation)
+      call warn_of_risks(run%simulation, run%log, run%monitor%at_start)
       call choose_intervals(run)
       if (.not. allocated(error)) call recall(run, error)
       if (.not. allocated(error)) call check_recording(run%simulation, run%folder, error)
-      if (is_restart .and. .not. allocated(error)) call remove_surplus_files(run%folder, run%manifest, run%past, error)
+      if (is_restart .and. .not. allocated(error)) call remove_surplus_files(run%folder, run%manifest, run%earlier, &
+         error)
    end subroutine open_and_restore
 
    !> Write the deep initial contacts to the log and to a table.

@@ -76,7 +76,7 @@ contains
    end subroutine find_finished
 
    !> Choose the newest valid checkpoint, and check that settings and initial bodies are unchanged.
-   subroutine find_restart(folder, manifest, settings, scene, may_change, past, error)
+   subroutine find_restart(folder, manifest, settings, scene, may_change, earlier, error)
       !> Result folder; this run holds its lock
       character(len=*), intent(in) :: folder
       !> Valid manifest of the folder
@@ -88,41 +88,42 @@ contains
       !> Whether the settings may differ from those of the checkpoint
       logical, intent(in) :: may_change
       !> State of the folder after earlier attempts
-      type(earlier_attempts_t), intent(out) :: past
+      type(earlier_attempts_t), intent(out) :: earlier
       !> Allocated if the run cannot restart
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: changes
 
       call check_closed(manifest, folder, error)
-      if (.not. allocated(error)) call choose_checkpoint(folder, past, error)
+      if (.not. allocated(error)) call choose_checkpoint(folder, earlier, error)
       if (allocated(error)) return
-      if (past%checkpoint == 0_ip) then
-         call restart_without_checkpoint(folder, manifest, settings, scene, past, error)
+      if (earlier%checkpoint == 0_ip) then
+         call restart_without_checkpoint(folder, manifest, settings, scene, earlier, error)
          return
       end if
-      changes = changed_entries(past%former_settings, settings%resolved)
+      changes = changed_entries(earlier%former_settings, settings%resolved)
       if (changes /= '' .and. .not. may_change) then
          call raise(error, input_error, 'the settings differ from those of the run in '//folder//': '//changes// &
-                    '. Restore them, or add --changed to resume with the new settings from step '//to_text(past%step))
-      else if (origin_of(checkpoint_path(folder, past%checkpoint), 'scene') /= scene) then
+                    '. Restore them, or add --changed to resume with the new settings from step '// &
+                    to_text(earlier%step))
+      else if (origin_of(checkpoint_path(folder, earlier%checkpoint), 'scene') /= scene) then
          call raise(error, input_error, folder//' holds the result of another run: '//other_bodies// &
                     '. Restore them (check the bodies file), or use --force instead of --continue to overwrite it')
       end if
       if (allocated(error)) return
-      if (changes /= '') past%remark = past%remark//new_line('a')//'changed    '//changes
-      call count_segments(folder, manifest, scene, changes /= '', past, error)
+      if (changes /= '') earlier%remark = earlier%remark//new_line('a')//'changed    '//changes
+      call count_segments(folder, manifest, scene, changes /= '', earlier, error)
    end subroutine find_restart
 
    !> Restart at step 0 without a checkpoint; keep the closed segments of a run of the same scene and settings.
-   subroutine restart_without_checkpoint(folder, manifest, settings, scene, past, error)
+   subroutine restart_without_checkpoint(folder, manifest, settings, scene, earlier, error)
       character(len=*), intent(in) :: folder, scene
       type(manifest_t), intent(in) :: manifest
       type(settings_t), intent(in) :: settings
-      type(earlier_attempts_t), intent(inout) :: past
+      type(earlier_attempts_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path, changes, former
 
-      past%remark = 'there is no checkpoint in '//folder//': the run starts at step 0'
+      earlier%remark = 'there is no checkpoint in '//folder//': the run starts at step 0'
       path = segment_path(folder, 1_ip)
       if (.not. exists(path)) path = profile_path(folder)
       if (.not. exists(path)) return
@@ -130,7 +131,7 @@ contains
       former = origin_of(path, 'scene')
       if (changes == '' .and. former /= scene) changes = other_bodies
       if (changes == '') then
-         call count_segments(folder, manifest, scene, .false., past, error)
+         call count_segments(folder, manifest, scene, .false., earlier, error)
       else
          call raise(error, input_error, folder//' holds the result of another run and no checkpoint: '//changes// &
                     '. Use --force instead of --continue to overwrite it')
@@ -138,9 +139,9 @@ contains
    end subroutine restart_without_checkpoint
 
    !> Read all checkpoints and choose the valid one with the greatest step.
-   subroutine choose_checkpoint(folder, past, error)
+   subroutine choose_checkpoint(folder, earlier, error)
       character(len=*), intent(in) :: folder
-      type(earlier_attempts_t), intent(inout) :: past
+      type(earlier_attempts_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: problem
       type(earlier_attempts_t) :: candidate
@@ -155,13 +156,14 @@ contains
          if (allocated(problem)) then
             damage = damage//problem%message//new_line('a')
             deallocate (problem)
-         else if (past%checkpoint == 0_ip .or. candidate%step > past%step) then
-            past = candidate
+         else if (earlier%checkpoint == 0_ip .or. candidate%step > earlier%step) then
+            earlier = candidate
          end if
       end do
-      if (past%checkpoint > 0_ip) then
-         past%remark = 'continued  from '//checkpoint_path(folder, past%checkpoint)//', step '//to_text(past%step)
-         if (damage /= '') past%remark = 'warning: '//damage//past%remark//', the newest valid checkpoint'
+      if (earlier%checkpoint > 0_ip) then
+         earlier%remark = 'continued  from '//checkpoint_path(folder, &
+            earlier%checkpoint)//', step '//to_text(earlier%step)
+         if (damage /= '') earlier%remark = 'warning: '//damage//earlier%remark//', the newest valid checkpoint'
       else if (damage /= '') then
          call raise(error, io_error, folder//': no checkpoint can be used. '//damage//'Start the run '// &
                     'again with --force instead of --continue')
@@ -169,93 +171,95 @@ contains
    end subroutine choose_checkpoint
 
    !> Read step, attempts and settings of a checkpoint.
-   subroutine read_progress(path, past, error)
+   subroutine read_progress(path, earlier, error)
       character(len=*), intent(in) :: path
-      type(earlier_attempts_t), intent(inout) :: past
+      type(earlier_attempts_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
-      type(attempts_t) :: history
+      type(attempts_t) :: attempts
 
       call file%open(path, error)
       if (allocated(error)) return
-      call serialize_progress(file, past%step, history)
-      past%segments_at_checkpoint = history%segments
-      call file%read_origin(past%revision, past%former_settings, error)
+      call serialize_progress(file, earlier%step, attempts)
+      earlier%segments_at_checkpoint = attempts%segments
+      call file%read_origin(earlier%revision, earlier%former_settings, error)
       call file%close(error)
    end subroutine read_progress
 
    !> Find the last frame in closed segments. With changed settings, the run removes segments after the checkpoint.
-   subroutine count_segments(folder, manifest, scene, is_changed, past, error)
+   subroutine count_segments(folder, manifest, scene, is_changed, earlier, error)
       character(len=*), intent(in) :: folder, scene
       type(manifest_t), intent(in) :: manifest
       logical, intent(in) :: is_changed
-      type(earlier_attempts_t), intent(inout) :: past
+      type(earlier_attempts_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path, problem
       integer, allocatable :: places(:)
       integer(lp) :: steps(2)
 
       call find_segments(manifest, folder, places, problem)
-      past%segments = size(places, kind=ip)
-      call find_unlisted(folder, manifest, scene, places, past, error)
-      if (int(past%segments, lp) < past%segments_at_checkpoint) then
-         call raise(error, io_error, segment_path(folder, past%segments + 1_ip)//' is missing, but it existed '// &
-                    'at the checkpoint of step '//to_text(past%step)//'. Put the file back, or start the run again '// &
+      earlier%segments = size(places, kind=ip)
+      call find_unlisted(folder, manifest, scene, places, earlier, error)
+      if (int(earlier%segments, lp) < earlier%segments_at_checkpoint) then
+         call raise(error, io_error, segment_path(folder, earlier%segments + 1_ip)//' is missing, but it existed '// &
+                    'at the checkpoint of step '//to_text(earlier%step)//'. Put the file back, or start the run '// &
+                    'again '// &
                     'with --force instead of --continue')
       end if
-      do while (past%segments > 0_ip .and. .not. allocated(error))
-         path = segment_path(folder, past%segments)
-         steps = past%unlisted(2:)
-         if (past%segments <= size(places)) steps = manifest%entry(places(past%segments))%frames(2:)
-         past%last_frame = steps(2)
-         if (.not. is_changed .or. past%last_frame <= past%step) return
-         if (steps(1) <= past%step) then
-            call raise(error, input_error, path//' holds frames before and after step '//to_text(past%step)// &
+      do while (earlier%segments > 0_ip .and. .not. allocated(error))
+         path = segment_path(folder, earlier%segments)
+         steps = earlier%unlisted(2:)
+         if (earlier%segments <= size(places)) steps = manifest%entry(places(earlier%segments))%frames(2:)
+         earlier%last_frame = steps(2)
+         if (.not. is_changed .or. earlier%last_frame <= earlier%step) return
+         if (steps(1) <= earlier%step) then
+            call raise(error, input_error, path//' holds frames before and after step '//to_text(earlier%step)// &
                        ', at which the settings would change. Resume with the old settings until '// &
-                       'after step '//to_text(past%last_frame))
+                       'after step '//to_text(earlier%last_frame))
          else
-            past%surplus = past%surplus + 1_ip
-            past%remark = past%remark//new_line('a')//'removed    '//path//', its frames belong to the earlier settings'
+            earlier%surplus = earlier%surplus + 1_ip
+            earlier%remark = earlier%remark//new_line('a')//'removed    '//path// &
+               ', its frames belong to the earlier settings'
          end if
-         past%segments = past%segments - 1_ip
-         past%last_frame = -1_lp
+         earlier%segments = earlier%segments - 1_ip
+         earlier%last_frame = -1_lp
       end do
    end subroutine count_segments
 
    !> Find a segment that has its final name but is not closed in the manifest, because a kill came in between. A
    !> segment gets its final name only when it is complete.
-   subroutine find_unlisted(folder, manifest, scene, places, past, error)
+   subroutine find_unlisted(folder, manifest, scene, places, earlier, error)
       character(len=*), intent(in) :: folder, scene
       type(manifest_t), intent(in) :: manifest
       integer, intent(in) :: places(:)
-      type(earlier_attempts_t), intent(inout) :: past
+      type(earlier_attempts_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path
       integer(lp) :: last
 
-      path = segment_path(folder, past%segments + 1_ip)
+      path = segment_path(folder, earlier%segments + 1_ip)
       if (.not. manifest%owns(name_in(path))) return
       if (.not. exists(path)) return
-      call read_frames(path, past%unlisted, error)
+      call read_frames(path, earlier%unlisted, error)
       if (allocated(error)) return
       last = -1_lp
       if (size(places) > 0) last = manifest%entry(places(size(places)))%frames(3)
-      if (past%unlisted(2) <= last) call raise(error, io_error, path//' does not follow the previous segment, '// &
+      if (earlier%unlisted(2) <= last) call raise(error, io_error, path//' does not follow the previous segment, '// &
          'which ends at step '//to_text(last)//'. Move the file away; the run writes its frames again')
       if (origin_of(path, 'scene') /= scene) call raise(error, io_error, path//' is a segment of another run: '// &
          other_bodies//'. Move the file away; the run writes its frames again')
-      past%segments = past%segments + 1_ip
+      earlier%segments = earlier%segments + 1_ip
    end subroutine find_unlisted
 
    !> Remove the files of earlier attempts that the run does not keep: unfinished files, the profile of an ended run,
    !> and segments of earlier settings. Call this only after all checks of the restart have passed.
-   subroutine remove_surplus_files(folder, manifest, past, error)
+   subroutine remove_surplus_files(folder, manifest, earlier, error)
       !> Result folder
       character(len=*), intent(in) :: folder
       !> Manifest of the folder, which is updated
       type(manifest_t), intent(inout) :: manifest
       !> State of the folder after earlier attempts
-      type(earlier_attempts_t), intent(in) :: past
+      type(earlier_attempts_t), intent(in) :: earlier
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: number
@@ -265,49 +269,49 @@ contains
       do k = 1, manifest%n
          if (.not. allocated(error)) call manifest%empty(trim(manifest%entry(k)%name), error, stays=.true.)
       end do
-      do number = past%segments + past%surplus, past%segments + 1_ip, -1_ip
+      do number = earlier%segments + earlier%surplus, earlier%segments + 1_ip, -1_ip
          call manifest%empty(segment_path(folder, number), error)
          call manifest%forget(segment_path(folder, number), error)
       end do
-      if (past%unlisted(1) > 0_lp .and. past%surplus == 0_ip) &
-         call manifest%close_file(segment_path(folder, past%segments), error, past%unlisted)
+      if (earlier%unlisted(1) > 0_lp .and. earlier%surplus == 0_ip) &
+         call manifest%close_file(segment_path(folder, earlier%segments), error, earlier%unlisted)
       k = manifest%place_of(name_in(trace_path(folder)))
       if (k == 0) return
       if (.not. manifest%entry(k)%is_closed) call manifest%close_file(trace_path(folder), error)
    end subroutine remove_surplus_files
 
    !> Restore the simulation from the checkpoint.
-   subroutine restore(folder, past, revision, simulation, history, watch, log, error)
+   subroutine restore(folder, earlier, revision, simulation, attempts, monitor, log, error)
       !> Result folder
       character(len=*), intent(in) :: folder
       !> State of the folder, with a checkpoint
-      type(earlier_attempts_t), intent(in) :: past
+      type(earlier_attempts_t), intent(in) :: earlier
       !> Commit of this program
       character(len=*), intent(in) :: revision
       !> A simulation of the same scene at time 0
       type(simulation_t), intent(inout) :: simulation
       !> On entry the scene hash, on return all attempts including this one
-      type(attempts_t), intent(inout) :: history
+      type(attempts_t), intent(inout) :: attempts
       !> Monitor at time 0
-      type(monitor_t), intent(inout) :: watch
+      type(monitor_t), intent(inout) :: monitor
       !> Log
       type(log_t), intent(inout) :: log
       !> Allocated if the checkpoint does not fit this run
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
 
-      call file%open(checkpoint_path(folder, past%checkpoint), error)
+      call file%open(checkpoint_path(folder, earlier%checkpoint), error)
       if (allocated(error)) return
-      call serialize_run(file, simulation, history, watch)
+      call serialize_run(file, simulation, attempts, monitor)
       call file%close(error)
       if (allocated(error)) then
-         error%message = checkpoint_path(folder, past%checkpoint)//' does not fit this run: '//error%message
+         error%message = checkpoint_path(folder, earlier%checkpoint)//' does not fit this run: '//error%message
          return
       end if
-      history%attempts = history%attempts + 1_lp
-      call log%write_line('attempt    '//to_text(history%attempts))
-      if (revision /= past%revision) call log%write_line('warning: another revision of this program ('// &
-         past%revision//') wrote the checkpoint; results may differ from those of an uninterrupted run')
+      attempts%attempts = attempts%attempts + 1_lp
+      call log%write_line('attempt    '//to_text(attempts%attempts))
+      if (revision /= earlier%revision) call log%write_line('warning: another revision of this program ('// &
+         earlier%revision//') wrote the checkpoint; results may differ from those of an uninterrupted run')
    end subroutine restore
 
 end module polydem_restart

@@ -42,9 +42,9 @@ module polydem_run
       !> Start of the attempt, from `wall_seconds` [s]
       real(dp) :: began = 0.0_dp
       !> State of the result folder after earlier attempts
-      type(earlier_attempts_t) :: past
+      type(earlier_attempts_t) :: earlier
       !> Scene hash and counts of all attempts
-      type(attempts_t) :: history
+      type(attempts_t) :: attempts
       !> Schedule of checkpoints
       type(checkpoints_t) :: checkpoints
       !> The simulation
@@ -74,7 +74,7 @@ module polydem_run
       !> Steps between lines of the log
       integer(lp) :: log_steps = 0_lp
       !> Monitor
-      type(monitor_t) :: watch
+      type(monitor_t) :: monitor
       !> Step of the last frame; negative if there is none
       integer(lp) :: last_frame = -1_lp
       !> Reason to end the run early, set on the root rank only; unallocated while the run continues

@@ -41,7 +41,7 @@ contains
       associate (s => run%simulation)
          frame_due = s%step == s%n_steps .or. is_due(s%step, run%frame_steps)
          line_due = s%step == s%n_steps .or. is_due(s%step, run%log_steps)
-         call look(run%watch, s, line_due, run%log, error)
+         call look(run%monitor, s, line_due, run%log, error)
          if (allocated(error)) return
          if (frame_due .or. line_due) call update_balance(run)
          if (line_due) then
@@ -68,7 +68,7 @@ contains
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
 
-      if (run%simulation%step <= run%past%last_frame) return
+      if (run%simulation%step <= run%earlier%last_frame) return
       associate (s => run%simulation, output => run%simulation%settings%output)
          call complete_wall_forces(run%comm, s%bodies, s%contacts)
          if (output%contacts .and. output%ledger) then
@@ -129,7 +129,7 @@ contains
       associate (s => run%simulation)
          call hash_all_bodies(run%comm, s%bodies, hash)
          call report_counters(s, counters)
-         call report_pending_warnings(run%watch, s, run%log)
+         call report_pending_warnings(run%monitor, s, run%log)
          if (allocated(error)) call write_last_frame(run, error%code, write_error)
          call run%trajectory%close(write_error, run%manifest)
          call run%recorder%close(run%log, run%manifest, write_error)
@@ -141,7 +141,7 @@ contains
          call write_rank_times(run, run%log)
          call write_counters(run%log, counters)
          if (s%settings%output%ledger) call write_energy_report(s, run%log)
-         call write_warning_counts(run%watch, s, run%log)
+         call write_warning_counts(run%monitor, s, run%log)
       end associate
       if (allocated(error)) call run%log%write_line('stopped: '//status)
       call write_hash(run%log, hexadecimal(hash))

@@ -70,7 +70,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: is_due, must_stop
 
-      if (run%past%checkpoint == 0_ip) then
+      if (run%earlier%checkpoint == 0_ip) then
          call end_step(run, error)
          if (.not. allocated(error)) call remove_replaced(run, error)
       end if
@@ -83,7 +83,7 @@ contains
          if (.not. allocated(error)) call run%recorder%record(run%simulation, run%manifest, error)
          if (.not. allocated(error)) call write_due_checkpoint(run, is_due, must_stop, error)
       end do
-      call finish(run, run%history%seconds + (wall_seconds() - run%began), error)
+      call finish(run, run%attempts%seconds + (wall_seconds() - run%began), error)
    end subroutine run_steps
 
    !> All-reduce the error of a step, and broadcast whether a checkpoint is due and whether the run must end, which the
@@ -104,12 +104,12 @@ contains
       call run%log%check(error)
       if (run%comm%size == 1_ip) return
       flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), merge(1_lp, 0_lp, run%has_lost_folder), &
-               warning_counts(run%watch, run%simulation)]
+               warning_counts(run%monitor, run%simulation)]
       call run%comm%all_reduce_error(error, flags)
       is_due = flags(1) == 1_lp
       must_stop = flags(2) == 1_lp
       run%has_lost_folder = flags(3) == 1_lp
-      call set_warning_counts(run%watch, run%simulation, flags(4:))
+      call set_warning_counts(run%monitor, run%simulation, flags(4:))
       call run%simulation%timers%lap(stage_exchange)
    end subroutine synchronise_ranks
 
@@ -118,21 +118,21 @@ contains
       type(run_t), intent(inout) :: run
       logical, intent(in) :: is_due, must_stop
       type(error_t), allocatable, intent(inout) :: error
-      type(attempts_t) :: history
+      type(attempts_t) :: attempts
 
       associate (s => run%simulation)
          if (s%step == s%n_steps) return
          if (is_due) then
             call s%timers%start()
             ! A checkpoint holds the number of warnings, not their text.
-            call report_pending_warnings(run%watch, s, run%log)
+            call report_pending_warnings(run%monitor, s, run%log)
             ! The frames up to the checkpoint are on disk before the checkpoint is.
             call run%trajectory%close(error, run%manifest)
             if (allocated(error)) return
-            history = run%history
-            history%segments = int(run%trajectory%number, lp)
-            history%seconds = history%seconds + (wall_seconds() - run%began)
-            call run%checkpoints%write(run%folder, run%provenance, run%comm, s, history, run%watch, error)
+            attempts = run%attempts
+            attempts%segments = int(run%trajectory%number, lp)
+            attempts%seconds = attempts%seconds + (wall_seconds() - run%began)
+            call run%checkpoints%write(run%folder, run%provenance, run%comm, s, attempts, run%monitor, error)
             call s%timers%add_to_total(stage_output)
          end if
          if (.not. must_stop) return

@@ -64,26 +64,26 @@ contains
       call run%comm%all_reduce_error(error)
       if (allocated(error)) return
       if (run%comm%size > 1_ip) then
-         longs = [run%history%scene, int(run%past%checkpoint, lp), run%past%step, int(run%past%segments, lp), &
-                  run%past%last_frame, int(run%checkpoints%next, lp)]
-         stored = real(run%watch%energy%stored, dp)
+         longs = [run%attempts%scene, int(run%earlier%checkpoint, lp), run%earlier%step, &
+                  int(run%earlier%segments, lp), run%earlier%last_frame, int(run%checkpoints%next, lp)]
+         stored = real(run%monitor%energy%stored, dp)
          call run%comm%broadcast(longs)
          call run%comm%broadcast(stored)
          if (.not. run%comm%is_root()) then
-            run%history%scene = longs(1)
-            run%past%checkpoint = int(longs(2), ip)
-            run%past%step = longs(3)
-            run%past%segments = int(longs(4), ip)
-            run%past%last_frame = longs(5)
+            run%attempts%scene = longs(1)
+            run%earlier%checkpoint = int(longs(2), ip)
+            run%earlier%step = longs(3)
+            run%earlier%segments = int(longs(4), ip)
+            run%earlier%last_frame = longs(5)
             call run%checkpoints%open(settings%checkpoint, run%simulation%dt, run%began, 0.0_dp)
-            if (run%past%checkpoint > 0_ip) run%checkpoints%last_step = run%past%step
+            if (run%earlier%checkpoint > 0_ip) run%checkpoints%last_step = run%earlier%step
             run%checkpoints%next = int(longs(6), ip)
-            run%watch%energy%stored = real(stored(1), wp)
+            run%monitor%energy%stored = real(stored(1), wp)
             call choose_intervals(run)
          end if
          allocate (broadcaster%comm, source=run%comm)
          broadcaster%is_reading = .not. run%comm%is_root()
-         call serialize_global(broadcaster, run%simulation, run%history, run%watch)
+         call serialize_global(broadcaster, run%simulation, run%attempts, run%monitor)
          if (allocated(broadcaster%error)) call move_alloc(broadcaster%error, error)
          call run%comm%all_reduce_error(error)
          if (allocated(error)) return
@@ -93,7 +93,7 @@ contains
          end if
       end if
       call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error, &
-                               run%past%segments, run%comm)
+                               run%earlier%segments, run%comm)
       if (run%comm%size == 1_ip .and. .not. allocated(error)) &
          call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, run%manifest, error)
    end subroutine join
@@ -110,8 +110,8 @@ contains
       if (allocated(run%provenance%scene)) return
       call new_simulation(settings, run%simulation, error)
       if (allocated(error)) return
-      run%history%scene = scene_hash(run%simulation%bodies)
-      run%provenance%scene = hexadecimal(run%history%scene)
+      run%attempts%scene = scene_hash(run%simulation%bodies)
+      run%provenance%scene = hexadecimal(run%attempts%scene)
    end subroutine build_start
 
    !> Start the schedule of checkpoints, and restore the checkpoint of an earlier attempt if there is one.
@@ -122,13 +122,14 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       call run%checkpoints%open(run%simulation%settings%checkpoint, run%simulation%dt, run%began, run%attempt%limit)
-      if (allocated(run%past%remark)) call run%log%write_line(run%past%remark)
-      if (run%past%checkpoint == 0_ip) return
-      run%provenance%parent = checkpoint_path(run%folder, run%past%checkpoint)//', step '//to_text(run%past%step)
-      call restore(run%folder, run%past, run%provenance%revision, run%simulation, run%history, run%watch, run%log, &
+      if (allocated(run%earlier%remark)) call run%log%write_line(run%earlier%remark)
+      if (run%earlier%checkpoint == 0_ip) return
+      run%provenance%parent = checkpoint_path(run%folder, run%earlier%checkpoint)//', step '//to_text(run%earlier%step)
+      call restore(run%folder, run%earlier, run%provenance%revision, run%simulation, run%attempts, run%monitor, &
+         run%log, &
          error)
-      run%checkpoints%last_step = run%past%step
-      run%checkpoints%next = modulo(run%past%checkpoint, n_checkpoints) + 1_ip
+      run%checkpoints%last_step = run%earlier%step
+      run%checkpoints%next = modulo(run%earlier%checkpoint, n_checkpoints) + 1_ip
    end subroutine recall
 
 end module polydem_start

@@ -1,7 +1,7 @@
 !> Parts of a simulation that depend on the bodies of a rank: force law, boxes, pair list with contact history, guards.
 module polydem_local_bodies
    use polydem_box_maker, only: new_box_maker
-   use polydem_contact_history, only: contact_memory_t, add_column
+   use polydem_contact_history, only: contact_history_t, add_column
    use polydem_contact_incidence, only: incidence_t
    use polydem_errors, only: error_t, raise, run_error
    use polydem_finder_statistics, only: finder_statistics_t
@@ -78,12 +78,12 @@ contains
       type(simulation_t), intent(inout) :: self
       integer :: k
 
-      self%memory = contact_memory_t()
-      allocate (self%memory%separating_edge(0))
+      self%history = contact_history_t()
+      allocate (self%history%separating_edge(0))
       do k = 1, size(self%law%stored)
-         call add_column(self%memory, self%law%stored(k), 0_ip)
+         call add_column(self%history, self%law%stored(k), 0_ip)
       end do
-      if (self%settings%guards%passing /= 'off') call add_column(self%memory, former_direction, 0_ip)
+      if (self%settings%guards%passing /= 'off') call add_column(self%history, former_direction, 0_ip)
    end subroutine allocate_history
 
    !> List the slots that may move: free bodies, bodies with prescribed motion, halo bodies.

@@ -72,13 +72,14 @@ contains
       type(simulation_t), intent(inout) :: self
       integer(ip) :: n_known
 
-      if (.not. allocated(self%arrived)) return
+      if (.not. allocated(self%received_history)) return
       associate (pairs => self%neighbours%pairs)
-         call receive_pairs(self%arrived, pairs%n, pairs%first, pairs%second, self%bodies%global_index, self%memory, &
+         call receive_pairs(self%received_history, pairs%n, pairs%first, pairs%second, self%bodies%global_index, &
+            self%history, &
             n_known)
          pairs%n_began = pairs%n_began - n_known
       end associate
-      deallocate (self%arrived)
+      deallocate (self%received_history)
    end subroutine restore_history
 
    !> Time spent so far in the stages that depend on the bodies [s]
@@ -133,10 +134,10 @@ contains
             if (bodies%fixed(leading)) leading = pairs%second(p)
             is_own(p) = .not. bodies%in_halo(leading)
          end do
-         allocate (self%arrived)
+         allocate (self%received_history)
          call send_pairs(self%comm, pairs%n, pairs%first, pairs%second, bodies%global_index, is_own, owner, &
-            self%memory, &
-                         self%arrived)
+            self%history, &
+                         self%received_history)
       end associate
    end subroutine send_history
 

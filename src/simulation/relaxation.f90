@@ -12,7 +12,7 @@ module polydem_relaxation
    use polydem_box_maker, only: box_maker_t, new_box_maker, update_boxes
    use polydem_boxes, only: boxes_t
    use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contact_incidence, only: incidence_t, index_contacts
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, input_error, raise
@@ -54,7 +54,7 @@ contains
       type(boxes_t) :: boxes
       type(neighbours_t) :: neighbours
       type(contacts_t) :: contacts
-      type(contact_memory_t) :: no_memory
+      type(contact_history_t) :: no_memory
       type(incidence_t) :: incidence
       real(wp), allocatable :: thickness(:), start(:, :)
       integer(ip) :: worst

@@ -4,7 +4,7 @@ module polydem_simulation
    use polydem_box_maker, only: box_maker_t
    use polydem_boxes, only: boxes_t
    use polydem_communicator, only: communicator_t
-   use polydem_contact_history, only: contact_memory_t, memory_kind_t
+   use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
    use polydem_domain, only: domain_t
@@ -46,9 +46,9 @@ module polydem_simulation
       !> Contacts of the last step
       type(contacts_t) :: contacts
       !> Contact history of the pairs
-      type(contact_memory_t) :: memory
+      type(contact_history_t) :: history
       !> Contact history received by a redistribution, until the pairs are found again; unallocated between steps
-      type(packed_history_t), allocatable :: arrived
+      type(packed_history_t), allocatable :: received_history
       !> Contacts of each body
       type(incidence_t) :: incidence
       !> Force law
@@ -78,8 +78,8 @@ module polydem_simulation
    end type simulation_t
 
    !> What the guard against passing bodies remembers
-   type(memory_kind_t), parameter :: former_direction = &
-      memory_kind_t('direction', '1', 'direction at the last step, packed')
+   type(history_kind_t), parameter :: former_direction = &
+      history_kind_t('direction', '1', 'direction at the last step, packed')
 
 contains
 

@@ -79,9 +79,9 @@ contains
          call self%integrator%start(bodies)
       end associate
       ! A scheme that ignores the forces at time 0 has no contact history before its first step.
-      if (self%integrator%starts_from_forces .or. .not. allocated(self%memory%column)) return
-      do c = 1, size(self%memory%column)
-         if (self%memory%column(c)%kind%zero_is_new) self%memory%column(c)%value = 0.0_wp
+      if (self%integrator%starts_from_forces .or. .not. allocated(self%history%column)) return
+      do c = 1, size(self%history%column)
+         if (self%history%column(c)%kind%zero_is_new) self%history%column(c)%value = 0.0_wp
       end do
    end subroutine start_integration
 

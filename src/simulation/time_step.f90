@@ -102,13 +102,13 @@ contains
       call restore_history(self)
       call self%timers%lap(stage_neighbours)
       associate (pairs => self%neighbours%pairs)
-         call find_contacts(self%bodies, pairs%n, pairs%first, pairs%second, self%memory, self%contacts)
+         call find_contacts(self%bodies, pairs%n, pairs%first, pairs%second, self%history, self%contacts)
          self%sums(3:4) = self%sums(3:4) + int([pairs%n_began, pairs%n_ended], lp)
       end associate
       call count_own(self)
       call check_contacts(self%settings%overlap%degenerate, self%bodies, self%contacts, self%step, error)
       call self%timers%lap(stage_overlap)
-      call evaluate_law(self%law, self%bodies, dt, self%contacts, self%memory)
+      call evaluate_law(self%law, self%bodies, dt, self%contacts, self%history)
       call index_contacts(self%bodies%n, self%contacts, self%incidence)
       call assemble_forces(self%settings%forces%gravity, self%incidence, self%contacts, self%bodies)
       if (allocated(self%law%constraint)) call constrain(self, error)
@@ -121,7 +121,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call self%law%constraint%apply(self%dt, self%incidence, self%bodies, self%contacts, self%memory, error)
+      call self%law%constraint%apply(self%dt, self%incidence, self%bodies, self%contacts, self%history, error)
       if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
       call assemble_forces(self%settings%forces%gravity, self%incidence, self%contacts, self%bodies)
    end subroutine constrain
@@ -131,11 +131,11 @@ contains
       type(simulation_t), intent(inout) :: self
       integer :: k
 
-      associate (pairs => self%neighbours%pairs, memory => self%memory)
-         call pairs%carry(memory%separating_edge, 0_ip)
-         if (.not. allocated(memory%column)) return
-         do k = 1, size(memory%column)
-            call pairs%carry(memory%column(k)%value, 0.0_wp)
+      associate (pairs => self%neighbours%pairs, history => self%history)
+         call pairs%carry(history%separating_edge, 0_ip)
+         if (.not. allocated(history%column)) return
+         do k = 1, size(history%column)
+            call pairs%carry(history%column(k)%value, 0.0_wp)
          end do
       end associate
    end subroutine carry_history

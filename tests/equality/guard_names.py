@@ -98,4 +98,7 @@ BASE = Names()
 
 #: What the present tree calls what the base revision called otherwise
 #: Ranks send along one more number of each pair, for `guards.passing`, so how many bytes they send is not compared.
-PRESENT = Names(counters={"bytes in messages": None, "bytes at the start": None})
+#: Variants of finders are choices of a bench, not of a run.
+PRESENT = Names(
+    counters={"bytes in messages": None, "bytes at the start": None},
+    words={f"neighbours.finder={name}": None for name in ("quadtree_called", "quadtree_o2", "sort_and_sweep_o2")})

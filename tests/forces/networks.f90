@@ -2,7 +2,7 @@
 module networks
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_contact_history, only: contact_memory_t, memory_kind_t, add_column
+   use polydem_contact_history, only: contact_history_t, history_kind_t, add_column
    use polydem_contact_incidence, only: incidence_t, index_contacts
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_errors, only: error_t
@@ -21,7 +21,7 @@ module networks
       !> Index of the contacts
       type(incidence_t) :: incidence
       !> Memory of one pair per contact
-      type(contact_memory_t) :: memory
+      type(contact_history_t) :: history
    end type scene_t
 
 contains
@@ -238,7 +238,7 @@ contains
 
       scene%contacts%n = n_contacts
       scene%contacts%tangential_force(1:n_contacts) = 0.0_wp
-      call add_column(scene%memory, memory_kind_t('tangential', 'N/m', ''), n_contacts)
+      call add_column(scene%history, history_kind_t('tangential', 'N/m', ''), n_contacts)
       call index_contacts(scene%bodies%n, scene%contacts, scene%incidence)
    end subroutine finish
 

@@ -1,7 +1,7 @@
 !> Two parts of a force law that pull, for tests: one that stores energy, one that does not.
 module pulls
    use polydem_bodies, only: bodies_t
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_normal, force_part_t
    use polydem_kinds, only: ip, wp
@@ -45,15 +45,15 @@ contains
    end subroutine choose_cohesion
 
    !> Add the attraction.
-   subroutine add_cohesion(self, bodies, dt, contacts, memory)
+   subroutine add_cohesion(self, bodies, dt, contacts, history)
       class(cohesion_t), intent(in) :: self
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: dt
       type(contacts_t), intent(inout) :: contacts
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       integer(ip) :: c
 
-      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => memory)
+      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => history)
       end associate
       contacts%energy_is_quadratic = .false.
       do c = 1_ip, contacts%n
@@ -76,15 +76,15 @@ contains
    end subroutine choose_drag
 
    !> Add the attraction.
-   subroutine add_drag(self, bodies, dt, contacts, memory)
+   subroutine add_drag(self, bodies, dt, contacts, history)
       class(drag_t), intent(in) :: self
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: dt
       type(contacts_t), intent(inout) :: contacts
-      type(contact_memory_t), intent(inout) :: memory
+      type(contact_history_t), intent(inout) :: history
       integer(ip) :: c
 
-      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => memory)
+      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => history)
       end associate
       do c = 1_ip, contacts%n
          contacts%normal_force(c) = contacts%normal_force(c) - self%pull

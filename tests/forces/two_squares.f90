@@ -2,7 +2,7 @@
 module two_squares
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_contact_history, only: contact_memory_t, memory_kind_t, add_column
+   use polydem_contact_history, only: contact_history_t, history_kind_t, add_column
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
@@ -23,13 +23,13 @@ module two_squares
 contains
 
    !> The first square below, the second above it; the first approaches at 1 m/s and slides at 2 m/s to the right.
-   subroutine make_contact(bodies, contacts, memory)
+   subroutine make_contact(bodies, contacts, history)
       !> Two squares
       type(bodies_t), intent(out) :: bodies
       !> One contact
       type(contacts_t), intent(out) :: contacts
       !> Columns for one pair
-      type(contact_memory_t), intent(out) :: memory
+      type(contact_history_t), intent(out) :: history
       type(body_list_t) :: list
       type(error_t), allocatable :: error
       real(wp) :: square(2, 4), arm
@@ -57,8 +57,8 @@ contains
       contacts%elastic(1) = 0.0_wp
       contacts%normal_force(1) = 0.0_wp
       contacts%tangential_force(1) = 0.0_wp
-      call add_column(memory, memory_kind_t('tangential', 'N/m', ''), 1_ip)
-      call add_column(memory, memory_kind_t('area', 'm2', ''), 1_ip)
+      call add_column(history, history_kind_t('tangential', 'N/m', ''), 1_ip)
+      call add_column(history, history_kind_t('area', 'm2', ''), 1_ip)
    end subroutine make_contact
 
 end module two_squares

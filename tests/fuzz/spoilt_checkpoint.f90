@@ -43,16 +43,16 @@ contains
       type(field_t), allocatable :: fields(:)
       type(field_serializer_t) :: serializer
       type(simulation_t) :: simulation
-      type(attempts_t) :: history
-      type(monitor_t) :: watch
+      type(attempts_t) :: attempts
+      type(monitor_t) :: monitor
       type(error_t), allocatable :: error
 
-      call begin(simulation, watch, error)
+      call begin(simulation, monitor, error)
       call do_steps(simulation, steps_before, error)
       if (allocated(error)) error stop 'fuzz: the run of the checkpoint fails'
       allocate (serializer%fields(0))
-      history%scene = any_hash
-      call serialize_run(serializer, simulation, history, watch)
+      attempts%scene = any_hash
+      call serialize_run(serializer, simulation, attempts, monitor)
       call move_alloc(serializer%fields, fields)
    end function sound_checkpoint
 
@@ -80,28 +80,28 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
       type(simulation_t) :: simulation
-      type(attempts_t) :: history
-      type(monitor_t) :: watch
+      type(attempts_t) :: attempts
+      type(monitor_t) :: monitor
 
-      call begin(simulation, watch, error)
-      history%scene = any_hash
+      call begin(simulation, monitor, error)
+      attempts%scene = any_hash
       call file%open(path, error)
       if (allocated(error)) return
-      call serialize_run(file, simulation, history, watch)
+      call serialize_run(file, simulation, attempts, monitor)
       call file%close(error)
       if (allocated(error)) error%message = path//' does not fit this run: '//error%message
       call do_steps(simulation, steps_after, error)
    end subroutine go_on_from
 
-   subroutine begin(simulation, watch, error)
+   subroutine begin(simulation, monitor, error)
       type(simulation_t), intent(out) :: simulation
-      type(monitor_t), intent(out) :: watch
+      type(monitor_t), intent(out) :: monitor
       type(error_t), allocatable, intent(inout) :: error
       type(settings_t) :: settings
 
       call read_settings_text('small.nml', scene, none, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
-      if (.not. allocated(error)) call new_monitor(watch, simulation)
+      if (.not. allocated(error)) call new_monitor(monitor, simulation)
    end subroutine begin
 
    subroutine do_steps(simulation, n, error)

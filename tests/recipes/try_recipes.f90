@@ -42,7 +42,7 @@ contains
          call advance(simulation, error)
          if (failed(error)) return
          if (simulation%neighbours%pairs%n > 0_ip) stored = &
-            max(stored, simulation%memory%column(column_of(simulation%memory, 'greatest_area'))%value(1))
+            max(stored, simulation%history%column(column_of(simulation%history, 'greatest_area'))%value(1))
          if (simulation%contacts%n == 0_ip .and. simulation%bodies%velocity(2, 1) > 0.0_wp) exit
       end do
       call compute_balance(simulation, balance)

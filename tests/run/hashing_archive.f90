@@ -27,10 +27,10 @@ contains
       type(simulation_t), intent(inout) :: simulation
       integer(lp) :: hash
       type(hashing_serializer_t) :: serializer
-      type(attempts_t) :: history
-      type(monitor_t) :: watch
+      type(attempts_t) :: attempts
+      type(monitor_t) :: monitor
 
-      call serialize_run(serializer, simulation, history, watch)
+      call serialize_run(serializer, simulation, attempts, monitor)
       hash = serializer%hash
    end function hash_of_everything
 

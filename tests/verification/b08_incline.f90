@@ -88,7 +88,7 @@ contains
       call table%expect_relative('rests at 0.1 rad: sag of the spring [m]', load/(2.0_wp/7.0_wp*young), &
                                  downhill(slope, middle - start) + 0.5_wp*size(2)*simulation%bodies%angle(2), 0.01_wp)
       call table%expect_relative('rests: force of the spring [N/m]', load, &
-                                 abs(simulation%memory%column(column_of(simulation%memory, 'tangential'))%value(1)), &
+                                 abs(simulation%history%column(column_of(simulation%history, 'tangential'))%value(1)), &
                                  1.0e-6_wp)
       call steps(simulation, n, error)
       call table%note_error(error)

@@ -3,7 +3,7 @@ module posed_pair
    use polydem_assemble_forces, only: assemble_forces
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_contact_history, only: contact_memory_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contact_incidence, only: incidence_t, index_contacts
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
@@ -24,7 +24,7 @@ module posed_pair
       type(bodies_t) :: bodies
       !> Their contact, if there is one
       type(contacts_t) :: contacts
-      type(contact_memory_t) :: memory
+      type(contact_history_t) :: history
       type(incidence_t) :: incidence
       type(force_law_t) :: law
    end type pair_t
@@ -60,8 +60,8 @@ contains
       type(pair_t), intent(inout) :: pair
 
       call turn_bodies(pair%bodies, [1_ip, 2_ip])
-      call find_contacts(pair%bodies, 1_ip, [1_ip], [2_ip], pair%memory, pair%contacts)
-      call evaluate_law(pair%law, pair%bodies, 0.0_wp, pair%contacts, pair%memory)
+      call find_contacts(pair%bodies, 1_ip, [1_ip], [2_ip], pair%history, pair%contacts)
+      call evaluate_law(pair%law, pair%bodies, 0.0_wp, pair%contacts, pair%history)
       call index_contacts(2_ip, pair%contacts, pair%incidence)
       call assemble_forces([0.0_wp, 0.0_wp], pair%incidence, pair%contacts, pair%bodies)
    end subroutine press
