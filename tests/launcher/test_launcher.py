@@ -77,6 +77,9 @@ echo "apt-get $*" >>"$APT_LOG"
 for name in gfortran cmake ninja git h5fc; do ln -sf "$(PATH=$REAL_PATH command -v $name)" "$COMMANDS/$name"; done
 """
 
+# Where the help texts of the verbs are
+HELP_PLACES = ("src/app/help", "postproc/src/polydem_post/help")
+
 # What the launcher and the tools may call on a bare machine.
 COMMANDS = ("ar as bash cat cp dirname env find flock grep head id ld ln mkdir mv nproc ranlib readlink rm sed "
             "setsid sh tail").split()
@@ -95,6 +98,8 @@ class Toy(unittest.TestCase):
         self.write("src/app/CMakeLists.txt", "add_executable(polydem main.f90)\n")
         self.write("src/app/main.f90", PROGRAM)
         self.write("tests/verification/CMakeLists.txt", "add_executable(verify ../../src/app/main.f90)\n")
+        for place in HELP_PLACES:
+            shutil.copytree(os.path.join(os.path.dirname(LAUNCHER), place), os.path.join(self.folder, place))
         self.write("postproc/pyproject.toml", "")
         self.write(".venv/.made", self.folder + "\n")
         for name in ("mpirun", "mpifort", "h5pfc"):
@@ -140,17 +145,51 @@ class Toy(unittest.TestCase):
 class Words(Toy):
     """What needs no preparation."""
 
-    def test_help_needs_no_build(self):
-        code, output, _ = self.call("--help")
-        self.assertEqual(code, 0)
-        verbs = "run check info plot replay bench workprecision costs scale sweep test build verify"
-        for word in [*verbs.split(), "--no-install"]:
-            self.assertIn(f"\n  {word} ", output)
+    def verbs(self):
+        """Verbs that the launcher lists."""
+        code, output, messages = self.call("--help")
+        self.assertEqual((code, messages), (0, ""))
+        return [verb for verb in re.findall(r"^  ([a-z]+) ", output, re.MULTILINE) if verb != "help"]
+
+    def test_every_verb_has_help_at_once_and_without_any_tool(self):
+        verbs = self.verbs()
+        texts = [name for place in HELP_PLACES for name in os.listdir(os.path.join(self.folder, place))]
+        self.assertEqual(sorted(verbs), sorted({name[:-len(".txt")] for name in texts} - {"table"}))
+        machine = self.bare_machine()
+        for verb in verbs:
+            for words in ((verb, "--help"), (verb, "-h"), ("help", verb), ("--help", verb), (verb, "x", "--a=b", "-h")):
+                start = time.perf_counter()
+                code, output, messages = self.call(*words, **machine)
+                self.assertLess(time.perf_counter() - start, 0.5)
+                self.assertEqual((code, messages), (0, ""))
+                self.assertTrue(output.startswith(f"usage: ./polydem {verb}"), output)
+                self.assertIn("\n  -h, --help  ", output)
+        for words in (["--help"], ["-h"], ["help"], ["help", "--help"], ["help", "help"]):
+            self.assertEqual(self.call(*words, **machine), (0, self.call("--help")[1], ""))
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
+        self.assertFalse(os.path.exists(machine["APT_LOG"]))
+
+    def test_the_help_names_every_option_of_the_launcher(self):
+        output = self.call("--help")[1]
+        for word in ("--help", "--version", "--no-install", "--yes"):
+            self.assertIn(f" {word}", output)
+        self.assertIn("\n  --ranks R ", self.call("help", "run")[1])
+        self.assertLessEqual(max(map(len, output.splitlines())), 120)
+
+    def test_the_help_of_verify_names_every_benchmark(self):
+        path = os.path.join(os.path.dirname(LAUNCHER), "tests/verification/benchmarks.f90")
+        with open(path, encoding="utf-8") as file:
+            listed = re.search(r":: benchmark_names\(\*\) = \[[^:]*::([^\]]*)\]", file.read())[1]
+        said = self.call("help", "verify")[1]
+        last, others = re.search(r"The benchmarks are B1 to B(\d+), (.*) and exact\.", said).groups()
+        names = [f"B{number}" for number in range(1, int(last) + 1)] + others.split(", ")
+        self.assertEqual(sorted(re.findall(r"'([^']+)'", listed)), sorted(names))
 
     def test_wrong_verbs_and_options_give_2(self):
         self.assertEqual(self.call()[0], 2)
         self.assertEqual(self.call("fly"), (2, "", "polydem: there is no verb fly; see ./polydem --help\n"))
+        for words in (("help", "fly"), ("fly", "--help")):
+            self.assertEqual(self.call(*words), (2, "", "polydem: there is no verb fly; see ./polydem --help\n"))
         self.assertEqual(self.call("test", "a", "b")[0], 2)
         self.assertEqual(self.call("test", "--quick")[0], 2)
         self.assertEqual(self.call("build", "--quick")[0], 2)
@@ -177,7 +216,7 @@ class Ranks(Toy):
         self.assertEqual(noted.get("OMPI_ALLOW_RUN_AS_ROOT"), "1" if os.getuid() == 0 else None)
         output, _, _ = self.run_ranks("check", "--ranks=1", "--threads=1", "--", "--ranks")
         self.assertEqual(output, ["1 ranks", "<check>", "<--threads=1>", "<-->", "<--ranks>"])
-        self.assertEqual(self.call("run", "--ranks", "2", "--help")[1], "<run>\n<--help>\n")
+        self.assertEqual(self.call("run", "--ranks", "2", "--version")[1], "<run>\n<--version>\n")
         self.assertEqual(self.call("info", "--ranks", "2")[1], "<info>\n<--ranks>\n<2>\n")
 
     def test_cores_are_shared_and_too_many_ranks_take_turns(self):
@@ -333,16 +372,11 @@ class Build(Toy):
         code, output, _ = self.call("verify", "B9", "exact")
         self.assertEqual((code, output), (1, f"<B9>\n{exact} --behind\n"))
         self.assertEqual(self.call("verify", "B0", "exact")[:2], (2, "<B0>\n"))
-        code, output, _ = self.call("verify", "--help")
-        self.assertEqual(code, 0)
-        self.assertIn("\n exact: ", output)
 
-    def test_a_sweep_knows_the_program_and_its_help_needs_none(self):
+    def test_a_sweep_knows_the_program(self):
         self.write(".venv/bin/python", '#!/bin/bash\nprintf "<%s>\\n" "$@"\n')
         os.chmod(os.path.join(self.folder, ".venv/bin/python"), 0o755)
         program = os.path.join(self.folder, "build/release/src/app/polydem")
-        code, output, messages = self.call("sweep", "make", "--help")
-        self.assertEqual((code, messages, os.path.exists(program)), (0, "", False))
         code, output, _ = self.call("sweep", "run", "my sweep", "--cores", "2")
         self.assertEqual((code, os.path.exists(program)), (0, True))
         words = ["-m", "polydem_post", "sweep", "--program", program, "run", "my sweep", "--cores", "2"]
@@ -389,7 +423,7 @@ class Build(Toy):
             self.assertTrue(os.access(program, os.X_OK))
             expected += ["--program", f"{precision}={program}"]
         self.assertEqual(output.splitlines(), [*expected, "stack", "--repeats", "2"])
-        self.assertEqual(self.call("workprecision", "--help")[1].splitlines(), [*expected[:3], "--help"])
+        self.assertEqual(self.call("workprecision", "--report-only")[1].splitlines(), [*expected[:3], "--report-only"])
 
     def test_build_judges_every_preset(self):
         presets = ("release", "mpi", "single", "quadruple", "debug")
