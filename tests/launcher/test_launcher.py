@@ -7,6 +7,7 @@ commands and a made-up apt-get, which links the real commands, stand for a machi
 """
 
 import os
+import pty
 import re
 import shutil
 import signal
@@ -116,6 +117,14 @@ class Toy(unittest.TestCase):
         with open(path, "w", encoding="utf-8") as file:
             file.write(text)
 
+    def write_command(self, name, text):
+        """Make up a command of the bare machine; a link to the real one goes first, or that would be written to."""
+        path = os.path.join(self.folder, "commands", name)
+        if os.path.lexists(path):
+            os.remove(path)
+        self.write(path, text)
+        os.chmod(path, 0o755)
+
     def call(self, *arguments, launcher=None, **environment):
         """Exit code, output and messages of a call."""
         result = subprocess.run([launcher or self.launcher, *arguments], capture_output=True, text=True, check=False,
@@ -134,10 +143,8 @@ class Toy(unittest.TestCase):
             found = shutil.which(name)
             if found:
                 os.symlink(found, os.path.join(commands, name))
-        self.write("commands/apt-get", APT_GET)
-        self.write("commands/sudo", '#!/bin/bash\nexec "$@"\n')
-        for name in ("apt-get", "sudo"):
-            os.chmod(os.path.join(commands, name), 0o755)
+        self.write_command("apt-get", APT_GET)
+        self.write_command("sudo", '#!/bin/bash\nexec "$@"\n')
         return {"PATH": commands, "REAL_PATH": os.environ["PATH"], "COMMANDS": commands,
                 "APT_LOG": os.path.join(self.folder, "apt.log")}
 
@@ -243,8 +250,7 @@ class Ranks(Toy):
         self.assertEqual(messages, "polydem: missing Debian packages: openmpi-bin\n"
                          "polydem: no apt-get here: please install them (or what they contain) yourself\n")
         real = os.path.join(self.folder, "mpi", "mpirun")
-        self.write("commands/apt-get", APT_GET + f'ln -sf "{real}" "$COMMANDS/mpirun"\n')
-        os.chmod(os.path.join(commands, "apt-get"), 0o755)
+        self.write_command("apt-get", APT_GET + f'ln -sf "{real}" "$COMMANDS/mpirun"\n')
         code, output, messages = self.call("run", "x", "--ranks", "1", "--threads", "1", **machine)
         self.assertEqual((code, output.splitlines()[:2]), (0, ["1 ranks", "<run>"]), messages)
         self.assertIn("missing Debian packages: openmpi-bin", messages)
@@ -583,6 +589,54 @@ class BareMachine(Toy):
                 "apt-get update",
                 "apt-get install -y --no-install-recommends gfortran cmake ninja-build git libhdf5-dev"])
         self.assertEqual(self.call("--no-install", **machine)[0], 0)
+
+    def call_on_a_terminal(self, machine, *words, answer=""):
+        """Exit code, output and messages of a call whose input and messages are a terminal; the user is not root."""
+        self.write_command("id", "#!/bin/bash\necho 1000\n")
+        self.write_command("sudo", '#!/bin/bash\necho "sudo $*" >>"$APT_LOG"\nexec "$@"\n')
+        shown, terminal = pty.openpty()
+        with subprocess.Popen([self.launcher, *words], stdin=terminal, stdout=subprocess.PIPE, stderr=terminal,
+                              text=True, env={**self.environment, **machine}, cwd="/") as call:
+            os.close(terminal)
+            os.write(shown, answer.encode())
+            messages = b""
+            while True:
+                try:
+                    messages += os.read(shown, 4096)
+                except OSError:
+                    break
+            output = call.stdout.read()
+        os.close(shown)
+        return call.returncode, output, messages.decode().replace("\r\n", "\n")
+
+    def test_a_terminal_is_asked_before_sudo(self):
+        machine = self.bare_machine()
+        question = "polydem: install them with sudo apt-get? [y/N] "
+        for answer in ("n\n", "\n", "\x04"):
+            code, output, messages = self.call_on_a_terminal(machine, "info", answer=answer)
+            self.assertEqual((code, output), (1, ""))
+            self.assertIn("missing Debian packages: gfortran cmake ninja-build git libhdf5-dev\n", messages)
+            self.assertIn(question, messages)
+            self.assertIn("polydem: nothing is installed; ", messages)
+        self.assertFalse(os.path.exists(machine["APT_LOG"]))
+        code, output, messages = self.call_on_a_terminal(machine, "info", "--threads", "2", answer="y\n")
+        self.assertEqual((code, output), (0, "<info>\n<--threads>\n<2>\n"), messages)
+        self.assertIn(question, messages)
+        self.assertIn("sudo apt-get update", self.read("apt.log"))
+
+    def test_yes_answers_in_advance_and_the_program_does_not_see_it(self):
+        machine = self.bare_machine()
+        code, output, messages = self.call_on_a_terminal(machine, "info", "--yes", "--", "--yes")
+        self.assertEqual((code, output), (0, "<info>\n<-->\n<--yes>\n"), messages)
+        self.assertNotIn("[y/N]", messages)
+        self.assertIn("sudo apt-get update", self.read("apt.log"))
+
+    def test_without_a_terminal_sudo_is_not_asked_for(self):
+        machine = self.bare_machine()
+        self.write_command("id", "#!/bin/bash\necho 1000\n")
+        code, output, messages = self.call("info", **machine)
+        self.assertEqual((code, output), (0, "<info>\n"), messages)
+        self.assertNotIn("[y/N]", messages)
 
     def test_shows_why_the_installation_failed(self):
         code, output, messages = self.call("info", APT_FAILS="yes", **self.bare_machine())
