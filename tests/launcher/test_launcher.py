@@ -400,6 +400,26 @@ class Build(Toy):
             self.assertEqual((code, output), (1, ""))
             self.assertIn("Error: Symbol", messages)
 
+    def test_ninja_knows_every_source(self):
+        self.write("src/app/CMakeLists.txt", "add_executable(polydem main.f90 ../../elsewhere/idle.f90)\n")
+        self.write("elsewhere/idle.f90", "subroutine idle()\nend subroutine idle\n")
+        self.assertEqual(self.call("info")[0], 0)
+        self.assertEqual(self.call("info"), (0, "<info>\n", ""))
+        self.write("elsewhere/idle.f90", "subroutine idle(\nend subroutine idle\n")
+        self.assertEqual(self.call("info")[0], 1)
+        self.write("elsewhere/idle.f90", "subroutine idle()\nend subroutine idle\n")
+        self.assertEqual(self.call("info"), (0, "<info>\n", "polydem: building program in build/release\n"))
+
+    def test_without_ninja_the_built_program_runs(self):
+        self.call("info")
+        self.assertEqual(self.call("info", **self.bare_machine()), (0, "<info>\n", ""))
+
+    def test_the_first_call_keeps_the_working_folder(self):
+        self.write("src/app/main.f90", "program here\n   open (10, file='mark')\nend program here\n")
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([self.launcher, "info"], env=self.environment, cwd=folder, capture_output=True, check=True)
+            self.assertEqual(os.listdir(folder), ["mark"])
+
     def test_the_preset_chooses_the_folder_and_a_moved_project_is_built_anew(self):
         self.assertEqual(self.call("info", POLYDEM_PRESET="debug")[0], 0)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build", "release")))
@@ -471,6 +491,9 @@ class Build(Toy):
         results = [call.communicate() for call in calls]
         self.assertEqual([output for output, _ in results], 3*["<info>\n"])
         self.assertEqual("".join(messages for _, messages in results).count("building"), 1)
+        calls = [subprocess.Popen([self.launcher, "info"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                  env=self.environment) for _ in range(6)]
+        self.assertEqual([call.communicate() for call in calls], 6*[("<info>\n", "")])
 
     def test_tests_are_chosen_by_label_and_counted_in_the_last_line(self):
         code, output, _ = self.call("test")
