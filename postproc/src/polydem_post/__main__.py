@@ -232,7 +232,7 @@ def _plot(options: argparse.Namespace) -> None:
     trajectory = Trajectory(options.result)
     if len(trajectory) == 0:
         raise ResultError(f"{options.result}: holds no frames")
-    numbers = options.frames if options.frames else [-1 if options.frame is None else options.frame]
+    numbers = options.frames or [-1 if options.frame is None else options.frame]
     figure = plot_frames(trajectory, numbers, options.colour, options.contacts)
     path = options.output or trajectory.folder / _picture_name(trajectory, numbers)
     save(figure, path)
