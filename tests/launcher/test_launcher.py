@@ -411,9 +411,15 @@ class Build(Toy):
         self.write("elsewhere/idle.f90", "subroutine idle()\nend subroutine idle\n")
         self.assertEqual(self.call("info"), (0, "<info>\n", "polydem: building program in build/release\n"))
 
-    def test_without_ninja_the_built_program_runs(self):
+    def test_without_ninja_or_compiler_the_built_program_runs(self):
         self.call("info")
-        self.assertEqual(self.call("info", **self.bare_machine()), (0, "<info>\n", ""))
+        machine = self.bare_machine()
+        self.write("src/app/main.f90", PROGRAM.replace("'<'", "'['"))
+        for name in ("ninja", "cmake"):
+            self.assertEqual(self.call("info", **machine), (0, "<info>\n", ""))
+            os.symlink(shutil.which(name), os.path.join(machine["COMMANDS"], name))
+        self.assertEqual(self.call("info", **machine), (0, "<info>\n", ""))
+        self.assertFalse(os.path.exists(machine["APT_LOG"]))
 
     def test_the_first_call_keeps_the_working_folder(self):
         self.write("src/app/main.f90", "program here\n   open (10, file='mark')\nend program here\n")
