@@ -83,7 +83,7 @@ HELP_PLACES = ("src/app/help", "postproc/src/polydem_post/help")
 
 # What the launcher and the tools may call on a bare machine.
 COMMANDS = ("ar as bash cat cp dirname env find flock grep head id ld ln mkdir mv nproc ranlib readlink rm sed "
-            "setsid sh tail").split()
+            "setsid sh tail true").split()
 
 
 class Toy(unittest.TestCase):
