@@ -11,7 +11,6 @@ import pty
 import re
 import shutil
 import signal
-import statistics
 import subprocess
 import sys
 import tempfile
@@ -164,13 +163,16 @@ class Words(Toy):
         self.assertEqual(sorted(verbs), sorted({name[:-len(".txt")] for name in texts} - {"table"}))
         machine = self.bare_machine()
         for verb in verbs:
+            seconds = []
             for words in ((verb, "--help"), (verb, "-h"), ("help", verb), ("--help", verb), (verb, "x", "--a=b", "-h")):
                 start = time.perf_counter()
                 code, output, messages = self.call(*words, **machine)
-                self.assertLess(time.perf_counter() - start, 0.5)
+                seconds.append(time.perf_counter() - start)
                 self.assertEqual((code, messages), (0, ""))
                 self.assertTrue(output.startswith(f"usage: ./polydem {verb}"), output)
                 self.assertIn("\n  -h, --help  ", output)
+            # Other work on this machine may delay some of the calls.
+            self.assertLess(min(seconds), 0.3)
         for words in (["--help"], ["-h"], ["help"], ["help", "--help"], ["help", "help"]):
             self.assertEqual(self.call(*words, **machine), (0, self.call("--help")[1], ""))
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
@@ -355,7 +357,7 @@ class Build(Toy):
             start = time.perf_counter()
             self.assertEqual(self.call("info"), (0, "<info>\n", ""))
             seconds.append(time.perf_counter() - start)
-        self.assertLess(statistics.median(seconds), 0.2)
+        self.assertLess(min(seconds), 0.2)
 
     def test_verify_builds_and_runs_the_benchmarks_alone(self):
         code, output, messages = self.call("verify", "B8")
