@@ -3,6 +3,7 @@
 !> Parsing is pure and works on an array of arguments. Only `read_command_line` queries the system.
 module polydem_command_line
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_help_texts, only: help_text
    use polydem_namelist_entries, only: choices_of
    use polydem_strings, only: join, quoted, split_words, suggestion
    implicit none
@@ -49,26 +50,18 @@ module polydem_command_line
    type :: verb_t
       !> Name on the command line
       character(len=8) :: name
-      !> Name of its file argument in the usage text
+      !> File argument in the usage text
       character(len=16) :: file
       !> Whether the file argument is optional
       logical :: file_is_optional
-      !> Help text
-      character(len=88) :: meaning
    end type verb_t
 
    !> Table of verbs
    type(verb_t), parameter :: verbs(*) = [ &
-      verb_t('run', 'FILE.nml', .false., 'run the simulation that a namelist file describes'), &
-      verb_t('check', 'FILE.nml', .false., &
-      'read a namelist file, build its scene and say what a run would do; run nothing'), &
-      verb_t('info', '[RESULT.h5]', .true., 'describe this program, or a result file'), &
-      verb_t('replay', 'TRACE.h5', .false., &
-      'replay recorded boxes through a neighbour finder and check every step'), &
-      verb_t('bench', 'FILE.nml', .false., &
-      'measure neighbour finders on the scenes of a namelist file; if interrupted, go on')]
+      verb_t('run', 'FILE.nml', .false.), verb_t('check', 'FILE.nml', .false.), verb_t('info', '[RESULT.h5]', .true.), &
+      verb_t('replay', 'TRACE.h5', .false.), verb_t('bench', 'FILE.nml', .false.)]
 
-   !> An option
+   !> An option; src/app/help explains it
    type :: option_t
       !> Name on the command line
       character(len=12) :: name
@@ -76,8 +69,6 @@ module polydem_command_line
       character(len=16) :: value
       !> Verbs that accept the option, separated by blanks
       character(len=32) :: verbs
-      !> Help text
-      character(len=88) :: meaning
    end type option_t
 
    !> Names of all verbs
@@ -85,27 +76,21 @@ module polydem_command_line
 
    !> Table of options
    type(option_t), parameter :: options(*) = [ &
-      option_t('--set', 'GROUP.KEY=VALUE', 'run check bench', &
-      'override an entry of the namelist; may be repeated'), &
-      option_t('--threads', 'T', 'run check replay', &
-      'number of threads (default: all that the system offers; replay: one)'), &
-      option_t('--ranks', 'R', 'run check', &
-      'number of processes by MPI, which the launcher ./polydem starts'), &
-      option_t('--force', '', 'run', 'overwrite results that are there already'), &
-      option_t('--continue', '', 'run', &
-      'go on from the last checkpoint, or begin if there is none; do nothing if all is done'), &
-      option_t('--changed', '', 'run', 'go on although the settings have changed since'), &
-      option_t('--walltime', 'HH:MM:SS', 'run', &
-      'end within this elapsed time, with a checkpoint and exit code 75'), &
-      option_t('--finder', 'NAME', 'replay', 'neighbour finder (default: quadtree)'), &
-      option_t('--repeat', 'R', 'replay', 'how often the trace is replayed (default: 1)'), &
-      option_t('--steps', 'N', 'replay', 'replay the first steps of the trace only (default: all)'), &
-      option_t('--samples', 'FOLDER', 'replay', 'write one file of measurements per replay (default: none)'), &
-      option_t('--oracle', '', 'replay', 'compare every list with that of all pairs, whatever the trace knows'), &
-      option_t('--check', '', 'info', &
-      'compare all files of the result in a folder with their checksums; code 3 if one is wrong'), &
-      option_t('--help', '', all_verbs, 'show this help'), &
-      option_t('--version', '', all_verbs, 'show the version')]
+      option_t('--set', 'GROUP.KEY=VALUE', 'run check bench'), &
+      option_t('--threads', 'T', 'run check replay'), &
+      option_t('--ranks', 'R', 'run check'), &
+      option_t('--force', '', 'run'), &
+      option_t('--continue', '', 'run'), &
+      option_t('--changed', '', 'run'), &
+      option_t('--walltime', 'HH:MM:SS', 'run'), &
+      option_t('--finder', 'NAME', 'replay'), &
+      option_t('--repeat', 'R', 'replay'), &
+      option_t('--steps', 'N', 'replay'), &
+      option_t('--samples', 'FOLDER', 'replay'), &
+      option_t('--oracle', '', 'replay'), &
+      option_t('--check', '', 'info'), &
+      option_t('--help', '', all_verbs), &
+      option_t('--version', '', all_verbs)]
 
 contains
 
@@ -190,7 +175,9 @@ contains
       type(command_t), intent(inout) :: command
       type(error_t), allocatable, intent(inout) :: error
 
-      if (command%verb == '') then
+      if (word == 'help' .and. command%verb == '' .and. .not. command%help) then
+         command%help = .true.
+      else if (command%verb == '') then
          command%verb = word
          if (all(verbs%name /= word)) call raise(error, input_error, 'unknown verb '//quoted(word)// &
             suggestion(word, verbs%name)//' (polydem --help explains them)')
@@ -216,6 +203,7 @@ contains
 
       equals = index(arguments(k)//'=', '=')
       name = trim(arguments(k)(:equals - 1))
+      if (name == '-h') name = '--help'
       which = option_at(name)
       if (which == 0) then
          call raise(error, input_error, 'unknown option '//name// &
@@ -370,30 +358,29 @@ contains
       end do
    end subroutine check_command
 
-   !> Usage text, with one line per verb and per option
+   !> Help text of a verb, or one line per verb
    pure function usage(verb) result(text)
       !> A verb, or an empty text for all verbs
       character(len=*), intent(in) :: verb
-      character(len=:), allocatable :: text
+      character(len=:), allocatable :: text, lines
       character(len=*), parameter :: line_end = new_line('a')
-      character(len=40) :: call_text
-      integer :: k
+      character(len=28) :: call_text
+      integer :: k, first, second
 
-      text = 'Usage:'//line_end
+      if (verb /= '') then
+         lines = help_text(verb)
+         text = 'usage: polydem '//lines(:len(lines) - 1)
+         return
+      end if
+      text = 'usage: polydem VERB [ARGUMENTS]'//line_end//line_end
       do k = 1, size(verbs)
-         if (verb /= '' .and. verbs(k)%name /= verb) cycle
-         call_text = '  polydem '//trim(verbs(k)%name)//' '//trim(verbs(k)%file)//' [options]'
-         text = text//call_text//trim(verbs(k)%meaning)//line_end
+         lines = help_text(trim(verbs(k)%name))
+         first = index(lines, line_end)
+         second = first + index(lines(first + 1:), line_end)
+         call_text = '  '//lines(:index(lines, ' [OPTIONS]') - 1)
+         text = text//call_text//lines(first + 1:second)
       end do
-      text = text//'Options:'//line_end
-      do k = 1, size(options)
-         if (.not. takes(options(k), verb)) cycle
-         call_text = '  '//trim(options(k)%name)//' '//trim(options(k)%value)
-         text = text//call_text//trim(options(k)%meaning)
-         if (verb == '' .and. options(k)%verbs /= all_verbs) text = text//' ('// &
-            join(split_words(options(k)%verbs), ', ')//')'
-         text = text//line_end
-      end do
+      text = text//line_end//'polydem help VERB prints the options of a verb, polydem --version the version.'
    end function usage
 
 end module polydem_command_line

@@ -67,14 +67,14 @@ class Names:
         """The base revision's path of a data set that this revision calls so: kind/path."""
         for old, new in sorted(self.data.items(), key=lambda pair: -len(pair[1] or "")):
             if new is not None and old.startswith(f"{kind}/"):
-                if path == new or new.endswith("/") and path.startswith(new):
+                if path == new or (new.endswith("/") and path.startswith(new)):
                     return old + path[len(new):]
         return f"{kind}/{path}"
 
     def new_data(self, old):
         """What this revision calls a data set kind/path of the base, without its kind; None if it was removed."""
         for prefix, new in sorted(self.data.items(), key=lambda pair: -len(pair[0])):
-            if old == prefix or prefix.endswith("/") and old.startswith(prefix):
+            if old == prefix or (prefix.endswith("/") and old.startswith(prefix)):
                 return None if new is None else new + old[len(prefix):]
         return old.split("/", 1)[1]
 

@@ -6,7 +6,6 @@ import unittest
 from pathlib import Path
 
 import guard_python  # first: it finds a Python that has the next two
-
 import h5py
 import numpy as np
 from guard_cases import generated_cases, read_entries

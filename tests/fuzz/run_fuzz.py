@@ -119,7 +119,7 @@ def try_kind(fuzz, inputs, kind, first, last, limit):
             with open(folder / "messages", "w+b") as messages:
                 process = subprocess.Popen([fuzz, kind, inputs, str(first), str(last)], cwd=folder, env=environment,
                                            stdout=subprocess.DEVNULL, stderr=messages,
-                                           preexec_fn=None if sanitized else limit_memory)
+                                           preexec_fn=None if sanitized else limit_memory)  # noqa: PLW1509
                 in_time = watch(process, folder, limit)
                 messages.seek(0)
                 text = messages.read().decode("utf-8", errors="replace")

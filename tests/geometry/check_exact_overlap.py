@@ -164,8 +164,8 @@ def many_corners(rng):
 RANDOM = [pair_of_grains, grain_on_wall, grain_at_end_of_wall, needles, many_corners]
 DEGENERATE = [lattice_pair, turned_lattice_pair, nearly_parallel]
 # pairs of each kind
-USUAL = {kind: 1800 for kind in RANDOM} | {kind: 400 for kind in DEGENERATE}
-FULL = {kind: 20000 for kind in RANDOM} | {kind: 3334 for kind in DEGENERATE}
+USUAL = dict.fromkeys(RANDOM, 1800) | dict.fromkeys(DEGENERATE, 400)
+FULL = dict.fromkeys(RANDOM, 20000) | dict.fromkeys(DEGENERATE, 3334)
 # pairs that one process compares at a time
 LOT = 200
 # kinds whose polygons share edges up to rounding: N jumps when a body inside another leaves the edge it lies at

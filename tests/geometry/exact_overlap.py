@@ -4,6 +4,7 @@ It knows nothing of clipping loops: every edge of one polygon is cut to the inte
 Beck), in integers, and the area follows from Green's theorem.
 """
 
+import itertools
 import math
 from fractions import Fraction
 
@@ -65,7 +66,7 @@ def exact_overlap(a, b, offset):
 
     The integrals leave edges that both outlines share to the larger polygon, as the program does.
     """
-    exponents = [math.frexp(v)[1] for v in sum(map(list, a + b + [offset]), []) if v != 0.0]
+    exponents = [math.frexp(v)[1] for v in itertools.chain(*a, *b, offset) if v != 0.0]
     bits = 54 - min(exponents)
     a_edges = edges_of(to_integers(a, (0.0, 0.0), bits))
     b_edges = edges_of(to_integers(b, offset, bits))

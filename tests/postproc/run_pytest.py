@@ -16,7 +16,7 @@ def main() -> int:
     python = root / ".venv" / "bin" / "python"
     if not python.exists():
         python = Path(sys.executable)
-    if subprocess.run([str(python), "-c", NEEDED], stderr=subprocess.DEVNULL).returncode != 0:
+    if subprocess.run([str(python), "-c", NEEDED], stderr=subprocess.DEVNULL, check=False).returncode != 0:
         print(f"{python} lacks one of h5py, matplotlib, numpy and pytest. Let the launcher make the environment:")
         print("    ./polydem test")
         return 1
@@ -27,7 +27,7 @@ def main() -> int:
     environment["POLYDEM_PROGRAM"] = str(program)
     environment["POLYDEM_SOURCE_DIR"] = str(root)
     command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests), *sys.argv[5:]]
-    return subprocess.run(command, env=environment).returncode
+    return subprocess.run(command, env=environment, check=False).returncode
 
 
 if __name__ == "__main__":

@@ -104,7 +104,7 @@ def test_the_depth_of_the_tree_is_compared_with_the_papers(tmp_path):
         truth = replace(truths()["quadtree"], counts={"depth": 14, "nodes": 1.6})
         for repeat in range(2):
             write_sample(tmp_path, f"drum_{boxes}", "quadtree", truth, boxes, repeat=repeat)
-    assert dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C7"].verdict == CONTRADICTED
+    assert {c.id: f for c, f in judge_all(read_bench([tmp_path]))}["C7"].verdict == CONTRADICTED
 
 
 def test_memory_against_clock_needs_two_machines_that_state_their_clocks(tmp_path, agreeing):
@@ -121,14 +121,14 @@ def test_wrong_lists_on_cut_walls_contradict(tmp_path):
     for finder in ("quadtree", "linked_cells"):
         truth = truths()[finder]
         write_sample(tmp_path, "sizes_50", finder, truth, 3000, pair_hash=finder, bodies=2500)
-    found = dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C11"]
+    found = {c.id: f for c, f in judge_all(read_bench([tmp_path]))}["C11"]
     assert found.verdict == IN_PART and "Equal lists on 3 of 4 scenes" in found.reason
 
 
 def test_a_list_that_was_not_compared_with_the_oracle_proves_nothing(tmp_path):
     write_hard_scenes(tmp_path, as_the_paper_says())
     write_sample(tmp_path, "sizes_50", "quadtree", truths()["quadtree"], 3000, checked="sort_and_sweep")
-    assert dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C11"].verdict == NOT_MEASURED
+    assert {c.id: f for c, f in judge_all(read_bench([tmp_path]))}["C11"].verdict == NOT_MEASURED
 
 
 @pytest.mark.parametrize("jump, verdict", [(1.0, CONTRADICTED), (1.5, CONFIRMED)])
@@ -137,14 +137,14 @@ def test_a_rise_beyond_a_cache_is_seen(tmp_path, jump, verdict):
         truth = replace(truths()["quadtree"], time=45.0 * (jump if boxes > 50000 else 1.0))
         for repeat in range(6):
             write_sample(tmp_path, f"drum_{boxes}", "quadtree", truth, boxes, repeat=repeat)
-    assert dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C13"].verdict == verdict
+    assert {c.id: f for c, f in judge_all(read_bench([tmp_path]))}["C13"].verdict == verdict
 
 
 def test_whole_steps_tell_what_a_week_is_worth_and_no_more(tmp_path):
     write_drums(
         tmp_path, {"quadtree": truths()["quadtree"]}, sizes=(12651,), repeats=2, threads=(1,), mode="live", noise=0.0
     )
-    found = dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C14"]
+    found = {c.id: f for c, f in judge_all(read_bench([tmp_path]))}["C14"]
     assert found.verdict == NOT_TESTABLE
     assert found.ours.startswith("3.19 ms per step; a week: ")
 
@@ -170,7 +170,7 @@ def test_the_worst_order_is_judged_by_exponents(tmp_path):
                 repeat=0,
                 first_counts={"swaps": boxes},
             )
-    assert dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C16"].verdict == IN_PART
+    assert {c.id: f for c, f in judge_all(read_bench([tmp_path]))}["C16"].verdict == IN_PART
 
 
 @pytest.mark.parametrize("tree, verdict", [(90, CONFIRMED), (300, CONTRADICTED)])
@@ -181,7 +181,7 @@ def test_complexities_are_judged_by_their_ratio(monkeypatch, agreeing, tmp_path,
     assert claim_rules_structure.complexities(None).verdict == verdict
     monkeypatch.setattr(complexity, "counter", lambda: None)
     write_sample(tmp_path, "drum_100", "verlet", truths()["quadtree"], 100)
-    found = dict((c.id, f) for c, f in judge_all(read_bench([tmp_path])))["C8"]
+    found = {c.id: f for c, f in judge_all(read_bench([tmp_path]))}["C8"]
     assert found.verdict == NOT_MEASURED and "pip install" in found.reason
 
 

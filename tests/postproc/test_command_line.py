@@ -1,9 +1,12 @@
-"""The command line: pictures, tables, errors."""
+"""The command line: pictures, tables, help, errors."""
+
+import argparse
+import re
 
 import pytest
 from matplotlib.image import imread
 from polydem_post import Trajectory
-from polydem_post.__main__ import main
+from polydem_post.__main__ import HELP, _parser, help_text, main
 from polydem_post.plot import plot_frames
 
 
@@ -80,3 +83,59 @@ def test_a_wrong_command_line_ends_with_code_2(arguments):
     with pytest.raises(SystemExit) as end:
         main(arguments)
     assert end.value.code == 2
+
+
+def parsers():
+    """All parsers by their words, without the program's name."""
+    found, open_ones = {}, [_parser()]
+    while open_ones:
+        parser = open_ones.pop()
+        found[tuple(parser.prog.split()[1:])] = parser
+        for action in parser._actions:
+            if isinstance(action, argparse._SubParsersAction):
+                open_ones += action.choices.values()
+    del found[()]
+    return found
+
+
+def part_of(words):
+    """The part of a help text that speaks of a verb, or of one step of a verb."""
+    text = help_text(words[0])
+    return text[text.index("\n" + " ".join(words)):].split("\n\n")[0] if len(words) > 1 else text
+
+
+@pytest.mark.parametrize("words", parsers(), ids=" ".join)
+def test_the_help_text_names_every_option_and_its_default(words):
+    part = part_of(words)
+    for action in parsers()[words]._actions:
+        for name in action.option_strings:
+            assert re.search(rf"(^|, | ){name}( |,|$)", part, re.MULTILINE) or name in ("-h", "--help")
+        said = re.search(rf"  {action.option_strings[-1]} .*(?:\n {{20}}.*)*?\(default: ([^,;)]\S*?)[;)]", part) \
+            if action.option_strings and action.default not in (None, False, [], argparse.SUPPRESS) else None
+        if said:
+            assert (action.type or str)(said[1]) == action.default, said[0]
+        elif action.option_strings:
+            assert action.default in (None, False, [], argparse.SUPPRESS), f"no default of {action.option_strings}"
+
+
+def test_the_help_texts_name_no_other_options():
+    known = {}
+    for words, parser in parsers().items():
+        known.setdefault(words[0], set()).update(name for action in parser._actions for name in action.option_strings)
+    assert {path.stem for path in HELP.glob("*.txt")} == set(known)
+    for verb, options in known.items():
+        assert set(re.findall(r"(?<![\w-])--?[a-zA-Z][\w-]*", help_text(verb))) <= options, verb
+
+
+def test_help_is_the_text_of_the_verb(capsys):
+    for words in parsers():
+        with pytest.raises(SystemExit) as end:
+            main([*words, "--help"])
+        assert (end.value.code, capsys.readouterr().out) == (0, f"usage: polydem_post {help_text(words[0])}")
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    output = capsys.readouterr().out
+    assert all(f"\n  {words[0]} " in output for words in parsers())
+    with pytest.raises(SystemExit):
+        main(["plot"])
+    assert capsys.readouterr().err.startswith("usage: polydem_post plot RESULT [OPTIONS]\n")

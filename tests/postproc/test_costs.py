@@ -18,7 +18,7 @@ class FakeStudy(Study):
 
     def count(self, namelist, folder, overrides):
         self.run(namelist, folder, overrides)
-        steps = int(round(float(next(word for word in overrides if "duration" in word).split("=")[1]) / 2e-5))
+        steps = round(float(next(word for word in overrides if "duration" in word).split("=")[1]) / 2e-5)
         return 1000 + steps * (300 if "forces.friction=cundall_strack" in overrides else 200)
 
     def run(self, namelist, folder, overrides, **environment):

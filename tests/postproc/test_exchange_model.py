@@ -5,8 +5,7 @@ from dataclasses import astuple, fields, replace
 
 import pytest
 from polydem_post.__main__ import main
-from polydem_post.exchange_model import (
-    RANKS, Count, Machine, fit_law, predict, read_counts, scale_table, strip_table)
+from polydem_post.exchange_model import RANKS, Count, Machine, fit_law, predict, read_counts, scale_table, strip_table
 from polydem_post.trajectory import ResultError
 
 MACHINE = Machine(body=1e-6, latency=1e-6, bandwidth=1e9)

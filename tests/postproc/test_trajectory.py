@@ -143,4 +143,4 @@ def test_names_what_a_run_did_not_write(tmp_path, finished):
     with pytest.raises(ResultError, match="holds no contacts"):
         run.contacts(0)
     with pytest.raises(ResultError, match="profile.h5: there is no such file"):
-        run.state_hash
+        _ = run.state_hash

@@ -169,5 +169,5 @@ def test_every_scene_has_its_namelist_and_steps_that_end_together():
         for steps in (*scene.steps, scene.reference, scene.reference // 2):
             assert steps % scene.moments == 0
         assert scene.reference == 0 or scene.reference >= 4 * max(scene.steps)
-        assert len({choice for choice in choices_of(scene, ("double", "single"))}) > 0
+        assert len(set(choices_of(scene, ("double", "single")))) > 0
         assert all(choice.precision == "quadruple" for choice in references_of(scene))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from runs import PARALLEL, contents, count, run, state_hash
-from scenes import SCENES, write_scene
+from scenes import write_scene
 
 HERE = Path(__file__).parent
 

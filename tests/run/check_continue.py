@@ -210,7 +210,7 @@ def a_disk_that_is_full_loses_nothing(case):
     os.makedirs("disk", exist_ok=True)
     for kilobytes in (300, 500, 900, 1500):
         mount = ["mount", "-t", "tmpfs", "-o", f"size={kilobytes}k", "tmpfs", "disk"]
-        if subprocess.run(mount, capture_output=True).returncode != 0:
+        if subprocess.run(mount, capture_output=True, check=False).returncode != 0:
             print("  skipped: no file system may be mounted here")
             return
         try:

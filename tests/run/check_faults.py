@@ -73,7 +73,7 @@ def a_file_that_another_program_holds_is_named_and_stays(case, _):
 
 def a_folder_that_may_only_be_read_stays_as_it_is(case, _):
     os.makedirs("disk", exist_ok=True)
-    if subprocess.run(["mount", "-t", "tmpfs", "tmpfs", "disk"], capture_output=True).returncode != 0:
+    if subprocess.run(["mount", "-t", "tmpfs", "tmpfs", "disk"], capture_output=True, check=False).returncode != 0:
         print("  skipped: no file system may be mounted here")
         return
     try:

@@ -164,7 +164,7 @@ def a_small_stack_is_refused(case):
             for verb, words in case.calls(threads).items():
                 # Where nothing is refused each call takes its time.
                 few = kilobytes is None or kilobytes >= 256
-                if threads > 4 and (verb != "run" or few and kilobytes != 512):
+                if threads > 4 and (verb != "run" or (few and kilobytes != 512)):
                     continue
                 if few and kilobytes != 257 and (threads != 2 or verb != "run") and threads <= 4:
                     continue
@@ -223,7 +223,7 @@ def nobody_need_read_what_is_printed(case):
             clear()
             reader, writer = os.pipe()
             os.close(reader)
-            code, _, message = case.call(*words, **{name: writer for name in closed})
+            code, _, message = case.call(*words, **dict.fromkeys(closed, writer))
             os.close(writer)
             assert code == GOOD and not message, (closed, verb, code, message)
             if verb == "run":
@@ -232,7 +232,7 @@ def nobody_need_read_what_is_printed(case):
                     assert hash_of(file.read()) == case.expected
         reader, writer = os.pipe()
         os.close(reader)
-        code, _, _ = case.call("run", "nothing.nml", **{name: writer for name in closed})
+        code, _, _ = case.call("run", "nothing.nml", **dict.fromkeys(closed, writer))
         os.close(writer)
         assert code == BAD_INPUT, code
     # A reader who stops after the first line.

@@ -141,7 +141,7 @@ class Case:
             raise Broken(f"the continued result is wrong, after {said}")
         # If nothing could be removed any more, the lock of the dead run stays where a finished result needs none.
         rest = [name for name in os.listdir("failed") if name.endswith((".open", ".unfinished"))
-                or name.endswith(".lock") and self.how != "on"]
+                or (name.endswith(".lock") and self.how != "on")]
         if rest and code != 0:
             raise Broken(f"{rest} are left after {said}")
         # Runs differ by a few lines of the log.

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "ranks"))
-import seals  # noqa: E402
+import seals
 
 PROGRAM = os.path.abspath(os.environ["POLYDEM_PROGRAM"])
 ROOT = os.environ["POLYDEM_SOURCE_DIR"]
@@ -46,7 +46,7 @@ def call(*words):
     return done.returncode, done.stdout, done.stderr
 
 
-def lead(path, name, way):
+def lead(path, name, way):  # noqa: C901
     """Put a data set of a file elsewhere, whose place a link or a description takes."""
     group, leaf = os.path.split(name)
     other = path + ".other"
@@ -127,9 +127,9 @@ def test_bodies_must_be_in_their_file():
             if "soft" in way:
                 # The other names of these at the top would be unknown data sets.
                 with h5py.File("bodies.h5", "r+") as file:
-                    if "values" in file.keys():
+                    if "values" in file:
                         continue
-                    if "elsewhere_too" in file.keys():
+                    if "elsewhere_too" in file:
                         del file["elsewhere_too"]
                         del file[name]
                         file[name] = h5py.SoftLink("/elsewhere/step")
@@ -164,7 +164,7 @@ def test_boxes_must_be_in_their_trace():
             elif code != 0:
                 read += 1
                 assert (f"trace.h5: {name} lies in" in message or f"trace.h5: {os.path.dirname(name)}" in message
-                        or way == "link to a group" and "lies in another file" in message), (name, way, message)
+                        or (way == "link to a group" and "lies in another file" in message)), (name, way, message)
             else:
                 # Nobody asked for it.
                 assert name.startswith("/provenance"), (name, way)

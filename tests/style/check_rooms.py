@@ -89,7 +89,7 @@ def read_targets(build):
 
 def rooms_of(targets):
     """Rooms by name, each with a module that stands for it; and the libraries."""
-    found = {target.room: sorted(target.defined)[0] for target in targets.values() if target.room and target.defined}
+    found = {target.room: min(target.defined) for target in targets.values() if target.room and target.defined}
     return {**found, **{name: module for name, (module, _) in LIBRARIES.items()}}
 
 

@@ -1,4 +1,4 @@
-"""The house rules that a machine can check.
+"""The rules of this project that a machine can check; .fortitude.toml and .ruff.toml have the generic ones.
 
 usage: check_style.py ROOT      prints file:line: what is wrong, and ends with code 1 if anything is
 """
@@ -9,7 +9,7 @@ import sys
 
 from fortran_source import Source, split_commas
 
-WIDEST = {".f90": 120, ".pf": 124, ".py": 120}  # columns; 124: what pFUnit can take
+WIDEST = {".pf": 124}  # columns; 124: what pFUnit can take
 LONGEST_FILE = 400
 LONGEST_PROCEDURE = 60
 TEXTS = (".f90", ".in", ".pf", ".py", ".cmake", ".txt", ".md", ".json", ".toml", ".nml", ".cff")
@@ -59,8 +59,6 @@ STAGES_OF_ROOMS = {"exchange": "decomposition", "output": "io"}
 def of_any(statement, room):
     """Statements that are nowhere allowed, or only in one room."""
     code = statement.code
-    if re.match(r"use\b", code) and not re.search(r",\s*only\s*:", code):
-        yield "use without only"
     if re.match(r"use\b.*\b(hdf5|h5lt|h5ds)\b\s*,", code) and room != "hdf5":
         yield "the library HDF5 is used in src/hdf5 only"
     if re.match(r"use\b.*\bmpi(_f08)?\b\s*,", code) and room not in ("hdf5", "communicator"):
@@ -69,7 +67,7 @@ def of_any(statement, room):
         yield "only the program in src/app stops"
     if re.match(r"(if\s*\(.*\)\s*)?call\s+(exit|abort)\b", code) and room != "app":
         yield "only the program in src/app stops"
-    if re.match(r"(save|common|equivalence|data|include)\b(?!\s*[=%(])", code) or re.match(r"(save|common)\s*/", code):
+    if re.match(r"(save|data|include)\b(?!\s*[=%(])", code) or re.match(r"save\s*/", code):
         yield f"{code.split()[0]} is not used here"
     if code.startswith("#"):
         yield "no preprocessor: CMake chooses files"
@@ -78,8 +76,6 @@ def of_any(statement, room):
     if not code.startswith("!$omp"):
         for literal in REAL_LITERAL.findall(code):
             yield f"the real number {literal} has no kind"
-    if re.search(r"\b(integer|real|logical|complex)\s*\(\s*(kind\s*=\s*)?\d|_[48]\b|\bdouble\s+precision\b", code):
-        yield "kinds come from base/kinds.f90"
     if re.search(r"%(law|damping|friction)\s*(==|/=)", code) and statement.scopes[-1].name != "choose":
         yield "only `choose` of a force part knows its word in the namelist"
 
@@ -91,15 +87,9 @@ def of_declaration(statement):
     attributes, scope = statement.attributes, statement.scopes[-1]
     if re.search(r",\s*save\b", attributes):
         yield "no save: state lives in arguments"
-        return
-    if "parameter" in attributes:
-        return
-    if scope.kind in ("module", "submodule") and not attributes.startswith("procedure"):
+    elif scope.kind in ("module", "submodule") and not (
+            "parameter" in attributes or attributes.startswith("procedure")):
         yield "a variable of a module: state lives in arguments"
-    if scope.kind == "procedure":
-        for part in split_commas(statement.code.split("::", 1)[1]):
-            if re.search(r"(?<![=<>/])=(?!=)", re.sub(r"\([^()]*\)", "", part)):
-                yield "a local variable with an initial value keeps its value between calls: assign it below"
 
 
 def of_directive(statement):
@@ -121,20 +111,9 @@ def check_scopes(source):
     """Rules of modules and procedures."""
     if len(source.lines) - 1 > LONGEST_FILE:
         yield len(source.lines) - 1, f"{len(source.lines) - 1} lines, more than {LONGEST_FILE}"
-    units = [scope for scope in source.scopes if not scope.first.scopes]
-    if len(units) != 1:
-        yield 1, "one module or program per file"
-    for unit in units:
-        codes = [statement.code for statement in source.inside(unit)]
-        if unit.kind not in ("module", "submodule", "program"):
-            yield unit.first.line, "procedures stand in modules"
-        elif "implicit none" not in codes:
-            yield unit.first.line, f"{unit.kind} {unit.name} without implicit none"
-        if unit.kind == "module" and "private" not in codes:
-            yield unit.first.line, f"module {unit.name} without private"
-        if not source.has_comment_above(unit.first):
-            yield unit.first.line, f"no comment !> above {unit.kind} {unit.name}"
     for scope in source.scopes:
+        if not scope.first.scopes and not source.has_comment_above(scope.first):
+            yield scope.first.line, f"no comment !> above {scope.kind} {scope.name}"
         length = scope.last.line - scope.first.line + 1 if scope.last else 0
         if scope.kind == "procedure" and length > LONGEST_PROCEDURE:
             yield scope.first.line, f"{scope.name} has {length} lines, more than {LONGEST_PROCEDURE}"

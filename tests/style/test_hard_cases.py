@@ -69,7 +69,7 @@ class HardCases(unittest.TestCase):
         self.assertIn("G1 has no test of its own first", wrong_in(text, self.names))
 
     def test_a_test_that_no_row_names_is_found(self):
-        self.assertEqual(wrong_in(self.text, self.names + ["d4_another"]), ["D4 lacks d4_another"])
+        self.assertEqual(wrong_in(self.text, [*self.names, "d4_another"]), ["D4 lacks d4_another"])
 
 
 if __name__ == "__main__":

@@ -149,7 +149,7 @@ class Translation(unittest.TestCase):
                         except translator.Wrong as wrong:
                             refused = f"{wrong.line} {wrong}"
                         of_module = "implicit none" in old and "use helpers" not in new
-                        expected = name in names or name != "mine" and of_module
+                        expected = name in names or (name != "mine" and of_module)
                         words = f"{line} pFUnit has a name {name.capitalize()} of its own: choose another"
                         self.assertEqual(refused, words if expected else "")
 

@@ -316,8 +316,7 @@ def main():
     lines.append("\ncontains")
     lines.append(COMMON)
     digits = {"real32": 8, "real64": 16, "real128": 33}
-    for kind in REALS:
-        lines.append(REAL_CORE.format(kind=kind, digits=digits[kind], width=digits[kind] + 12))
+    lines.extend(REAL_CORE.format(kind=kind, digits=digits[kind], width=digits[kind] + 12) for kind in REALS)
     lines.extend(text for members in found.values() for _, text in members)
     lines.append("\nend module funit_asserts\n")
     with open(sys.argv[1], "w", encoding="utf-8") as file:

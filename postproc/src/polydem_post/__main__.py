@@ -21,6 +21,9 @@ INPUT_ERROR = 2
 #: Exit code of what no reader foresaw, and of a program whose output nobody reads any more, as shells have it
 UNFORESEEN, CLOSED_PIPE = 1, 141
 
+#: Help texts of the verbs
+HELP = Path(__file__).parent / "help"
+
 #: Variable of the environment that shows where an unforeseen error happened
 TRACEBACK = "POLYDEM_TRACEBACK"
 
@@ -57,32 +60,51 @@ def _end_quietly() -> int:
     return CLOSED_PIPE
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose help is a text of the folder help, which the launcher prints without Python."""
+
+    def format_help(self) -> str:
+        name, verb = [*self.prog.split(), ""][:2]
+        if verb:
+            return f"usage: {name} {help_text(verb)}"
+        calls = [path.read_text(encoding="utf-8").splitlines()[:2] for path in sorted(HELP.glob("*.txt"))]
+        lines = [f"  {call.replace(' [OPTIONS]', ''):<28} {meaning}" for call, meaning in calls]
+        return "\n".join([f"usage: {name} VERB [ARGUMENTS]", "", *lines, ""])
+
+    def format_usage(self) -> str:
+        return self.format_help().splitlines()[0] + "\n"
+
+
+def help_text(verb: str) -> str:
+    """What a verb does and takes; the first line is its call, the second one its meaning."""
+    return (HELP / f"{verb}.txt").read_text(encoding="utf-8")
+
+
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="polydem_post", description="Draws and tabulates results of polydem.")
+    parser = _Parser(prog="polydem_post")
     parser.add_argument("--version", action="version", version=f"polydem_post {__version__}")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
-    plot = verbs.add_parser("plot", help="draw frames as a picture")
+    plot = verbs.add_parser("plot")
     plot.set_defaults(action=_plot)
-    plot.add_argument("result", type=Path, metavar="RESULT", help="folder of a result, or one segment")
+    plot.add_argument("result", type=Path, metavar="RESULT")
     which = plot.add_mutually_exclusive_group()
-    which.add_argument("--frame", type=int, metavar="K", help="frame, counted from 0; -1, the last one, if absent")
-    which.add_argument("--frames", type=_numbers, metavar="A,B,C", help="frames to draw side by side")
-    plot.add_argument("--output", type=Path, metavar="FILE", help="picture; frame_K.png in the result if absent")
-    plot.add_argument("--colour", choices=("speed", "angle", "id", "none"), default="speed", help="colour by this")
-    plot.add_argument("--contacts", action="store_true", help="draw the forces of the contacts")
+    which.add_argument("--frame", type=int, metavar="K")
+    which.add_argument("--frames", type=_numbers, metavar="A,B,C")
+    plot.add_argument("--output", type=Path, metavar="FILE")
+    plot.add_argument("--colour", choices=("speed", "angle", "id", "none"), default="speed")
+    plot.add_argument("--contacts", action="store_true")
 
-    table = verbs.add_parser("table", help="print the table of times")
+    table = verbs.add_parser("table")
     table.set_defaults(action=_table)
-    table.add_argument("result", type=Path, metavar="RESULT", help="folder of a result")
-    table.add_argument("--format", choices=FORMATS, default="text", help="form of the table")
+    table.add_argument("result", type=Path, metavar="RESULT")
+    table.add_argument("--format", choices=FORMATS, default="text")
 
-    tables = verbs.add_parser("tables", help="write all tables, figures and verdicts of bench folders")
+    tables = verbs.add_parser("tables")
     tables.set_defaults(action=_tables)
-    tables.add_argument("folders", type=Path, nargs="+", metavar="BENCH_FOLDER",
-                        help="folder of a bench; several: of other machines or builds, the first one leads")
-    tables.add_argument("--output", type=Path, metavar="DIR", help="where to; report in the first folder if absent")
-    tables.add_argument("--no-figures", action="store_true", help="tables and verdicts only")
+    tables.add_argument("folders", type=Path, nargs="+", metavar="BENCH")
+    tables.add_argument("--output", type=Path, metavar="DIR")
+    tables.add_argument("--no-figures", action="store_true")
     _add_cache(verbs)
     _add_costs(verbs)
     _add_workprecision(verbs)
@@ -92,52 +114,37 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def _add_cache(verbs) -> None:
-    cache = verbs.add_parser(
-        "cache", help="count cache misses on the traces of a bench folder",
-        description="Replays every trace of a bench folder in cachegrind and writes cache.csv there, which the "
-                    "verb tables "
-        "takes up. What cache.csv holds is not counted again: delete it after a change of the program.")
+    cache = verbs.add_parser("cache")
     cache.set_defaults(action=_cache)
-    cache.add_argument("folder", type=Path, metavar="BENCH_FOLDER", help="folder of a bench, with traces")
-    cache.add_argument("--program", type=Path, required=True, help="the built program (the launcher says which)")
-    cache.add_argument("--finders", type=_words, metavar="A,B,C", help="those of the samples if absent")
-    cache.add_argument("--scenes", type=_words, metavar="A,B,C", help="all that have a trace if absent")
-    cache.add_argument("--steps", type=_numbers, default=[2, 12], metavar="FEW,MORE",
-                       help="steps of the two replays whose difference counts (default: 2,12)")
-    cache.add_argument("--machine", action="store_true",
-                       help="simulate first and last level of this machine, not D1 32 KiB 8-way and LL 1 MiB 16-way")
+    cache.add_argument("folder", type=Path, metavar="BENCH")
+    cache.add_argument("--program", type=Path, required=True)
+    cache.add_argument("--finders", type=_words, metavar="A,B,C")
+    cache.add_argument("--scenes", type=_words, metavar="A,B,C")
+    cache.add_argument("--steps", type=_numbers, default=[2, 12], metavar="FEW,MORE")
+    cache.add_argument("--machine", action="store_true")
     for level in ("D1", "LL"):
-        cache.add_argument(f"--{level}", metavar="SIZE,WAYS,LINE", help=f"simulate this {level} [bytes, ways, bytes]")
-    cache.add_argument("--branch-sim", action="store_true", help="count mispredicted branches too")
+        cache.add_argument(f"--{level}", metavar="SIZE,WAYS,LINE")
+    cache.add_argument("--branch-sim", action="store_true")
 
 
 def _add_costs(verbs) -> None:
-    costs = verbs.add_parser(
-        "costs", help="measure what each optional model costs",
-        description="Runs a packed drum with one optional model after the other, on and off in turns, and writes what "
-        "each costs of a step and in memory. An interrupted call goes on; samples of another build are refused.")
+    costs = verbs.add_parser("costs")
     costs.set_defaults(action=_costs)
-    costs.add_argument("--program", type=Path, required=True, help="the built program (the launcher says which)")
-    costs.add_argument("--inputs", type=Path, default=Path("inputs"), help="folder of the scenes (default: inputs)")
-    costs.add_argument("--output", type=Path, default=Path("results/costs"), help="where to (default: results/costs)")
-    costs.add_argument("--repeats", type=int, default=9, help="timed runs of each model (default: 9); 0, "
-                       "as on a busy machine: instructions and memory alone")
-    costs.add_argument("--threads", type=int, default=1, help="threads of each run (default: 1)")
+    costs.add_argument("--program", type=Path, required=True)
+    costs.add_argument("--inputs", type=Path, default=Path("inputs"))
+    costs.add_argument("--output", type=Path, default=Path("results/costs"))
+    costs.add_argument("--repeats", type=int, default=9)
+    costs.add_argument("--threads", type=int, default=1)
 
 
 def _add_workprecision(verbs) -> None:
-    work = verbs.add_parser(
-        "workprecision", help="measure error against time over steps, integrators, laws and precisions",
-        description="Runs small scenes with all steps, integrators, force laws and precisions, and writes tables, "
-                    "figures and a recommendation to DIR/report. Goes on where an interrupted study was.")
+    work = verbs.add_parser("workprecision")
     work.set_defaults(action=_workprecision)
-    work.add_argument("scenes", nargs="*", metavar="SCENE", help="names in inputs/precision; all if absent")
-    work.add_argument("--output", type=Path, default=Path("results/workprecision"), metavar="DIR",
-                      help="folder of the study (default: results/workprecision)")
-    work.add_argument("--repeats", type=int, default=3, metavar="N", help="timed runs of every choice (default: 3)")
-    work.add_argument("--report-only", action="store_true", help="run nothing, write the report of what there is")
-    work.add_argument("--program", type=_program, action="append", default=[], metavar="PRECISION=PATH",
-                      help="a built program (the launcher says which)")
+    work.add_argument("scenes", nargs="*", metavar="SCENE")
+    work.add_argument("--output", type=Path, default=Path("results/workprecision"), metavar="DIR")
+    work.add_argument("--repeats", type=int, default=3, metavar="N")
+    work.add_argument("--report-only", action="store_true")
+    work.add_argument("--program", type=_program, action="append", default=[], metavar="PREC=PATH")
 
 
 def _program(text: str) -> tuple:
@@ -148,68 +155,44 @@ def _program(text: str) -> tuple:
 
 
 def _add_sweep(verbs) -> None:
-    sweep = verbs.add_parser("sweep", help="run a table of runs that differ in some entries of one namelist")
-    sweep.add_argument("--program", type=Path, help="the built program (the launcher says which)")
+    sweep = verbs.add_parser("sweep")
+    sweep.add_argument("--program", type=Path)
     steps = sweep.add_subparsers(dest="step", required=True, metavar="make|run|collect")
 
-    make = steps.add_parser(
-        "make", help="check a table of runs, and lay out their folders",
-        usage="./polydem sweep make [TABLE.csv] BASE.nml [group.key=A,B,...]... --output FOLDER",
-        description="The table has a column name and one for each entry that differs, as scene.seed; an empty cell "
-                    "leaves the entry as BASE.nml has it. Listed values are combined with each other and with all "
-                    "rows; values with commas stand between semicolons: 'forces.gravity=0,-9.81;0,-1.62'.")
+    make = steps.add_parser("make")
     make.set_defaults(action=_sweep_make)
-    make.add_argument("words", nargs="+", metavar="WORD", help="table, namelist, lists of values")
-    make.add_argument("--output", type=Path, required=True, metavar="FOLDER", help="folder of the sweep")
-    make.add_argument("--cores", type=_count, default=1, metavar="N", help="checks at once (default: 1)")
+    make.add_argument("words", nargs="+", metavar="WORD")
+    make.add_argument("--output", type=Path, required=True, metavar="FOLDER")
+    make.add_argument("--cores", type=_count, default=1, metavar="N")
 
-    run = steps.add_parser(
-        "run", help="run what is not finished",
-        description="Ends with 0 if all runs are finished, 1 if some failed, 75 if it was asked to end (INT, TERM, "
-                    "HUP, USR1) before: the same command then goes on.")
+    run = steps.add_parser("run")
     run.set_defaults(action=_sweep_run)
-    run.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the sweep")
-    run.add_argument("--cores", type=_count, metavar="N", help="cores to use (default: all that there are)")
-    run.add_argument("--threads", type=_count, default=1, metavar="T", help="threads of each run (default: 1)")
-    run.add_argument("--rows", type=_numbers, metavar="A,B,C", help="only these rows of the table, counted from 1")
-    run.add_argument("--names", type=_words, metavar="A,B,C", help="only the runs of these names")
-    run.add_argument("--retry", action="store_true", help="run again what failed")
+    run.add_argument("folder", type=Path, metavar="FOLDER")
+    run.add_argument("--cores", type=_count, metavar="N")
+    run.add_argument("--threads", type=_count, default=1, metavar="T")
+    run.add_argument("--rows", type=_numbers, metavar="A,B,C")
+    run.add_argument("--names", type=_words, metavar="A,B,C")
+    run.add_argument("--retry", action="store_true")
 
-    collect = steps.add_parser("collect", help="write results.csv and results.h5 of what there is")
+    collect = steps.add_parser("collect")
     collect.set_defaults(action=_sweep_collect)
-    collect.add_argument("folder", type=Path, metavar="FOLDER", help="folder of the sweep")
+    collect.add_argument("folder", type=Path, metavar="FOLDER")
 
 
 def _add_scale(verbs) -> None:
-    scale = verbs.add_parser(
-        "scale", help="reckon the time of a step on many ranks from counts",
-        description="Prints Markdown: what the ranks of runs told each other, how wide the strips of ghosts are, and "
-                    "the time of a step on 1 to 4096 ranks with all that is assumed.")
+    scale = verbs.add_parser("scale")
     scale.set_defaults(action=_scale)
-    scale.add_argument("counts", type=Path, nargs="+", metavar="COUNTS",
-                       help="folders of runs on several ranks, files of --save, files of count_exchange")
-    scale.add_argument("--save", type=Path, metavar="FILE.csv", help="write the counts of the runs")
-    scale.add_argument("--bodies", type=_positives, default=[1e6], metavar="N,...",
-                       help="bodies of all ranks, a table for each (default: 1e6)")
-    scale.add_argument("--body", type=_positive, metavar="S",
-                       help="time of a step per body on one rank [s]; without it counts only")
-    for name, default, meaning in (
-        ("latency", 2e-6, "time of a message of no length [s]"),
-        ("bandwidth", 1e9, "of a rank [B/s]"),
-        ("ghost", 0.5, "what a ghost costs, in bodies"),
-        ("imbalance", 1.1, "work of the busiest rank over the mean"),
-        ("interval", 40.0, "steps between two settlements"),
-        ("settlement", 4.0, "what one costs, in steps of the own bodies"),
-        ("settled-bytes", 300.0, "what one tells of a ghost"),
-    ):
-        scale.add_argument(f"--{name}", type=_positive, default=default, metavar="X",
-                           help=f"{meaning} (default: {default:g})")
-    scale.add_argument("--sums", type=_count, default=2, metavar="K", help="sums over all ranks in a step (default: 2)")
-    scale.add_argument("--shape", help="packing that was counted: run, box or drum (default: run if there are runs, "
-                                       "else drum)")
-    scale.add_argument("--cut", default="bisection", help="bisection or morton (default: bisection)")
-    scale.add_argument("--margin", type=_positive, help="of runs in m (default: those that choose their own), of "
-                                                        "count_exchange in long axes of a grain (default: 0.2)")
+    scale.add_argument("counts", type=Path, nargs="+", metavar="COUNTS")
+    scale.add_argument("--save", type=Path, metavar="FILE.csv")
+    scale.add_argument("--bodies", type=_positives, default=[1e6], metavar="N,...")
+    scale.add_argument("--body", type=_positive, metavar="S")
+    for name, default in (("latency", 2e-6), ("bandwidth", 1e9), ("ghost", 0.5), ("imbalance", 1.1),
+                          ("interval", 40.0), ("settlement", 4.0), ("settled-bytes", 300.0)):
+        scale.add_argument(f"--{name}", type=_positive, default=default, metavar="X")
+    scale.add_argument("--sums", type=_count, default=2, metavar="K")
+    scale.add_argument("--shape")
+    scale.add_argument("--cut", default="bisection")
+    scale.add_argument("--margin", type=_positive)
 
 
 def _positives(text: str) -> list[float]:
@@ -249,7 +232,7 @@ def _plot(options: argparse.Namespace) -> None:
     trajectory = Trajectory(options.result)
     if len(trajectory) == 0:
         raise ResultError(f"{options.result}: holds no frames")
-    numbers = options.frames if options.frames else [-1 if options.frame is None else options.frame]
+    numbers = options.frames or [-1 if options.frame is None else options.frame]
     figure = plot_frames(trajectory, numbers, options.colour, options.contacts)
     path = options.output or trajectory.folder / _picture_name(trajectory, numbers)
     save(figure, path)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 
 import h5py
@@ -182,7 +182,7 @@ class Bench:
         return next(case.provenance for case in self.cases if case.machine == machine)
 
 
-@lru_cache(maxsize=None)
+@cache
 def _settings(text: str) -> dict:
     return settings_of(text)
 

@@ -122,6 +122,7 @@ def count_hardware(command: list[str]) -> dict:
             env=_environment(),
             capture_output=True,
             text=True,
+            check=False,
         )
         return _hardware_events(out.read()) if done.returncode == 0 else {}
 
@@ -132,7 +133,7 @@ def _hardware_events(text: str) -> dict:
 
 
 def _run(command: list[str]) -> None:
-    done = subprocess.run(command, env=_environment(), capture_output=True, text=True)
+    done = subprocess.run(command, env=_environment(), capture_output=True, text=True, check=False)
     if done.returncode != 0:
         last = "\n".join((done.stderr or done.stdout).strip().splitlines()[-5:])
         hint = ""

@@ -6,9 +6,9 @@ import numpy as np
 
 from . import paper, series
 from .bench import Bench
-from .paper_tables import clock_of
 from .cache import read_records
 from .claims import NOT_TESTABLE, Finding, Missing, claim, needed, of_parts, word
+from .paper_tables import clock_of
 from .series import SWEEP, TREE
 from .statistics import every, median, number, of_one_bench, pooled, ratio_of_means, ratio_of_medians, some
 

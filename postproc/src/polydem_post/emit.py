@@ -37,7 +37,7 @@ LATEX = {
 
 
 def printable(text: str) -> str:
-    """A text without what steers a terminal, which files may hold: such letters are written as \\x1b."""
+    r"""A text without what steers a terminal, which files may hold: such letters are written as \x1b."""
     text = text.encode("utf-8", errors="backslashreplace").decode("utf-8")
     return STEERING.sub(lambda match: repr(match.group())[1:-1], text)
 

@@ -88,6 +88,7 @@ class Sample:
 
     @property
     def choice(self) -> Choice:
+        """The settings of the run."""
         return Choice(self.scene, self.model, self.numerics, self.precision, self.steps)
 
     @property
@@ -197,7 +198,7 @@ class Study:
         """Whether the program refused the same model or numerics, or stopped in the same run."""
         for sample in self.samples:
             same = (sample.scene, sample.model, sample.numerics) == (choice.scene, choice.model, choice.numerics)
-            if same and sample.status == "refused" or sample.choice == choice and sample.status == "stopped":
+            if (same and sample.status == "refused") or (sample.choice == choice and sample.status == "stopped"):
                 return True
         return False
 

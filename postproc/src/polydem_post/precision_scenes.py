@@ -46,6 +46,7 @@ class Model:
 
     @property
     def name(self) -> str:
+        """The three laws, as in tables."""
         return f"{self.law}/{self.damping}/{self.friction}"
 
     def overrides(self) -> list[str]:
@@ -111,6 +112,7 @@ class Scene:
 
     @property
     def namelist(self) -> Path:
+        """The input file of the scene."""
         return INPUTS / f"{self.name}.nml"
 
     @property

@@ -13,7 +13,6 @@ from .slope_tables import slopes
 from .targets import targets
 from .trajectory import ResultError
 
-
 #: File that says what made the numbers of the tables beside it, since CSV has no room for that
 ORIGIN = "revision.txt"
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 
@@ -221,7 +221,7 @@ def _draws(n: int, stream: int = 0) -> np.ndarray:
     return np.random.default_rng([SEED, stream]).integers(0, n, size=(DRAWS, n))
 
 
-@lru_cache(maxsize=None)
+@cache
 def _tail(n: int) -> float:
     """Probability that is cut off at each end of the draws from n repeats."""
     quantile = -_student(0.5 * (1.0 - CONFIDENCE), n - 1) * math.sqrt(n / (n - 1))

@@ -77,7 +77,7 @@ def read_outcome(sweep: Sweep, run: Run) -> Outcome:
     attempts = run.attempts()
     facts = outcome.facts
     facts.update(state=state_of(run), attempts=len(attempts))
-    if facts["state"] == RUNNING or not attempts and facts["state"] != FINISHED:
+    if facts["state"] == RUNNING or (not attempts and facts["state"] != FINISHED):
         return outcome
     if attempts:
         facts.update(exit_code=attempts[-1]["exit_code"], threads=attempts[-1]["threads"],

@@ -167,7 +167,7 @@ class WorkPrecision:
     def _point(self, choice: Choice, repeats: list) -> Point | None:
         measured = next((sample.values for sample in repeats if sample.result), None)
         known = self.references.get((choice.scene, choice.model))
-        if measured is None or known is None and SCENES[choice.scene].reference > 0:
+        if measured is None or (known is None and SCENES[choice.scene].reference > 0):
             return None
         rms, worst, growth = errors_of(measured, known.values if known else None)
         duration = repeats[0].duration

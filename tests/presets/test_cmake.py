@@ -1,0 +1,121 @@
+"""CMake: the compiler that it wants, the revision that it asks for, what it installs, and its workflows.
+
+usage: test_cmake.py SOURCES BUILD CMAKE      sources, a built folder, the program cmake
+"""
+
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SOURCES = BUILD = pathlib.Path()
+CMAKE = ""
+
+
+def call(*words, **options):
+    """Exit code, output and messages of a command."""
+    done = subprocess.run([str(word) for word in words], capture_output=True, text=True, check=False, **options)
+    return done.returncode, done.stdout, done.stderr
+
+
+class Scene(unittest.TestCase):
+    """An empty folder for each test."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+
+class Compiler(Scene):
+    def test_only_a_new_gfortran_is_accepted(self):
+        for name, version, accepted in (("GNU", "12.2.0", True), ("GNU", "15.1", True), ("GNU", "11.4.0", False),
+                                        ("LLVMFlang", "20.1", False), ("IntelLLVM", "2025.0", False), ("", "", False)):
+            with self.subTest(compiler=name, version=version):
+                code, _, message = call(CMAKE, "-D", f"CMAKE_Fortran_COMPILER_ID={name}", "-D",
+                                        f"CMAKE_Fortran_COMPILER_VERSION={version}", "-D",
+                                        "CMAKE_Fortran_COMPILER=/opt/it", "-P", SOURCES / "src/cmake/compiler.cmake")
+                self.assertEqual(code == 0, accepted, message)
+                if not accepted:
+                    sentence = f"polydem needs gfortran 12 or newer, but /opt/it is {name} {version}."
+                    self.assertIn(sentence, " ".join(message.split()).replace("is .", "is  ."))
+
+    def test_the_project_refuses_another_compiler(self):
+        code, _, message = call(CMAKE, "-S", SOURCES, "-B", self.folder, "-G", "Ninja",
+                                "-D", "CMAKE_Fortran_COMPILER_FORCED=1", "-D", "CMAKE_Fortran_COMPILER_ID_RUN=1",
+                                "-D", "CMAKE_Fortran_COMPILER_ID=LLVMFlang", "-D", "CMAKE_Fortran_COMPILER_VERSION=20")
+        self.assertNotEqual(code, 0)
+        self.assertIn("polydem needs gfortran 12 or newer", message)
+
+
+class Revision(Scene):
+    def setUp(self):
+        super().setUp()
+        self.clone = self.folder / "clone"
+        self.clone.mkdir()
+
+    def git(self, *words):
+        code, output, message = call("git", "-c", "user.name=n", "-c", "user.email=e", *words, cwd=self.clone)
+        self.assertEqual(code, 0, message)
+        return output.strip()
+
+    def ask(self):
+        """The revision in a new build_info.f90."""
+        result = self.folder / "build_info.f90"
+        room = SOURCES / "src/output"
+        code, _, message = call(CMAKE, "-D", f"TEMPLATE={room / 'build_info.f90.in'}", "-D", f"RESULT={result}",
+                                "-D", f"SOURCE_DIR={self.clone}", "-D", "VERSION=1", "-D", "BUILD_TYPE=Release",
+                                "-D", "NATIVE=OFF", "-P", room / "build_info.cmake")
+        self.assertEqual(code, 0, message)
+        return result.read_text(encoding="utf-8").split("git_revision = '")[1].split("'")[0]
+
+    def test_the_revision_follows_commits_and_edits_and_outlives_git(self):
+        self.assertEqual(self.ask(), "unknown")
+        self.git("init", "--quiet")
+        (self.clone / "a").write_text("a\n", encoding="utf-8")
+        self.git("add", "a")
+        self.git("commit", "--quiet", "--message", "first")
+        first = self.git("rev-parse", "--short", "HEAD")
+        self.assertEqual(self.ask(), first)
+        (self.clone / "a").write_text("b\n", encoding="utf-8")
+        self.assertEqual(self.ask(), f"{first}-dirty")
+        self.git("commit", "--quiet", "--all", "--message", "second")
+        second = self.git("rev-parse", "--short", "HEAD")
+        self.assertNotEqual(first, second)
+        self.assertEqual(self.ask(), second)
+        (self.clone / ".git").rename(self.clone / "gone")
+        self.assertEqual(self.ask(), second)
+
+
+class Install(Scene):
+    def test_an_installed_program_runs(self):
+        code, _, message = call(CMAKE, "--install", BUILD, "--prefix", self.folder)
+        self.assertEqual(code, 0, message)
+        program = self.folder / "bin/polydem"
+        self.assertEqual(call(program, "--version"), call(BUILD / "src/app/polydem", "--version"))
+        self.assertEqual(call(program, "--version")[0], 0)
+        self.assertEqual(call(program, "help", "run")[1].split()[:3], ["usage:", "polydem", "run"])
+        code, output, message = call(program, "check", self.folder / "share/polydem/inputs/stack.nml", cwd=self.folder)
+        self.assertEqual(code, 0, output + message)
+        self.assertTrue((self.folder / "share/doc/polydem/LICENSE").exists())
+
+
+class Workflows(unittest.TestCase):
+    def test_workflows_configure_build_and_test(self):
+        presets = json.loads((SOURCES / "CMakePresets.json").read_text(encoding="utf-8"))
+        self.assertEqual([flow["name"] for flow in presets["workflowPresets"]], ["release", "debug", "sanitize"])
+        for flow in presets["workflowPresets"]:
+            steps = [(step["type"], step["name"]) for step in flow["steps"]]
+            self.assertEqual(steps, [(kind, flow["name"]) for kind in ("configure", "build", "test")])
+        # CMake reads the whole file and refuses steps that it does not know.
+        code, output, message = call(CMAKE, "--workflow", "--list-presets", cwd=SOURCES)
+        self.assertEqual((code, message), (0, ""))
+        for flow in presets["workflowPresets"]:
+            self.assertIn(f'"{flow["name"]}"', output)
+
+
+if __name__ == "__main__":
+    SOURCES, BUILD, CMAKE = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), sys.argv[3]
+    unittest.main(argv=sys.argv[:1], verbosity=2)
