@@ -202,7 +202,7 @@ contains
       character(len=:), allocatable :: message
 
       message = path//' blocks a file of the result: no '//manifest_name//' lists it, so it is neither changed nor '// &
-         'removed. Move it away, or choose another folder with --set output.folder=NAME. (Results of older '// &
+         'removed. Move the file away, or choose another folder with --set output.folder=NAME. (Results of older '// &
          'versions of this program have no '//manifest_name//'.)'
    end function conflict_text
 

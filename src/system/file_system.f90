@@ -3,6 +3,7 @@ module polydem_file_system
    use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_int64_t, c_loc, c_null_char, c_ptr, c_size_t
    use polydem_errors, only: error_t, io_error, raise
    use polydem_kinds, only: lp
+   use polydem_posix, only: c_close, c_open, c_strlen, c_write, error_number
    implicit none
    private
    public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_space, sync_file, overwrite_start
@@ -72,21 +73,6 @@ module polydem_file_system
          character(kind=c_char), intent(in) :: path(*)
       end function c_unlink
 
-      !> POSIX open(2) of an existing file; only new files need the mode
-      integer(c_int) function c_open(path, flags) bind(C, name='open')
-         import :: c_char, c_int
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int), value :: flags
-      end function c_open
-
-      !> POSIX write(2); ssize_t is as wide as size_t
-      integer(c_size_t) function c_write(descriptor, bytes, length) bind(C, name='write')
-         import :: c_int, c_ptr, c_size_t
-         integer(c_int), value :: descriptor
-         type(c_ptr), value :: bytes
-         integer(c_size_t), value :: length
-      end function c_write
-
       !> POSIX fsync(2)
       integer(c_int) function c_fsync(descriptor) bind(C, name='fsync')
          import :: c_int
@@ -108,28 +94,11 @@ module polydem_file_system
          integer(c_int64_t), value :: offset, length
       end function c_fallocate
 
-      !> POSIX close(2)
-      integer(c_int) function c_close(descriptor) bind(C, name='close')
-         import :: c_int
-         integer(c_int), value :: descriptor
-      end function c_close
-
-      !> Address of errno (Linux)
-      type(c_ptr) function errno_location() bind(C, name='__errno_location')
-         import :: c_ptr
-      end function errno_location
-
       !> POSIX strerror(3)
       type(c_ptr) function c_strerror(number) bind(C, name='strerror')
          import :: c_int, c_ptr
          integer(c_int), value :: number
       end function c_strerror
-
-      !> C strlen
-      integer(c_size_t) function c_strlen(text) bind(C, name='strlen')
-         import :: c_ptr, c_size_t
-         type(c_ptr), value :: text
-      end function c_strlen
    end interface
 
 contains
@@ -243,17 +212,15 @@ contains
       !> Allocated if the space is not available
       type(error_t), allocatable, intent(inout) :: error
       integer(c_int) :: descriptor
-      integer(c_int), pointer :: number
 
-      descriptor = c_open(path//c_null_char, write_only)
+      descriptor = c_open(path//c_null_char, write_only, 0_c_int)
       if (descriptor < 0_c_int) then
          call raise(error, io_error, "cannot open '"//path//"' for writing: "//last_failure())
          return
       end if
-      call c_f_pointer(errno_location(), number)
       if (c_fallocate(descriptor, keep_size, 0_c_int64_t, &
                       c_lseek(descriptor, 0_c_int64_t, to_end) + int(bytes, c_int64_t)) /= 0_c_int) then
-         if (any(no_space == number)) call raise(error, io_error, path//': '//last_failure()//disk_hint)
+         if (any(no_space == error_number())) call raise(error, io_error, path//': '//last_failure()//disk_hint)
       end if
       if (c_close(descriptor) /= 0_c_int) call raise(error, io_error, path//': '//last_failure()//disk_hint)
    end subroutine reserve_space
@@ -266,7 +233,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(c_int) :: descriptor
 
-      descriptor = c_open(path//c_null_char, read_and_write)
+      descriptor = c_open(path//c_null_char, read_and_write, 0_c_int)
       if (descriptor >= 0_c_int) then
          if (c_close(descriptor) == 0_c_int) return
       end if
@@ -291,7 +258,7 @@ contains
       do k = 1, len(text)
          bytes(k) = text(k:k)
       end do
-      descriptor = c_open(path//c_null_char, write_only)
+      descriptor = c_open(path//c_null_char, write_only, 0_c_int)
       if (descriptor < 0_c_int) reason = last_failure()
       n = 0
       do while (n < len(text) .and. .not. allocated(reason))
@@ -317,7 +284,7 @@ contains
       integer(c_int) :: descriptor, status
       character(len=:), allocatable :: reason
 
-      descriptor = c_open(path//c_null_char, read_only)
+      descriptor = c_open(path//c_null_char, read_only, 0_c_int)
       if (descriptor < 0_c_int) then
          call raise(error, io_error, "cannot open '"//path//"' to flush it to disk: "//last_failure())
          return
@@ -331,10 +298,8 @@ contains
    !> Error message of the operating system for its last failed call
    function last_failure() result(reason)
       character(len=:), allocatable :: reason
-      integer(c_int), pointer :: number
 
-      call c_f_pointer(errno_location(), number)
-      reason = errno_message(number)
+      reason = errno_message(error_number())
    end function last_failure
 
    !> Error message of the operating system for a value of errno

@@ -1,10 +1,10 @@
 !> Contents of folders (POSIX, GNU C library on Linux): lists of names, links, canonical paths, and the bytes of small
 !> files.
 module polydem_folders
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_null_char, c_null_ptr, c_ptr, &
-      c_size_t
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_null_char, c_null_ptr, c_ptr
    use polydem_errors, only: error_t, io_error, raise
    use polydem_file_system, only: last_failure
+   use polydem_posix, only: c_free, c_strlen
    implicit none
    private
    public :: link_exists, list_names, read_bytes, remove_folder, canonical_path
@@ -59,18 +59,6 @@ module polydem_folders
          character(kind=c_char), intent(in) :: path(*)
          type(c_ptr), value :: resolved
       end function c_realpath
-
-      !> C strlen
-      integer(c_size_t) function c_strlen(text) bind(C, name='strlen')
-         import :: c_ptr, c_size_t
-         type(c_ptr), value :: text
-      end function c_strlen
-
-      !> C free
-      subroutine c_free(memory) bind(C, name='free')
-         import :: c_ptr
-         type(c_ptr), value :: memory
-      end subroutine c_free
    end interface
 
 contains

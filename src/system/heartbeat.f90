@@ -10,6 +10,7 @@ module polydem_heartbeat
    use polydem_clock, only: wall_seconds
    use polydem_kinds, only: dp
    use polydem_lock_file, only: lock_file_t, read_record, record_length
+   use polydem_posix, only: c_close, c_free
    implicit none
    private
    public :: heartbeat_t, n_digits
@@ -103,23 +104,11 @@ module polydem_heartbeat
          integer(c_int), value :: milliseconds
       end function c_poll
 
-      !> POSIX close(2)
-      integer(c_int) function c_close(descriptor) bind(C, name='close')
-         import :: c_int
-         integer(c_int), value :: descriptor
-      end function c_close
-
       !> C malloc
       type(c_ptr) function c_malloc(size) bind(C, name='malloc')
          import :: c_ptr, c_size_t
          integer(c_size_t), value :: size
       end function c_malloc
-
-      !> C free
-      subroutine c_free(memory) bind(C, name='free')
-         import :: c_ptr
-         type(c_ptr), value :: memory
-      end subroutine c_free
    end interface
 
 contains

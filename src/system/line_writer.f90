@@ -3,10 +3,11 @@
 !> Every written line survives a crash of the program, and every failure is detected. The Fortran `flush` statement does
 !> not report a full disk.
 module polydem_line_writer
-   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_loc, c_new_line, c_null_char, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_loc, c_new_line, c_null_char, c_size_t
    use, intrinsic :: iso_fortran_env, only: output_unit
    use polydem_errors, only: error_t, io_error, raise
    use polydem_file_system, only: exists, last_failure
+   use polydem_posix, only: c_close, c_open, c_write, error_number
    implicit none
    private
    public :: line_writer_t
@@ -50,32 +51,6 @@ module polydem_line_writer
          character(kind=c_char), intent(in) :: path(*)
          integer(c_int), value :: mode
       end function c_creat
-
-      !> POSIX open(2) of an existing file
-      integer(c_int) function c_open(path, flags) bind(C, name='open')
-         import :: c_char, c_int
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int), value :: flags
-      end function c_open
-
-      !> POSIX write(2); ssize_t is as wide as size_t
-      integer(c_size_t) function c_write(descriptor, bytes, length) bind(C, name='write')
-         import :: c_int, c_ptr, c_size_t
-         integer(c_int), value :: descriptor
-         type(c_ptr), value :: bytes
-         integer(c_size_t), value :: length
-      end function c_write
-
-      !> POSIX close(2)
-      integer(c_int) function c_close(descriptor) bind(C, name='close')
-         import :: c_int
-         integer(c_int), value :: descriptor
-      end function c_close
-
-      !> Address of errno (Linux)
-      type(c_ptr) function errno_location() bind(C, name='__errno_location')
-         import :: c_ptr
-      end function errno_location
    end interface
 
 contains
@@ -96,7 +71,7 @@ contains
       appends = exists(path)
       if (appends) appends = present(appended)
       if (appends) appends = appended
-      if (appends) self%descriptor = c_open(path//c_null_char, write_and_append)
+      if (appends) self%descriptor = c_open(path//c_null_char, write_and_append, 0_c_int)
       if (.not. appends) self%descriptor = c_creat(path//c_null_char, read_and_write)
       if (self%descriptor < 0_c_int) call raise(error, io_error, path//': cannot be written: '//last_failure())
    end subroutine open_writer
@@ -125,8 +100,8 @@ contains
       !> The text
       character(len=*), intent(in) :: text
       character(kind=c_char), target :: bytes(len(text))
+      integer(c_int) :: number
       integer(c_size_t) :: written
-      integer(c_int), pointer :: number
       integer :: k, n, ignored
 
       if (self%descriptor < 0_c_int .or. allocated(self%failure)) return
@@ -138,7 +113,7 @@ contains
       do while (n < len(text))
          written = c_write(self%descriptor, c_loc(bytes(n + 1)), int(len(text) - n, c_size_t))
          if (written <= 0_c_size_t) then
-            call c_f_pointer(errno_location(), number)
+            number = error_number()
             if (self%is_screen() .and. number == broken_pipe) then
                self%descriptor = -1_c_int
             else

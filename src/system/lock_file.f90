@@ -5,8 +5,9 @@
 !> zombie. Closing another descriptor of the same file does not release the lock (unlike a lock of fcntl(2)). All
 !> descriptors are closed by exec(3).
 module polydem_lock_file
-   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_int64_t, c_null_char, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char, c_size_t
    use polydem_file_system, only: last_failure
+   use polydem_posix, only: c_close, c_open, error_number
    implicit none
    private
    public :: lock_file_t, read_record, record_length
@@ -41,13 +42,6 @@ module polydem_lock_file
       exists_already = 17_c_int, no_folder = 20_c_int, stale = 116_c_int
 
    interface
-      !> POSIX open(2)
-      integer(c_int) function c_open(path, flags, mode) bind(C, name='open')
-         import :: c_char, c_int
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int), value :: flags, mode
-      end function c_open
-
       !> flock(2)
       integer(c_int) function c_flock(descriptor, operation) bind(C, name='flock')
          import :: c_int
@@ -71,17 +65,6 @@ module polydem_lock_file
          integer(c_size_t), value :: length
          integer(c_int64_t), value :: offset
       end function c_pwrite
-
-      !> POSIX close(2)
-      integer(c_int) function c_close(descriptor) bind(C, name='close')
-         import :: c_int
-         integer(c_int), value :: descriptor
-      end function c_close
-
-      !> Address of errno (Linux)
-      type(c_ptr) function errno_location() bind(C, name='__errno_location')
-         import :: c_ptr
-      end function errno_location
    end interface
 
 contains
@@ -177,13 +160,5 @@ contains
       length = int(c_pread(descriptor, text, int(record_length, c_size_t), 0_c_int64_t))
       ignored = c_close(descriptor)
    end subroutine read_record
-
-   !> Value of errno
-   integer(c_int) function error_number()
-      integer(c_int), pointer :: number
-
-      call c_f_pointer(errno_location(), number)
-      error_number = number
-   end function error_number
 
 end module polydem_lock_file

@@ -9,6 +9,7 @@ module polydem_process_limits
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: errno_message, last_failure
    use polydem_kinds, only: ip, lp
+   use polydem_posix, only: c_close
    use polydem_strings, only: to_text
    implicit none
    private
@@ -93,12 +94,6 @@ module polydem_process_limits
          character(kind=c_char), intent(out) :: bytes(*)
          integer(c_size_t), value :: length
       end function c_read
-
-      !> POSIX close(2)
-      integer(c_int) function c_close(descriptor) bind(C, name='close')
-         import :: c_int
-         integer(c_int), value :: descriptor
-      end function c_close
    end interface
 
 contains

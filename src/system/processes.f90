@@ -1,7 +1,8 @@
 !> Processes of this machine (POSIX): identifier of this process, state of another process, and waiting.
 module polydem_processes
-   use, intrinsic :: iso_c_binding, only: c_f_pointer, c_int, c_null_ptr, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_int, c_null_ptr, c_ptr, c_size_t
    use polydem_kinds, only: dp, ip
+   use polydem_posix, only: error_number
    use polydem_strings, only: to_text
    implicit none
    private
@@ -33,11 +34,6 @@ module polydem_processes
          integer(c_size_t), value :: n
          integer(c_int), value :: milliseconds
       end function c_poll
-
-      !> Address of errno (Linux)
-      type(c_ptr) function errno_location() bind(C, name='__errno_location')
-         import :: c_ptr
-      end function errno_location
    end interface
 
 contains
@@ -51,13 +47,11 @@ contains
    logical function is_running(process)
       !> Process identifier; the result is false below 1
       integer(ip), intent(in) :: process
-      integer(c_int), pointer :: number
 
       is_running = .false.
       if (process < 1_ip) return
       is_running = c_kill(int(process, c_int), no_signal) == 0_c_int
-      call c_f_pointer(errno_location(), number)
-      if (.not. is_running) is_running = number /= no_such_process
+      if (.not. is_running) is_running = error_number() /= no_such_process
       if (is_running) is_running = .not. has_ended(process)
    end function is_running
 

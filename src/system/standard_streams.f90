@@ -1,6 +1,7 @@
 !> Standard input, output and error of this process (POSIX).
 module polydem_standard_streams
-   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char
+   use, intrinsic :: iso_c_binding, only: c_int, c_null_char
+   use polydem_posix, only: c_close, c_open
    implicit none
    private
    public :: open_closed_streams
@@ -9,21 +10,6 @@ module polydem_standard_streams
    integer(c_int), parameter :: standard_error = 2_c_int
    !> O_RDWR of open(2)
    integer(c_int), parameter :: read_and_write = 2_c_int
-
-   interface
-      !> POSIX open(2) of an existing file
-      integer(c_int) function c_open(path, flags) bind(C, name='open')
-         import :: c_char, c_int
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int), value :: flags
-      end function c_open
-
-      !> POSIX close(2)
-      integer(c_int) function c_close(descriptor) bind(C, name='close')
-         import :: c_int
-         integer(c_int), value :: descriptor
-      end function c_close
-   end interface
 
 contains
 
@@ -35,7 +21,7 @@ contains
       descriptor = 0_c_int
       ! A new descriptor gets the lowest free number.
       do while (descriptor >= 0_c_int .and. descriptor <= standard_error)
-         descriptor = c_open('/dev/null'//c_null_char, read_and_write)
+         descriptor = c_open('/dev/null'//c_null_char, read_and_write, 0_c_int)
       end do
       if (descriptor > standard_error) ignored = c_close(descriptor)
    end subroutine open_closed_streams

@@ -9,6 +9,7 @@ module polydem_time_limit
       c_null_char, c_null_ptr, c_ptr, c_size_t
    use polydem_errors, only: io_error
    use polydem_kinds, only: dp, ip, lp
+   use polydem_posix, only: c_free, c_strlen, c_write
    use polydem_strings, only: to_text
    implicit none
    private
@@ -88,26 +89,6 @@ module polydem_time_limit
          import :: c_char, c_ptr
          character(kind=c_char), intent(in) :: text(*)
       end function c_strdup
-
-      !> C strlen
-      integer(c_size_t) function c_strlen(text) bind(C, name='strlen')
-         import :: c_ptr, c_size_t
-         type(c_ptr), value :: text
-      end function c_strlen
-
-      !> C free
-      subroutine c_free(memory) bind(C, name='free')
-         import :: c_ptr
-         type(c_ptr), value :: memory
-      end subroutine c_free
-
-      !> POSIX write(2); ssize_t is as wide as size_t
-      integer(c_size_t) function c_write(descriptor, bytes, length) bind(C, name='write')
-         import :: c_int, c_ptr, c_size_t
-         integer(c_int), value :: descriptor
-         type(c_ptr), value :: bytes
-         integer(c_size_t), value :: length
-      end function c_write
 
       !> POSIX _exit(2)
       subroutine c_exit_now(code) bind(C, name='_exit')
