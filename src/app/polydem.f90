@@ -10,6 +10,7 @@ program polydem
    use polydem_check_result, only: check_result
    use polydem_command_line, only: command_t, read_command_line, usage
    use polydem_communicator, only: communicator_t
+   use polydem_convert_file, only: convert_file
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: start_library
    use polydem_kinds, only: dp, ip
@@ -65,7 +66,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(settings_t) :: settings
       type(bench_settings_t) :: bench
-      character(len=:), allocatable :: crowd
+      character(len=:), allocatable :: crowd, report
 
       if (command%help) then
          call print_line(usage(command%verb), error)
@@ -98,6 +99,9 @@ contains
          call read_bench(command%file, command%overrides, bench, error)
          if (.not. allocated(error)) call check_threads(maxval(bench%threads), error)
          if (.not. allocated(error)) call run_bench(bench, error)
+      case ('convert')
+         call convert_file(command%file, command%output, report, error)
+         if (.not. allocated(error)) call print_line(report, error)
       case default
          if (command%file == '') call describe_program(error)
          if (command%checks) then
@@ -114,7 +118,7 @@ contains
       type(command_t), intent(in) :: command
       type(error_t), allocatable, intent(inout) :: error
 
-      if (command%verb == 'info') return
+      if (command%verb == 'info' .or. command%verb == 'convert') return
       if (command%threads > 0) then
          call check_threads(int(command%threads, ip), error)
          if (.not. allocated(error)) call omp_set_num_threads(command%threads)

@@ -15,7 +15,7 @@ module polydem_named_values
 
    !> The entries of one frame; the caller chooses them
    type :: named_values_t
-      !> Name of each entry, which is also the name of its data set in /ledger
+      !> Name of each entry, which is also the name of its data set in /energy_balance
       character(len=name_length), allocatable :: name(:)
       !> Unit of each entry; 1 if it is dimensionless
       character(len=unit_length), allocatable :: unit(:)

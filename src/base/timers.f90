@@ -7,7 +7,8 @@ module polydem_timers
    implicit none
    private
    public :: timers_t, n_stages, stage_names
-   public :: stage_boxes, stage_neighbours, stage_overlap, stage_forces, stage_integrate, stage_exchange, stage_output
+   public :: stage_boxes, stage_neighbours, stage_overlap, stage_forces, stage_integrate
+   public :: stage_decomposition, stage_output
 
    !> Indices of the stages
    integer, parameter :: stage_boxes = 1
@@ -15,13 +16,13 @@ module polydem_timers
    integer, parameter :: stage_overlap = 3
    integer, parameter :: stage_forces = 4
    integer, parameter :: stage_integrate = 5
-   integer, parameter :: stage_exchange = 6
+   integer, parameter :: stage_decomposition = 6
    integer, parameter :: stage_output = 7
    !> Number of timed stages
    integer, parameter :: n_stages = 7
    !> Names of the stages, in the order of the constants above
    character(len=*), parameter :: stage_names(n_stages) = &
-      [character(len=10) :: 'boxes', 'neighbours', 'overlap', 'forces', 'integrate', 'exchange', 'output']
+      [character(len=13) :: 'boxes', 'neighbours', 'overlap', 'forces', 'integrate', 'decomposition', 'output']
 
    !> Stopwatches, one per stage; a stage that does not run is not timed
    type :: timers_t

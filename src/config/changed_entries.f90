@@ -6,9 +6,10 @@ module polydem_changed_entries
    public :: changed_entries
 
    !> Entries that do not affect the computed result
-   character(len=*), parameter :: harmless(*) = [character(len=19) :: 'output.folder', 'checkpoint.steps', &
-                                                 'checkpoint.interval', 'checkpoint.elapsed', 'exchange.cut', &
-                                                 'exchange.margin', 'exchange.balance', 'exchange.imbalance']
+   character(len=*), parameter :: harmless(*) = [character(len=23) :: 'output.folder', 'checkpoint.steps', &
+                                                 'checkpoint.interval', 'checkpoint.elapsed', &
+                                                 'decomposition.partition', 'decomposition.margin', &
+                                                 'decomposition.balance', 'decomposition.imbalance']
 
 contains
 

@@ -43,7 +43,7 @@ contains
          call check_container(scene%radius, 'radius', scene, values, error)
          call check_container(scene%opening, 'opening', scene, values, error)
          if (any(scene%name == grain_scenes)) call check_container(scene%width, 'width', scene, values, error)
-         call require(scene%movers <= scene%bodies, 'must not exceed', 'movers', 'bodies', values, error)
+         call require(scene%moving_grains <= scene%bodies, 'must not exceed', 'moving_grains', 'bodies', values, error)
          call require(scene%size_ratio <= 1.0_wp .or. scene%packing == '', &
             'above 1 cannot be combined with', 'size_ratio', 'packing', values, error)
          call require(scene%size_ratio <= 1.0_wp .or. .not. scene%overlap, &
@@ -65,9 +65,9 @@ contains
                'because a smaller value needs a very small time step; omit it to use ''damping_coefficient''')
          end if
       end associate
-      if (settings%guards%energy /= 'off' .and. .not. settings%output%ledger) then
+      if (settings%guards%energy /= 'off' .and. .not. settings%output%energy_balance) then
          call raise(error, input_error, values(first_row('guards', 'energy'))%place// &
-            ': ''energy'' in &guards needs ''ledger'' = .true. in &output')
+            ': ''energy'' in &guards needs ''energy_balance'' = .true. in &output')
       end if
    end subroutine check_settings
 

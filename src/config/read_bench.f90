@@ -2,7 +2,7 @@
 module polydem_read_bench
    use polydem_bench_settings, only: bench_settings_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_fill_settings, only: fill_bench
+   use polydem_fill_groups, only: fill_bench
    use polydem_namelist_entries, only: bench_group, first_row
    use polydem_namelist_tokens, only: source_t
    use polydem_namelist_values, only: value_t
@@ -62,7 +62,9 @@ contains
       bench%file = trim(file_name)
       bench%text = normalise_line_ends(text)
       bench%resolved = resolved_text(values)
-      call fill_bench(values, bench)
+      call fill_bench(values, bench%bench_group_t)
+      bench%scenes_place = values(first_row(bench_group, 'scenes'))%place
+      bench%prepare_place = values(first_row(bench_group, 'prepare'))%place
       call check_bench(bench, values, error)
    end subroutine read_bench_text
 

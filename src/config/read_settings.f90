@@ -7,7 +7,7 @@ module polydem_read_settings
    use polydem_check_settings, only: check_settings
    use polydem_errors, only: error_t
    use polydem_exclusive_entries, only: resolve_exclusive_entries
-   use polydem_fill_settings, only: fill_settings
+   use polydem_fill_groups, only: fill_groups
    use polydem_namelist_tokens, only: source_t
    use polydem_namelist_values, only: value_t
    use polydem_resolve_entries, only: resolve_entries, resolved_text
@@ -66,7 +66,7 @@ contains
          settings%places(k)%text = settings%file
          if (allocated(values(k)%place)) settings%places(k)%text = values(k)%place
       end do
-      call fill_settings(values, settings)
+      call fill_groups(values, settings%group_settings_t)
       call check_settings(settings, values, error)
    end subroutine read_settings_text
 

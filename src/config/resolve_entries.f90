@@ -6,6 +6,7 @@
 !> error.
 module polydem_resolve_entries
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_former_words, only: present_group, present_key, present_value, renaming
    use polydem_kinds, only: ip, wp
    use polydem_namelist_entries, only: bench_group, entries, entry_t, first_row, group_length, groups, keys_of, required
    use polydem_namelist_statements, only: read_statements, statement_t
@@ -98,6 +99,8 @@ contains
       logical, intent(in) :: of_bench
       type(error_t), allocatable, intent(inout) :: error
 
+      call refuse_former_words(statement, error)
+      if (allocated(error)) return
       if (all(groups() /= statement%group)) then
          call raise(error, input_error, statement%place//': unknown group &'//statement%group// &
             suggestion(statement%group, pack(groups(), (groups() == bench_group) .eqv. of_bench)))
@@ -108,10 +111,61 @@ contains
          call raise(error, input_error, statement%place// &
             ': group &bench belongs to a bench; use polydem bench FILE.nml')
       else if (statement%key /= '' .and. first_row(statement%group, statement%key) == 0) then
+         call raise_unknown_key(statement, error)
+      end if
+   end subroutine check_names
+
+   !> Refuse a group, key or value that has another name now.
+   pure subroutine refuse_former_words(statement, error)
+      type(statement_t), intent(in) :: statement
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: group, key, name, text, value
+      integer :: k
+
+      group = present_group(statement%group)
+      key = present_key(group, statement%key)
+      text = ''
+      do k = size(statement%values), 1, -1
+         value = trim(statement%values(k)%text)
+         name = present_value(group, key, value)
+         if (name /= value) text = renaming(group, key, value, name)
+      end do
+      if (key /= statement%key) text = renaming(group, statement%key, '', key)
+      if (group /= statement%group) text = renaming(statement%group, '', '', group)
+      if (group /= statement%group .and. statement%key /= '') &
+         text = statement%group//'.'//statement%key//' is now '//group//'.'//key
+      if (text == '') return
+      if (.not. statement%is_override) then
+         text = text//'; ./polydem convert '//statement%place(:index(statement%place, ':', back=.true.) - 1)// &
+            ' rewrites the file'
+      end if
+      call raise(error, input_error, statement%place//': '//text)
+   end subroutine refuse_former_words
+
+   !> Raise an error about a key that the group does not have. The message names the groups that have it.
+   pure subroutine raise_unknown_key(statement, error)
+      type(statement_t), intent(in) :: statement
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=group_length), allocatable :: names(:)
+      character(len=:), allocatable :: owners
+      integer :: k
+
+      names = groups()
+      owners = ''
+      do k = 1, size(names)
+         if ((names(k) == bench_group) .neqv. (statement%group == bench_group)) cycle
+         if (first_row(names(k), statement%key) == 0) cycle
+         if (owners /= '') owners = owners//' and '
+         owners = owners//'&'//trim(names(k))
+      end do
+      if (owners /= '') then
+         call raise(error, input_error, statement%place//': '//quoted(statement%key)//' is a key of '//owners// &
+            ', not of &'//statement%group)
+      else
          call raise(error, input_error, statement%place//': unknown key '//quoted(statement%key)//' in &'// &
             statement%group//suggestion(statement%key, keys_of(statement%group)))
       end if
-   end subroutine check_names
+   end subroutine raise_unknown_key
 
    !> Replace statements of the file by the overrides of the command line.
    pure subroutine collect_overrides(overrides, of_bench, given, error)

@@ -11,7 +11,7 @@ module polydem_communication_counters
 
 contains
 
-   !> Set the counters of a run on several ranks. A counter "most of a process" is the maximum over the ranks,
+   !> Set the counters of a run on several ranks. A counter "maximum per rank" is the maximum over the ranks,
    !> separately for each quantity. Bodies and pairs are present numbers; all other counts are sums over steps.
    !> Collective.
    subroutine report_communication(comm, domain, n_free, n_pairs, counters)
@@ -31,24 +31,24 @@ contains
       most = [n_free, n_pairs, domain%halo_steps, domain%step_messages, domain%step_bytes]
       call comm%all_reduce_sum(sums)
       call comm%all_reduce_max(most)
-      call counters%set('processes', int(comm%size, lp))
-      call counters%set('settlements', domain%redistributions)
-      call counters%set('divisions of space', domain%divisions)
+      call counters%set('ranks', int(comm%size, lp))
+      call counters%set('redistributions', domain%redistributions)
+      call counters%set('partitions of space', domain%divisions)
       call counters%set('rectangles', int(domain%regions%n_rectangles(), lp))
       call counters%set('migrations', sums(4))
       call counters%set('migrations at the start', sums(5))
-      call counters%set('ghosts, summed over steps', sums(3))
+      call counters%set('halo bodies, summed over steps', sums(3))
       call counters%set('messages', sums(1))
       call counters%set('bytes in messages', sums(2))
       call counters%set('messages at the start', sums(8))
       call counters%set('bytes at the start', sums(9))
-      call counters%set('messages to ghosts', sums(6))
-      call counters%set('bytes to ghosts', sums(7))
-      call counters%set('most of a process: bodies', most(1))
-      call counters%set('most of a process: pairs', most(2))
-      call counters%set('most of a process: ghosts', most(3))
-      call counters%set('most of a process: messages', most(4))
-      call counters%set('most of a process: bytes', most(5))
+      call counters%set('halo messages', sums(6))
+      call counters%set('halo bytes', sums(7))
+      call counters%set('maximum per rank: bodies', most(1))
+      call counters%set('maximum per rank: pairs', most(2))
+      call counters%set('maximum per rank: halo bodies', most(3))
+      call counters%set('maximum per rank: messages', most(4))
+      call counters%set('maximum per rank: bytes', most(5))
    end subroutine report_communication
 
 end module polydem_communication_counters

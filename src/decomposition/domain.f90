@@ -12,15 +12,15 @@ module polydem_domain
    use polydem_partition, only: partition_t
    use polydem_partition_factory, only: new_partition
    use polydem_rank_bounds, only: rank_bounds_t
-   use polydem_settings, only: exchange_settings_t
+   use polydem_settings, only: decomposition_settings_t
    implicit none
    private
    public :: domain_t, new_domain
 
    !> Domain of one rank
    type :: domain_t
-      !> Group &exchange
-      type(exchange_settings_t) :: settings
+      !> Group &decomposition
+      type(decomposition_settings_t) :: settings
       !> Partition of space; not allocated in a run on one rank
       class(partition_t), allocatable :: partition
       !> Bounding rectangles of the bodies of the other ranks
@@ -68,8 +68,8 @@ contains
    subroutine new_domain(domain, settings, median_diameter, comm, error)
       !> The domain
       type(domain_t), intent(out) :: domain
-      !> Group &exchange
-      type(exchange_settings_t), intent(in) :: settings
+      !> Group &decomposition
+      type(decomposition_settings_t), intent(in) :: settings
       !> Median diameter of the free bodies of the run [m]
       real(wp), intent(in) :: median_diameter
       !> Ranks
@@ -81,7 +81,7 @@ contains
       domain%median_diameter = median_diameter
       domain%margin = settings%margin
       if (settings%margin <= 0.0_wp) domain%margin = first_margin*median_diameter
-      if (comm%size > 1_ip) call new_partition(domain%partition, settings%cut, error)
+      if (comm%size > 1_ip) call new_partition(domain%partition, settings%partition, error)
    end subroutine new_domain
 
    !> Whether a box of a body of this rank has left its padded box recorded at the last redistribution. In a run on

@@ -193,9 +193,9 @@ contains
       !> Serializer
       class(serializer_t), intent(inout) :: serializer
 
-      call serializer%field('/run/ledger_start', sums%start, 'J/m, N s/m, N s', &
+      call serializer%field('/run/energy_balance_start', sums%start, 'J/m, N s/m, N s', &
                         'energy, momentum and angular momentum at the start')
-      call serializer%field('/run/ledger_steps', sums%steps, '1', 'number of accumulated steps')
+      call serializer%field('/run/energy_balance_steps', sums%steps, '1', 'number of accumulated steps')
       call serializer%field('/run/elastic_start', sums%elastic_start, 'J/m', 'elastic energy at the start')
       call serializer%field('/run/energy_scale', sums%energy_scale, 'J/m', 'greatest energy turned over')
    end subroutine serialize_balance
@@ -211,10 +211,10 @@ contains
 
       if (serializer%is_reading) sums%is_current = .false.
       if (serializer%is_reading .or. .not. allocated(sums%power_sum)) call allocate_channels(sums, n_bodies)
-      call serializer%field('/bodies/book', sums%power_sum, 'W/m', &
+      call serializer%field('/bodies/power_sum', sums%power_sum, 'W/m', &
                         'sums over steps of the powers of elastic, damping and tangential forces')
-      call serializer%field('/bodies/torque_book', sums%torque, 'N', 'sum over steps of the torque of gravity')
-      call serializer%field('/bodies/wall_book', sums%wall_sum, 'W/m, N/m, N/m, N, N/m, N', &
+      call serializer%field('/bodies/torque_sum', sums%torque, 'N', 'sum over steps of the torque of gravity')
+      call serializer%field('/bodies/wall_sum', sums%wall_sum, 'W/m, N/m, N/m, N, N/m, N', &
                         'sums over steps for fixed bodies: power, force, torque, absolute forces and torques')
    end subroutine serialize_contributions
 

@@ -1,8 +1,8 @@
 !> Elastic normal force of the overlap area: F = E A/l.
 !>
-!> H.-G. Matuttis & J. Chen, Understanding the Discrete Element Method, Wiley 2014, Eq. 7.6 and 7.7: l is the
-!> characteristic length 4 r1 r2/(r1 + r2) of the distances of the force point (the centroid of the overlap) from the
-!> centres of mass, so that two equal squares face to face have the stiffness E.
+!> H.-G. Matuttis & J. Chen, Understanding the Discrete Element Method, Wiley 2014, Eq. 7.6 and 7.7. The characteristic
+!> length is l = 4 r1 r2/(r1 + r2), where r1 and r2 are the distances of the force point (the centroid of the overlap)
+!> from the centres of mass. Two equal squares face to face have the stiffness E.
 module polydem_area_law
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
@@ -27,18 +27,18 @@ module polydem_area_law
       procedure :: undamped_warning
    end type area_law_t
 
-   !> Least characteristic length as a share of the square root of the area, which only acts where the force point
-   !> falls on a centre of mass; in contacts without a direction, where it often does, the whole square root.
+   !> Least characteristic length as a share of the square root of the area. It acts only where the force point is at a
+   !> centre of mass. This is common in degenerate contacts, whose least length is the square root itself
    real(wp), parameter :: least_length = 1.0e-3_wp
 
 contains
 
-   !> It is the law 'area'.
+   !> Choose this part if law = 'area' in &forces.
    subroutine choose(self, settings, chosen)
       class(area_law_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether it belongs to the law
+      !> Whether the settings ask for this part
       logical, intent(out) :: chosen
 
       chosen = settings%law == 'area'
@@ -48,21 +48,21 @@ contains
       self%stiffness = settings%stiffness
    end subroutine choose
 
-   !> Set the characteristic length and add the elastic force, which acts at the centroid of the overlap.
+   !> Set the characteristic length and add the elastic force. It acts at the centroid of the overlap.
    subroutine add(self, bodies, dt, contacts, history)
       class(area_law_t), intent(in) :: self
-      !> Bodies (not used: all that matters is in the contacts)
+      !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
       !> Contacts; `inverse_length`, `lever`, `elastic` and `normal_force` change
       type(contacts_t), intent(inout) :: contacts
-      !> Memory of the pairs (not used)
+      !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
       real(wp) :: r1, r2, length, force
       integer(ip) :: c
 
-      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => history)
+      associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
       end associate
       contacts%energy_is_quadratic = .false.
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
@@ -82,15 +82,15 @@ contains
       !$omp end parallel do
    end subroutine add
 
-   !> Add the stiffness E L/l. An expected contact is a face on the edge with the greatest ratio, where l is twice its
-   !> distance from the centre.
+   !> Add the stiffness E L/l. An expected contact is a face on the edge with the greatest ratio L/l, where l is twice
+   !> the distance of the edge from the centre.
    subroutine stiffen(self, bodies, contacts, element)
       class(area_law_t), intent(in) :: self
-      !> Bodies, for the shape of one whose contact is only expected
+      !> Bodies, for the shape of the body of an expected contact
       type(bodies_t), intent(in) :: bodies
       !> Contacts (not used)
       type(contacts_t), intent(in) :: contacts
-      !> The contact; its normal stiffness changes, and its ratio if it is only expected
+      !> The contact; its normal stiffness changes, and its ratio if it is an expected contact
       type(contact_element_t), intent(inout) :: element
 
       associate (unused_contacts => contacts)
@@ -118,10 +118,10 @@ contains
       end do
    end function greatest_ratio
 
-   !> Depth [m] where l = 4 r1 r2/(r1 + r2) (Matuttis & Chen 2014, inverse of eq. 7.6).
+   !> Depth at which a flat contact carries a load at rest [m]: inverse of Matuttis & Chen 2014, Eq. 7.6.
    !>
-   !> It holds the distances of the two centres from the centroid of the overlap, which lies d/2 inside either body: a
-   !> weak dependence on d that a few substitutions resolve to rounding.
+   !> The length l = 4 r1 r2/(r1 + r2) contains the distances of the two centres from the centroid of the overlap, which
+   !> is d/2 inside either body. l depends weakly on the depth d, so a few fixed-point iterations converge to rounding.
    real(wp) function static_depth(self, load, block, support, offset) result(depth)
       class(area_law_t), intent(in) :: self
       !> Normal load per unit depth of the plane [N/m]
@@ -143,15 +143,15 @@ contains
       end do
    end function static_depth
 
-   !> On closed paths it does work; only damping hides that.
+   !> Warning: the elastic force does work on closed paths, which only damping hides
    function undamped_warning(self) result(warning)
       class(area_law_t), intent(in) :: self
       character(len=:), allocatable :: warning
 
       associate (unused_self => self)
       end associate
-      warning = 'the area law is not conservative, and without damping it heats grains whatever the step: the '// &
-         'kinetic energy of a gas grew by a third in 0.2 s. Take law = ''conservative'' in &forces, or damping'
+      warning = 'the area law is not conservative: without damping it adds kinetic energy at any time step '// &
+         '(a third in 0.2 s in a gas); set law = ''conservative'' in &forces, or use damping'
    end function undamped_warning
 
 end module polydem_area_law

@@ -1,12 +1,12 @@
-!> From forces of contacts to forces and torques of bodies.
+!> Sums the forces of contacts into forces and torques of bodies.
 !>
-!> The force of a contact acts at the centroid of the overlap, with a torque where the line of action of the normal
-!> force does not run through it (`lever`), and with a torque of its own if there is one (`twist`); the second body
-!> feels the opposite of all.
+!> The force of a contact acts at the centroid of the overlap. Two torques are added: `lever` times the normal force,
+!> because its line of action may miss the centroid, and `twist`, the contact's own torque. The second body feels the
+!> opposite force and torques.
 !>
-!> Every body sums over its contacts in ascending order of the partner's identifier, whatever the number of
-!> threads, so that results have the same bits. A contact table is ascending in the first body already;
-!> for the second body an index is made by counting.
+!> Each body sums over its contacts in ascending order of the partner's identifier, so the result has the same bits for
+!> any number of threads. The table of contacts is in ascending order of the first body. For the second body, the
+!> contact index (`incidence_t`) gives the order.
 module polydem_assemble_forces
    use polydem_bodies, only: bodies_t
    use polydem_contact_incidence, only: incidence_t
@@ -18,11 +18,11 @@ module polydem_assemble_forces
 
 contains
 
-   !> Turn the forces of contacts into sums over bodies, and add gravity to the free ones.
+   !> Sum the forces and torques of contacts over bodies, and add gravity to free bodies.
    subroutine assemble_forces(gravity, incidence, contacts, bodies)
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
-      !> Index of these contacts
+      !> Contacts of each body
       type(incidence_t), intent(in) :: incidence
       !> Contacts; `force` is set
       type(contacts_t), intent(inout) :: contacts

@@ -1,21 +1,25 @@
 !> Friction of a contact network as a quadratic programme with bounds.
 !>
-!> The tangential forces f make 1/2 f' h W f + f' u_free, whose gradient is the slip velocity u, as small as it gets
-!> with |f| <= mu F_n: then u = 0 where |f| < mu F_n, and u is opposed to f at the bound. But for the motion of walls
-!> this is the kinetic energy over h: friction takes as much of it as it can. The programme is convex. Velocities and
-!> the sums of forces on bodies are unique; single forces are not where contacts brace each other, and then they
-!> stay near those that the search starts from.
+!> The tangential forces f minimise 1/2 f' h W f + f' u_free subject to |f| <= mu F_n. The gradient of this function is
+!> the slip velocity u. At the minimum, u = 0 where |f| < mu F_n, and u is opposed to f at the bound. Apart from the
+!> motion of walls, the function is the kinetic energy over h: friction removes as much of it as possible. The
+!> programme is convex. The velocities and the sums of forces on the bodies are unique. Single forces are not unique
+!> where contacts brace each other; they stay near the forces at the start of the search.
 !>
-!> Projected Gauss-Seidel finds which contacts stick and solves easy networks in a few sweeps from the forces of the
-!> last step, but for a column of n blocks it takes some n^2 sweeps. So, when sweeps gain little, the contacts
-!> off their bounds are handed to conjugate gradients (with the mobilities as preconditioner), anew with those that are
-!> left whenever some come to their bounds, until the minimum among them is reached or the contacts at bounds have
-!> much more to gain by being let go; then sweeps go on. This is the scheme of J.J. More & G. Toraldo, SIAM J. Optim. 1
-!> (1991) 93, with sweeps in place of projected gradients, and with the test for letting go of Z. Dostal, SIAM J. Optim.
-!> 7 (1997) 871. Every step lowers the function, and sweeps alone converge, so the whole does; once the contacts at
-!> bounds are known, a search ends in at most as many iterations as there are others.
+!> The solver alternates between two methods.
 !>
-!> Sums run over fixed blocks, and then over blocks in order: the same bits for any number of threads.
+!> * Sweeps of projected Gauss-Seidel find the contacts that stick. They start from the forces of the last step and
+!>   solve easy networks in a few sweeps, but a column of n blocks takes about n^2 sweeps.
+!> * When sweeps gain little, conjugate gradients, preconditioned with the mobilities, search among the contacts off
+!>   their bounds. The search starts again with the remaining contacts whenever some reach their bounds. It ends at the
+!>   minimum among them, or when releasing the contacts at their bounds gains much more. Then sweeps continue.
+!>
+!> This is the scheme of J.J. More & G. Toraldo, SIAM J. Optim. 1 (1991) 93, with sweeps in place of projected
+!> gradients, and with the release test of Z. Dostal, SIAM J. Optim. 7 (1997) 871. Every step lowers the function and
+!> sweeps alone converge, so the scheme converges. Once the contacts at bounds are known, a search takes at most as
+!> many iterations as there are other contacts.
+!>
+!> Sums run over fixed blocks and then over the blocks in order. The result has the same bits for any number of threads.
 module polydem_box_qp
    use omp_lib, only: omp_get_max_threads
    use polydem_contact_incidence, only: incidence_t
@@ -26,66 +30,66 @@ module polydem_box_qp
    private
    public :: box_qp_t, solve_box_qp, reserve_box_qp
 
-   !> What a search looks at
-   type :: measures_t
-      !> Squared steepest descent of the contacts off their bounds, and of those that ask to be let go
-      real(wp) :: descent = 0.0_wp, wish = 0.0_wp
-      !> Curvature along the direction of search, and how far it is to the first bound
-      real(wp) :: curvature = 0.0_wp, room = 0.0_wp
+   !> Sums and extrema over all contacts at one point of a search
+   type :: search_state_t
+      !> Squared steepest descent of the contacts off their bounds, and of the contacts that would leave their bounds
+      real(wp) :: descent = 0.0_wp, bound_descent = 0.0_wp
+      !> Curvature along the search direction, and step length to the first bound
+      real(wp) :: curvature = 0.0_wp, max_length = 0.0_wp
       !> Greatest slip of the contacts off their bounds [m/s]
       real(wp) :: slip = 0.0_wp
-   end type measures_t
+   end type search_state_t
 
-   !> A programme, its solution and how it was found
+   !> A programme, its solution and the state of the solver
    type :: box_qp_t
       !> Velocities of bodies without friction, (3, slot) [m/s, m/s, rad/s]
       real(wp), allocatable :: free(:, :)
-      !> Velocities of bodies with it, (3, slot)
+      !> Velocities of bodies with friction, (3, slot) [m/s, m/s, rad/s]
       real(wp), allocatable :: velocity(:, :)
-      !> Tangential force of each contact of the network [N/m]
+      !> Tangential force of each contact of the network, (contact) [N/m]
       real(wp), allocatable :: force(:)
-      !> Avoidable slip that may remain, as a share of the greatest slip velocity that a contact takes away
+      !> Largest accepted avoidable slip, as a share of the greatest slip velocity that friction removes from a contact
       real(wp) :: tolerance = 0.0_wp
-      !> Sweeps and searches take turns at most this often, at least once
+      !> Largest number of rounds of sweeps and a search, at least 1
       integer :: most_rounds = 1000
-      !> The share that did remain
+      !> Remaining avoidable slip, as a share like `tolerance`
       real(wp) :: residual = 0.0_wp
-      !> Sweeps, searches by conjugate gradients and their iterations so far
+      !> Numbers of sweeps, of searches by conjugate gradients and of their iterations so far
       integer(lp) :: n_sweeps = 0_lp, n_searches = 0_lp, n_iterations = 0_lp
-      !> Slip velocities, steepest descent, direction of search and its slip, (contact)
+      !> Slip velocities, steepest descent, search direction and its slip, (contact)
       real(wp), allocatable, private :: slip(:), steepest(:), direction(:), response(:)
-      !> Velocities that the direction of search gives, (3, slot)
+      !> Velocities of bodies due to the search direction, (3, slot)
       real(wp), allocatable, private :: push(:, :)
-      !> Sums, or the greatest or least numbers, of blocks of contacts, (5, block)
-      real(wp), allocatable, private :: of_block(:, :)
+      !> Sums, maxima or minima over each block of contacts, (5, block)
+      real(wp), allocatable, private :: block_values(:, :)
       !> Slip below which a search ends [m/s]
-      real(wp), private :: enough = 0.0_wp
-      !> Whether a search has come to a bound, with what it knew there
+      real(wp), private :: slip_tolerance = 0.0_wp
+      !> Whether the search has reached a bound, and the state of the search there
       logical, private :: is_blocked = .false.
-      type(measures_t), private :: last
+      type(search_state_t), private :: last
    end type box_qp_t
 
    !> Contacts per block of a sum
    integer(ip), parameter :: block = 256_ip
-   !> Sweeps go on while one leaves less than this share of the slip
-   real(wp), parameter :: good_share = 0.3_wp
-   !> Contacts are held at their bounds until their squared descent is this many times that of the others
-   real(wp), parameter :: patience = 10.0_wp
-   !> No smaller share of slip than this can be told from rounding
+   !> Sweeps continue while each reduces the slip to at most this share
+   real(wp), parameter :: sweep_ratio = 0.3_wp
+   !> Contacts stay at their bounds until their squared descent is this multiple of that of the other contacts
+   real(wp), parameter :: release_ratio = 10.0_wp
+   !> Smaller shares of slip are rounding errors
    real(wp), parameter :: least_tolerance = 16.0_wp*epsilon(1.0_wp)
 
 contains
 
-   !> Improve the forces until no slip is left that they could take away.
+   !> Improve the forces until the avoidable slip is within the tolerance.
    subroutine solve_box_qp(self, network, incidence, solved)
-      !> Programme: `free` and `tolerance` are given, and `force` to start from, within its bounds; `force` and
-      !> `velocity` are the solution
+      !> Programme. Inputs: `free`, `tolerance`, and the first guess `force`, which must be within its bounds. Results:
+      !> `force`, `velocity` and `residual`
       type(box_qp_t), intent(inout) :: self
-      !> Contacts
+      !> Network of the contacts
       type(friction_network_t), intent(in) :: network
       !> Contacts of each body
       type(incidence_t), intent(in) :: incidence
-      !> Whether the solution is as good as was asked for
+      !> Whether the residual is within the tolerance
       logical, intent(out) :: solved
       real(wp) :: residual, before, scale, allowed
       integer :: round
@@ -93,7 +97,7 @@ contains
       self%residual = 0.0_wp
       solved = .true.
       if (network%n == 0_ip) return
-      call renew_velocities(self, network, incidence)
+      call update_velocities(self, network, incidence)
       before = huge(before)
       do round = 1, self%most_rounds
          do
@@ -105,10 +109,10 @@ contains
                if (residual > 0.0_wp) self%residual = residual/scale
                return
             end if
-            if (.not. residual <= good_share*before) exit
+            if (.not. residual <= sweep_ratio*before) exit
             before = residual
          end do
-         self%enough = 0.5_wp*allowed
+         self%slip_tolerance = 0.5_wp*allowed
          call search(self, network, incidence)
          before = residual
       end do
@@ -116,13 +120,13 @@ contains
       solved = .false.
    end subroutine solve_box_qp
 
-   !> Velocities from the forces, without the rounding errors of earlier changes.
-   subroutine renew_velocities(self, network, incidence)
+   !> Compute the velocities from the forces. This removes the rounding errors of earlier updates.
+   subroutine update_velocities(self, network, incidence)
       type(box_qp_t), intent(inout) :: self
       type(friction_network_t), intent(in) :: network
       type(incidence_t), intent(in) :: incidence
 
-      if (is_shared(network)) then
+      if (uses_threads(network)) then
          !$omp parallel default(none) shared(self, network, incidence)
          call push_bodies(network, incidence, self%force, self%push)
          !$omp end parallel
@@ -130,9 +134,9 @@ contains
          call push_bodies(network, incidence, self%force, self%push)
       end if
       self%velocity = self%free + self%push
-   end subroutine renew_velocities
+   end subroutine update_velocities
 
-   !> Conjugate gradients among the contacts off their bounds, which become fewer whenever some come to theirs.
+   !> Search among the contacts off their bounds by conjugate gradients; start again whenever some reach their bounds.
    subroutine search(self, network, incidence)
       type(box_qp_t), intent(inout) :: self
       type(friction_network_t), intent(in) :: network
@@ -140,55 +144,56 @@ contains
       integer(ip) :: k
 
       self%n_searches = self%n_searches + 1_lp
-      ! Each time around a contact comes to its bound, but for rounding errors.
+      ! Apart from rounding errors, one contact at least reaches its bound in each iteration.
       do k = 1_ip, 2_ip*network%n
-         call renew_velocities(self, network, incidence)
-         if (is_shared(network)) then
+         call update_velocities(self, network, incidence)
+         if (uses_threads(network)) then
             !$omp parallel default(none) shared(self, network, incidence)
-            call descend(self, network, incidence)
+            call iterate(self, network, incidence)
             !$omp end parallel
          else
-            call descend(self, network, incidence)
+            call iterate(self, network, incidence)
          end if
          if (.not. self%is_blocked) exit
          call step_to_bounds(self, network, incidence)
       end do
-      call renew_velocities(self, network, incidence)
+      call update_velocities(self, network, incidence)
    end subroutine search
 
-   !> Whether several threads work on a network; barriers cost something even where there is only one.
-   logical function is_shared(network)
+   !> Whether several threads work on a network. A barrier costs time even with one thread.
+   logical function uses_threads(network)
       type(friction_network_t), intent(in) :: network
 
-      is_shared = network%n > worth_sharing
-      if (is_shared) is_shared = omp_get_max_threads() > 1
-   end function is_shared
+      uses_threads = network%n > worth_sharing
+      if (uses_threads) uses_threads = omp_get_max_threads() > 1
+   end function uses_threads
 
-   !> The iterations. Threads of a parallel region share the work on contacts and bodies and do the rest alike.
-   subroutine descend(self, network, incidence)
+   !> Iterate conjugate gradients until the minimum, a bound or the release of contacts. The threads of a parallel
+   !> region share the loops over contacts and bodies; every thread does the rest.
+   subroutine iterate(self, network, incidence)
       type(box_qp_t), intent(inout) :: self
       type(friction_network_t), intent(in) :: network
       type(incidence_t), intent(in) :: incidence
-      type(measures_t) :: now
+      type(search_state_t) :: now
       real(wp) :: share, descent
       logical :: is_blocked
       integer(ip) :: iteration, b
 
       !$omp do schedule(static)
       do b = 1_ip, blocks_of(network)
-         call begin_block(self, network, b)
+         call start_block(self, network, b)
       end do
       !$omp end do
-      call look_around(self, network, 0.0_wp, now)
+      call take_step(self, network, 0.0_wp, now)
       share = 0.0_wp
       is_blocked = .false.
       do iteration = 0_ip, network%n
-         if (now%slip <= self%enough .or. now%wish > patience*now%descent) exit
-         call look_ahead(self, network, incidence, share, now)
-         is_blocked = .not. now%descent < now%curvature*now%room
+         if (now%slip <= self%slip_tolerance .or. now%bound_descent > release_ratio*now%descent) exit
+         call set_direction(self, network, incidence, share, now)
+         is_blocked = .not. now%descent < now%curvature*now%max_length
          if (is_blocked) exit
          descent = now%descent
-         call look_around(self, network, now%descent/now%curvature, now)
+         call take_step(self, network, now%descent/now%curvature, now)
          share = now%descent/descent
       end do
       !$omp single
@@ -196,14 +201,15 @@ contains
       self%is_blocked = is_blocked
       self%last = now
       !$omp end single
-   end subroutine descend
+   end subroutine iterate
 
-   !> Move a number of times along the direction of search, and find the steepest descent there.
-   subroutine look_around(self, network, length, measures)
+   !> Take a step along the search direction, and find the steepest descent there.
+   subroutine take_step(self, network, length, measures)
       type(box_qp_t), intent(inout) :: self
       type(friction_network_t), intent(in) :: network
+      !> Step length in multiples of the search direction
       real(wp), intent(in) :: length
-      type(measures_t), intent(inout) :: measures
+      type(search_state_t), intent(inout) :: measures
       integer(ip) :: b
 
       !$omp do schedule(static)
@@ -212,23 +218,23 @@ contains
       end do
       !$omp end do
       measures%descent = 0.0_wp
-      measures%wish = 0.0_wp
+      measures%bound_descent = 0.0_wp
       measures%slip = 0.0_wp
       do b = 1_ip, blocks_of(network)
-         measures%descent = measures%descent + self%of_block(1, b)
-         measures%wish = measures%wish + self%of_block(2, b)
-         measures%slip = max(measures%slip, self%of_block(3, b))
+         measures%descent = measures%descent + self%block_values(1, b)
+         measures%bound_descent = measures%bound_descent + self%block_values(2, b)
+         measures%slip = max(measures%slip, self%block_values(3, b))
       end do
-   end subroutine look_around
+   end subroutine take_step
 
-   !> Next direction of search, conjugate to the last one, and what lies along it.
-   subroutine look_ahead(self, network, incidence, share, measures)
+   !> Set the next search direction, conjugate to the last one, and find the curvature and the nearest bound along it.
+   subroutine set_direction(self, network, incidence, share, measures)
       type(box_qp_t), intent(inout) :: self
       type(friction_network_t), intent(in) :: network
       type(incidence_t), intent(in) :: incidence
       !> Share of the last direction in the next one
       real(wp), intent(in) :: share
-      type(measures_t), intent(inout) :: measures
+      type(search_state_t), intent(inout) :: measures
       integer(ip) :: b, c
 
       !$omp do schedule(static)
@@ -239,19 +245,19 @@ contains
       call push_bodies(network, incidence, self%direction, self%push)
       !$omp do schedule(static)
       do b = 1_ip, blocks_of(network)
-         call look_in_block(self, network, b)
+         call survey_block(self, network, b)
       end do
       !$omp end do
       measures%curvature = 0.0_wp
-      measures%room = huge(measures%room)
+      measures%max_length = huge(measures%max_length)
       do b = 1_ip, blocks_of(network)
-         measures%curvature = measures%curvature + self%of_block(4, b)
-         measures%room = min(measures%room, self%of_block(5, b))
+         measures%curvature = measures%curvature + self%block_values(4, b)
+         measures%max_length = min(measures%max_length, self%block_values(5, b))
       end do
-   end subroutine look_ahead
+   end subroutine set_direction
 
-   !> The part of a block in the start of a search: from now on slip velocities follow the steps, and velocities rest.
-   subroutine begin_block(self, network, b)
+   !> Start a search in one block. Until its end, steps update the slip velocities, but not the velocities of bodies.
+   subroutine start_block(self, network, b)
       type(box_qp_t), intent(inout) :: self
       type(friction_network_t), intent(in) :: network
       integer(ip), intent(in) :: b
@@ -262,19 +268,19 @@ contains
       call slip_of_contacts(network, self%velocity, low, high, self%slip)
       self%direction(low:high) = 0.0_wp
       self%response(low:high) = 0.0_wp
-   end subroutine begin_block
+   end subroutine start_block
 
-   !> The part of a block in `look_around`.
+   !> Take the step of `take_step` in one block.
    subroutine step_in_block(self, network, length, b)
       type(box_qp_t), intent(inout) :: self
       type(friction_network_t), intent(in) :: network
       real(wp), intent(in) :: length
       integer(ip), intent(in) :: b
-      real(wp) :: descent, wish, greatest, avoidable
+      real(wp) :: descent, bound_descent, greatest, avoidable
       integer(ip) :: c
 
       descent = 0.0_wp
-      wish = 0.0_wp
+      bound_descent = 0.0_wp
       greatest = 0.0_wp
       do c = (b - 1_ip)*block + 1_ip, min(b*block, network%n)
          self%force(c) = within(network%limit(c), self%force(c) + length*self%direction(c))
@@ -286,37 +292,39 @@ contains
          else
             self%steepest(c) = 0.0_wp
             avoidable = avoidable_slip(self%force(c), network%limit(c), self%slip(c))
-            wish = wish + avoidable**2/network%mobility(c)
+            bound_descent = bound_descent + avoidable**2/network%mobility(c)
          end if
       end do
-      self%of_block(1:3, b) = [descent, wish, greatest]
+      self%block_values(1:3, b) = [descent, bound_descent, greatest]
    end subroutine step_in_block
 
-   !> The part of a block in `look_ahead`.
-   subroutine look_in_block(self, network, b)
+   !> Find curvature and nearest bound of `set_direction` in one block.
+   subroutine survey_block(self, network, b)
       type(box_qp_t), intent(inout) :: self
       type(friction_network_t), intent(in) :: network
       integer(ip), intent(in) :: b
-      real(wp) :: curvature, room
+      real(wp) :: curvature, max_length
       integer(ip) :: c, low, high
 
       low = (b - 1_ip)*block + 1_ip
       high = min(b*block, network%n)
       call slip_of_contacts(network, self%push, low, high, self%response)
       curvature = 0.0_wp
-      room = huge(room)
+      max_length = huge(max_length)
       do c = low, high
          associate (direction => self%direction(c))
             curvature = curvature + direction*self%response(c)
             if (abs(direction) > 0.0_wp) &
-               room = min(room, (network%limit(c) - sign(self%force(c), self%force(c)*direction))/abs(direction))
+               max_length = min(max_length, &
+                                (network%limit(c) - sign(self%force(c), self%force(c)*direction))/abs(direction))
          end associate
       end do
-      self%of_block(4:5, b) = [curvature, room]
-   end subroutine look_in_block
+      self%block_values(4:5, b) = [curvature, max_length]
+   end subroutine survey_block
 
-   !> The minimum along the direction of search lies beyond a bound: go there with all forces cut at their bounds, which
-   !> finds many bounds at once, or only to the first bound if that lowers the function more.
+   !> Take a step where the minimum along the search direction lies beyond a bound. The full step, with all forces
+   !> limited to their bounds, finds many bounds at once. The step to the first bound is taken if it lowers the function
+   !> more.
    subroutine step_to_bounds(self, network, incidence)
       type(box_qp_t), intent(inout) :: self
       type(friction_network_t), intent(in) :: network
@@ -324,10 +332,11 @@ contains
       real(wp) :: length, at_first_bound, beyond
       integer(ip) :: b
 
-      associate (n => network%n, room => self%last%room, curvature => self%last%curvature, descent => self%last%descent)
-         at_first_bound = room*(0.5_wp*room*curvature - descent)
-         length = room
-         if (curvature > 0.0_wp) length = max(room, descent/curvature)
+      associate (n => network%n, max_length => self%last%max_length, curvature => self%last%curvature, &
+                 descent => self%last%descent)
+         at_first_bound = max_length*(0.5_wp*max_length*curvature - descent)
+         length = max_length
+         if (curvature > 0.0_wp) length = max(max_length, descent/curvature)
          self%steepest(1:n) = within(network%limit(1:n), self%force(1:n) + length*self%direction(1:n)) - self%force(1:n)
          call push_bodies(network, incidence, self%steepest, self%push)
          call slip_of_contacts(network, self%push, 1_ip, n, self%response)
@@ -338,12 +347,12 @@ contains
          if (beyond < at_first_bound) then
             self%force(1:n) = within(network%limit(1:n), self%force(1:n) + self%steepest(1:n))
          else
-            self%force(1:n) = within(network%limit(1:n), self%force(1:n) + room*self%direction(1:n))
+            self%force(1:n) = within(network%limit(1:n), self%force(1:n) + max_length*self%direction(1:n))
          end if
       end associate
    end subroutine step_to_bounds
 
-   !> Make room for a network.
+   !> Allocate the arrays for a network.
    subroutine reserve_box_qp(self, n_bodies, n_contacts)
       !> Programme; contents are lost when it grows
       type(box_qp_t), intent(inout) :: self
@@ -361,11 +370,11 @@ contains
       end if
       if (allocated(self%force)) then
          if (size(self%force) >= n_contacts) return
-         deallocate (self%force, self%slip, self%steepest, self%direction, self%response, self%of_block)
+         deallocate (self%force, self%slip, self%steepest, self%direction, self%response, self%block_values)
       end if
       m = n_contacts + n_contacts/4_ip + 16_ip
       allocate (self%force(m), self%slip(m), self%steepest(m), self%direction(m), self%response(m))
-      allocate (self%of_block(5, m/block + 1_ip))
+      allocate (self%block_values(5, m/block + 1_ip))
    end subroutine reserve_box_qp
 
    !> Number of blocks of contacts

@@ -1,24 +1,25 @@
-!> Elastic force from an energy of the overlap: W = E G^2/(2 l b), where G is its effective area (see `effective_area`).
+!> Elastic force with a potential: W = E G^2/(2 l b), where G is the effective area of the overlap (`effective_area`).
 !>
-!> With N and M of `effective_area`, dG/dt = N . (v1 - v2) + M1 w1 - M2 w2. So the first body feels the force -w' N and
-!> the torque -w' M1, the second w' N and w' M2, w' = E G/(l b): energy returns on every closed path, and momentum and
-!> angular momentum balance. (The energy of a contact as a function of its volume: Y. T. Feng, Comput. Methods Appl.
-!> Mech. Eng. 373 (2021). A function of the area alone gives nothing against tilts of a face, whose area stays as it is
-!> while its corners stay inside; the effective area, which is ours, has the second moments besides.)
+!> With N and M of `effective_area`, dG/dt = N . (v1 - v2) + M1 w1 - M2 w2. With W' = dW/dG = E G/(l b), the first body
+!> feels the force -W' N and the torque -W' M1, the second body W' N and W' M2. The work on every closed path is zero,
+!> and momentum and angular momentum are conserved. (Y. T. Feng, Comput. Methods Appl. Mech. Eng. 373 (2021), makes the
+!> energy of a contact a function of its volume. A function of the area alone does not resist tilts of a face, because
+!> the area is constant while the corners stay inside. The effective area is our own. It includes the second moments.)
 !>
-!> Seen from the outline, the bodies press on each other with p(x) = w' G/4 (x - c)^T S^-1 (x - c). A face of width w
-!> and depth d is a bed of springs: stiffness E w^2/(l b) against approach, w^2/12 of that against tilts as long as
-!> these are small against d/w, and less when a corner comes to leave, where the force is still continuous. Corners are
-!> softer, F ~ d^3. (p is least in the middle of a face: only its sum and moment are meant, not its distribution.)
+!> The force equals that of a pressure p(x) = W' G/4 (x - c)^T S^-1 (x - c) on the outline. A face of width w and depth
+!> d acts like a bed of springs: its stiffness against approach is E w^2/(l b), and against tilts w^2/12 of that while
+!> tilts are small against d/w. The tilt stiffness falls when a corner leaves; the force stays continuous. Corners are
+!> softer, F ~ d^3. (p has its minimum in the middle of a face. Only its sum and its moment are physical, not its
+!> distribution.)
 !>
-!> l and b belong to the pair, not to the contact: with s the side of the square of a body's area, l = 2 s1 s2/(s1 + s2)
-!> and b = min(s1, s2). Two equal squares face to face have the stiffness E, a square on a large plate E/2, and two bars
-!> of length a and height h E a/h side to side and E h/a end to end, as with the area law.
+!> l and b are constants of the pair: l = 2 s1 s2/(s1 + s2) and b = min(s1, s2), where s is the side of the square of a
+!> body's area. Two equal squares face to face have the stiffness E, and a square on a large plate has E/2. Two bars of
+!> length a and height h have E a/h side to side and E h/a end to end, as with the area law.
 !>
-!> Where one body is inside the other, or bars cross, G is that of the body or of the parallelogram in common: it does
-!> not depend on small shifts, and such a contact has no direction and no force of that kind (crossed bars have their
-!> torque). The force it gets, along the line of centres, leads out but has no energy; whoever cannot accept that sets
-!> degenerate = 'stop' in &overlap.
+!> Where one body is inside the other, or bars cross, G is that of the body or of the common parallelogram. It does not
+!> depend on small shifts, so the potential gives no force and no direction (crossed bars get their torque). Such a
+!> degenerate contact gets a force along the line of centres. It separates the bodies but has no potential. Set
+!> degenerate = 'stop' in &overlap to stop the run instead.
 module polydem_conservative_law
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
@@ -35,7 +36,7 @@ module polydem_conservative_law
    type, extends(force_part_t) :: conservative_law_t
       !> Young's modulus in two dimensions E [N/m2]
       real(wp) :: stiffness = 0.0_wp
-      !> Reciprocal side 1/s of the square of each body's area, (bodies) [1/m]
+      !> Reciprocal side 1/s of the square of each body's area, (slot) [1/m]
       real(wp), allocatable :: inverse_size(:)
    contains
       procedure :: choose
@@ -45,17 +46,17 @@ module polydem_conservative_law
       procedure :: static_depth
    end type conservative_law_t
 
-   !> Greatest stiffness of a contact over that of a face of the same length
+   !> Greatest ratio of the stiffness of a contact to that of a face of the same length
    real(wp), parameter :: steepening = 1.5_wp
 
 contains
 
-   !> It is the law 'conservative'.
+   !> Choose this part if law = 'conservative' in &forces.
    subroutine choose(self, settings, chosen)
       class(conservative_law_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether it belongs to the law
+      !> Whether the settings ask for this part
       logical, intent(out) :: chosen
 
       chosen = settings%law == 'conservative'
@@ -66,7 +67,7 @@ contains
       self%stiffness = settings%stiffness
    end subroutine choose
 
-   !> Measure the bodies.
+   !> Measure the areas of the bodies.
    subroutine measure(self, bodies)
       class(conservative_law_t), intent(inout) :: self
       !> Bodies, for their shapes
@@ -94,21 +95,21 @@ contains
       end do
    end function area_of
 
-   !> Add the elastic force and set its lever and the characteristic length, which is l b/L here.
+   !> Add the elastic force, and set its lever and the characteristic length, here l b/L.
    subroutine add(self, bodies, dt, contacts, history)
       class(conservative_law_t), intent(in) :: self
-      !> Bodies (not used: all that matters is in the contacts)
+      !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
       !> Contacts with the effective area; `inverse_length`, `lever`, `elastic` and `normal_force` change
       type(contacts_t), intent(inout) :: contacts
-      !> Memory of the pairs (not used)
+      !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
       real(wp) :: p, q, force
       integer(ip) :: c
 
-      associate (unused_bodies => bodies, unused_dt => dt, unused_memory => history)
+      associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
       end associate
       contacts%energy_is_quadratic = .true.
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
@@ -125,23 +126,23 @@ contains
       !$omp end parallel do
    end subroutine add
 
-   !> Add the stiffness. With K_n = E L/l, where l is l b/L here:
+   !> Add upper bounds of the stiffness. K_n is E L^2/(l b), the characteristic length being l b/L.
    !>
-   !> The force steepens as L grows with the depth. The root of the effective area G is a concave function of the
-   !> displacement of convex bodies: it is the least, over all linear maps of determinant 1, of a multiple of the fourth
-   !> root of the polar moment of inertia, which is concave (H. Hadwiger, Comment. Math. Helv. 30 (1956) 285). So
-   !> G'' <= G'^2/(2 G), and the stiffness is at most 3/2 of K_n. The law also resists tilts, like a face:
-   !> K = K_n L^2/12. (No bound for rotations, but of 2600 random contacts of all kinds none had a frequency more
-   !> than 8 % above.)
+   !> The force steepens as L grows with the depth. The square root of the effective area G is a concave function of the
+   !> displacement of convex bodies: it is the minimum, over all linear maps of determinant 1, of a multiple of the
+   !> fourth root of the polar moment of inertia, which is concave (H. Hadwiger, Comment. Math. Helv. 30 (1956) 285). So
+   !> G'' <= G'^2/(2 G), and the normal stiffness is at most 3/2 K_n. The stiffness against tilts is taken as 3/2 of
+   !> that of a face, K_n L^2/12. (This is no bound for rotations; none of 2600 random contacts of all kinds had a
+   !> frequency more than 8 % above it.)
    !>
    !> An expected contact is a face on the longest edge of two equal bodies, where l b is the area.
    subroutine stiffen(self, bodies, contacts, element)
       class(conservative_law_t), intent(in) :: self
-      !> Bodies, for the shape of one whose contact is only expected
+      !> Bodies, for the shape of the body of an expected contact
       type(bodies_t), intent(in) :: bodies
       !> Contacts with their lengths
       type(contacts_t), intent(in) :: contacts
-      !> The contact; stiffness against approach and tilts change, and its ratio if it is only expected
+      !> The contact; stiffness against approach and tilts changes, and its ratio if it is an expected contact
       type(contact_element_t), intent(inout) :: element
 
       if (element%contact == 0_ip) then
@@ -154,7 +155,7 @@ contains
       end if
    end subroutine stiffen
 
-   !> Square of the longest edge of a body over its area
+   !> Ratio of the square of the longest edge of a body to its area
    pure real(wp) function longest_edge_over_area(bodies, s) result(ratio)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
@@ -176,8 +177,8 @@ contains
       ratio = longest*longest/area
    end function longest_edge_over_area
 
-   !> Depth at which a flat contact of width w carries a load, F l/(E w) [m]: l = 2 s1 s2 min(s1, s2)/((s1 + s2) w),
-   !> where s is the side of the square of a body's area.
+   !> Depth at which a flat contact of width w carries a load at rest, F l/(E w) [m]. The characteristic length is
+   !> l = 2 s1 s2 min(s1, s2)/((s1 + s2) w), where s is the side of the square of a body's area.
    real(wp) function static_depth(self, load, block, support, offset) result(depth)
       class(conservative_law_t), intent(in) :: self
       !> Normal load per unit depth of the plane [N/m]
@@ -197,7 +198,7 @@ contains
       depth = load/(self%stiffness*block(1))*(2.0_wp*s1*s2*min(s1, s2)/((s1 + s2)*block(1)))
    end function static_depth
 
-   !> Moment of N about the force point [m2], from the nearer centre, from which it is rounded least
+   !> Moment of N about the force point [m2], computed from the nearer centre for the least rounding error
    pure real(wp) function moment_about_force_point(contacts, c) result(moment)
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: c

@@ -1,16 +1,16 @@
 !> Friction by a tangential spring with a Coulomb limit.
 !>
-!> P.A. Cundall & O.D.L. Strack, Geotechnique 29 (1979) 47; as in Matuttis & Chen 2014, Sec. 3.4.1: the spring
-!> force changes by -k_t v_t dt and is cut at mu F_n, as is its sum with the damping -d sqrt(k_t m_t) v_t,
-!> 1/m_t = 1/m1 + 1/m2 + r1^2/I1 + r2^2/I2 (p. 144). The cut spring is what is remembered.
+!> P.A. Cundall & O.D.L. Strack, Geotechnique 29 (1979) 47, in the form of Matuttis & Chen 2014, Sec. 3.4.1. The spring
+!> force changes by -k_t v_t dt and is limited to mu F_n. So is its sum with the dashpot force -d sqrt(k_t m_t) v_t,
+!> 1/m_t = 1/m1 + 1/m2 + r1^2/I1 + r2^2/I2 (p. 144). The contact history stores the limited spring force.
 !>
-!> Coulomb's limit is one of contacts under pressure, F_n >= 0. Where another part pulls the bodies together, F_n < 0,
-!> the limit is zero: there is no friction, and the spring is unloaded, so that it starts from zero when the contact
-!> is pressed again. A cohesive part that wants friction under tension brings its own.
+!> Coulomb's limit applies to contacts under pressure, F_n >= 0. Where another part pulls the bodies together, F_n < 0,
+!> the limit is zero: there is no friction, and the spring force is reset to zero. A cohesive part with friction under
+!> tension must compute that friction itself.
 !>
-!> With v_t at the end of the step, as in the book, the spring is of first order in the step whatever the integrator,
-!> and an undamped one is unstable from w dt = 1.41 on. With v_t in the middle of the step its extension is that
-!> of a spring tied to the positions: of second order, and stable to w dt = 2 with velocity Verlet.
+!> With v_t at the end of the step, as in Matuttis & Chen, the spring is of first order in the step with any integration
+!> scheme, and an undamped spring is unstable for w dt > 1.41. With v_t in the middle of the step its extension follows
+!> the positions: it is of second order, and stable up to w dt = 2 with velocity Verlet.
 module polydem_cundall_strack
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
@@ -23,15 +23,15 @@ module polydem_cundall_strack
    private
    public :: cundall_strack_t
 
-   !> Friction by a spring with memory
+   !> Friction by a tangential spring
    type, extends(force_part_t) :: cundall_strack_t
       !> Friction coefficient mu
       real(wp) :: coefficient = 0.0_wp
       !> Stiffness of the spring k_t [N/m2]
       real(wp) :: stiffness = 0.0_wp
-      !> Damping as a share of sqrt(k_t m_t)
+      !> Dashpot as a share d of sqrt(k_t m_t)
       real(wp) :: damping = 0.0_wp
-      !> Whether the slip velocity in the middle of the step extends the spring, not that at its end
+      !> Whether the spring uses the slip velocity in the middle of the step instead of that at its end
       logical :: midstep = .false.
    contains
       procedure :: choose
@@ -42,12 +42,12 @@ module polydem_cundall_strack
 
 contains
 
-   !> It is the friction 'cundall_strack'.
+   !> Choose this part if friction = 'cundall_strack' in &forces.
    subroutine choose(self, settings, chosen)
       class(cundall_strack_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether it belongs to the law
+      !> Whether the settings ask for this part
       logical, intent(out) :: chosen
 
       chosen = settings%friction == 'cundall_strack'
@@ -60,17 +60,17 @@ contains
       self%midstep = settings%midstep_slip
    end subroutine choose
 
-   !> It stores the force of the spring.
+   !> Contact history of this part: the spring force
    function stored(self) result(kinds)
       class(cundall_strack_t), intent(in) :: self
       type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
-      kinds = [history_kind_t('tangential', 'N/m', 'tangential force remembered')]
+      kinds = [history_kind_t('tangential', 'N/m', 'force of the tangential spring')]
    end function stored
 
-   !> Add the tangential force and remember the spring.
+   !> Add the tangential force and store the spring force.
    subroutine add(self, bodies, dt, contacts, history)
       class(cundall_strack_t), intent(in) :: self
       !> Bodies, for their masses and velocities
@@ -79,7 +79,7 @@ contains
       real(wp), intent(in) :: dt
       !> Contacts; `tangential_force` changes
       type(contacts_t), intent(inout) :: contacts
-      !> Memory of the pairs; the spring is read and set
+      !> Contact history; the spring force is read and set
       type(contact_history_t), intent(inout) :: history
       real(wp) :: slip, mean, limit, spring
       integer(ip) :: c
@@ -122,10 +122,10 @@ contains
          + self%damping*sqrt(element%tangential_mass*self%stiffness)
    end subroutine stiffen
 
-   !> Velocity (or acceleration) of the first body against the second at the force point, along (-direction_y,
-   !> direction_x) [m/s]; that of the rotating arm itself has no place in the extension of the spring
+   !> Velocity (or acceleration) of the first body relative to the second at the force point, along (-direction_y,
+   !> direction_x) [m/s]. The centripetal acceleration of the arms does not extend the spring and is left out
    pure real(wp) function slip_of(velocity, angular_velocity, contacts, c)
-      !> Of all bodies, (2, body) [m/s] and (body) [rad/s]
+      !> Velocities (2, body) [m/s] and angular velocities (body) [rad/s] of all bodies, or accelerations
       real(wp), intent(in) :: velocity(:, :), angular_velocity(:)
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: c

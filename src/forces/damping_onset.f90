@@ -1,11 +1,11 @@
-!> Damping that begins when bodies touch, not with the step in which they are first seen to overlap.
+!> Weights the normal damping in the first step of a contact by the time since first touch.
 !>
-!> A dashpot jumps from nothing to gamma v at first touch. A force that is computed once per step acts for a whole step,
-!> from half a step before to half a step after, however late the bodies met in it; so restitution is only of
-!> first order in the step. The contact is s = A/((dA/dt) dt) of a step old when it is first seen, and the dashpot has
-!> to act for s + 1/2 steps: with this weight of its first force restitution is of second order, at no cost but
-!> the memory of the area. (Exact to second order for faces, A ~ depth; at corners, where A ~ depth^2, damping
-!> begins without a jump and needs no weight; theirs, between 1/2 and 1, does not change the order.)
+!> The force of a dashpot jumps from zero to gamma v at first touch. A force that is computed once per step acts for a
+!> whole step, from half a step before to half a step after, even if the bodies meet late in the step. So the error of
+!> restitution is of first order in the step. In its first step a contact has the age s = A/((dA/dt) dt), in steps, and
+!> the dashpot should act for s + 1/2 steps. With this weight the error is of second order. The only cost is the stored
+!> area. (This holds for faces, A ~ depth. At corners, A ~ depth^2, damping begins without a jump and needs no weight;
+!> their weight, between 1/2 and 1, does not change the order.)
 module polydem_damping_onset
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
@@ -17,7 +17,7 @@ module polydem_damping_onset
    private
    public :: damping_onset_t
 
-   !> Weighs the normal damping in the step of first touch
+   !> Weight of the normal damping in the first step of a contact
    type, extends(force_part_t) :: damping_onset_t
    contains
       procedure :: choose
@@ -27,12 +27,12 @@ module polydem_damping_onset
 
 contains
 
-   !> It is the choice `damping_from_touch`.
+   !> Choose this part if damping_from_touch is true in &forces.
    subroutine choose(self, settings, chosen)
       class(damping_onset_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether it belongs to the law
+      !> Whether the settings ask for this part
       logical, intent(out) :: chosen
 
       chosen = settings%damping_from_touch
@@ -41,17 +41,17 @@ contains
       self%stage = acts_on_damping
    end subroutine choose
 
-   !> It stores the area of the last step.
+   !> Contact history of this part: the overlap area of the last step
    function stored(self) result(kinds)
       class(damping_onset_t), intent(in) :: self
       type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
-      kinds = [history_kind_t('area', 'm2', 'area of the overlap at the last step', zero_is_new=.true.)]
+      kinds = [history_kind_t('area', 'm2', 'overlap area at the last step', zero_is_new=.true.)]
    end function stored
 
-   !> Weigh the damping of new contacts, limit the sum to repulsion and remember the areas.
+   !> Weight the damping of new contacts, limit the normal force to repulsion, and store the areas.
    subroutine add(self, bodies, dt, contacts, history)
       class(damping_onset_t), intent(in) :: self
       !> Bodies (not used)
@@ -60,7 +60,7 @@ contains
       real(wp), intent(in) :: dt
       !> Contacts; `normal_force` changes
       type(contacts_t), intent(inout) :: contacts
-      !> Memory of the pairs; the area is read and set
+      !> Contact history; the area is read and set
       type(contact_history_t), intent(inout) :: history
       real(wp) :: growth, damping
       integer(ip) :: c

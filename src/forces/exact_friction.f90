@@ -1,32 +1,31 @@
 !> Exact static friction: stick is a constraint on velocities, not a spring.
 !>
-!> A contact that can hold does not slip at all, and needs no tangential stiffness, which would set the step; what it
-!> carries follows from all contacts at once (D. Krengel & H.-G. Matuttis, J. Phys. Soc. Jpn. 87 (2018) 124402, pursue
-!> the same aim). Normal forces F_n are those of the elastic and damping parts, known once positions are known, so that
-!> neither inconsistency nor ambiguity of velocities can arise, as it does where normal and frictional forces
-!> are sought together.
+!> A contact below its Coulomb limit does not slip at all. It needs no tangential stiffness, which would limit the time
+!> step. Its force follows from all contacts at once (D. Krengel & H.-G. Matuttis, J. Phys. Soc. Jpn. 87 (2018) 124402,
+!> pursue the same aim). The elastic and damping parts compute the normal forces F_n before friction is solved. So the
+!> velocities exist and are unique, unlike with methods that solve for normal and frictional forces together.
 !>
-!> **In time.** With a the accelerations by all other forces and b those by friction, velocity Verlet says
+!> **In time.** Let a be the accelerations by all other forces and b those by friction. Velocity Verlet reads
 !>
 !>     x_n+1 = x_n + h w_n,     w_n = v_n + h/2 (a_n + b_n) = w_n-1 + h (a_n + b_n)
 !>
-!> Positions move with w_n, the velocity in the middle of the step to come. Hence friction is asked to make
-!> the slip of w_n vanish, or else to be at its limit and opposed to it: b_n is implicit, and otherwise a
-!> force like any other. What follows:
+!> Positions move with w_n, the velocity in the middle of the next step. The friction force makes the slip of w_n zero,
+!> or it is at its limit and opposes the slip. So b_n is implicit; otherwise friction is a force like any other. Hence:
 !>
 !> * A contact that sticks does not move: its slip is zero in every step, not only on average. If w_n-1 and w_n
 !>   do not slip, a_n + b_n = 0 along the tangent, and so v_n = w_n does not slip either.
 !> * A contact that slides gets -mu F_n at the positions where F_n is taken: second order, as all other forces.
-!> * A contact that stops does so within one step, w_n = 0, and the next one finds nothing to do.
-!> * Friction never adds energy: the kick of the other forces would lead to w' = w_n-1 + h a_n, and of all forces
-!>   within the limits those of friction leave the least kinetic energy (see `polydem_box_qp`).
-!> * Sums of forces times h are exact changes of momentum, as ever.
+!> * A contact that stops does so within one step, w_n = 0, and the next step starts from the solution.
+!> * Friction never adds energy. Without it the velocity would be w' = w_n-1 + h a_n. Of all forces within the limits,
+!>   friction leaves the least kinetic energy (see `polydem_box_qp`).
+!> * Sums of forces times h are exact changes of momentum.
 !>
-!> Had one asked for no slip of v_n instead, v_n = v_n+1 = 0 would want b to alternate around what it should be; had one
-!> added friction at the end of a step only, a block on a slope would have crept by h^2/2 g sin(slope) in each. Stick
-!> holds along the tangents at the start of a step: a body that rolls slips by what the tangent turns in a step,
-!> first order in h; and a wall moves with its velocity at the start of the step, which shifts what it
-!> carries by h/2 times the change of its velocity, but does not add up.
+!> A constraint on v_n instead would make b alternate around its correct value to keep v_n = v_n+1 = 0. Friction that is
+!> added only at the end of a step would let a block on a slope creep by h^2/2 g sin(slope) per step.
+!>
+!> Stick holds along the tangents at the start of a step. A rolling body therefore slips by the turn of the tangent in a
+!> step, first order in h. A wall moves with its velocity at the start of the step. This shifts the bodies on it by h/2
+!> times the change of its velocity; the shift does not accumulate.
 module polydem_exact_friction
    use polydem_bodies, only: bodies_t
    use polydem_box_qp, only: box_qp_t, reserve_box_qp, solve_box_qp
@@ -48,15 +47,15 @@ module polydem_exact_friction
    type, extends(velocity_constraint_t) :: exact_friction_t
       !> Friction coefficient mu
       real(wp) :: coefficient = 0.0_wp
-      !> Slip that may remain, as a share of the greatest slip velocity that friction takes from a contact in a step
+      !> Accepted remaining slip, as a share of the greatest slip velocity that friction removes in a step
       real(wp) :: tolerance = 0.0_wp
-      !> Contacts of the last step
+      !> Network of the contacts of the last step
       type(friction_network_t) :: network
       !> Forces and velocities of the last step
       type(box_qp_t) :: programme
-      !> Steps in which there was something to solve
+      !> Number of steps with at least one contact
       integer(lp), private :: n_solved = 0_lp
-      !> Greatest slip so far, as a share like `tolerance`
+      !> Greatest remaining slip so far, as a share like `tolerance`
       real(wp), private :: greatest_residual = 0.0_wp
    contains
       procedure :: choose
@@ -66,17 +65,17 @@ module polydem_exact_friction
       procedure :: report
    end type exact_friction_t
 
-   !> Unit of the residual among the counters, which are whole numbers
+   !> Unit of the counter of the residual; counters are integers
    real(wp), parameter :: residual_unit = 1.0e-15_wp
 
 contains
 
-   !> It is the friction 'exact'.
+   !> Choose this part if friction = 'exact' in &forces.
    subroutine choose(self, settings, chosen)
       class(exact_friction_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether it belongs to the law
+      !> Whether the settings ask for this part
       logical, intent(out) :: chosen
 
       chosen = settings%friction == 'exact'
@@ -86,14 +85,14 @@ contains
       self%tolerance = settings%friction_tolerance
    end subroutine choose
 
-   !> Refuse schemes that know no velocity in the middle of a step, and several processes.
+   !> Refuse integration schemes without a velocity in the middle of a step, and several ranks.
    subroutine check(self, settings, n_processes, error)
       class(exact_friction_t), intent(in) :: self
       !> All settings of the run
       type(settings_t), intent(in) :: settings
-      !> Number of processes that share the bodies
+      !> Number of ranks
       integer(ip), intent(in) :: n_processes
-      !> Names the entry and says what to do
+      !> Allocated if a setting is refused; names the entry and the remedy
       type(error_t), allocatable, intent(inout) :: error
 
       associate (unused_self => self)
@@ -102,33 +101,33 @@ contains
          place_of(settings, 'integrate', 'scheme')//': ''scheme'' in &integrate must be velocity_verlet, since '// &
          '''friction'' in &forces is exact')
       if (n_processes > 1_ip) call raise(error, input_error, settings%file//': exact friction couples all contacts '// &
-         'and needs a process of its own; use threads instead of ranks, or friction = ''cundall_strack'' in &forces')
+         'and runs on one rank only; use threads instead of ranks, or friction = ''cundall_strack'' in &forces')
    end subroutine check
 
-   !> It stores the force that the next search starts from.
+   !> Contact history of this part: the force, from which the next search starts
    function stored(self) result(kinds)
       class(exact_friction_t), intent(in) :: self
       type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
-      kinds = [history_kind_t('tangential', 'N/m', 'tangential force remembered')]
+      kinds = [history_kind_t('tangential', 'N/m', 'tangential force of the last step')]
    end function stored
 
-   !> Find the friction of all contacts.
+   !> Compute the friction of all contacts.
    subroutine apply(self, dt, incidence, bodies, contacts, history, error)
       class(exact_friction_t), intent(inout) :: self
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Index of the contacts
+      !> Contacts of each body
       type(incidence_t), intent(in) :: incidence
-      !> Bodies as predicted
+      !> Bodies with predicted positions and velocities, and all other forces
       type(bodies_t), intent(in) :: bodies
       !> Contacts; `tangential_force` changes
       type(contacts_t), intent(inout) :: contacts
-      !> Memory of the pairs: the force that the search starts from
+      !> Contact history; the force from which the search starts is read and set
       type(contact_history_t), intent(inout) :: history
-      !> Says how much slip is left
+      !> Allocated if the search does not converge; gives the remaining slip
       type(error_t), allocatable, intent(inout) :: error
       logical :: solved
       integer(ip) :: c
@@ -148,16 +147,17 @@ contains
          end do
          if (contacts%n > 0_ip) self%n_solved = self%n_solved + 1_lp
          self%greatest_residual = max(self%greatest_residual, programme%residual)
-         if (.not. solved) call raise(error, run_error, 'exact friction: '//to_text(programme%residual, 2)// &
-            ' of the greatest slip is left in a network of '//to_text(network%n)//' contacts, more than the '// &
-            to_text(self%tolerance, 2)//' of friction_tolerance in &forces. Take a larger one')
+         if (.not. solved) call raise(error, run_error, 'exact friction did not converge in a network of '// &
+            to_text(network%n)//' contacts: the remaining slip is '//to_text(programme%residual, 2)// &
+            ' of the greatest slip, more than friction_tolerance = '//to_text(self%tolerance, 2)// &
+            ' in &forces; set a larger friction_tolerance')
       end associate
    end subroutine apply
 
-   !> Set the counters of the work done so far.
+   !> Set the counters of the solver.
    subroutine report(self, counters)
       class(exact_friction_t), intent(in) :: self
-      !> List to set them in
+      !> Counters of the run
       type(counters_t), intent(inout) :: counters
 
       call counters%set('friction steps', self%n_solved)

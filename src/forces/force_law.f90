@@ -1,8 +1,8 @@
-!> The force law of a run: its parts, and the factory, the only file that lists all of them.
+!> The force law of a run, a list of parts, and its factory, the only code that lists all parts.
 !>
-!> To add a part: write it as a `force_part_t` in a file of its own, and name it here by a `use` and an `offer`. The
-!> order of the offers does not matter, as parts say when they act. A law may have a constraint on velocities, which
-!> acts when all other forces on the bodies are known.
+!> To add a part, write it as a `force_part_t` in a file of its own, and add a `use` and an `offer` here. The order of
+!> the offers does not matter, because the `stage` of a part gives its place. A law may have a constraint on velocities,
+!> which acts when all other forces on the bodies are known.
 module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
@@ -33,25 +33,25 @@ module polydem_force_law
       class(force_part_t), allocatable :: part
    end type part_holder_t
 
-   !> Parts in the order in which they act, and what they need
+   !> A force law: its parts in the order in which they act, and their requirements
    type :: force_law_t
       type(part_holder_t), allocatable, private :: parts(:)
-      !> What acts after all parts; unallocated if there is none
+      !> Constraint that acts after all parts; not allocated if there is none
       class(velocity_constraint_t), allocatable :: constraint
-      !> What is stored of each pair: the first columns of memory, in this order; not allocated before `choose_parts`
+      !> First columns of the contact history, in this order; not allocated before `choose_parts`
       type(history_kind_t), allocatable :: stored(:)
-      !> Whether the law asks for the effective area of overlaps
+      !> Whether the law needs the effective area of overlaps
       logical :: needs_effective_area = .false.
       !> Whether a part adds to the column `cohesion`
       logical :: needs_cohesion = .false.
-      !> Whether a part adds torques of its own
+      !> Whether a part adds to the column `twist`
       logical :: needs_twist = .false.
-      !> Names of the parts, for `check` and the log
+      !> Names of the parts, for `polydem check` and the log
       character(len=:), allocatable :: description
    contains
       procedure, private :: offer_part
       procedure, private :: offer_constraint
-      !> Offer the settings to a part or a constraint
+      !> Add a part or a constraint if the settings ask for it
       generic :: offer => offer_part, offer_constraint
       procedure :: collect_needs
       procedure :: measure
@@ -62,7 +62,7 @@ module polydem_force_law
 
 contains
 
-   !> Make the law that the settings ask for; what is off is absent.
+   !> Create the law that the settings ask for. It contains no other parts.
    subroutine new_force_law(settings, bodies, law)
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
@@ -75,8 +75,8 @@ contains
       call law%measure(bodies)
    end subroutine new_force_law
 
-   !> Choose the parts that the settings ask for: the list of all there are. The law computes forces after `measure`; it
-   !> knows everything else already.
+   !> Choose the parts that the settings ask for, from the list of all parts. The law must `measure` the bodies before
+   !> it computes forces.
    subroutine choose_parts(settings, law)
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
@@ -96,11 +96,11 @@ contains
       call law%collect_needs()
    end subroutine choose_parts
 
-   !> Offer the settings to a part; if they ask for it, it joins the law, behind all parts that act before it.
+   !> Add a part if the settings ask for it. Parts are sorted by their stages.
    subroutine offer_part(law, offered, settings)
       !> The law; `collect_needs` must follow the last offer
       class(force_law_t), intent(inout) :: law
-      !> A part as its type makes it
+      !> A part with default components
       class(force_part_t), intent(in) :: offered
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
@@ -126,11 +126,11 @@ contains
       call move_alloc(longer, law%parts)
    end subroutine offer_part
 
-   !> Offer the settings to a constraint; there is at most one that they ask for.
+   !> Set the constraint if the settings ask for it. They ask for at most one.
    subroutine offer_constraint(law, offered, settings)
       !> The law
       class(force_law_t), intent(inout) :: law
-      !> A constraint as its type makes it
+      !> A constraint with default components
       class(velocity_constraint_t), intent(in) :: offered
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
@@ -142,7 +142,7 @@ contains
       if (chosen) call move_alloc(constraint, law%constraint)
    end subroutine offer_constraint
 
-   !> Collect what the parts need and store, and their names.
+   !> Collect the requirements, the contact history and the names of the parts.
    subroutine collect_needs(law)
       !> The law
       class(force_law_t), intent(inout) :: law
@@ -184,13 +184,13 @@ contains
       if (allocated(law%constraint)) call law%constraint%measure(bodies)
    end subroutine measure
 
-   !> Refuse settings that the law does not go with.
+   !> Refuse settings that exclude a part of the law.
    subroutine check_law(settings, n_processes, error)
       !> All settings of the run
       type(settings_t), intent(in) :: settings
-      !> Number of processes that share the bodies
+      !> Number of ranks
       integer(ip), intent(in) :: n_processes
-      !> Names the entry and says what to do
+      !> Allocated if a setting is refused; names the entry and the remedy
       type(error_t), allocatable, intent(inout) :: error
       type(force_law_t) :: law
       integer :: k
@@ -212,7 +212,7 @@ contains
       real(wp), intent(in) :: dt
       !> Contacts; `elastic`, `cohesion`, `normal_force`, `tangential_force` and `twist` are set
       type(contacts_t), intent(inout) :: contacts
-      !> What is remembered of the pairs
+      !> Contact history
       type(contact_history_t), intent(inout) :: history
       integer :: k
 
@@ -232,7 +232,7 @@ contains
       class(force_law_t), intent(in) :: law
       !> Bodies
       type(bodies_t), intent(in) :: bodies
-      !> Contacts with their forces, or none if the contact is only expected
+      !> Contacts with their forces; empty for an expected contact
       type(contacts_t), intent(in) :: contacts
       !> The contact
       type(contact_element_t), intent(inout) :: element
@@ -244,7 +244,7 @@ contains
       if (allocated(law%constraint)) call law%constraint%stiffen(bodies, contacts, element)
    end subroutine stiffen
 
-   !> Depth at which a flat contact carries a load at rest [m]; 0 if no part knows one
+   !> Depth at which a flat contact carries a load at rest [m]; 0 if no part carries a load
    real(wp) function static_depth(law, load, block, support, offset) result(depth)
       !> The law
       class(force_law_t), intent(in) :: law
@@ -264,7 +264,7 @@ contains
       end do
    end function static_depth
 
-   !> What is wrong with the law because nothing dissipates; blank: nothing
+   !> Warning of a law without dissipation; blank if there is none
    function undamped_warning(law) result(warning)
       !> The law
       class(force_law_t), intent(in) :: law

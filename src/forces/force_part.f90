@@ -1,20 +1,20 @@
-!> What every part of a contact force promises.
+!> Base type of a part of the contact force.
 !>
-!> Each part looks at all contacts in one loop and adds to columns of the contact table; it never overwrites what other
-!> parts left there. The column says where the work of the force goes in the balance of energy:
+!> A part adds to columns of the table of contacts in one loop over all contacts. It never overwrites values of other
+!> parts. The columns decide the channel of the energy balance:
 !>
-!> * `elastic` and `normal_force`: the repulsion of the overlap, work of elastic forces;
-!> * `cohesion` and `normal_force`: another force that stores energy and may attract, work of elastic forces, too;
+!> * `elastic` and `normal_force`: repulsion of the overlap, work of elastic forces;
+!> * `cohesion` and `normal_force`: another force with a potential, which may attract, also work of elastic forces;
 !> * `normal_force` alone: work of damping;
-!> * `twist`: torque of its own, work of damping;
+!> * `twist`: torque of the contact itself, work of damping;
 !> * `tangential_force`: work of tangential forces.
 !>
-!> `energy_is_quadratic` of the table holds if the energy of all elastic forces is half of elastic area/length: the part
-!> of the overlap sets it, and a part with cohesion sets it to false.
+!> `energy_is_quadratic` of the table is true if the energy of all elastic forces is half of elastic area/length. The
+!> elastic part sets it; a part with cohesion sets it to false.
 !>
-!> The order in which parts are listed does not matter: each says when it acts, so that it finds what it needs. Parts
-!> are immutable once they are chosen and measured; what they remember lies in the columns of `contact_memory_t` that
-!> ride on the pair list.
+!> The order in which parts are listed does not matter; they act in the order of their stages. A part is immutable once
+!> it is chosen and has measured the bodies. Its contact history is in columns of `contact_history_t`, with one entry
+!> per pair of the pair list.
 module polydem_force_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t
@@ -25,29 +25,29 @@ module polydem_force_part
    private
    public :: force_part_t, acts_elastic, acts_damping, acts_on_damping, acts_normal, acts_last
 
-   !> When a part acts: first the elastic repulsion, which sets `inverse_length` and `lever`; then normal damping, which
-   !> knows the repulsion and nothing else; what changes damping; other normal forces, as cohesion; last friction and
-   !> damping of tilts, which know the whole normal force
+   !> Stages in the order in which they act: elastic repulsion, which sets `inverse_length` and `lever`; normal damping,
+   !> which uses the repulsion only; changes of the damping; other normal forces, such as cohesion; friction and damping
+   !> of tilts, which use the whole normal force
    integer, parameter :: acts_elastic = 1, acts_damping = 2, acts_on_damping = 3, acts_normal = 4, acts_last = 5
 
-   !> One part of the force between two bodies in contact. All components are set by `choose`
+   !> One part of the force between two bodies in contact. `choose` sets all components
    type, abstract, extends(law_part_t) :: force_part_t
-      !> When it acts, one of the constants above
+      !> Stage in which it acts, one of the constants above
       integer :: stage = acts_normal
-      !> Whether `area` and what follows from it must be those of the effective area
+      !> Whether `area` and the derived columns must be those of the effective area
       logical :: needs_effective_area = .false.
       !> Whether it adds to the column `cohesion`
       logical :: needs_cohesion = .false.
       !> Whether it adds to the column `twist`
       logical :: needs_twist = .false.
-      !> Whether every normal impact loses energy by it
+      !> Whether it dissipates energy in every normal impact
       logical :: dissipates = .false.
    contains
       !> Add this part to the forces of all contacts
       procedure(add), deferred :: add
-      !> Depth at which it carries a load
+      !> Depth at which this part carries a load at rest
       procedure :: static_depth
-      !> What is wrong with it if nothing dissipates
+      !> Warning if no part of the law dissipates
       procedure :: undamped_warning
    end type force_part_t
 
@@ -62,14 +62,14 @@ module polydem_force_part
          real(wp), intent(in) :: dt
          !> Contacts of this step
          type(contacts_t), intent(inout) :: contacts
-         !> What is remembered of the pairs
+         !> Contact history
          type(contact_history_t), intent(inout) :: history
       end subroutine add
    end interface
 
 contains
 
-   !> Depth at which a flat contact of this part carries a load at rest [m]; as it is here, it carries none.
+   !> Depth at which this part of a flat contact carries a load at rest [m]. Default: 0, it carries no load
    real(wp) function static_depth(self, load, block, support, offset)
       class(force_part_t), intent(in) :: self
       !> Normal load per unit depth of the plane [N/m]
@@ -87,7 +87,7 @@ contains
       static_depth = 0.0_wp
    end function static_depth
 
-   !> What is wrong with a law of this part if nothing dissipates; blank, as here: nothing
+   !> Warning if no part of the law dissipates. Default: blank, no warning
    function undamped_warning(self) result(warning)
       class(force_part_t), intent(in) :: self
       character(len=:), allocatable :: warning

@@ -1,15 +1,16 @@
 !> All contacts as a linear operator between their tangential forces and their slip velocities.
 !>
-!> With one unknown force f per contact, along the tangent of the contact and on its first body (the second feels the
-!> opposite), the velocities that bodies have after a step are v = v_free + h M^-1 H f, and the slip velocities of
-!> contacts u = H' v. A column of H holds the tangent t and the levers (arm x t) of both bodies; fixed bodies have
-!> no inverse mass, and their velocity is what it is. W = H' M^-1 H is never formed. A contact that is not
-!> pressed, or has no direction, has the limit 0.
+!> Each contact has one unknown force f along its tangent. It acts on the first body; the second feels the opposite.
+!> After a step the velocities of bodies are v = v_free + h M^-1 H f, and the slip velocities of contacts u = H' v. A
+!> column of H holds the tangent t and the levers (arm x t) of both bodies. Fixed bodies have the inverse mass 0; their
+!> velocity is prescribed. W = H' M^-1 H is never formed. A contact without pressure or without direction has the
+!> limit 0.
 !>
-!> Gauss-Seidel takes contacts one after the other. In a small network that is the order of the contact table, by one
-!> thread. In a large one contacts are sorted by colours, and threads share those of a colour, which have no
-!> free body in common. A contact gets the first colour that is free, in the order of the table, which is that of
-!> identifiers; those that find all colours taken come last. So the order does not depend on threads.
+!> Gauss-Seidel visits the contacts one after the other. One thread visits a small network in the order of the contact
+!> table. In a large network each contact has a colour. Contacts of one colour have no free body in common, and threads
+!> share them. Colours are assigned in the order of the table, which is that of identifiers: a contact gets the first
+!> colour that no other contact of its free bodies has. Contacts for which no colour is left come last. The order does
+!> not depend on the number of threads.
 module polydem_friction_network
    use polydem_bodies, only: bodies_t
    use polydem_contact_incidence, only: incidence_t
@@ -20,11 +21,11 @@ module polydem_friction_network
    public :: friction_network_t, build_network, free_velocities, push_bodies, sweep_contacts, slip_of_contacts
    public :: avoidable_slip, measure_slip, within, worth_sharing
 
-   !> Colours that threads share; one more is for what is left
+   !> Number of colours; contacts without a colour follow in one more group
    integer, parameter :: n_colours = 62
-   !> Loops over fewer contacts of a network run on one thread: what is done for each is little
+   !> Loops over fewer contacts run on one thread, because each contact takes little time
    integer(ip), parameter :: worth_sharing = 1024_ip
-   !> Networks with fewer contacts are not coloured: there would be too few of a colour to be worth several threads
+   !> Networks with fewer contacts are not coloured: a colour would have too few contacts for several threads
    integer(ip), parameter :: worth_colours = 16384_ip
    !> Relative rounding error of a sum of some forces or velocities
    real(wp), parameter :: rounding = 8.0_wp*epsilon(1.0_wp)
@@ -35,31 +36,32 @@ module polydem_friction_network
       integer(ip) :: n = 0_ip
       !> Slots of the two bodies, (2, contact)
       integer(ip), allocatable :: body(:, :)
-      !> Tangent, and arm x tangent of the first and of the second body, (4, contact) [-, -, m, m]
+      !> Column of H: tangent, and arm x tangent of the first and the second body, (4, contact) [-, -, m, m]
       real(wp), allocatable :: row(:, :)
-      !> Change of the slip velocity by a unit force within a step, h W_cc [m/s per N/m]
+      !> Change of the slip velocity by a unit force within a step, h W_cc, (contact) [m/s per N/m]
       real(wp), allocatable :: mobility(:)
-      !> Greatest force mu F_n [N/m], never negative: a contact that is pulled together has no friction
+      !> Greatest force mu F_n, (contact) [N/m]; 0 if the contact is under tension
       real(wp), allocatable :: limit(:)
-      !> What a slip velocity may be by the rounding errors of the forces on the bodies [m/s]
+      !> Slip velocity due to rounding errors of the forces on the bodies, (contact) [m/s]
       real(wp), allocatable :: noise(:)
-      !> Change of velocity and angular velocity of each body by a unit force and torque, h/m and h/I, (2, slot)
+      !> Change of velocity and angular velocity of each body by a unit force and torque, h/m and h/I; 0 for a fixed
+      !> body, (2, slot)
       real(wp), allocatable :: inverse(:, :)
       !> Contacts in the order of sweeps
       integer(ip), allocatable, private :: order(:)
-      !> Places in `order`: first contact of each colour, and first of those left
+      !> Indices in `order`: first contact of each colour, and first contact without a colour
       integer(ip), private :: start(n_colours + 1) = 1_ip
       !> Colour of each contact
       integer(ip), allocatable, private :: colour(:)
-      !> Colours that are taken at each body, one bit each
+      !> Colours in use at each body, one bit each
       integer(lp), allocatable, private :: taken(:)
    end type friction_network_t
 
 contains
 
-   !> Set up the network of a step.
+   !> Build the network of a step.
    subroutine build_network(dt, coefficient, bodies, contacts, network)
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
       !> Friction coefficient mu
       real(wp), intent(in) :: coefficient
@@ -67,7 +69,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Contacts with their normal forces
       type(contacts_t), intent(in) :: contacts
-      !> Network to build anew
+      !> Network to rebuild
       type(friction_network_t), intent(inout) :: network
       integer(ip) :: c, s
 
@@ -151,13 +153,13 @@ contains
       end do
    end subroutine order_contacts
 
-   !> Velocities that the positions would move with during the next step if there were no friction.
+   !> Compute the velocities in the middle of the next step without friction.
    !>
-   !> Velocity Verlet predicts v_n + dt a_n; half a step before that is the velocity in the middle of the last step.
+   !> Velocity Verlet predicts v_n + dt a_n. The velocity in the middle of the last step is v_n + dt a_n/2.
    subroutine free_velocities(dt, bodies, velocity)
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Bodies as predicted, with the accelerations of the last step and the forces of this one
+      !> Bodies with predicted velocities, the accelerations of the last step and the forces of this step
       type(bodies_t), intent(in) :: bodies
       !> Velocity and angular velocity of each body, (3, slot) [m/s, m/s, rad/s]
       real(wp), intent(inout) :: velocity(:, :)
@@ -180,7 +182,7 @@ contains
       !$omp end parallel do
    end subroutine free_velocities
 
-   !> Velocities that forces give, h M^-1 H f. Threads of a parallel region share the work.
+   !> Compute the velocities due to tangential forces, h M^-1 H f. The threads of a parallel region share the work.
    subroutine push_bodies(network, incidence, force, push)
       !> Network
       type(friction_network_t), intent(in) :: network
@@ -188,7 +190,7 @@ contains
       type(incidence_t), intent(in) :: incidence
       !> Tangential force of each contact [N/m]
       real(wp), intent(in), contiguous :: force(:)
-      !> Velocity and angular velocity of each body, (3, slot)
+      !> Velocity and angular velocity of each body, (3, slot) [m/s, m/s, rad/s]
       real(wp), intent(inout), contiguous :: push(:, :)
       real(wp) :: total(3)
       integer(ip) :: c, k, s
@@ -216,8 +218,7 @@ contains
       !$omp end do
    end subroutine push_bodies
 
-   !> One sweep of projected Gauss-Seidel: each contact in turn takes the force that stops its slip, or the greatest it
-   !> can take.
+   !> Do one sweep of projected Gauss-Seidel: each contact in turn gets the force that stops its slip, within its limit.
    subroutine sweep_contacts(network, force, velocity)
       !> Network
       type(friction_network_t), intent(in) :: network
@@ -243,15 +244,15 @@ contains
       end do
    end subroutine sweep_contacts
 
-   !> Slip velocities of some contacts, u = H' v.
+   !> Compute the slip velocities of a range of contacts, u = H' v.
    pure subroutine slip_of_contacts(network, velocity, low, high, slip)
       !> Network
       type(friction_network_t), intent(in) :: network
       !> Velocities, (3, slot)
       real(wp), intent(in), contiguous :: velocity(:, :)
-      !> First and last of the contacts
+      !> First and last contact
       integer(ip), intent(in) :: low, high
-      !> Slip velocity of each [m/s]
+      !> Slip velocity of each contact, (contact) [m/s]
       real(wp), intent(inout), contiguous :: slip(:)
       integer(ip) :: c
 
@@ -260,8 +261,8 @@ contains
       end do
    end subroutine slip_of_contacts
 
-   !> Greatest avoidable slip beyond the rounding errors of forces and velocities, and the greatest slip velocity that
-   !> the friction of a contact takes from its own bodies in a step.
+   !> Find the greatest avoidable slip beyond rounding errors, and the greatest slip velocity that the friction of one
+   !> contact removes from its own bodies in a step.
    subroutine measure_slip(network, force, velocity, residual, scale)
       !> Network
       type(friction_network_t), intent(in) :: network
@@ -271,7 +272,7 @@ contains
       real(wp), intent(in), contiguous :: velocity(:, :)
       !> Greatest avoidable slip [m/s]
       real(wp), intent(out) :: residual
-      !> Greatest change of a slip velocity [m/s]
+      !> Greatest slip velocity removed by one contact [m/s]
       real(wp), intent(out) :: scale
       integer(ip) :: c
 
@@ -286,8 +287,8 @@ contains
       !$omp end parallel do
    end subroutine measure_slip
 
-   !> Slip of a contact that its friction could still lessen [m/s]: any slip below the limit, at the limit only slip
-   !> along the force.
+   !> Slip of a contact that a change of its force could reduce [m/s]: any slip if the force is below the limit, slip
+   !> along the force if it is at the limit
    elemental real(wp) function avoidable_slip(force, limit, slip)
       !> Tangential force [N/m]
       real(wp), intent(in) :: force
@@ -301,7 +302,7 @@ contains
       if (force <= -limit) avoidable_slip = min(0.0_wp, avoidable_slip)
    end function avoidable_slip
 
-   !> A force cut at its limit [N/m]
+   !> Force limited to -limit ... limit [N/m]
    elemental real(wp) function within(limit, force)
       !> Greatest force [N/m]
       real(wp), intent(in) :: limit
@@ -311,7 +312,7 @@ contains
       within = max(-limit, min(limit, force))
    end function within
 
-   !> Avoidable slip of a contact less the rounding errors of the forces and velocities it is made of [m/s]
+   !> Avoidable slip of a contact minus the rounding errors of its forces and velocities [m/s]
    pure real(wp) function excess_slip(network, c, force, velocity)
       type(friction_network_t), intent(in) :: network
       integer(ip), intent(in) :: c
@@ -325,7 +326,7 @@ contains
       end associate
    end function excess_slip
 
-   !> Sum of the absolute parts of a body's velocity at a contact [m/s]
+   !> Sum of the absolute terms of a body's velocity at a contact [m/s]
    pure real(wp) function sum_of(velocity, lever)
       real(wp), intent(in) :: velocity(3), lever
 
@@ -345,7 +346,7 @@ contains
       end associate
    end function slip_of
 
-   !> Give a contact the force that stops its slip, as far as it can.
+   !> Give a contact the force that stops its slip, within its limit.
    pure subroutine stop_slip(network, c, force, velocity)
       type(friction_network_t), intent(in) :: network
       integer(ip), intent(in) :: c
@@ -359,7 +360,7 @@ contains
       if (.not. abs(change) > 0.0_wp) return
       associate (i => network%body(1, c), j => network%body(2, c))
          g = change*network%inverse(:, i)
-         ! Threads share fixed bodies.
+         ! Threads share fixed bodies, so their velocities must not be written.
          if (network%inverse(1, i) > 0.0_wp) then
             velocity(1, i) = velocity(1, i) + g(1)*network%row(1, c)
             velocity(2, i) = velocity(2, i) + g(1)*network%row(2, c)
@@ -374,7 +375,7 @@ contains
       end associate
    end subroutine stop_slip
 
-   !> Make room for bodies and contacts.
+   !> Allocate the arrays for bodies and contacts.
    subroutine reserve(n_bodies, n_contacts, network)
       integer(ip), intent(in) :: n_bodies, n_contacts
       type(friction_network_t), intent(inout) :: network

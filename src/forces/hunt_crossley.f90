@@ -1,9 +1,9 @@
 !> Normal damping in proportion to the elastic force: F = F_el (1 + a v_n), a = gamma sqrt(m_eff/E)/l.
 !>
-!> K.H. Hunt & F.R.E. Crossley, J. Appl. Mech. 42 (1975) 440, with v_n = (dA/dt)/L, so that the loss is never negative.
-!> It vanishes with the overlap: nothing jumps when bodies touch, and restitution converges with the second order of
-!> the step. Slow impacts lose less: with u = a v before and e the restitution, u - ln(1 + u) = -e u - ln(1 - e u),
-!> e = 1 - 2u/3 + ...
+!> K.H. Hunt & F.R.E. Crossley, J. Appl. Mech. 42 (1975) 440, with v_n = (dA/dt)/L, so the loss is never negative. The
+!> damping vanishes with the overlap. The force does not jump at first touch, and the error of restitution is of second
+!> order in the step. Slow impacts lose less: with u = a v before the impact, the restitution e follows from
+!> u - ln(1 + u) = -e u - ln(1 - e u), e = 1 - 2u/3 + ...
 module polydem_hunt_crossley
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
@@ -26,12 +26,12 @@ module polydem_hunt_crossley
 
 contains
 
-   !> It is the damping 'hunt_crossley'.
+   !> Choose this part if damping = 'hunt_crossley' in &forces.
    subroutine choose(self, settings, chosen)
       class(hunt_crossley_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether it belongs to the law
+      !> Whether the settings ask for this part
       logical, intent(out) :: chosen
 
       chosen = settings%damping == 'hunt_crossley'
@@ -40,7 +40,7 @@ contains
       call self%take_coefficients(settings)
    end subroutine choose
 
-   !> Find the damping of some contacts.
+   !> Compute the damping forces of one block of contacts.
    subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
       class(hunt_crossley_t), intent(in) :: self
       !> Bodies, for their masses
@@ -49,27 +49,27 @@ contains
       real(wp), intent(in) :: dt
       !> Contacts with their elastic forces
       type(contacts_t), intent(in) :: contacts
-      !> Memory of the pairs (not used)
+      !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
-      !> First and last of the contacts
+      !> First and last contact of the block
       integer(ip), intent(in) :: low, high
-      !> Damping of contact c at c - low + 1 [N/m]
+      !> Damping force of contact c at index c - low + 1 [N/m]
       real(wp), intent(inout) :: force(block_size)
       real(wp) :: mobility, share
       integer(ip) :: c
 
-      associate (unused_dt => dt, unused_memory => history)
+      associate (unused_dt => dt, unused_history => history)
       end associate
       do c = low, high
          mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
-         ! Bars that nearly cross turn without approach: L is not taken shorter than the side of a square of the area.
+         ! Bars that nearly cross turn without approach. L is at least the side of a square of the same area.
          share = self%coefficient*sqrt(1.0_wp/(mobility*self%stiffness))*contacts%inverse_length(c) &
             *(contacts%rate(c)/max(contacts%length(c), sqrt(contacts%area(c))))
          force(c - low + 1_ip) = contacts%elastic(c)*share
       end do
    end subroutine find_forces
 
-   !> Both the stiffness and the dashpot follow the force of the moment; before there is one there is neither.
+   !> Add stiffness and dashpot from the present force. An expected contact has no force and gets neither.
    subroutine stiffen(self, bodies, contacts, element)
       class(hunt_crossley_t), intent(in) :: self
       !> Bodies (not used)

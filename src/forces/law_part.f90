@@ -1,8 +1,8 @@
-!> What every member of a force law knows about itself: parts of the contact force, and a constraint on velocities.
+!> Base type of the members of a force law: parts of the contact force, and a constraint on velocities.
 !>
-!> A member takes what it needs from the settings, says whether the scene asks for it, what it stores of each pair,
-!> how stiff it makes a contact, and what it does not go with. So no other file has to know its name: the factory
-!> (`force_law`) offers the settings to each member in turn. A member writes only what differs from the defaults below.
+!> A member chooses itself from the settings, refuses settings that exclude it, declares its contact history, and adds
+!> its stiffness to that of a contact. The names of members occur only in their own files and in the factory
+!> (`force_law`), which offers the settings to each member. A member overrides only the defaults that do not fit.
 module polydem_law_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
@@ -17,52 +17,52 @@ module polydem_law_part
 
    !> A member of a force law
    type, abstract :: law_part_t
-      !> Name for `check` and the log; `choose` sets it
+      !> Name for `polydem check` and the log; `choose` sets it
       character(len=40) :: name = ''
-      !> Place of the first of its columns among those of `contact_memory_t`; the law sets it
+      !> Index of the first column of this member in `contact_history_t`; the law sets it
       integer :: first_column = 1
    contains
-      !> Take what it needs from the settings
+      !> Copy its parameters from the settings
       procedure(choose), deferred :: choose
-      !> Refuse what it does not go with
+      !> Refuse settings that exclude this member
       procedure :: check
       !> Measure the bodies
       procedure :: measure
-      !> What it stores of each pair
+      !> Columns of its contact history
       procedure :: stored
       !> Add its springs and dashpots to those of a contact
       procedure :: stiffen
    end type law_part_t
 
    abstract interface
-      !> Take what it needs from the settings, and say whether the scene asks for it.
+      !> Copy the parameters from the settings, and return whether the settings ask for this member.
       subroutine choose(self, settings, chosen)
          import :: forces_settings_t, law_part_t
          class(law_part_t), intent(inout) :: self
          !> Group &forces
          type(forces_settings_t), intent(in) :: settings
-         !> Whether this member belongs to the law
+         !> Whether the settings ask for this member
          logical, intent(out) :: chosen
       end subroutine choose
    end interface
 
 contains
 
-   !> Refuse settings that it does not go with; as it is here, it goes with all.
+   !> Refuse settings that exclude this member. Default: none.
    subroutine check(self, settings, n_processes, error)
       class(law_part_t), intent(in) :: self
       !> All settings of the run
       type(settings_t), intent(in) :: settings
-      !> Number of processes that share the bodies
+      !> Number of ranks
       integer(ip), intent(in) :: n_processes
-      !> Names the entry and says what to do
+      !> Allocated if a setting is refused; names the entry and the remedy
       type(error_t), allocatable, intent(inout) :: error
 
       associate (unused_self => self, unused_settings => settings, unused_n => n_processes, unused_error => error)
       end associate
    end subroutine check
 
-   !> Measure the bodies, whenever they are other bodies than before; as it is here, nothing about them matters.
+   !> Measure the bodies, at the start and after each redistribution. Default: nothing.
    subroutine measure(self, bodies)
       class(law_part_t), intent(inout) :: self
       !> Bodies, for their shapes
@@ -72,8 +72,8 @@ contains
       end associate
    end subroutine measure
 
-   !> What it stores of each pair, in the order of its columns: column(first_column), column(first_column + 1) ... of
-   !> `contact_memory_t`; as it is here, nothing. Names must differ from those of other members of the same law.
+   !> Columns of the contact history, in the order column(first_column), column(first_column + 1) ... of
+   !> `contact_history_t`. Default: none. Names must differ from those of other members of the same law.
    function stored(self) result(kinds)
       class(law_part_t), intent(in) :: self
       type(history_kind_t), allocatable :: kinds(:)
@@ -83,15 +83,15 @@ contains
       allocate (kinds(0))
    end function stored
 
-   !> Add its springs and dashpots to those of a contact, for the stable step; as it is here, it has none. A part that
-   !> acts later finds those of the parts that act before it.
+   !> Add the springs and dashpots to those of a contact, for the stable step. Default: none. The parts add theirs in
+   !> the order of their stages.
    subroutine stiffen(self, bodies, contacts, element)
       class(law_part_t), intent(in) :: self
       !> Bodies
       type(bodies_t), intent(in) :: bodies
-      !> Contacts with their forces; only those of `element%contact` may be looked at
+      !> Contacts with their forces; only the contact `element%contact` may be read
       type(contacts_t), intent(in) :: contacts
-      !> The contact: masses and geometry are set
+      !> The contact; masses and geometry are set
       type(contact_element_t), intent(inout) :: element
 
       associate (unused_self => self, unused_bodies => bodies, unused_contacts => contacts, unused => element)

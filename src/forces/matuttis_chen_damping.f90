@@ -1,8 +1,8 @@
-!> Normal damping as in the programs that accompany the book: backward difference of the area, with cut-offs.
+!> Normal damping of the programs that accompany Matuttis & Chen 2014: backward difference of the area, with limits.
 !>
-!> Matuttis & Chen 2014, Eq. 7.13: F = gamma sqrt(m_eff E) (A - A_old)/(l dt), where A_old is 0 in the first step of
-!> a contact; on approach at most four times the elastic force (p. 227), never attractive in sum (p. 277).
-!> Meant for comparison; `rate_damping` is the same law without the artefacts of the difference.
+!> Eq. 7.13: F = gamma sqrt(m_eff E) (A - A_old)/(l dt), where A_old is 0 in the first step of a contact. On approach F
+!> is at most four times the elastic force (p. 227). The sum with the elastic force is never attractive (p. 277). This
+!> law is for comparison; `rate_damping` is the same law without the artefacts of the difference.
 module polydem_matuttis_chen_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
@@ -27,44 +27,44 @@ module polydem_matuttis_chen_damping
 
 contains
 
-   !> It is the damping 'book'.
+   !> Choose this part if damping = 'matuttis_chen' in &forces.
    subroutine choose(self, settings, chosen)
       class(matuttis_chen_damping_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether it belongs to the law
+      !> Whether the settings ask for this part
       logical, intent(out) :: chosen
 
-      chosen = settings%damping == 'book'
+      chosen = settings%damping == 'matuttis_chen'
       if (.not. chosen) return
-      self%name = 'book damping'
+      self%name = 'Matuttis-Chen damping'
       call self%take_coefficients(settings)
    end subroutine choose
 
-   !> It stores the area of the last step.
+   !> Contact history of this part: the overlap area of the last step
    function stored(self) result(kinds)
       class(matuttis_chen_damping_t), intent(in) :: self
       type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
-      kinds = [history_kind_t('area', 'm2', 'area of the overlap at the last step', zero_is_new=.true.)]
+      kinds = [history_kind_t('area', 'm2', 'overlap area at the last step', zero_is_new=.true.)]
    end function stored
 
-   !> Find the damping of some contacts, and remember the area.
+   !> Compute the damping forces of one block of contacts, and store the areas.
    subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
       class(matuttis_chen_damping_t), intent(in) :: self
       !> Bodies, for their masses
       type(bodies_t), intent(in) :: bodies
-      !> Time since the last evaluation [s]; 0: no rate is known, no damping
+      !> Time since the last evaluation [s]; 0: the rate is unknown, and there is no damping
       real(wp), intent(in) :: dt
       !> Contacts with their elastic forces
       type(contacts_t), intent(in) :: contacts
-      !> Memory of the pairs; the area is read and set
+      !> Contact history; the area is read and set
       type(contact_history_t), intent(inout) :: history
-      !> First and last of the contacts
+      !> First and last contact of the block
       integer(ip), intent(in) :: low, high
-      !> Damping of contact c at c - low + 1 [N/m]
+      !> Damping force of contact c at index c - low + 1 [N/m]
       real(wp), intent(inout) :: force(block_size)
       real(wp) :: mobility, difference
       integer(ip) :: c

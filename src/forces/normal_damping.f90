@@ -1,8 +1,7 @@
-!> What all normal dampings have in common: the loop over the contacts, the limit, and the dashpot of the stable step.
+!> Base type of normal dampings: the loop over the contacts, the limit of the force, and the dashpot of the stable step.
 !>
-!> Damping alone never attracts: it takes away at most the elastic repulsion, as the sum of both must not be negative
-!> (H.-G. Matuttis & J. Chen, Understanding the Discrete Element Method, Wiley 2014, p. 277). It leaves an attraction by
-!> another part as it is.
+!> Damping never makes a contact attractive: the sum of elastic and damping force is not negative (H.-G. Matuttis & J.
+!> Chen, Understanding the Discrete Element Method, Wiley 2014, p. 277). An attraction by another part is not changed.
 module polydem_normal_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
@@ -15,7 +14,7 @@ module polydem_normal_damping
    private
    public :: normal_damping_t, block_size
 
-   !> Contacts whose damping is found in one call
+   !> Largest number of contacts in one call of `find_forces`
    integer(ip), parameter :: block_size = 256_ip
 
    !> A normal damping
@@ -25,7 +24,7 @@ module polydem_normal_damping
       !> Dimensionless damping coefficient gamma
       real(wp) :: coefficient = 0.0_wp
    contains
-      !> Find the damping of some contacts
+      !> Compute the damping forces of one block of contacts
       procedure(find_forces), deferred :: find_forces
       procedure :: add
       procedure :: stiffen
@@ -33,7 +32,7 @@ module polydem_normal_damping
    end type normal_damping_t
 
    abstract interface
-      !> Find the damping of some contacts, without any limit to repulsion.
+      !> Compute the damping forces of one block of contacts, without a limit.
       subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
          import :: block_size, bodies_t, contact_history_t, contacts_t, ip, normal_damping_t, wp
          class(normal_damping_t), intent(in) :: self
@@ -43,18 +42,18 @@ module polydem_normal_damping
          real(wp), intent(in) :: dt
          !> Contacts of this step with their elastic forces
          type(contacts_t), intent(in) :: contacts
-         !> What is remembered of the pairs; only pairs of these contacts may change
+         !> Contact history; only the pairs of these contacts may change
          type(contact_history_t), intent(inout) :: history
-         !> First and last of the contacts, at most `block_size`
+         !> First and last contact of the block, at most `block_size` contacts
          integer(ip), intent(in) :: low, high
-         !> Damping of contact c at c - low + 1, positive in repulsion [N/m]
+         !> Damping force of contact c at index c - low + 1, positive in repulsion [N/m]
          real(wp), intent(inout) :: force(block_size)
       end subroutine find_forces
    end interface
 
 contains
 
-   !> Add the damping, limited so that the sum with the elastic repulsion does not attract.
+   !> Add the damping force. Its sum with the elastic force is limited to repulsion.
    subroutine add(self, bodies, dt, contacts, history)
       class(normal_damping_t), intent(in) :: self
       !> Bodies, for their masses
@@ -63,7 +62,7 @@ contains
       real(wp), intent(in) :: dt
       !> Contacts; `normal_force` changes
       type(contacts_t), intent(inout) :: contacts
-      !> What is remembered of the pairs
+      !> Contact history
       type(contact_history_t), intent(inout) :: history
       real(wp) :: force(block_size)
       integer(ip) :: c, low, high
@@ -96,7 +95,7 @@ contains
          + self%coefficient*sqrt(element%normal_mass*self%stiffness)*element%ratio
    end subroutine stiffen
 
-   !> Take stiffness and coefficient from the settings.
+   !> Copy stiffness and coefficient from the settings.
    subroutine take_coefficients(self, settings)
       class(normal_damping_t), intent(inout) :: self
       !> Group &forces

@@ -1,7 +1,7 @@
 !> Normal damping by the exact rate of the overlap area: F = gamma sqrt(m_eff E) (dA/dt)/l.
 !>
-!> Matuttis & Chen 2014, Eq. 7.13, with dA/dt taken from positions and velocities instead of a backward
-!> difference: no memory, no lag of half a step, no jump at the first step of a contact.
+!> Matuttis & Chen 2014, Eq. 7.13, with dA/dt from positions and velocities instead of a backward difference. There is
+!> no contact history, no lag of half a step and no jump in the first step of a contact.
 module polydem_rate_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t
@@ -22,12 +22,12 @@ module polydem_rate_damping
 
 contains
 
-   !> It is the damping 'rate' where no restitution is given.
+   !> Choose this part if damping = 'rate' and restitution = 0 in &forces.
    subroutine choose(self, settings, chosen)
       class(rate_damping_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether it belongs to the law
+      !> Whether the settings ask for this part
       logical, intent(out) :: chosen
 
       chosen = settings%damping == 'rate'
@@ -37,7 +37,7 @@ contains
       call self%take_coefficients(settings)
    end subroutine choose
 
-   !> Find the damping of some contacts.
+   !> Compute the damping forces of one block of contacts.
    subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
       class(rate_damping_t), intent(in) :: self
       !> Bodies, for their masses
@@ -46,16 +46,16 @@ contains
       real(wp), intent(in) :: dt
       !> Contacts
       type(contacts_t), intent(in) :: contacts
-      !> Memory of the pairs (not used)
+      !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
-      !> First and last of the contacts
+      !> First and last contact of the block
       integer(ip), intent(in) :: low, high
-      !> Damping of contact c at c - low + 1 [N/m]
+      !> Damping force of contact c at index c - low + 1 [N/m]
       real(wp), intent(inout) :: force(block_size)
       real(wp) :: mobility
       integer(ip) :: c
 
-      associate (unused_dt => dt, unused_memory => history)
+      associate (unused_dt => dt, unused_history => history)
       end associate
       do c = low, high
          mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))

@@ -1,17 +1,17 @@
-!> Normal damping for a given restitution: F = 2 zeta sqrt(m_eff k) v_n, where k = E L/l is the stiffness of the contact
-!> as it is and v_n = (dA/dt)/L.
+!> Normal damping for a given restitution: F = 2 zeta sqrt(m_eff k) v_n, where k = E L/l is the present stiffness of the
+!> contact and v_n = (dA/dt)/L.
 !>
-!> A flat contact keeps its k, so it is a damped spring that is let go when its force vanishes (no attraction). Its
+!> A flat contact has a constant k. It is a damped spring that is released when its force vanishes (no attraction). Its
 !> restitution depends on the damping ratio zeta alone (T. Schwager & T. Poeschel, Granular Matter 9 (2007) 465):
 !>
 !>     e = exp(-2 zeta acos(zeta)/sqrt(1 - zeta^2))       zeta < 1
 !>     e = exp(-2 zeta acosh(zeta)/sqrt(zeta^2 - 1))      zeta > 1
 !>
-!> whatever the sizes and masses of the two bodies. With the conservative law every central contact has it: there
-!> F = K A A' and k = K A'^2, A' = dA/dd, so that dv/dA is the same function of A and v whatever A(d). With the area
-!> law contacts that are not flat have another restitution, but since k follows the depth it does not depend on the
-!> speed either (Y. Tsuji, T. Tanaka & T. Ishida, Powder Technol. 71 (1992) 239). The effective mass is that of a
-!> central impact; eccentric ones lose more.
+!> It does not depend on the sizes and masses of the two bodies. With the conservative law every central contact has
+!> this restitution: F = K A A' and k = K A'^2 with A' = dA/dd, so dv/dA is the same function of A and v for any A(d).
+!> With the area law, contacts that are not flat have another restitution. It does not depend on the speed either,
+!> because k follows the depth (Y. Tsuji, T. Tanaka & T. Ishida, Powder Technol. 71 (1992) 239). The effective mass is
+!> that of a central impact; eccentric impacts lose more energy.
 module polydem_restitution_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
@@ -24,7 +24,7 @@ module polydem_restitution_damping
    private
    public :: restitution_damping_t, restitution_of, damping_ratio_of
 
-   !> Damping with one ratio for all contacts; the coefficient is not used
+   !> Damping with one damping ratio for all contacts; `coefficient` is not used
    type, extends(normal_damping_t) :: restitution_damping_t
       !> Damping ratio zeta
       real(wp) :: ratio = 0.0_wp
@@ -36,12 +36,12 @@ module polydem_restitution_damping
 
 contains
 
-   !> It is the damping 'rate' where a restitution is given.
+   !> Choose this part if damping = 'rate' and restitution > 0 in &forces.
    subroutine choose(self, settings, chosen)
       class(restitution_damping_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether it belongs to the law
+      !> Whether the settings ask for this part
       logical, intent(out) :: chosen
 
       chosen = settings%damping == 'rate'
@@ -53,7 +53,7 @@ contains
       self%dissipates = self%ratio > 0.0_wp
    end subroutine choose
 
-   !> Find the damping of some contacts.
+   !> Compute the damping forces of one block of contacts.
    subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
       class(restitution_damping_t), intent(in) :: self
       !> Bodies, for their masses
@@ -62,20 +62,20 @@ contains
       real(wp), intent(in) :: dt
       !> Contacts
       type(contacts_t), intent(in) :: contacts
-      !> Memory of the pairs (not used)
+      !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
-      !> First and last of the contacts
+      !> First and last contact of the block
       integer(ip), intent(in) :: low, high
-      !> Damping of contact c at c - low + 1 [N/m]
+      !> Damping force of contact c at index c - low + 1 [N/m]
       real(wp), intent(inout) :: force(block_size)
       real(wp) :: mobility, reach
       integer(ip) :: c
 
-      associate (unused_dt => dt, unused_memory => history)
+      associate (unused_dt => dt, unused_history => history)
       end associate
       do c = low, high
          mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
-         ! Bars that nearly cross turn without approach: L is not taken shorter than the side of a square of the area.
+         ! Bars that nearly cross turn without approach. L is at least the side of a square of the same area.
          reach = max(contacts%length(c), sqrt(contacts%area(c)))
          force(c - low + 1_ip) = 2.0_wp*self%ratio*sqrt(self%stiffness/mobility) &
             *sqrt(contacts%inverse_length(c)/reach)*contacts%rate(c)
@@ -98,7 +98,7 @@ contains
          + 2.0_wp*self%ratio*sqrt(element%normal_mass*self%stiffness)*sqrt(element%ratio)
    end subroutine stiffen
 
-   !> Restitution of a damped spring that is let go when its force vanishes
+   !> Restitution of a damped spring that is released when its force vanishes
    elemental real(wp) function restitution_of(ratio) result(restitution)
       !> Damping ratio zeta, not negative
       real(wp), intent(in) :: ratio
@@ -114,7 +114,7 @@ contains
       end if
    end function restitution_of
 
-   !> Damping ratio with which a damped spring has a restitution; exactly 0 for 1
+   !> Damping ratio of a damped spring with a given restitution; exactly 0 for the restitution 1
    elemental real(wp) function damping_ratio_of(restitution) result(ratio)
       !> Restitution, above 0, at most 1
       real(wp), intent(in) :: restitution

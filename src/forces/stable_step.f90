@@ -1,13 +1,13 @@
-!> The largest stable time step, from actual contacts or, before there are any, from the shapes of the bodies.
+!> The largest stable time step, from the contacts or, if there are none yet, from the shapes of the bodies.
 !>
-!> Each contact is an element of its own: with the normal stiffness K_n, the tangential stiffness K_t and the
-!> mobilities G of its two bodies, each mass shared among the n contacts that it carries, the greatest
-!> eigenvalue of K^(1/2) G K^(1/2) is an upper bound of the square of the frequencies of the whole (element
-!> bound; in the spirit of C. O'Sullivan & J.D. Bray, Eng. Comput. 21 (2004) 278). The integrator says which
-!> product of frequency and step it stands, as a function of the damping ratio.
+!> Each contact is an element with the normal stiffness K_n, the tangential stiffness K_t and the mobilities G of its
+!> two bodies. The mass of a body is divided among its n contacts. The greatest eigenvalue of K^(1/2) G K^(1/2) over all
+!> elements is an upper bound of the squared frequencies of the whole system (element bound; similar to C. O'Sullivan &
+!> J.D. Bray, Eng. Comput. 21 (2004) 278). The integration scheme has a largest stable product of frequency and step,
+!> given as a function of the damping ratio.
 !>
-!> Stiffnesses and dashpots are those that the parts of the force law add (see `stiffen` of each). Stiffness against
-!> tilts comes in beside the others.
+!> The parts of the force law add the stiffnesses and dashpots (`stiffen`). The stiffness against tilts is added to the
+!> squared frequency of the other two.
 module polydem_stable_step
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
@@ -20,26 +20,26 @@ module polydem_stable_step
    private
    public :: contact_numbers, stable_step_of_contacts, stable_step_of_shapes
 
-   !> Contacts per pair of bodies assumed before there are any: two equal bodies with four each
+   !> Assumed number of contacts of the two equal bodies of an expected contact: four of each body
    real(wp), parameter :: assumed_contacts = 8.0_wp
 
 contains
 
-   !> Stable step of the contacts as they are [s], huge if there are none, and the contact that sets it.
+   !> Find the stable step of the present contacts, and the contact that limits it.
    subroutine stable_step_of_contacts(law, table, bodies, numbers, contacts, step, critical)
       !> Force law
       type(force_law_t), intent(in) :: law
-      !> What the integrator stands
+      !> Stability limit of the integration scheme
       type(stability_table_t), intent(in) :: table
       !> Bodies
       type(bodies_t), intent(in) :: bodies
-      !> Contacts that each body carries, (slot)
+      !> Number of contacts of each body, (slot)
       real(wp), intent(in) :: numbers(:)
       !> Contacts with their forces
       type(contacts_t), intent(in) :: contacts
-      !> Stable step [s]
+      !> Stable step [s], huge if there are no contacts
       real(wp), intent(out) :: step
-      !> The contact that sets it, 0 if there is none
+      !> Index of the contact that limits the step, 0 if there are no contacts
       integer(ip), intent(out) :: critical
       real(wp) :: this
       integer(ip) :: c
@@ -55,18 +55,18 @@ contains
       end do
    end subroutine stable_step_of_contacts
 
-   !> Stable step expected from the shapes of the free bodies [s], and the body that sets it: each body is expected to
-   !> have contacts with equal ones, as stiff as its edges can make them.
+   !> Find the stable step expected from the shapes of the free bodies, and the body that limits it. Each body is
+   !> assumed to have contacts with equal bodies, with the greatest stiffness that its edges allow.
    subroutine stable_step_of_shapes(law, table, bodies, step, critical)
-      !> Force law; it need not have measured the bodies
+      !> Force law; `measure` is not required
       type(force_law_t), intent(in) :: law
-      !> What the integrator stands
+      !> Stability limit of the integration scheme
       type(stability_table_t), intent(in) :: table
       !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Stable step [s], huge if there is no free body
       real(wp), intent(out) :: step
-      !> Slot of the body that sets it, 0 if there is none
+      !> Slot of the body that limits the step, 0 if there is no free body
       integer(ip), intent(out) :: critical
       type(contact_element_t) :: element
       type(contacts_t) :: no_contacts
@@ -95,6 +95,7 @@ contains
       end do
    end subroutine stable_step_of_shapes
 
+   !> Stable step of contact c [s]
    real(wp) function step_of_contact(law, table, bodies, numbers, contacts, c)
       type(force_law_t), intent(in) :: law
       type(stability_table_t), intent(in) :: table
@@ -139,11 +140,11 @@ contains
 
    end function step_of_contact
 
-   !> Contacts that each body carries, (slot)
+   !> Number of contacts of each body, (slot)
    pure function contact_numbers(n_bodies, incidence) result(numbers)
       !> Number of bodies
       integer(ip), intent(in) :: n_bodies
-      !> Index of the contacts
+      !> Contacts of each body
       type(incidence_t), intent(in) :: incidence
       real(wp) :: numbers(n_bodies)
       integer(ip) :: s
@@ -154,7 +155,7 @@ contains
       end do
    end function contact_numbers
 
-   !> Stable step of one element [s].
+   !> Stable step of one element [s]
    pure real(wp) function step_of_element(table, element, g)
       type(stability_table_t), intent(in) :: table
       !> Springs and dashpots

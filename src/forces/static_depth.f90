@@ -1,4 +1,4 @@
-!> How deep a block at rest sinks into what carries it.
+!> Depth to which a block at rest sinks into its support.
 module polydem_static_depth
    use polydem_force_law, only: choose_parts, force_law_t
    use polydem_kinds, only: wp
@@ -9,7 +9,7 @@ module polydem_static_depth
 
 contains
 
-   !> Depth d [m] at which the elastic force of a flat contact, E w d/l, balances a load.
+   !> Depth d at which the elastic force of a flat contact, E w d/l, balances a load [m]
    real(wp) function static_depth(forces, load, block, support, offset)
       !> Group &forces
       type(forces_settings_t), intent(in) :: forces

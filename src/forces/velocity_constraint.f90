@@ -1,8 +1,8 @@
-!> What every constraint on velocities promises.
+!> Base type of a constraint on velocities.
 !>
-!> A constraint knows no force law: it asks for velocities, and the forces follow from all contacts at once. So it acts
-!> after the parts of the force law, when all other forces on the bodies are known, and adds to the
-!> forces of contacts. What it remembers lies in the columns of `contact_memory_t`; what it needs to work is its own.
+!> A constraint prescribes conditions on velocities, and its forces follow from all contacts at once. It acts after the
+!> parts of the force law, when all other forces on the bodies are known, and adds to the forces of contacts. Its
+!> contact history is in columns of `contact_history_t`; its work arrays are components of its type.
 module polydem_velocity_constraint
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t
@@ -16,40 +16,40 @@ module polydem_velocity_constraint
    private
    public :: velocity_constraint_t
 
-   !> Forces of contacts that follow from a demand on velocities
+   !> Forces of contacts that follow from conditions on velocities
    type, abstract, extends(law_part_t) :: velocity_constraint_t
    contains
-      !> Find the forces of all contacts
+      !> Compute the forces of all contacts
       procedure(apply), deferred :: apply
-      !> Set the counters of the work done so far
+      !> Set the counters of the solver
       procedure(report), deferred :: report
    end type velocity_constraint_t
 
    abstract interface
-      !> Find the forces of all contacts.
+      !> Compute the forces of all contacts.
       subroutine apply(self, dt, incidence, bodies, contacts, history, error)
          import :: bodies_t, contact_history_t, contacts_t, error_t, incidence_t, velocity_constraint_t, wp
          class(velocity_constraint_t), intent(inout) :: self
-         !> Step [s]
+         !> Time step [s]
          real(wp), intent(in) :: dt
-         !> Index of the contacts
+         !> Contacts of each body
          type(incidence_t), intent(in) :: incidence
-         !> Bodies as velocity Verlet predicts them, with the accelerations of the last step (0 before the first) and
-         !> all other forces of this one
+         !> Bodies as predicted by velocity Verlet, with the accelerations of the last step (0 before the first step)
+         !> and all other forces of this step
          type(bodies_t), intent(in) :: bodies
          !> Contacts of this step; `tangential_force` changes
          type(contacts_t), intent(inout) :: contacts
-         !> What is remembered of the pairs
+         !> Contact history
          type(contact_history_t), intent(inout) :: history
-         !> The forces were not found
+         !> Allocated if the forces are not found
          type(error_t), allocatable, intent(inout) :: error
       end subroutine apply
 
-      !> Set the counters of the work done so far.
+      !> Set the counters of the solver.
       subroutine report(self, counters)
          import :: counters_t, velocity_constraint_t
          class(velocity_constraint_t), intent(in) :: self
-         !> List to set them in
+         !> Counters of the run
          type(counters_t), intent(inout) :: counters
       end subroutine report
    end interface

@@ -141,8 +141,26 @@ contains
          call raise(error, io_error, path//': is damaged: '//problem)
       else
          call self%file%open(path, error)
+         if (.not. allocated(error)) call refuse_other_versions(self, error)
       end if
    end subroutine open_checkpoint
+
+   !> Refuse a checkpoint of another version of the file layout. Close it in this case.
+   subroutine refuse_other_versions(self, error)
+      class(checkpoint_file_t), intent(inout) :: self
+      !> Allocated if the version differs
+      type(error_t), allocatable, intent(inout) :: error
+      real(dp) :: version
+
+      version = 0.0_dp
+      call self%file%read_real_attribute('/', 'schema_version', version, error)
+      if (allocated(error)) return
+      if (nint(version) == int(schema_version)) return
+      call self%file%close(error)
+      if (.not. allocated(error)) call raise(error, input_error, self%path//': has file layout '// &
+         to_text(nint(version))//', but this version of polydem reads only layout '//to_text(schema_version)// &
+         '; finish the run with the version that began it')
+   end subroutine refuse_other_versions
 
    !> Close a checkpoint after reading.
    subroutine close_checkpoint(self, error)

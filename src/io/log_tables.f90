@@ -49,17 +49,17 @@ contains
       !> Number of bodies
       integer(ip), intent(in) :: bodies
       character(len=line_width) :: line
-      character(len=12) :: name
+      character(len=14) :: name
       integer :: k
 
       call log%write_line('')
-      write (line, '(a12,a12,3a14,a14,a10)') 'stage       ', 'steps', 'least [us]', 'mean [us]', &
+      write (line, '(a14,a12,3a14,a14,a10)') 'stage         ', 'steps', 'least [us]', 'mean [us]', &
          'most [us]', 'total [s]', 'share'
       call log%write_line(trim(line))
       do k = 1, n_stages
          if (timers%calls(k) == 0_lp) cycle
          name = stage_names(k)
-         write (line, '(a12,i12,3f14.2,f14.3,f9.1,a)') name, timers%calls(k), &
+         write (line, '(a14,i12,3f14.2,f14.3,f9.1,a)') name, timers%calls(k), &
             1.0e6_dp*timers%least(k), 1.0e6_dp*timers%total(k)/real(timers%calls(k), dp), &
             1.0e6_dp*timers%most(k), timers%total(k), share(timers%total(k), seconds), '%'
          call log%write_line(trim(line))
@@ -74,25 +74,26 @@ contains
                           ' us per step and body')
    end subroutine write_timings
 
-   !> Write the distribution of the time of each stage over ranks. The time of stage `exchange` includes waiting times.
+   !> Write the distribution of the time of each stage over ranks. The time of stage `decomposition`
+   !> includes waiting times.
    subroutine write_ranks(log, total)
       !> Log
       type(log_t), intent(inout) :: log
       !> Total time, (stage, rank) [s]
       real(dp), intent(in) :: total(:, :)
       character(len=line_width) :: line
-      character(len=12) :: name
+      character(len=14) :: name
       real(dp) :: mean
       integer :: k
 
       call log%write_line('')
-      write (line, '(a12,4a14)') 'of processes', 'least [s]', 'mean [s]', 'most [s]', 'most/mean'
+      write (line, '(a14,4a14)') 'over ranks    ', 'least [s]', 'mean [s]', 'most [s]', 'most/mean'
       call log%write_line(trim(line))
       do k = 1, size(total, 1)
          mean = sum(total(k, :))/real(size(total, 2), dp)
          if (.not. mean > 0.0_dp) cycle
          name = stage_names(k)
-         write (line, '(a12,3f14.3,f14.2)') name, minval(total(k, :)), mean, maxval(total(k, :)), &
+         write (line, '(a14,3f14.3,f14.2)') name, minval(total(k, :)), mean, maxval(total(k, :)), &
             maxval(total(k, :))/mean
          call log%write_line(trim(line))
       end do
@@ -131,10 +132,10 @@ contains
       character(len=*), intent(in) :: name
       real(dp), intent(in) :: part, whole
       character(len=line_width) :: line
-      character(len=12) :: padded
+      character(len=14) :: padded
 
       padded = name
-      write (line, '(a12,54x,f14.3,f9.1,a)') padded, part, share(part, whole), '%'
+      write (line, '(a14,54x,f14.3,f9.1,a)') padded, part, share(part, whole), '%'
       call log%write_line(trim(line))
    end subroutine write_sum
 

@@ -5,7 +5,7 @@
 !>     /walls       id; force and torque on the fixed bodies: one row per frame
 !>     /contacts    start: rows start[k] to start[k + 1] - 1 belong to frame k; first, second, area, point,
 !>                  normal, force: one row per contact (optional)
-!>     /ledger      energy balance: one data set per entry, one row per frame (optional)
+!>     /energy_balance      energy balance: one data set per entry, one row per frame (optional)
 !>     /provenance  origin of the file
 !>
 !> Indices count from 0. The normal of a contact is the integral of the outward normal over the part of the outline of
@@ -247,7 +247,7 @@ contains
 
       if (.not. allocated(row%name)) return
       do k = 1, size(row%name)
-         call file%append('/ledger/'//trim(row%name(k)), row%value(k), error, trim(row%unit(k)), &
+         call file%append('/energy_balance/'//trim(row%name(k)), row%value(k), error, trim(row%unit(k)), &
                           trim(row%meaning(k)))
       end do
    end subroutine add_balance

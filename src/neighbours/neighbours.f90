@@ -144,7 +144,7 @@ contains
       type(counters_t), intent(inout) :: counters
 
       call counters%set('pairs', int(self%pairs%n, lp))
-      call counters%set('pair_contradictions', self%pairs%contradictions)
+      call counters%set('pair contradictions', self%pairs%contradictions)
       call self%finder%survey()
       call self%finder%work%report(counters)
    end subroutine report

@@ -69,7 +69,7 @@ module polydem_finder_statistics
    integer, parameter :: n_counts = 14
    !> Names of the counts, in the order of the constants above
    character(len=*), parameter :: count_names(n_counts) = &
-      [character(len=12) :: 'tests', 'swaps', 'idle_swaps', 'leavers', 'leaf_changes', 'searches', 'visits', &
+      [character(len=12) :: 'tests', 'swaps', 'idle_swaps', 'left_leaf', 'leaf_changes', 'searches', 'visits', &
        'rebuilds', 'crossings', 'passes', 'candidates', 'nodes', 'depth', 'bytes']
 
    !> Counts and seconds since the finder began

@@ -52,7 +52,7 @@ contains
       associate (s => simulation)
          call serialize_bodies(serializer, s%bodies)
          call s%integrator%serialize(serializer)
-         if (s%settings%output%ledger) call serialize_contributions(s%ledger, s%bodies%n, serializer)
+         if (s%settings%output%energy_balance) call serialize_contributions(s%energy_balance, s%bodies%n, serializer)
          call serializer%field('/boxes/bounds', s%boxes%bounds(:, :s%boxes%n), 'm', &
                            'xmin, ymin, xmax, ymax at the last search for pairs')
          call serialize_pairs(serializer, s)
@@ -87,7 +87,7 @@ contains
          call serializer%seconds_field('/run/stage_total', s%timers%total, 'time spent in each stage')
          call serializer%seconds_field('/run/stage_least', s%timers%least, 'shortest time in a step')
          call serializer%seconds_field('/run/stage_most', s%timers%most, 'longest time in a step')
-         if (s%settings%output%ledger) call serialize_balance(s%ledger, serializer)
+         if (s%settings%output%energy_balance) call serialize_balance(s%energy_balance, serializer)
       end associate
    end subroutine serialize_global
 

@@ -190,7 +190,7 @@ contains
       character(len=:), allocatable :: text
 
       text = ''
-      if (simulation%settings%output%ledger) text = ', energy balance'
+      if (simulation%settings%output%energy_balance) text = ', energy balance'
    end function balance_text
 
    !> Depth and bodies of the deepest contact, as text; the depth is overlap area over contact length [m]

@@ -54,11 +54,11 @@ contains
       end associate
    end subroutine end_step
 
-   !> Evaluate the energy and momentum balance of this step if output.ledger is on; collective.
+   !> Evaluate the energy and momentum balance of this step if output.energy_balance is on; collective.
    subroutine update_balance(run)
       type(run_t), intent(inout) :: run
 
-      if (.not. run%simulation%settings%output%ledger) return
+      if (.not. run%simulation%settings%output%energy_balance) return
       call compute_balance(run%simulation, run%balance)
       call name_terms(run%balance, run%row)
    end subroutine update_balance
@@ -71,13 +71,13 @@ contains
       if (run%simulation%step <= run%earlier%last_frame) return
       associate (s => run%simulation, output => run%simulation%settings%output)
          call complete_wall_forces(run%comm, s%bodies, s%contacts)
-         if (output%contacts .and. output%ledger) then
+         if (output%contacts .and. output%energy_balance) then
             call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, row=run%row, &
                                             manifest=run%manifest)
          else if (output%contacts) then
             call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, &
                                             manifest=run%manifest)
-         else if (output%ledger) then
+         else if (output%energy_balance) then
             call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, row=run%row, &
                                             manifest=run%manifest)
          else
@@ -140,7 +140,7 @@ contains
          call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n_all)
          call write_rank_times(run, run%log)
          call write_counters(run%log, counters)
-         if (s%settings%output%ledger) call write_energy_report(s, run%log)
+         if (s%settings%output%energy_balance) call write_energy_report(s, run%log)
          call write_warning_counts(run%monitor, s, run%log)
       end associate
       if (allocated(error)) call run%log%write_line('stopped: '//status)

@@ -18,7 +18,7 @@ module polydem_run_simulation
    use polydem_start, only: join
    use polydem_strings, only: to_text
    use polydem_time_step, only: advance
-   use polydem_timers, only: stage_exchange, stage_output
+   use polydem_timers, only: stage_decomposition, stage_output
    implicit none
    private
    public :: run_simulation
@@ -110,7 +110,7 @@ contains
       must_stop = flags(2) == 1_lp
       run%has_lost_folder = flags(3) == 1_lp
       call set_warning_counts(run%monitor, run%simulation, flags(4:))
-      call run%simulation%timers%lap(stage_exchange)
+      call run%simulation%timers%lap(stage_decomposition)
    end subroutine synchronise_ranks
 
    !> Write a checkpoint if one is due, and end the run early if it must stop; collective.

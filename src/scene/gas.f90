@@ -63,7 +63,7 @@ contains
    subroutine append_moving_grains(list, scene, random, grains, centres)
       !> List to extend
       type(body_list_t), intent(inout) :: list
-      !> Settings: speed, spin, movers
+      !> Settings: speed, spin, moving_grains
       type(scene_settings_t), intent(in) :: scene
       !> Stream of random numbers
       type(random_t), intent(inout) :: random
@@ -76,7 +76,7 @@ contains
 
       allocate (velocities(2, size(grains)), spins(size(grains)))
       call draw_velocities(random, 1.0_wp, velocities)
-      moves = choose_moving_grains(size(grains, kind=ip), scene%movers)
+      moves = choose_moving_grains(size(grains, kind=ip), scene%moving_grains)
       if (count(moves) > 1) call remove_momentum(grains, moves, velocities)
       call set_speed(scene%speed, moves, velocities)
       call draw_spins(random, scene%spin, spins)

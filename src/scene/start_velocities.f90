@@ -47,18 +47,18 @@ contains
    end subroutine draw_spins
 
    !> Choose the grains that move. They are evenly spaced in the order of the grains; a single one is in the middle. If
-   !> the scene has only one grain, this grain rests unless `movers` is 1.
-   pure function choose_moving_grains(n, movers) result(moves)
+   !> the scene has only one grain, this grain rests unless `moving_grains` is 1.
+   pure function choose_moving_grains(n, moving_grains) result(moves)
       !> Number of grains
       integer(ip), intent(in) :: n
       !> Number of grains that move, at most n; 0: all
-      integer(ip), intent(in) :: movers
+      integer(ip), intent(in) :: moving_grains
       logical :: moves(n)
       integer(ip) :: k
 
-      moves = movers == 0_ip .and. n > 1_ip
-      do k = 1_ip, movers
-         moves(ceiling((real(k, wp) - 0.5_wp)*real(n, wp)/real(movers, wp), ip)) = .true.
+      moves = moving_grains == 0_ip .and. n > 1_ip
+      do k = 1_ip, moving_grains
+         moves(ceiling((real(k, wp) - 0.5_wp)*real(n, wp)/real(moving_grains, wp), ip)) = .true.
       end do
    end function choose_moving_grains
 

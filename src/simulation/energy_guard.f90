@@ -67,7 +67,7 @@ contains
       call compute_balance(simulation, balance)
       growth = balance%energy_residual + balance%elastic_work - guard%stored &
          + max(0.0_wp, balance%damping_work) + max(0.0_wp, balance%friction_work)
-      scale = max(simulation%ledger%energy_scale, guard%stored)
+      scale = max(simulation%energy_balance%energy_scale, guard%stored)
       associate (settings => simulation%settings%guards)
          if (growth <= settings%energy_limit*scale) return
          call find_fastest(simulation%comm, simulation%bodies, id, position)

@@ -54,7 +54,7 @@ contains
          call broadcast_motions(comm, self%motions)
          if (.not. comm%is_root()) call begin_without_free_bodies(self, real(numbers(3), wp), error)
       end if
-      call new_domain(self%domain, settings%exchange, self%maker%median_diameter, comm, error)
+      call new_domain(self%domain, settings%decomposition, self%maker%median_diameter, comm, error)
       if (allocated(self%comm)) deallocate (self%comm)
       allocate (self%comm, source=comm)
    end subroutine start_on_all_ranks

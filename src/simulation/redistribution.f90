@@ -209,7 +209,8 @@ contains
 
       call serialize_bodies(serializer, self%bodies)
       call self%integrator%serialize_step(serializer)
-      if (self%settings%output%ledger) call serialize_contributions(self%ledger, self%bodies%n, serializer)
+      if (self%settings%output%energy_balance) &
+         call serialize_contributions(self%energy_balance, self%bodies%n, serializer)
    end subroutine serialize_columns
 
 end module polydem_redistribution

@@ -56,7 +56,7 @@ module polydem_simulation
       !> Integration scheme
       class(integrator_t), allocatable :: integrator
       !> Energy and momentum balance
-      type(energy_balance_t) :: ledger
+      type(energy_balance_t) :: energy_balance
       !> Timers of the stages
       type(timers_t) :: timers
       !> Number of steps done
@@ -93,12 +93,12 @@ contains
 
    !> Evaluate the energy and momentum balance; collective.
    subroutine compute_balance(self, balance)
-      !> The simulation at the end of a step, with `output.ledger` on
+      !> The simulation at the end of a step, with `output.energy_balance` on
       type(simulation_t), intent(inout) :: self
       !> Energy, momentum and their unexplained residuals
       type(balance_t), intent(out) :: balance
 
-      call evaluate_balance(self%ledger, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
+      call evaluate_balance(self%energy_balance, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
                             self%incidence, self%contacts, balance)
    end subroutine compute_balance
 

@@ -53,8 +53,8 @@ contains
       call compute_forces(self, 0.0_wp, error)
       if (allocated(error)) return
       call start_integration(self)
-      if (settings%output%ledger) call start_energy_balance(self%ledger, self%comm, settings%forces%gravity, &
-                                                            self%bodies, self%incidence, self%contacts)
+      if (settings%output%energy_balance) call start_energy_balance( &
+         self%energy_balance, self%comm, settings%forces%gravity, self%bodies, self%incidence, self%contacts)
       self%timers = timers_t()
    end subroutine start_simulation
 

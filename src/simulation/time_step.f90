@@ -15,7 +15,8 @@ module polydem_time_step
    use polydem_simulation, only: simulation_t, time_of
    use polydem_simulation_counters, only: count_own
    use polydem_strings, only: to_text
-   use polydem_timers, only: stage_boxes, stage_exchange, stage_forces, stage_integrate, stage_neighbours, stage_overlap
+   use polydem_timers, only: stage_boxes, stage_decomposition, stage_forces, stage_integrate, stage_neighbours
+   use polydem_timers, only: stage_overlap
    implicit none
    private
    public :: advance, compute_forces, move_walls
@@ -31,7 +32,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       self%step = self%step + 1_lp
-      self%ledger%is_current = .false.
+      self%energy_balance%is_current = .false.
       call self%timers%start()
       call self%integrator%predict(self%dt, self%bodies)
       call move_walls(self, time_of(self))
@@ -45,8 +46,9 @@ contains
       if (allocated(error)) return
       call self%integrator%correct(self%dt, self%bodies)
       call self%timers%lap(stage_integrate)
-      if (self%settings%output%ledger) then
-         call accumulate_step(self%ledger, self%settings%forces%gravity, self%bodies, self%incidence, self%contacts)
+      if (self%settings%output%energy_balance) then
+         call accumulate_step(self%energy_balance, self%settings%forces%gravity, self%bodies, self%incidence, &
+                              self%contacts)
          call self%timers%lap(stage_forces)
       end if
       call check_motion(self%guard, self%bodies, self%step, self%dt, error)
@@ -68,7 +70,7 @@ contains
             domain%step_messages = domain%step_messages + comm%messages
             domain%step_bytes = domain%step_bytes + comm%bytes
          end associate
-         call self%timers%lap(stage_exchange)
+         call self%timers%lap(stage_decomposition)
       end if
       if (.not. allocated(error)) then
          call turn_bodies(self%bodies, self%moving)
@@ -79,7 +81,7 @@ contains
       call redistribute(self, error)
       if (.not. is_parallel) return
       self%domain%halo_steps = self%domain%halo_steps + int(size(self%domain%halo%slots), lp)
-      call self%timers%lap(stage_exchange)
+      call self%timers%lap(stage_decomposition)
    end subroutine place_boxes
 
    !> Compute the forces on the bodies from their boxes: neighbours, contacts, force law. This is the middle of a step.

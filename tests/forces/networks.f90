@@ -1,4 +1,4 @@
-!> Networks of contacts made by hand or by chance, and their dense matrices, for tests of exact friction.
+!> Constructed and random networks of contacts, and their dense matrices, for tests of exact friction.
 module networks
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
@@ -18,9 +18,9 @@ module networks
       type(bodies_t) :: bodies
       !> Contacts
       type(contacts_t) :: contacts
-      !> Index of the contacts
+      !> Contacts of each body
       type(incidence_t) :: incidence
-      !> Memory of one pair per contact
+      !> Contact history, one pair per contact
       type(contact_history_t) :: history
    end type scene_t
 
@@ -32,7 +32,7 @@ contains
       integer(ip), intent(in) :: n_bodies
       !> Number of fixed bodies
       integer(ip), intent(in) :: n_fixed
-      !> Number of contacts, of different pairs; the pairs of fixed bodies and the first do not count
+      !> Number of contacts, of different pairs; pairs of two fixed bodies have no contact
       integer(ip), intent(in) :: n_contacts
       !> Random numbers
       type(random_t), intent(inout) :: random
@@ -65,7 +65,7 @@ contains
 
    contains
 
-      !> Pairs that are still to come, this one included
+      !> Number of remaining pairs, including this pair
       pure integer(ip) function pairs_left(i, j)
          integer(ip), intent(in) :: i, j
          integer(ip) :: k
@@ -78,7 +78,7 @@ contains
 
    end subroutine random_scene
 
-   !> Thin plates on top of each other on a fixed one, each pushed sideways and twisted.
+   !> A column of thin plates on a fixed plate, each with a sideways force and a torque.
    subroutine column_of(n_blocks, scene)
       !> Number of free plates
       integer(ip), intent(in) :: n_blocks
@@ -96,11 +96,11 @@ contains
       call finish(scene, n_blocks)
    end subroutine column_of
 
-   !> Matrix h W and slip velocities without friction, by the definition: the motion of contact points.
+   !> Matrix h W and slip velocities without friction, from their definition, the motion of contact points.
    subroutine dense_of(scene, dt, matrix, free_slip)
       !> Scene
       type(scene_t), intent(in) :: scene
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
       !> Matrix, (contact, contact) [m/s per N/m]
       real(wp), allocatable, intent(out) :: matrix(:, :)
@@ -132,7 +132,7 @@ contains
 
    contains
 
-      !> Velocity that a unit tangential force of contact k gives to a free body
+      !> Velocity of a free body due to a unit tangential force of contact k
       subroutine add_force(body, sign_of_force, arm)
          integer(ip), intent(in) :: body
          real(wp), intent(in) :: sign_of_force, arm(2)
@@ -164,12 +164,13 @@ contains
 
    end subroutine dense_of
 
-   !> Greatest violation of the conditions of a solution: of the bounds, of no slip below them, of slip against the
-   !> force at them; forces as shares of their limits, slip as a share of the greatest change of a slip velocity.
+   !> Greatest violation of the conditions of a solution (Karush-Kuhn-Tucker): forces within their bounds, no slip below
+   !> the bounds, and slip against the force at the bounds. Forces are shares of their limits; slip is a share of the
+   !> greatest change of a slip velocity.
    real(wp) function kkt_error(scene, dt, friction)
       !> Scene with its friction
       type(scene_t), intent(in) :: scene
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
       !> Friction coefficient
       real(wp), intent(in) :: friction

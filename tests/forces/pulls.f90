@@ -1,4 +1,4 @@
-!> Two parts of a force law that pull, for tests: one that stores energy, one that does not.
+!> Two attractive parts of a force law for tests, one with and one without potential energy.
 module pulls
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t
@@ -10,7 +10,7 @@ module pulls
    private
    public :: cohesion_t, drag_t
 
-   !> A constant attraction, whose work is elastic
+   !> A constant attraction; its work is that of elastic forces
    type, extends(force_part_t) :: cohesion_t
       !> Attraction [N/m]
       real(wp) :: pull = 0.0_wp
@@ -19,7 +19,7 @@ module pulls
       procedure :: add => add_cohesion
    end type cohesion_t
 
-   !> A constant force against opening, whose work is that of damping
+   !> A constant force against separation; its work is that of damping
    type, extends(force_part_t) :: drag_t
       !> Attraction [N/m]
       real(wp) :: pull = 0.0_wp
@@ -30,7 +30,7 @@ module pulls
 
 contains
 
-   !> It always belongs to the law.
+   !> Choose this part always.
    subroutine choose_cohesion(self, settings, chosen)
       class(cohesion_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
@@ -62,7 +62,7 @@ contains
       end do
    end subroutine add_cohesion
 
-   !> It always belongs to the law.
+   !> Choose this part always.
    subroutine choose_drag(self, settings, chosen)
       class(drag_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings

@@ -1,4 +1,4 @@
-!> Two equal squares in a face contact, made by hand, for tests of force parts.
+!> Two equal squares in a face contact, for tests of force parts.
 module two_squares
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
@@ -17,12 +17,12 @@ module two_squares
    !> Mass of each [kg/m]
    real(wp), parameter :: mass = 2500.0_wp*width**2
 
-   !> Columns of the memory
+   !> Columns of the contact history
    integer, parameter :: at_tangential = 1, at_area = 2
 
 contains
 
-   !> The first square below, the second above it; the first approaches at 1 m/s and slides at 2 m/s to the right.
+   !> The second square is above the first. The first approaches at 1 m/s and slides at 2 m/s to the right.
    subroutine make_contact(bodies, contacts, history)
       !> Two squares
       type(bodies_t), intent(out) :: bodies

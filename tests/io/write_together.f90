@@ -44,7 +44,7 @@ program write_together
       '/bodies/mass', '/bodies/inertia', '/bodies/vertex_start', '/bodies/vertex', '/walls/id', '/walls/force', &
       '/walls/torque', '/frames/step', '/frames/time', '/frames/position', '/frames/angle', '/frames/velocity', &
       '/frames/angular_velocity', '/contacts/start', '/contacts/first', '/contacts/second', '/contacts/area', &
-      '/contacts/point', '/contacts/normal', '/contacts/force', '/ledger/kinetic']
+      '/contacts/point', '/contacts/normal', '/contacts/force', '/energy_balance/kinetic']
    character(len=*), parameter :: in_checkpoint(9) = [character(len=24) :: '/run/sums', '/bodies/id', &
       '/bodies/position', '/bodies/angle', '/bodies/force', '/boxes/bounds', '/pairs/first', '/pairs/second', &
       '/pairs/tangential']

@@ -10,7 +10,7 @@ COUNTS = (
     "tests",
     "swaps",
     "idle_swaps",
-    "leavers",
+    "left_leaf",
     "leaf_changes",
     "searches",
     "visits",
@@ -22,7 +22,7 @@ COUNTS = (
     "depth",
     "bytes",
 )
-STAGES = ("boxes", "neighbours", "overlap", "forces", "integrate", "exchange", "output")
+STAGES = ("boxes", "neighbours", "overlap", "forces", "integrate", "decomposition", "output")
 SIZES = (2522, 5058, 7599, 10014, 12651, 100000)
 
 

@@ -60,8 +60,8 @@ def test_a_continued_run_reads_like_one_that_was_not_interrupted(start):
             assert_array_equal(getattr(mine, column), getattr(other, column))
         assert_array_equal(run.contacts(number).force, expected.contacts(number).force)
         assert_array_equal(run.walls(number).force, expected.walls(number).force)
-    for name, values in expected.ledger.items():
-        assert_array_equal(run.ledger[name], values)
+    for name, values in expected.energy_balance.items():
+        assert_array_equal(run.energy_balance[name], values)
     assert run.provenance["parent"].startswith("killed/checkpoint_")
     assert expected.provenance["parent"] == "none"
     for name in ("pairs", "pairs began", "pairs ended", "contacts"):

@@ -50,21 +50,21 @@ def study(tmp_path):
 
 
 def test_a_cost_is_the_median_of_the_ratios_within_turns():
-    ledger = next(model for model in MODELS if model.name == "ledger")
+    balance = next(model for model in MODELS if model.name == "energy balance")
     off = [replace(PLAIN, repeat=k, step=100.0 * k) for k in range(5)]
-    on = [replace(PLAIN, model="ledger", repeat=k, step=110.0 * k + (3.0 * k if k == 4 else 0.0)) for k in range(5)]
-    share = share_of_step(off + on, ledger)
+    on = [replace(PLAIN, model=balance.name, repeat=k, step=110.0 * k + (3.0 * k if k == 4 else 0.0)) for k in range(5)]
+    share = share_of_step(off + on, balance)
     assert share.value == pytest.approx(10.0)
     assert share.low <= share.value <= share.high <= 13.001
     assert share.repeats == 4
 
 
 def test_memory_is_a_difference_per_body():
-    ledger = next(model for model in MODELS if model.name == "ledger")
+    balance = next(model for model in MODELS if model.name == "energy balance")
     off = [replace(PLAIN, kind="memory", repeat=k, memory=5000) for k in (1, 2, 3)]
     memory = {1: 5100, 2: 5125, 3: 9999}
-    on = [replace(PLAIN, kind="memory", model="ledger", repeat=k, memory=memory[k]) for k in memory]
-    assert bytes_per_body(off + on, ledger) == pytest.approx(125 * 1.024)
+    on = [replace(PLAIN, kind="memory", model="energy balance", repeat=k, memory=memory[k]) for k in memory]
+    assert bytes_per_body(off + on, balance) == pytest.approx(125 * 1.024)
 
 
 def test_every_model_has_something_to_be_compared_with_before_it():
@@ -95,7 +95,7 @@ def test_the_table_tells_what_was_measured(study):
     rows = {row[0]: row for row in table.rows}
     assert rows["nothing"][2:5] == ("1.00 [1.00, 1.00] us", "0.000200 million", "10240")
     assert rows["friction (Cundall-Strack)"][2:5] == ("+100.0 [+100.0, +100.0]", "+50.00", "+10240")
-    assert rows["ledger"][2:5] == ("+0.0 [+0.0, +0.0]", "+0.00", "+0")
+    assert rows["energy balance"][2:5] == ("+0.0 [+0.0, +0.0]", "+0.00", "+0")
     assert rows["guard: energy"][1] == "guards.energy=warn"
     assert "polydem 1 (revision)" in table.note and "processor" in table.note
     assert costs_table(read_samples(study.output / costs.FILE)).rows == table.rows

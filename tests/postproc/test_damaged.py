@@ -60,7 +60,7 @@ def whole(tmp_path_factory, finished):
     shutil.copytree(finished, folder / "result")
     with h5py.File(folder / "result" / "profile.h5", "r+") as file:
         del file["counters"]
-        file["counters/name"] = np.array([b"steps", b"pairs", b"processes"])
+        file["counters/name"] = np.array([b"steps", b"pairs", b"ranks"])
         file["counters/value"] = [7, 5, 1]
     shutil.copytree(finished, folder / "checked")
     write_manifest(folder / "checked", texts_of(finished))

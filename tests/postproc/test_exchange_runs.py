@@ -12,11 +12,11 @@ from polydem_post.trajectory import ResultError, Trajectory
 
 #: Of 16 ranks, 101 steps, settled three times
 VALUES = {
-    "settlements": 3, "divisions of space": 1, "rectangles": 70, "migrations": 1000, "migrations at the start": 900,
-    "ghosts, summed over steps": 10100, "messages": 7000, "bytes in messages": 1480000, "messages at the start": 500,
-    "bytes at the start": 900000, "messages to ghosts": 6000, "bytes to ghosts": 480000,
-    "most of a process: bodies": 3, "most of a process: pairs": 20, "most of a process: ghosts": 1010,
-    "most of a process: messages": 401, "most of a process: bytes": 48000,
+    "redistributions": 3, "partitions of space": 1, "rectangles": 70, "migrations": 1000,
+    "migrations at the start": 900, "halo bodies, summed over steps": 10100, "messages": 7000,
+    "bytes in messages": 1480000, "messages at the start": 500, "bytes at the start": 900000, "halo messages": 6000,
+    "halo bytes": 480000, "maximum per rank: bodies": 3, "maximum per rank: pairs": 20,
+    "maximum per rank: halo bodies": 1010, "maximum per rank: messages": 401, "maximum per rank: bytes": 48000,
 }
 
 
@@ -24,7 +24,7 @@ VALUES = {
 def make_result(finished, tmp_path):
     """Copy the finished result under a name, with these counters."""
 
-    def make(name, counters, exchange="cut = 'morton'\n   margin = 0.0"):
+    def make(name, counters, exchange="partition = 'morton'\n   margin = 0.0"):
         folder = tmp_path / name
         shutil.copytree(finished, folder)
         with h5py.File(folder / "profile.h5", "a") as file:
@@ -34,7 +34,7 @@ def make_result(finished, tmp_path):
             group["name"] = np.array(list(counters), dtype=h5py.string_dtype())
             group["value"] = np.array(list(counters.values()), dtype=np.int64)
             del file["provenance/resolved_input"]
-            file["provenance/resolved_input"] = f"&boxes\n   margin = 7.0\n/\n&exchange\n   {exchange}\n/\n"
+            file["provenance/resolved_input"] = f"&boxes\n   margin = 7.0\n/\n&decomposition\n   {exchange}\n/\n"
         return folder
 
     return make
@@ -42,7 +42,7 @@ def make_result(finished, tmp_path):
 
 @pytest.fixture
 def shared(make_result):
-    return make_result("shared", {"steps": 101, "pairs": 130, "processes": 16, **VALUES})
+    return make_result("shared", {"steps": 101, "pairs": 130, "ranks": 16, **VALUES})
 
 
 @pytest.fixture
@@ -58,10 +58,10 @@ def test_all_counters_of_a_run_are_read(shared):
     assert (run.ranks, run.steps, run.cut, run.pairs, run.state_hash) == (16, 101, "morton", 130, result.state_hash)
 
 
-def test_cut_and_margin_are_those_of_the_group_exchange(make_result):
+def test_cut_and_margin_are_those_of_the_group_decomposition(make_result):
     counters = {"steps": 1, "pairs": 1}
     assert read_run(make_result("a", counters)).margin == 0.0
-    run = read_run(make_result("b", counters, "margin = 9.5E-003\n   cut = 'bisection'"))
+    run = read_run(make_result("b", counters, "margin = 9.5E-003\n   partition = 'bisection'"))
     assert (run.cut, run.margin, run.as_count().margin) == ("bisection", 0.0095, 0.0095)
 
 
@@ -119,7 +119,7 @@ def test_what_is_saved_is_read_again_and_nothing_else_is(shared, alone, tmp_path
 def test_results_without_these_counts_are_errors(make_result):
     lacking = {name: value for name, value in VALUES.items() if name != "rectangles"}
     with pytest.raises(ResultError, match=r"lacks counts \(rectangles\)"):
-        read_run(make_result("old", {"steps": 5, "pairs": 3, "processes": 4, **lacking}))
+        read_run(make_result("old", {"steps": 5, "pairs": 3, "ranks": 4, **lacking}))
     with pytest.raises(ResultError, match="no steps"):
         read_run(make_result("still", {"steps": 0, "pairs": 3}))
 

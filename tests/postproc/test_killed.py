@@ -24,7 +24,7 @@ def assert_good(run):
         assert_array_equal(run.frame(number).position, [[0, 0], [-step, 3], [step, 0.5]])
         assert_array_equal(run.contacts(number).area, step + np.arange(1, step % 3 + 1))
         assert_array_equal(run.walls(number).torque, [-step])
-    assert_array_equal(run.ledger["kinetic"], 0.5 * np.arange(1, len(run) + 1))
+    assert_array_equal(run.energy_balance["kinetic"], 0.5 * np.arange(1, len(run) + 1))
 
 
 @pytest.mark.parametrize("frames", [1, 2, 3, 4, 8, 9, 20])

@@ -68,7 +68,7 @@ def use(folder, **options):
     run = Trajectory(folder, **options)
     for number in range(len(run)):
         run.frame(number), run.contacts(number), run.walls(number)
-    return run.ledger, run.profile, run.counters, run.provenance, run.state_hash, run.status
+    return run.energy_balance, run.profile, run.counters, run.provenance, run.state_hash, run.status
 
 
 @pytest.mark.parametrize("size", [0, 1, 7, 8, 9, 65528, 65536, 65537, 131072, 200001])

@@ -51,4 +51,4 @@ def test_reads_frames_of_a_segment_renamed_after_it_was_found(growing):
     close_last(growing)
     assert_array_equal(run.frame(5).position, [[0, 0], [-6, 3], [6, 0.5]])
     assert_array_equal(run.walls(5).torque, [-6])
-    assert_array_equal(run.ledger["momentum_x"], [-1, -2, -3, -4, -5, -6])
+    assert_array_equal(run.energy_balance["momentum_x"], [-1, -2, -3, -4, -5, -6])

@@ -456,7 +456,7 @@ def test_collects_what_the_program_left(heights, capsys):
         rows = {row["name"]: row for row in csv.DictReader(file)}
     high = Trajectory(sweep.runs[1].result)
     assert rows["high"]["state_hash"] == high.state_hash != rows["low"]["state_hash"]
-    assert float(rows["high"]["ledger.kinetic"]) == high.ledger["kinetic"][-1]
+    assert float(rows["high"]["energy_balance.kinetic"]) == high.energy_balance["kinetic"][-1]
     assert float(rows["high"]["stage.all"]) == high.profile["seconds"]
     assert int(rows["high"]["counter.steps"]) == high.counters["steps"]
     assert (rows["high"]["revision"], rows["high"]["threads"]) == (high.provenance["revision"], "1")
@@ -467,8 +467,8 @@ def test_collects_what_the_program_left(heights, capsys):
         assert list(file["name"].asstr()) == ["low", "high", "wild", "later"]
         assert list(file["parameter/scene.bodies"]) == [2, 4, 3, 3]
         assert list(file["state_hash"].asstr())[1] == high.state_hash
-        assert file["ledger/kinetic"][1] == high.ledger["kinetic"][-1]
-        assert file["ledger/kinetic"].attrs["unit"] == high.ledger_units["kinetic"] == "J/m"
+        assert file["energy_balance/kinetic"][1] == high.energy_balance["kinetic"][-1]
+        assert file["energy_balance/kinetic"].attrs["unit"] == high.balance_units["kinetic"] == "J/m"
         assert file["stage/all"].attrs["unit"] == "s"
         assert str(file["exit_code"][3]) == "nan"
 

@@ -65,15 +65,15 @@ def test_reads_the_contacts_of_every_frame(finished, number):
     assert_array_equal(contacts.force, np.column_stack([count, np.full(len(count), -step)]))
 
 
-def test_reads_walls_and_ledger(finished):
+def test_reads_walls_and_energy_balance(finished):
     run = Trajectory(finished)
     walls = run.walls(5)
     assert_array_equal(walls.id, [10])
     assert_array_equal(walls.force, [[6.0, 12.0]])
     assert_array_equal(walls.torque, [-6.0])
-    assert sorted(run.ledger) == ["kinetic", "momentum_x"]
-    assert_array_equal(run.ledger["kinetic"], 0.5 * np.arange(1, 8))
-    assert_array_equal(run.ledger["momentum_x"], -np.arange(1, 8))
+    assert sorted(run.energy_balance) == ["kinetic", "momentum_x"]
+    assert_array_equal(run.energy_balance["kinetic"], 0.5 * np.arange(1, 8))
+    assert_array_equal(run.energy_balance["momentum_x"], -np.arange(1, 8))
 
 
 def test_reads_profile_counters_and_hash(finished):
@@ -138,7 +138,7 @@ def test_names_what_a_run_did_not_write(tmp_path, finished):
             file.attrs["schema_version"] = 1
     run = Trajectory(tmp_path)
     assert len(run) == 3
-    assert run.ledger == {}
+    assert run.energy_balance == {}
     assert len(run.walls(0).id) == 0
     with pytest.raises(ResultError, match="holds no contacts"):
         run.contacts(0)

@@ -150,7 +150,7 @@ def test_files_of_something_else_are_refused(tmp_path):
 def test_theory_agrees_with_known_values():
     assert restitution(Model("area", "none", "none")) == 1.0
     assert restitution(Model("area", "rate", "none")) == pytest.approx(0.74408, abs=1e-5)
-    assert restitution(Model("area", "book", "none")) == pytest.approx(0.74779, abs=1e-5)
+    assert restitution(Model("area", "matuttis_chen", "none")) == pytest.approx(0.74779, abs=1e-5)
     e = restitution(Model("area", "hunt_crossley", "none"))
     u = 250.0 * math.sqrt(0.25 / 1e7) / 0.01 * 0.1
     assert u - math.log(1.0 + u) == pytest.approx(-e * u - math.log(1.0 - e * u), abs=1e-12)

@@ -87,9 +87,9 @@ def table(config):
     lines = [
         "# The same bits for any number of processes", "",
         f"Written by `run_ranks.py --full` on {datetime.date.today()} with {version}. Each cell: runs whose state "
-        "hash, trajectory (all frames, contacts, walls and rows of the ledger) and counts of steps and contacts were "
-        f"those of the program without MPI, of {combinations} runs with every finder on 1 and 2 threads; in brackets "
-        "how often a body changed its process in a run.", "",
+        "hash, trajectory (all frames, contacts, walls and rows of the energy balance) and counts of steps and "
+        f"contacts were those of the program without MPI, of {combinations} runs with every finder on 1 and 2 threads; "
+        "in brackets how often a body changed its process in a run.", "",
         "| scene | steps | contacts | " + " | ".join(f"{number} ranks" for number in ranks) + " |",
         "|---|--:|--:|" + "---|" * len(ranks),
     ]

@@ -68,8 +68,8 @@ def frames(folder):
         for part in (result.frame(number), result.contacts(number), result.walls(number)):
             for name, value in vars(part).items():
                 found[f"frame {number}: {type(part).__name__}.{name}"] = getattr(value, "tobytes", lambda: value)()
-    for name, values in result.ledger.items():
-        found[f"ledger: {name}"] = values.tobytes()
+    for name, values in result.energy_balance.items():
+        found[f"energy balance: {name}"] = values.tobytes()
     assert found, f"{folder} holds no frame"
     return found
 

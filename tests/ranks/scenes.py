@@ -46,7 +46,7 @@ SCENES = {
 #: Frames with everything in them, some to a segment; regions that change as often as possible
 OTHER_GROUPS = """\
 &output frame_interval = {interval} frames_per_segment = 7 contacts = .true. /
-&exchange margin = 1e-4 imbalance = 1 /
+&decomposition margin = 1e-4 imbalance = 1 /
 &neighbours finder = '{finder}' /
 """
 

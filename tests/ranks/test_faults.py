@@ -236,8 +236,8 @@ def test_bodies_at_the_end_of_the_numbers_are_told(tmp_path):
     scene = tmp_path / "scene.nml"
     scene.write_text(CROSSING.format(bodies=tmp_path / "bodies.h5"), encoding="utf-8")
     options = ("--set", "overlap.degenerate=push", "--set", "forces.gravity=0,0", "--set", "integrate.dt=1",
-               "--set", "integrate.duration=2", "--set", "output.frame_interval=1", "--set", "output.ledger=.false.",
-               "--force")
+               "--set", "integrate.duration=2", "--set", "output.frame_interval=1", "--set",
+               "output.energy_balance=.false.", "--force")
     with h5py.File(tmp_path / "bodies.h5", "w") as file:
         file["vertex"] = [(0.03 * k + i, 0.011 * k + j) for k in range(12)
                           for i, j in ((0.0, 0.0), (0.02, 0.0), (0.02, 0.02), (0.0, 0.02))]

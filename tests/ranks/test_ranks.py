@@ -45,7 +45,7 @@ def test_the_result_has_the_same_bits(combination, expected, outcomes, tmp_path)
         assert count(output, name) == getattr(expected(scene), name), name
     outcome.equal += 1
     if ranks > 1:
-        assert count(output, "settlements") >= LEAST_SETTLEMENTS[scene], output
+        assert count(output, "redistributions") >= LEAST_SETTLEMENTS[scene], output
         outcome.migrations.append(count(output, "migrations"))
 
 
@@ -54,26 +54,27 @@ def test_what_ranks_tell_each_other_is_counted(scene, row_bytes, tmp_path):
     ranks = 3
     write_scene(tmp_path / "scene.nml", scene)
     # With such a margin every rank has all bodies, once and for all.
-    output, _ = run(tmp_path / "scene.nml", tmp_path / "result", ranks, 1, ("--set", "exchange.margin=100"))
+    output, _ = run(tmp_path / "scene.nml", tmp_path / "result", ranks, 1, ("--set", "decomposition.margin=100"))
     counts = {name: count(output, name) for name in (
-        "steps", "settlements", "migrations", "migrations at the start", "messages", "messages at the start",
+        "steps", "redistributions", "migrations", "migrations at the start", "messages", "messages at the start",
         "bytes in messages", "bytes at the start", "rectangles")}
     steps, told = counts["steps"], counts["steps"] - 1
-    ghosts = count(output, "ghosts, summed over steps")
+    ghosts = count(output, "halo bodies, summed over steps")
     bodies = ghosts // (2*steps)
     assert ghosts == 2*bodies*steps and bodies > 100
-    assert counts["settlements"] == 1 and counts["rectangles"] >= ranks
+    assert counts["redistributions"] == 1 and counts["rectangles"] >= ranks
     assert 0 < counts["migrations"] == counts["migrations at the start"] < bodies
-    assert count(output, "messages to ghosts") == ranks*(ranks - 1)*told
-    assert count(output, "bytes to ghosts") == row_bytes*2*bodies*told
-    assert counts["messages"] >= counts["messages at the start"] + count(output, "messages to ghosts")
-    assert counts["bytes in messages"] >= counts["bytes at the start"] + count(output, "bytes to ghosts")
-    most = {name: count(output, f"most of a process: {name}") for name in ("bodies", "ghosts", "messages", "bytes")}
+    assert count(output, "halo messages") == ranks*(ranks - 1)*told
+    assert count(output, "halo bytes") == row_bytes*2*bodies*told
+    assert counts["messages"] >= counts["messages at the start"] + count(output, "halo messages")
+    assert counts["bytes in messages"] >= counts["bytes at the start"] + count(output, "halo bytes")
+    names = ("bodies", "halo bodies", "messages", "bytes")
+    most = {name: count(output, f"maximum per rank: {name}") for name in names}
     assert bodies <= ranks*most["bodies"] and most["bodies"] < bodies
     assert most["messages"] == (ranks - 1)*told
     assert most["bytes"] == row_bytes*2*most["bodies"]*told
-    # The one that has fewest bodies of its own has most ghosts.
-    assert 2*bodies*steps <= ranks*most["ghosts"] and most["ghosts"] < bodies*steps
+    # The one that has fewest bodies of its own has most halo bodies.
+    assert 2*bodies*steps <= ranks*most["halo bodies"] and most["halo bodies"] < bodies*steps
 
 
 def interrupt(folder, namelist, ranks, options):

@@ -1,10 +1,10 @@
-"""The recipes of src/README.md, tried: a new force part and a new finder, as they stand there.
+"""Build and run the recipes of src/README.md: a new force part and a new finder.
 
 usage: check_recipes.py ROOT BUILD NINJA
 
-Blocks of Fortran of the manual become new files, blocks of a diff change files, in a copy of src; the file is the one
-that the text names last. What changed is compiled with the flags of BUILD against its modules, linked before its
-libraries, and run by try_recipes.f90. Nothing is written but into a temporary folder.
+In a copy of src, Fortran blocks of the guide become new files, and diff blocks change files. The last file name before
+a block is its target. The changed files are compiled with the flags of BUILD against its modules, linked before its
+libraries, and run by try_recipes.f90. All output goes to a temporary folder.
 """
 
 import json
@@ -17,19 +17,19 @@ import sys
 import tempfile
 import time
 
-#: Files that a recipe may change: what is told to CMake and the namelist, and the factory
+#: Files that each recipe changes: the list of CMake, the table of namelist entries, and the factory
 CHANGED = {"src/forces/walton_braun.f90": {"src/forces/force_law.f90", "src/forces/CMakeLists.txt",
-                                           "src/config/namelist_entries.f90"},
+                                           "src/config/entries.txt"},
            "src/neighbours/plain_loop.f90": {"src/neighbours/finder_factory.f90", "src/neighbours/CMakeLists.txt",
-                                             "src/config/namelist_entries.f90"}}
+                                             "src/config/entries.txt"}}
 
 
 class RecipeError(Exception):
-    """A recipe that does not do what the manual says."""
+    """A recipe that does not work as described in the guide."""
 
 
 def blocks_of(text):
-    """The blocks of Fortran and diffs of a page, as (language, file named last before it, lines)."""
+    """The Fortran and diff blocks of a page, as (language, last file name before the block, lines)."""
     path, language, lines = None, None, []
     for line in text.split("\n"):
         fence = re.match(r"```(\w*)$", line)
@@ -46,16 +46,16 @@ def blocks_of(text):
 
 
 def changed(text, lines):
-    """A text after a diff: its lines that were there must be found once."""
+    """The text after a diff; the old lines of the diff must occur exactly once in the text."""
     before = "".join(line[1:] + "\n" for line in lines if not line.startswith("+"))
     after = "".join(line[1:] + "\n" for line in lines if not line.startswith("-"))
     if text.count(before) != 1:
-        raise RecipeError(f"found {text.count(before)} times, not once:\n{before}")
+        raise RecipeError(f"lines of a diff occur {text.count(before)} times instead of once:\n{before}")
     return text.replace(before, after)
 
 
 def apply_recipes(root, copy):
-    """Make the files of the manual in a copy of the sources; by new file, the files that it changes beside."""
+    """Apply the recipes of the guide to a copy of the sources, and check which files each of them changes."""
     found, new = {}, None
     with open(os.path.join(root, "src", "README.md"), encoding="utf-8") as page:
         text = page.read()
@@ -63,7 +63,7 @@ def apply_recipes(root, copy):
         target = os.path.join(copy, path)
         if language == "fortran":
             if os.path.exists(target):
-                raise RecipeError(f"{path} is there already")
+                raise RecipeError(f"{path} exists already")
             new = path
             found[new] = set()
             content = "\n".join(lines) + "\n"
@@ -74,20 +74,20 @@ def apply_recipes(root, copy):
         with open(target, "w", encoding="utf-8") as source:
             source.write(content)
     if found != CHANGED:
-        raise RecipeError(f"the manual changes {found}, not {CHANGED}")
+        raise RecipeError(f"the recipes change {found} instead of {CHANGED}")
 
 
 def commands_of(build):
-    """How each source is compiled: by its path, the command and where it runs."""
+    """Compile command and working folder of each source, by path."""
     with open(os.path.join(build, "compile_commands.json"), encoding="utf-8") as stream:
         return {entry["file"]: (shlex.split(entry["command"]), entry["directory"]) for entry in json.load(stream)}
 
 
 def compile_file(source, like, commands, modules, folder):
-    """Compile a file with the flags of another one and the modules of this test in front; returns the object."""
+    """Compile a file with the flags of another file, with the modules of this test first; return the object."""
     words, directory = commands[like]
     target = os.path.join(folder, os.path.basename(source) + ".o")
-    # Where the room writes its modules, others of the room are read.
+    # The module folder of the room becomes a search folder.
     flags = [re.sub("^-J", "-I", word) for word in words[1:words.index("-c")]]
     done = subprocess.run([words[0], f"-I{modules}", *flags, "-Werror", f"-J{modules}", "-c", source, "-o", target],
                           cwd=directory, capture_output=True, text=True, check=False)
@@ -97,18 +97,21 @@ def compile_file(source, like, commands, modules, folder):
 
 
 def sources_of(folder):
-    """Fortran files of a room in the order of its CMakeLists.txt, which is one in which they compile."""
+    """Fortran files of a room in the order of its CMakeLists.txt, in which they compile."""
     with open(os.path.join(folder, "CMakeLists.txt"), encoding="utf-8") as page:
         return [os.path.join(folder, name) for name in re.findall(r"^ +(\w+\.f90)$", page.read(), re.MULTILINE)]
 
 
 def build_program(root, copy, build, ninja, folder):
-    """Compile what the recipes change and link it with the libraries of the build."""
+    """Compile the files that the recipes change, and link them with the libraries of the build."""
     commands = commands_of(build)
     modules = os.path.join(folder, "modules")
     os.mkdir(modules)
-    plan = [(path, os.path.join(root, os.path.relpath(path, copy)))
-            for path in sources_of(os.path.join(copy, "src", "config"))]
+    # The table makes sources, which differ from those of the build.
+    config, made = os.path.join(copy, "src", "config"), os.path.join(folder, "made")
+    subprocess.run([sys.executable, os.path.join(config, "make_entries.py"), os.path.join(config, "entries.txt"), made],
+                   check=True)
+    plan = [(os.path.join(made, "entry_table.f90"), os.path.join(build, "src", "config", "entry_table.f90"))]
     forces, neighbours = (os.path.join(root, "src", *names) for names in (
         ("forces", "force_law.f90"), ("neighbours", "finder_factory.f90")))
     for name, like in (("forces/walton_braun.f90", forces), ("forces/force_law.f90", forces),
@@ -125,12 +128,12 @@ def build_program(root, copy, build, ninja, folder):
     done = subprocess.run([words[0], "-fopenmp", *objects, "-o", program, *libraries], cwd=build, capture_output=True,
                           text=True, check=False)
     if done.returncode != 0:
-        raise RecipeError(f"the program is not linked:\n{done.stderr[:4000]}")
+        raise RecipeError(f"the program does not link:\n{done.stderr[:4000]}")
     return program
 
 
 def judge(text):
-    """Compare what the program prints with what the manual promises."""
+    """Compare the output of the program with the statements of the guide."""
     print(text, end="")
     values = dict(line.split(maxsplit=1) for line in text.strip().split("\n"))
     if "error" in values:
@@ -141,17 +144,17 @@ def judge(text):
         if abs(float(values[f"{law}_restitution"]) - 0.5) > tolerance:
             raise RecipeError(f"{law}: the restitution is not 1/2")
         if abs(float(values[f"{law}_damping_work"]) + 0.75) > 2 * tolerance:
-            raise RecipeError(f"{law}: damping does not take 3/4 of the energy")
+            raise RecipeError(f"{law}: damping does not dissipate 3/4 of the energy")
         if not float(values[f"{law}_greatest_area"]) > 0.0:
             raise RecipeError(f"{law}: the greatest area is not stored")
     if abs(float(values["stable_step_share"]) - 0.5) > 1e-12:
         raise RecipeError("four times the stiffness does not halve the stable step")
     if values["plain_loop_result"] != values["all_pairs_result"]:
-        raise RecipeError("the finder of the manual does not give the bits of all_pairs")
+        raise RecipeError("the finder of the recipe does not give the bits of all_pairs")
 
 
 def main(root, build, ninja):
-    """Try the recipes."""
+    """Test the recipes."""
     began = time.monotonic()
     with tempfile.TemporaryDirectory() as folder:
         copy = os.path.join(folder, "copy")
@@ -166,7 +169,7 @@ def main(root, build, ninja):
         except RecipeError as error:
             print(f"recipes: {error}")
             return 1
-    print(f"recipes: both parts of the manual work; {time.monotonic() - began:.0f} s")
+    print(f"recipes: both recipes work; {time.monotonic() - began:.0f} s")
     return 0
 
 

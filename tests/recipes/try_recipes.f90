@@ -1,4 +1,4 @@
-!> Runs of the force part and of the finder that the manual takes as examples; numbers go to check_recipes.py.
+!> Runs the example force part and the example finder of the developer guide; check_recipes.py checks the output.
 program try_recipes
    use trial, only: begin, block_at, steps
    use polydem_bodies, only: state_hash
@@ -25,7 +25,7 @@ program try_recipes
 
 contains
 
-   !> Let a square hit a plate face to face, and print its restitution and the share of its energy that damping took.
+   !> Let a square hit a plate face to face; print its restitution and the share of its energy dissipated by damping.
    subroutine hit_plate(law)
       character(len=*), intent(in) :: law
       type(simulation_t) :: simulation
@@ -51,7 +51,7 @@ contains
       print '(a, es24.16)', law//'_greatest_area ', stored
    end subroutine hit_plate
 
-   !> Print by how much the expected stable step is shorter.
+   !> Print the ratio of the expected stable steps with and without the example part.
    subroutine compare_stiffness()
       type(simulation_t) :: simple, stiff
       type(error_t), allocatable :: error
@@ -62,7 +62,7 @@ contains
       print '(a, es24.16)', 'stable_step_share ', stiff%expected_stable_step/simple%expected_stable_step
    end subroutine compare_stiffness
 
-   !> A square above a fixed plate.
+   !> Start a square above a fixed plate.
    subroutine start(law, damping, simulation, error)
       character(len=*), intent(in) :: law, damping
       type(simulation_t), intent(out) :: simulation
@@ -75,7 +75,7 @@ contains
                  '&integrate duration = 1 fraction = 0.002 /', list, simulation, error)
    end subroutine start
 
-   !> Print hash and pairs of a gas whose pairs a finder finds.
+   !> Run a gas with a finder; print its state hash and its pair counts.
    subroutine run_gas(finder)
       character(len=*), intent(in) :: finder
       character(len=*), parameter :: text = '&scene name = ''gas'' bodies = 60 fraction = 0.35 speed = 1 / '// &

@@ -53,7 +53,9 @@ def is_pointer(statement):
 
 
 #: Stages that have the name of a namelist group, not that of the room that does the work
-STAGES_OF_ROOMS = {"exchange": "decomposition", "output": "io"}
+STAGES_OF_ROOMS = {"output": "io"}
+#: Table of namelist entries, which names the groups
+TABLE = os.path.join("src", "config", "entries.txt")
 
 
 def of_any(statement, room):
@@ -202,13 +204,9 @@ def check_names(sources):
             yield source.path, line, f"module {name} should be polydem_{stem}, as its file"
 
 
-def check_stages(sources):
+def check_stages(sources, groups):
     """Timed stages are folders of src and groups of the namelist."""
     folders = {os.path.basename(os.path.dirname(source.path)) for source in sources} | set(STAGES_OF_ROOMS)
-    groups = set()
-    for source in sources:
-        if os.path.basename(os.path.dirname(source.path)) == "config":
-            groups.update(re.findall(r"\bentry_t\('(\w+)'", "\n".join(source.lines)))
     for source in sources:
         if not source.path.endswith(os.path.join("base", "timers.f90")):
             continue
@@ -228,13 +226,15 @@ def check_source(path, room, text):
 
 def check_tree(root):
     """All rules: file, line and message of each breach."""
-    sources = []
+    sources, groups = [], set()
     for path in text_files(root):
         name = os.path.relpath(path, root)
         if path.endswith((".F90", ".f", ".F", ".for")):
             yield name, 1, "free-form .f90 without preprocessor only"
         with open(path, encoding="utf-8", newline="") as file:
             text = file.read()
+        if name == TABLE:
+            groups.update(re.findall(r"^group (\w+)", text, re.MULTILINE))
         yield from ((name, *found) for found in check_lines(name, text.split("\n")))
         if name.startswith("src" + os.sep) and name.endswith(".f90"):
             sources.append(Source(name, text))
@@ -242,7 +242,7 @@ def check_tree(root):
     if not sources:
         yield "src", 1, "no sources found"
     yield from check_names(sources)
-    yield from check_stages(sources)
+    yield from check_stages(sources, groups)
 
 
 def text_files(root):

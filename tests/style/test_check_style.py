@@ -195,9 +195,8 @@ class Tree(unittest.TestCase):
         type_comment = "   !> A good type\n"
         names = "   integer, parameter :: stage_names(n_stages) = &\n      [character(len=5) :: 'state', 'flow']\n"
         timers = GOOD.replace("_good\n", "_timers\n").replace(type_comment, names + type_comment)
-        entries = GOOD.replace("_good\n", "_entries\n").replace("2_ip*x", "entry_t('state', 'size')")
         self.write("base/timers.f90", timers)
-        self.write("config/entries.f90", entries)
+        self.write("config/entries.txt", "# Comment\n\ngroup state: bodies\n")
         self.assertEqual(self.messages(), ["src/base/timers.f90:1: stage flow is not a folder of src",
                                            "src/base/timers.f90:1: stage flow is not a group of the namelist"])
 

@@ -1,8 +1,8 @@
 !> Benchmark B1: a body in free flight, for which velocity Verlet is exact up to rounding.
 !>
-!> x = x0 + v0 t - g t^2/2 and phi = w0 t. The errors of a million plain additions are biased, since the same numbers
-!> are added again and again, and grow with the distance from the origin. Compensated sums lose no more than the last
-!> one.
+!> x = x0 + v0 t - g t^2/2 and phi = w0 t. The errors of a million plain additions are biased, because the same numbers
+!> are added again and again, and grow with the distance from the origin. The error of a compensated sum is that of its
+!> last addition only.
 module b01_free_flight
    use outlines, only: gravity
    use trial, only: begin, block_at, steps
@@ -21,11 +21,11 @@ module b01_free_flight
 
 contains
 
-   !> Fly for a second, near the origin and far from it.
+   !> Fly for one second, near the origin and far from it.
    subroutine run_free_flight(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> In a million steps instead of 1e5
+      !> Whether to take a million steps instead of 1e5
       logical, intent(in) :: thorough
       integer :: n_steps
 
@@ -37,8 +37,8 @@ contains
       call fly(table, n_steps, 'compensated', 1.0e4_wp, 2.0e-12_wp, 1.0e-13_wp)
    end subroutine run_free_flight
 
-   !> One flight from (offset, 0); the tolerances are for x, which is of the size of the offset, and for all else, which
-   !> are numbers of a few units.
+   !> Fly from (offset, 0). One tolerance is for x, which is as large as the offset, the other for all other quantities,
+   !> which are of order one.
    subroutine fly(table, n_steps, accumulation, offset, tolerance, own_tolerance)
       type(table_t), intent(inout) :: table
       integer, intent(in) :: n_steps
@@ -51,7 +51,8 @@ contains
 
       call list%append(block_at(offset, 0.0_wp, 0.02_wp, 0.01_wp, 0.3_wp), velocity=velocity, angular_velocity=spin)
       call begin('&integrate duration = 1 accumulation = '''//accumulation//''' dt = '// &
-                 to_text(1.0_wp/real(n_steps, wp), 17)//' / &output ledger = .false. /', list, simulation, error)
+                 to_text(1.0_wp/real(n_steps, wp), 17)//' / &output energy_balance = .false. /', list, simulation, &
+                 error)
       if (.not. allocated(error)) call steps(simulation, n_steps, error)
       call table%note_error(error)
       if (allocated(error)) return

@@ -1,9 +1,9 @@
 !> Benchmark B2: mass properties of random convex polygons.
 !>
-!> The program sums over a fan of triangles. Expected is the sum over edges (Green's theorem), with the cross product
-!> c_i = x_i y_(i+1) - x_(i+1) y_i of neighbouring corners: A = sum c_i/2, centroid sum c_i (r_i + r_(i+1))/(6 A) and,
-!> about the centroid, J = sum c_i (r_i.r_i + r_i.r_(i+1) + r_(i+1).r_(i+1))/12. Moved and turned, a polygon keeps its
-!> area and second moment, and its centroid goes with it.
+!> The program sums over a fan of triangles. The expected values are sums over edges (Green's theorem), with the cross
+!> product c_i = x_i y_(i+1) - x_(i+1) y_i of neighbouring corners: A = sum c_i/2, centroid sum c_i (r_i + r_(i+1))/(6
+!> A) and, about the centroid, J = sum c_i (r_i.r_i + r_i.r_(i+1) + r_(i+1).r_(i+1))/12. A translation and a rotation do
+!> not change the area and the second moment, and they move the centroid with the polygon.
 module b02_mass_properties
    use outlines, only: pi
    use polydem_kinds, only: ip, wp
@@ -16,11 +16,11 @@ module b02_mass_properties
 
 contains
 
-   !> Compare many polygons of 3 to 16 corners; rows hold the worst.
+   !> Compare many polygons of 3 to 16 corners; each row has the greatest error.
    subroutine run_mass_properties(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> A million polygons instead of 20 000
+      !> Whether to compare a million polygons instead of 20 000
       logical, intent(in) :: thorough
       type(random_t) :: random
       real(wp) :: worst(6)

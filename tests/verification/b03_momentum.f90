@@ -1,11 +1,11 @@
 !> Benchmark B3: momentum and angular momentum of a closed gas.
 !>
-!> No force acts from outside but that of the four fixed walls, so momentum minus the impulses of the walls, as the
-!> books of the run have them, stays what it was at the start, if and only if the forces of every contact are opposite
-!> and act at one point. Errors are shares of the sums of |m v| and of |m r x v + I w| over the bodies at the start.
+!> The only external forces are those of the four fixed walls. So momentum minus the impulses of the walls, taken from
+!> the balance of the run, is constant if and only if the two forces of every contact are opposite and act at one point.
+!> Errors are shares of the sums of |m v| and of |m r x v + I w| over the bodies at the start.
 !>
-!> The elastic gas has the conservative law: with the area law, whose closed loops do work (B5), it heats up
-!> until bodies are too fast for the step, after 9e5 of a million steps.
+!> The elastic gas has the conservative law. With the area law, which does work on closed paths (B5), it heats up until
+!> bodies are too fast for the step, after 9e5 of a million steps.
 module b03_momentum
    use trial, only: steps
    use verification_table, only: table_t
@@ -26,7 +26,7 @@ contains
    subroutine run_momentum(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> A million steps instead of 20 000
+      !> Whether to take a million steps instead of 20 000
       logical, intent(in) :: thorough
       integer :: n_steps
 

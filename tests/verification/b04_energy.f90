@@ -1,9 +1,8 @@
 !> Benchmark B4: energy of an elastic impact, which separates the error of the model from that of integration.
 !>
-!> A square falls on a corner, off its centre, without friction, and leaves spinning. The conservative law has a
-!> potential, so what is missing at any time is the error of integration, and falls with the square of the step. The
-!> area law has none: the kinetic energy after the impact differs from that before it by an amount that does not depend
-!> on the step.
+!> A square falls on a corner, eccentrically and without friction, and leaves with a spin. The conservative law has a
+!> potential, so the missing energy at any time is the error of integration, which falls with the square of the step.
+!> The area law has no potential: the impact changes the kinetic energy by an amount that does not depend on the step.
 module b04_energy
    use outlines, only: pi
    use trial, only: begin, block_at, steps
@@ -19,12 +18,12 @@ module b04_energy
    public :: run_energy
 
    real(wp), parameter :: width = 0.01_wp
-   !> Frequency of the square on a face [1/s], with which the steps are given
+   !> Frequency of the square on a face [1/s], the unit of the reciprocal steps
    real(wp), parameter :: frequency = sqrt(0.5_wp*1.0e7_wp/(2500.0_wp*width**2))
 
 contains
 
-   !> Four steps for either law.
+   !> Run four time steps for each law.
    subroutine run_energy(table)
       !> Table to fill
       type(table_t), intent(inout) :: table
@@ -47,7 +46,8 @@ contains
                                  change(1)/change(4), 0.05_wp)
    end subroutine run_energy
 
-   !> Greatest energy missing in the books, where elastic work counts as stored, and loss of kinetic energy in the end.
+   !> Greatest missing energy in the balance, where elastic work counts as stored energy, and final loss of kinetic
+   !> energy.
    subroutine fall(table, law, dt, worst, change)
       type(table_t), intent(inout) :: table
       character(len=*), intent(in) :: law

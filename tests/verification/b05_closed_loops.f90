@@ -1,9 +1,9 @@
 !> Benchmark B5: work of the elastic force along closed paths of one body against another at rest.
 !>
-!> The body goes round an ellipse in the space of its three coordinates. A force with a potential does no work on the
-!> way; where no corner enters or leaves the other body, the trapezoidal rule of the periodic integrand is exact to
-!> rounding, elsewhere it converges. The area law does work, whatever the step. The work is given as a share of the
-!> sum of the absolute works of all steps.
+!> The body moves along an ellipse in the space of its three coordinates. A force with a potential does no work on this
+!> path. If no corner enters or leaves the other body, the trapezoidal rule of the periodic integrand is exact to
+!> rounding; otherwise it converges. The area law does work at any step. The work is given as a share of the sum of the
+!> absolute works of all steps.
 module b05_closed_loops
    use outlines, only: pi
    use polydem_kinds, only: ip, wp
@@ -17,17 +17,17 @@ module b05_closed_loops
 
    !> A path: the coordinates x, y and angle are middle + reach*cos(t + phase)
    type :: path_t
-      !> Side of the moving square; that of the other is 1 [m]
+      !> Side of the moving square [m]; that of the other is 1 m
       real(wp) :: side
       !> Middle of x, y [m] and the angle [rad]
       real(wp) :: middle(3)
-      !> Greatest distances from it
+      !> Greatest distances from the middle, as above
       real(wp) :: reach(3)
       !> Phases [rad]
       real(wp) :: phase(3)
    end type path_t
 
-   !> A corner in a side, turning and not; corner in corner; a side in a side; a corner in a side, turning on the spot
+   !> Corner in a side, with and without rotation; corner in corner; side in side; corner in a side, rotation only
    type(path_t), parameter :: smooth(5) = [ &
       path_t(1.0_wp, [0.1_wp, 1.1_wp, 0.25_wp*pi], [0.1_wp, 0.03_wp, 0.1_wp], [0.0_wp, 0.5_wp*pi, 1.0_wp]), &
       path_t(1.0_wp, [0.1_wp, 1.1_wp, 0.2_wp*pi], [0.2_wp, 0.03_wp, 0.0_wp], [0.0_wp, 0.5_wp*pi, 0.0_wp]), &
@@ -41,7 +41,7 @@ module b05_closed_loops
 
 contains
 
-   !> Five smooth paths and one on which corners come and go.
+   !> Run five smooth paths, and one on which corners enter and leave.
    subroutine run_closed_loops(table)
       !> Table to fill
       type(table_t), intent(inout) :: table

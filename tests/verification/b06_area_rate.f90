@@ -1,9 +1,8 @@
 !> Benchmark B6: the rate of change of the overlap area, from positions and velocities, against central differences.
 !>
 !> dA/dt = N . (v_A - v_B) + M_A w_A - M_B w_B with the integrals N and M over the outline of one body inside the
-!> other. The difference quotient over 2 h has an error of rounding 1e-16/h and one of truncation h^2, or h where a
-!> corner enters or leaves in between, which h = 1e-7 makes small against 1e-7 of the scale of the rate, |N| |v| + |M|
-!> |w|.
+!> other. The difference quotient over 2 h has a rounding error of 1e-16/h and a truncation error of h^2, or of h where
+!> a corner enters or leaves. With h = 1e-7 both are small against 1e-7 of the scale of the rate, |N| |v| + |M| |w|.
 module b06_area_rate
    use outlines, only: pi
    use polydem_kinds, only: ip, wp
@@ -16,11 +15,11 @@ module b06_area_rate
 
 contains
 
-   !> Random convex pairs of size 1 with random velocities.
+   !> Compare random pairs of convex polygons of size 1 with random velocities.
    subroutine run_area_rate(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> 1e5 pairs instead of 1e4
+      !> Whether to compare 1e5 pairs instead of 1e4
       logical, intent(in) :: thorough
       real(wp), parameter :: h = 1.0e-7_wp
       type(random_t) :: random
@@ -39,7 +38,7 @@ contains
             pair%bodies%angular_velocity(s) = random%normal()
          end do
          call press(pair)
-         ! A corner that enters within h changes the area by h^2 only, unless the overlap itself is as small as that.
+         ! A corner that enters within h changes the area by h^2 only, unless the overlap itself is that small.
          if (pair%contacts%n == 0_ip .or. pair%contacts%n_degenerate > 0_ip) cycle
          if (pair%contacts%area(1) < 1.0e-6_wp) cycle
          n = n + 1

@@ -1,7 +1,7 @@
-!> Benchmark B7: an elastic gas finds its way back when all velocities are reversed.
+!> Benchmark B7: an elastic gas returns to its start after all velocities are reversed.
 !>
-!> Velocity Verlet is symmetric in time, and without damping and friction forces depend on positions alone, so that only
-!> rounding errors keep a run from retracing its steps. Collisions amplify them.
+!> Velocity Verlet is symmetric in time, and without damping and friction the forces depend on positions alone. So only
+!> rounding errors, which collisions amplify, separate the way back from the way out.
 module b07_reversal
    use trial, only: steps
    use verification_table, only: table_t
@@ -18,7 +18,7 @@ module b07_reversal
 
 contains
 
-   !> Nine grains in a box, with either law.
+   !> Run nine grains in a box with each law.
    subroutine run_reversal(table)
       !> Table to fill
       type(table_t), intent(inout) :: table

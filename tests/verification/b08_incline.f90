@@ -1,13 +1,13 @@
 !> Benchmark B8: a block on an incline slides, rests or topples.
 !>
-!> Sliding it accelerates with g (sin a - mu cos a). Below tan a = mu it rests, and with a spring for friction it sags
-!> by m g sin a/k_t and then does not move.
+!> A sliding block accelerates with g (sin a - mu cos a). Below tan a = mu it rests; with friction by a spring it first
+!> moves downhill by m g sin a/k_t.
 !>
-!> With enough friction it topples where its weight points beside its base, tan a = w/h, if it is rigid. A soft one
-!> stands on a triangle of area A = m g l/E. With the length 3 s of the triangle, s the distance of the weight from
-!> the edge, it is tilted by t = 2 A/(9 s^2), which moves the weight towards the edge: s = s_0 - h t/2, s_0 = (w - h
-!> tan a)/2. Both hold somewhere as long as s_0^3 > 3 h A/4: so it topples at tan a = (w - 2 (3 h A/4)^(1/3))/h, which
-!> tends to w/h with E^(-1/3) only.
+!> With enough friction a rigid block topples when its weight points beside its base, tan a = w/h. A soft block stands
+!> on a triangle of area A = m g l/E and length 3 s, where s is the distance of the weight from the edge. It is tilted
+!> by t = 2 A/(9 s^2), which moves the weight towards the edge: s = s_0 - h t/2, s_0 = (w - h tan a)/2. Both equations
+!> have a solution if s_0^3 > 3 h A/4. So the block topples at tan a = (w - 2 (3 h A/4)^(1/3))/h, which tends to w/h
+!> only with E^(-1/3).
 module b08_incline
    use outlines, only: gravity, integrate_text
    use trial, only: begin, block_at, steps
@@ -24,7 +24,7 @@ module b08_incline
 
    real(wp), parameter :: young = 1.0e7_wp
    real(wp), parameter :: density = 2500.0_wp
-   !> Friction coefficient and sides of the block, but for toppling [m]
+   !> Friction coefficient, and sides of the block [m], except for toppling
    real(wp), parameter :: mu = 0.3_wp, size_of_block(2) = [0.02_wp, 0.01_wp]
    !> Thickness of the plank [m]
    real(wp), parameter :: thickness = 0.05_wp
@@ -35,7 +35,7 @@ contains
    subroutine run_incline(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> A million steps of rest instead of 1e5
+      !> Whether to rest for a million steps instead of 1e5
       logical, intent(in) :: thorough
 
       call table%begin('B8', 'block on an incline')
@@ -67,7 +67,7 @@ contains
                                  gravity*(sin(slope) - mu*cos(slope)), (late - early)/0.1_wp, 1.0e-3_wp)
    end subroutine slide
 
-   !> The load comes at once, so the slope is less than half the critical one, or the spring would overshoot its limit.
+   !> The load starts suddenly. The slope is less than half the critical one, so the spring does not reach its limit.
    subroutine rest(table, n)
       type(table_t), intent(inout) :: table
       integer, intent(in) :: n
@@ -84,7 +84,7 @@ contains
       load = density*size(1)*size(2)*gravity*sin(slope)
       call table%note_error(error)
       if (allocated(error)) return
-      ! The block also tilts; what the spring feels is the displacement of the base.
+      ! The block also tilts; the displacement of the base extends the spring.
       call table%expect_relative('rests at 0.1 rad: sag of the spring [m]', load/(2.0_wp/7.0_wp*young), &
                                  downhill(slope, middle - start) + 0.5_wp*size(2)*simulation%bodies%angle(2), 0.01_wp)
       call table%expect_relative('rests: force of the spring [N/m]', load, &
@@ -96,8 +96,8 @@ contains
                                  downhill(slope, simulation%bodies%position(:, 2) - middle), 1.0e-14_wp)
    end subroutine rest
 
-   !> At 0.99 of the critical slope, after it has settled, exact friction lets nothing creep: 2 units in the last place
-   !> of 1 m are allowed.
+   !> At 0.99 of the critical slope, a block with exact friction does not creep once it is at rest. The tolerance is 2
+   !> units in the last place of 1 m.
    subroutine rest_exactly(table, n)
       type(table_t), intent(inout) :: table
       integer, intent(in) :: n
@@ -117,8 +117,8 @@ contains
                                  2.0_wp*epsilon(1.0_wp))
    end subroutine rest_exactly
 
-   !> A block four times as high as wide, from its position of equilibrium just below the slope where it topples, and
-   !> from flat just above it.
+   !> A block four times as high as wide. It starts in equilibrium on a slope just below the critical one, and flat on a
+   !> slope just above it.
    subroutine topple(table, young)
       type(table_t), intent(inout) :: table
       real(wp), intent(in) :: young
@@ -168,9 +168,9 @@ contains
       overlap_area = density*size(1)*size(2)*gravity/young*4.0_wp*r1*r2/(r1 + r2)
    end function overlap_area
 
-   !> A block on its lower edge, tilted so that it is in equilibrium there: the overlap is a triangle of length 3 s
-   !> and angle t = 2 A/(3 s)^2, and the weight passes the corner at s = (w - h tan(a + t))/2. The smaller of the two
-   !> solutions is the stable one; where there is none, the tilt at which both would meet.
+   !> Equilibrium tilt of a block on its lower edge: the overlap is a triangle of length 3 s and angle t = 2 A/(3 s)^2,
+   !> and the line of the weight is at the distance s = (w - h tan(a + t))/2 from the corner. The smaller of the two
+   !> solutions is stable. If there is no solution, the result is the tilt at which the two coincide.
    subroutine put_on_edge(slope, size, young, area, simulation, error)
       real(wp), intent(in) :: slope, size(2), young, area
       type(simulation_t), intent(out) :: simulation
@@ -196,7 +196,7 @@ contains
                  integrate_text(5.0e-6_wp*sqrt(1.0e7_wp/young)), list, simulation, error)
    end subroutine put_on_edge
 
-   !> A long fixed plank and a block in its static depth on it, body 2, at steps of 1e-5 s.
+   !> Start a block, body 2, at its static depth on a long fixed plank, with steps of 1e-5 s.
    subroutine put_on_slope(slope, speed, size, mu, forces, simulation, error)
       !> Angle of the plank, downhill to the right [rad]
       real(wp), intent(in) :: slope
@@ -215,7 +215,7 @@ contains
       type(body_list_t) :: list
       real(wp) :: distance, depth
 
-      ! E w d/l with l = 2 h T/(h + T), up to d/h.
+      ! The load is E w d/l with l = 2 h T/(h + T), up to relative errors of d/h.
       depth = density*size(2)*gravity*cos(slope)/young*2.0_wp*size(2)*thickness/(size(2) + thickness)
       distance = 0.5_wp*(size(2) + thickness) - depth
       call list%append(block_at(0.0_wp, 0.0_wp, 2.0_wp, thickness, -slope), fixed=.true.)

@@ -1,8 +1,8 @@
 !> Benchmark B9: a block slides on a level floor until it stops.
 !>
-!> Distance v^2/(2 mu g), time v/(mu g). With a spring for friction it then swings with the frequency sqrt(k_t/m_t)
-!> about its place and comes to rest. Exact friction holds the base at once; the block, which tilted while it slid,
-!> rocks on until the damping of tilts has taken that, and for ever without it (shown).
+!> The distance is v^2/(2 mu g), the time v/(mu g). With friction by a spring the block then oscillates with the
+!> frequency sqrt(k_t/m_t) and comes to rest. Exact friction stops the base at once. The block tilts while it slides,
+!> and afterwards rocks until damping of tilts stops it. Without that damping it rocks for ever (shown).
 module b09_stopping
    use b08_incline, only: put_on_slope
    use outlines, only: gravity
@@ -17,7 +17,7 @@ module b09_stopping
 
 contains
 
-   !> With a spring for friction, and exactly.
+   !> Run with friction by a spring and with exact friction.
    subroutine run_stopping(table)
       !> Table to fill
       type(table_t), intent(inout) :: table

@@ -1,18 +1,18 @@
 !> Benchmark B10: an oscillator with dry friction (Matuttis & Chen 2014, Sec. 3.3).
 !>
 !> m x'' = -K (x - y) - D (x' - y') - S sgn(x'), y = a cos(w t), and x' = 0 as long as the sum of the other forces is
-!> less than S. A block slides on a floor, S = mu m g, between two slender posts that press on its sides: two springs
-!> of polygons, K = 2 E b/l for the thickness b of the posts, and D = gamma sqrt(m E) K/E. The posts move to and fro
-!> together. The block has a very large moment of inertia, so that it cannot tilt.
+!> less than S. A block slides on a floor, S = mu m g, between two slender posts that press on its sides: two springs of
+!> polygons, K = 2 E b/l for the thickness b of the posts, and D = gamma sqrt(m E) K/E. Both posts oscillate together.
+!> The block has a very large moment of inertia and does not tilt.
 !>
-!> With the length L = S/(4 K) and the time 1/sqrt(K/m) the book has D = 0.1, a = 1, w = pi, and starts from x = 3
-!> with the velocity 4: the block swings and then sticks for good. With a = 8 and w = 1/2 it sticks and slips in
-!> turns. The reference is the equation above, where l changes with the depth as it does in the simulation; it is
-!> integrated with a hundredth of the step, and the times of stick and slip are located.
+!> In units of the length L = S/(4 K) and the time 1/sqrt(K/m), Matuttis & Chen have D = 0.1, a = 1, w = pi, and start
+!> from x = 3 with the velocity 4: the block oscillates and then sticks for ever. With a = 8 and w = 1/2 it alternates
+!> between stick and slip. The reference is the equation above, where l changes with the depth as in the simulation. It
+!> is integrated with a hundredth of the step, and the times of stick and slip are located.
 !>
-!> A spring for friction gives way by S/k_t before it slips. When the block turns around, its force goes from S to -S
-!> on a way of 2 S/k_t, which kicks the block with an energy of the order S^2/k_t: the distance from the reference
-!> falls as k_t^(-1/2), by about ten for k_t a hundred times as large.
+!> A friction spring yields by S/k_t before it slips. When the block reverses, the spring force goes from S to -S over
+!> a distance of 2 S/k_t, which adds an energy of the order S^2/k_t. So the distance from the reference falls as
+!> k_t^(-1/2), by a factor of about ten when k_t is a hundred times larger.
 module b10_stick_slip
    use outlines, only: gravity, pi
    use trial, only: begin, block_at, steps
@@ -56,7 +56,7 @@ module b10_stick_slip
 
 contains
 
-   !> The book's case and one that sticks and slips, with every friction law.
+   !> Run the case of Matuttis & Chen and a case of repeated stick and slip, with every friction law.
    subroutine run_stick_slip(table)
       !> Table to fill
       type(table_t), intent(inout) :: table
@@ -78,7 +78,7 @@ contains
       end do
    end subroutine run_stick_slip
 
-   !> Entry for a spring that is stiffer than the default by a factor
+   !> Namelist entry for a spring stiffer than the default by a factor
    function spring_text(factor) result(text)
       integer, intent(in) :: factor
       character(len=:), allocatable :: text
@@ -86,7 +86,8 @@ contains
       text = 'tangential_stiffness = '//to_text(real(2*factor, wp)/7.0_wp)
    end function spring_text
 
-   !> Greatest distance from the reference in four periods of the spring, in units of L; rows for the first stop.
+   !> Greatest distance from the reference in four periods of the spring, in units of L; also adds rows for the first
+   !> stop.
    subroutine compare(table, drive, law, friction, worst)
       type(table_t), intent(inout) :: table
       type(case_t), intent(in) :: drive
@@ -110,8 +111,8 @@ contains
          if (allocated(error)) exit
          call follow(drive, reference)
          worst = max(worst, abs(simulation%bodies%position(1, 1) - reference%x)/unit)
-         ! The first stop comes after a start with a speed. Velocities that move the block are those in the middle of
-         ! steps: the last step forward ended at the stop, half a step more or less.
+         ! The block starts with a speed. Positions follow the velocities in the middle of steps, so the last step
+         ! forward ends at the stop, up to half a step.
          if (stop_time <= 0.0_wp .and. drive%velocity > 0.0_wp .and. simulation%bodies%position(1, 1) <= before) &
             stop_time = real(k - 1, wp)*dt
       end do
@@ -143,14 +144,14 @@ contains
       motion%kind = 'oscillation'
       motion%amplitude = [drive%amplitude*unit, 0.0_wp]
       motion%frequency = drive%rate*frequency
-      ! A cosine is a sine that began a quarter of a period ago.
+      ! A cosine is a sine with the phase of a quarter of a period.
       motion%start = -0.5_wp*pi/motion%frequency
       call begin('&forces '//friction//' friction_coefficient = '//to_text(mu, 17)// &
                  ' damping_coefficient = '//to_text(gamma_coefficient, 17)//' / &integrate dt = '//to_text(dt, 17)// &
-                 ' duration = 1000 / &output ledger = .false. /', list, simulation, error, motion, [2_ip, 3_ip])
+                 ' duration = 1000 / &output energy_balance = .false. /', list, simulation, error, motion, [2_ip, 3_ip])
    end subroutine build
 
-   !> Bring the reference a step of the simulation forward, in a hundred steps.
+   !> Advance the reference by one step of the simulation, in a hundred steps.
    subroutine follow(drive, reference)
       type(case_t), intent(in) :: drive
       type(reference_t), intent(inout) :: reference
@@ -176,7 +177,7 @@ contains
                r%x = x
                r%v = v
             else
-               ! The velocity is nearly linear in so short a time.
+               ! The velocity is nearly linear in this short time.
                share = r%v/(r%v - v)
                r%x = r%x + 0.5_wp*share*h*r%v
                r%sticks = abs(push(drive, r%x, 0.0_wp, r%time + share*h)) <= limit
@@ -220,8 +221,8 @@ contains
       push = one_post(press - ahead, -speed) - one_post(press + ahead, speed)
    end function push
 
-   !> E A/l with damping, for a depth and its rate; l from the distances of the two centres from the middle of the
-   !> overlap
+   !> E A/l with damping, for a depth and its rate; l follows from the distances of the two centres from the middle of
+   !> the overlap
    pure real(wp) function one_post(depth, rate)
       real(wp), intent(in) :: depth, rate
       real(wp) :: r1, r2

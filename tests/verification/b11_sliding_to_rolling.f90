@@ -1,8 +1,8 @@
-!> Benchmark B11: a 64-gon that slides at first and then rolls.
+!> Benchmark B11: a 64-gon first slides and then rolls.
 !>
-!> Friction mu N slows the centre and turns the body, m du = -mu N dt and I dw = R mu N dt, until u = R w: u = u0/(1 +
-!> I/(m R^2)) after the time (u0 - u)/(mu g), whatever the friction law does meanwhile. A polygon with n corners does
-!> so up to its radius, which varies by the factor cos(pi/n), 0.9988 for 64.
+!> Friction mu N slows the centre and turns the body, m du = -mu N dt and I dw = R mu N dt, until u = R w. Then u =
+!> u0/(1 + I/(m R^2)), after the time (u0 - u)/(mu g), for any friction law. For a polygon with n corners this holds up
+!> to the variation of its radius by the factor cos(pi/n), 0.9988 for 64.
 module b11_sliding_to_rolling
    use outlines, only: gravity, inertia_ratio, integrate_text, pi, regular_polygon
    use trial, only: begin, block_at, steps

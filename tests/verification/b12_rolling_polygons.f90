@@ -1,14 +1,14 @@
 !> Benchmark B12: regular polygons roll down a slope, corner after corner.
 !>
-!> Without slip and bounce the angular momentum about the next corner is kept when it hits: w+ = eta w-, eta = (I + m
-!> R^2 cos(2 pi/n))/J, J = I + m R^2. From corner to corner the centre falls by s sin(a), s = 2 R sin(pi/n), so that J
-!> w-^2/2 = J (eta w-)^2/2 + m g s sin(a) in the steady state: w-^2 = 2 m g s sin(a)/(J (1 - eta^2)). It goes on if
-!> the body gets over its corner, J (eta w-)^2/2 > m g R (1 - cos(pi/n - a)); for squares at 15 degrees it does not.
-!> And it must not fly: w-^2 R is less than g cos(a + pi/n) here, which 12 and 16 corners are only on a gentle slope.
+!> Without slip and bounce, an impact conserves the angular momentum about the next corner: w+ = eta w-, eta = (I + m
+!> R^2 cos(2 pi/n))/J, J = I + m R^2. From corner to corner the centre falls by s sin(a), s = 2 R sin(pi/n). So in the
+!> steady state J w-^2/2 = J (eta w-)^2/2 + m g s sin(a), and w-^2 = 2 m g s sin(a)/(J (1 - eta^2)). The body rolls on
+!> if it passes over its corner, J (eta w-)^2/2 > m g R (1 - cos(pi/n - a)); squares at 15 degrees do not. It must not
+!> lift off: w-^2 R must be less than g cos(a + pi/n), which holds for 12 and 16 corners on a gentle slope only.
 !>
-!> That takes it that the impact acts on the next corner alone. So corners land on narrow supports in a row, which
-!> reach under a face by 1 % of it at either end; on a plane the force of a soft face passes from corner to corner
-!> while the impact lasts, at any stiffness, and much less is lost (shown for 8 corners). Normal and tangential
+!> This theory assumes that the impact acts on the next corner alone. So the corners land on a row of narrow supports,
+!> which reach under a face by 1 % of it at either end. On a plane the force of a soft face passes from corner to corner
+!> during the impact, at any stiffness, and much less energy is lost (shown for 8 corners). Normal and tangential
 !> damping are so strong that impacts are plastic.
 module b12_rolling_polygons
    use outlines, only: gravity, inertia_ratio, integrate_text, pi, regular_polygon
@@ -27,11 +27,11 @@ module b12_rolling_polygons
 
 contains
 
-   !> Polygons of 5 to 16 corners.
+   !> Run polygons of 5 to 16 corners.
    subroutine run_rolling_polygons(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> Five polygons instead of one, wider supports and a plane, and a square
+      !> Whether to run five polygons instead of one, wider supports, a plane, and a square
       logical, intent(in) :: thorough
       integer, parameter :: corners(*) = [5, 6, 8, 12, 16]
       real(wp), parameter :: slopes(*) = [15.0_wp, 15.0_wp, 15.0_wp, 6.0_wp, 6.0_wp]
@@ -50,7 +50,7 @@ contains
       call stop_square(table)
    end subroutine run_rolling_polygons
 
-   !> `under` is how far a support reaches under a face, as a share of it; one half makes a plane.
+   !> Compare one polygon. `under` is the length of a support under a face, as a share of the face; one half is a plane.
    subroutine compare(table, n, degrees, floor, under, young, damping, must_hold)
       type(table_t), intent(inout) :: table
       integer, intent(in) :: n
@@ -64,8 +64,7 @@ contains
 
       slope = degrees*pi/180.0_wp
       expected = steady_rate(n, slope)
-      ! After 2 n impacts the memory of the start, a tenth too slow, is gone as eta^(4 n): less than 0.002 of it is
-      ! left.
+      ! The start is a tenth too slow. After 2 n impacts this error has decayed as eta^(4 n), to less than 0.002 of it.
       call put_on_slope(n, slope, 0.9_wp*survival(n)*expected, under, young, damping, simulation, error)
       if (.not. allocated(error)) call roll(simulation, n, 1, 2*n, before, error)
       if (.not. allocated(error)) call roll(simulation, n, 2*n + 1, 3*n, before, error)
@@ -79,7 +78,7 @@ contains
       end if
    end subroutine compare
 
-   !> Roll from a face to another, for at most a second; mean of the greatest rates while passing each.
+   !> Roll from one face to another, for at most one second; mean of the greatest rates on each face
    subroutine roll(simulation, n, first, last, before, error)
       type(simulation_t), intent(inout) :: simulation
       integer, intent(in) :: n, first, last
@@ -95,14 +94,14 @@ contains
             call steps(simulation, 1, error)
             if (allocated(error)) return
             greatest = max(greatest, -simulation%bodies%angular_velocity(1))
-            ! The greatest rate is that before an impact, which comes a whole number of faces after the start.
+            ! The greatest rate is the rate before an impact; impacts are a whole number of faces from the start.
             if (-simulation%bodies%angle(1) > 2.0_wp*pi*(real(face, wp) + 0.5_wp)/real(n, wp)) exit
          end do
          before = before + greatest/real(last - first + 1, wp)
       end do
    end subroutine roll
 
-   !> A square is started with the rate of its steady state, if it had one.
+   !> Start a square with the rate that the formula gives for a steady state; it stops.
    subroutine stop_square(table)
       type(table_t), intent(inout) :: table
       type(simulation_t) :: simulation
@@ -118,8 +117,8 @@ contains
       call table%expect_absolute('4 corners come to rest: turned by [rad]', 0.0_wp, simulation%bodies%angle(1), 0.01_wp)
    end subroutine stop_square
 
-   !> A polygon with a face on the slope, which begins to turn clockwise about its lower corner, and supports under the
-   !> corners to come.
+   !> A polygon with a face on the slope, which begins to turn clockwise about its lower corner, and supports where the
+   !> next corners land.
    subroutine put_on_slope(n, slope, rate, under, young, damping, simulation, error)
       integer, intent(in) :: n
       real(wp), intent(in) :: slope, rate, under, young, damping
@@ -147,7 +146,7 @@ contains
                          integrate_text(1.0e-6_wp*sqrt(1.0e9_wp/young)), list, simulation, error)
    end subroutine put_on_slope
 
-   !> Rate after an impact over the rate before it
+   !> Ratio of the rate after an impact to the rate before it
    pure real(wp) function survival(n)
       integer, intent(in) :: n
 

@@ -2,14 +2,14 @@
 !>
 !> With the angle alpha = atan(b/h) and the half diagonal R, a block that is tilted by t turns about its corner with J
 !> t'' = -m g R sin(alpha - t), J = (4/3) m R^2. From rest at t0 it takes the time int dt/w, w^2 = 2 p^2 (cos(alpha -
-!> t0) - cos(alpha - t)), p^2 = 3 g/(4 R), to fall flat; the angular momentum about the other corner is kept there:
-!> w+/w- = 1 - 1.5 sin^2(alpha), so the potential m g R (cos(alpha - t) - cos(alpha)) of the next greatest tilt is the
-!> square of that of the first one.
+!> t0) - cos(alpha - t)), p^2 = 3 g/(4 R), to fall flat. The impact conserves the angular momentum about the other
+!> corner: w+/w- = 1 - 1.5 sin^2(alpha). The potential m g R (cos(alpha - t) - cos(alpha)) of the next greatest tilt is
+!> that of the first one times the square of this ratio.
 !>
-!> That takes it that the impact acts on the other corner alone, so the block stands on two supports that reach under
-!> it by a hundredth of its width. On a plane the force of the soft face passes from one corner to the other while the
-!> impact lasts, at any stiffness, and much less is lost (shown). The damping is so strong that an impact on a support
-!> is plastic. The block pivots within what the support reaches under it.
+!> This theory assumes that the impact acts on the other corner alone. So the block stands on two supports that reach
+!> under it by a hundredth of its width. On a plane the force of the soft face passes from one corner to the other
+!> during the impact, at any stiffness, and much less energy is lost (shown). The damping is so strong that an impact on
+!> a support is plastic. The block pivots about a point above a support.
 module b13_rocking_block
    use outlines, only: gravity, integrate_text
    use trial, only: begin, block_at, steps
@@ -31,11 +31,11 @@ module b13_rocking_block
 
 contains
 
-   !> Fall from half the tilt at which the block would topple, on a plane and on two supports.
+   !> Fall from half the toppling angle, on a plane and on two supports.
    subroutine run_rocking_block(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> A smaller stiffness as well
+      !> Whether to run a smaller stiffness as well
       logical, intent(in) :: thorough
 
       call table%begin('B13', 'a block rocks: h = 10 cm, b = 2 cm, from half the toppling angle')
@@ -44,7 +44,7 @@ contains
       call rock(table, 'on supports, E = 1e10: ', 0.01_wp*width, 1.0e10_wp, 150.0_wp, .true.)
    end subroutine run_rocking_block
 
-   !> `under` is how far a support reaches under the block [m].
+   !> Compare one fall. `under` is the length of a support under the block [m].
    subroutine rock(table, name, under, young, damping, must_hold)
       type(table_t), intent(inout) :: table
       character(len=*), intent(in) :: name
@@ -62,7 +62,7 @@ contains
       do while (time < 1.0_wp)
          if (.not. allocated(error)) call steps(simulation, 1, error)
          if (allocated(error)) exit
-         ! The block starts tilted to the left, at angle 0 of its body: flat at -start, tilted to the right beyond.
+         ! The block starts tilted to the left, with the body angle 0. It is flat at -start and tilted right beyond.
          associate (to_the_right => -start - simulation%bodies%angle(1))
             if (.not. has_fallen) time = time_of(simulation)
             if (has_fallen .and. to_the_right < 0.0_wp) exit
@@ -98,7 +98,7 @@ contains
                  to_text(young)//' /'//integrate_text(1.0e-6_wp*sqrt(1.0e10_wp/young)), list, simulation, error)
    end subroutine put_on_corner
 
-   !> Time from rest to flat [s]: t = t0 (1 - u^2) takes away the singularity at the start, then midpoints.
+   !> Time from rest to flat [s]. The substitution t = t0 (1 - u^2) removes the singularity; then the midpoint rule.
    pure real(wp) function time_to_fall()
       real(wp) :: u, tilt
       integer :: k

@@ -1,13 +1,13 @@
-!> Benchmark B14: a stack of squares that starts in its static depths stays there, unless it is so high that it buckles.
+!> Benchmark B14: a stack of squares that starts at its static depths stays there, unless it is so high that it buckles.
 !>
-!> Interface i from the top carries i blocks: its depth is d_i = i m g l/(E w), where l = w - d_i since both force
-!> points lie half a depth inside the blocks. Everything is in balance from the start; rounding alone could move the
-!> stack. The damping must be strong, since the slowest mode of 50 blocks decays with 2 gamma 1/s only.
+!> Interface i from the top carries i blocks. Its depth is d_i = i m g l/(E w), where l = w - d_i because both force
+!> points are half a depth inside the blocks. All forces are in equilibrium from the start; only rounding errors could
+!> move the stack. The damping must be strong, because the slowest mode of 50 blocks decays with 2 gamma 1/s only.
 !>
-!> A face that tilts by t shifts the centroid of its overlap by w^2 t/(12 d), so it bends back with the moment
-!> E w^2 t/12, whatever it carries. A stack is thus a column of bending stiffness B = E w^3/12 under its own weight
-!> q = rho g w per height, and buckles at the height (7.837 B/q)^(1/3) (A.G. Greenhill, Proc. Camb. Phil. Soc. 4 (1881)
-!> 65): n = (0.653 E/(rho g w))^(1/3) blocks, 29.9 at E = 1e7 and 64 at E = 1e8. Stacks of 24 and 36 blocks get a nudge.
+!> A face that tilts by t shifts the centroid of its overlap by w^2 t/(12 d). Its restoring moment is E w^2 t/12 under
+!> any load. So a stack is a column of bending stiffness B = E w^3/12 under its own weight q = rho g w per height. It
+!> buckles at the height (7.837 B/q)^(1/3) (A.G. Greenhill, Proc. Camb. Phil. Soc. 4 (1881) 65), that is n = (0.653
+!> E/(rho g w))^(1/3) blocks, 29.9 at E = 1e7 and 64 at E = 1e8. Stacks of 24 and 36 blocks get a small push.
 module b14_stack
    use outlines, only: gravity
    use trial, only: steps
@@ -28,11 +28,11 @@ module b14_stack
 
 contains
 
-   !> Ten blocks for 2e4 steps, or fifty for a million.
+   !> Run ten blocks for 2e4 steps, or fifty for a million.
    subroutine run_stack(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> The high stack
+      !> Whether to run the high stack
       logical, intent(in) :: thorough
       real(wp) :: leaning
 
@@ -52,7 +52,7 @@ contains
       call table%expect_true('36 blocks, E = 1e7, nudged: the top leans by a width within 2 s', leaning > width)
    end subroutine run_stack
 
-   !> Push a stack sideways so that its top has 1 mm/s; distance of the top from the middle after 2 s, or when that
+   !> Push a stack sideways: its top gets 1 mm/s. Find the distance of the top from the middle after 2 s, or when it
    !> exceeds a width.
    subroutine nudge(table, n, leaning)
       type(table_t), intent(inout) :: table
@@ -89,8 +89,8 @@ contains
                               to_text(n)// &
                               ' / &forces friction = '''//friction//''' damping_coefficient = 1 stiffness = '// &
                                  to_text(young)// &
-                              ' / &integrate duration = 1000 / &output ledger = .false. /', no_overrides, settings, &
-                              error)
+                              ' / &integrate duration = 1000 / &output energy_balance = .false. /', &
+                              no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
    end subroutine build
 
@@ -112,8 +112,7 @@ contains
       if (.not. allocated(error)) call steps(simulation, n_steps, error)
       call table%note_error(error)
       if (allocated(error)) return
-      ! Contacts in the order of the lower block; the last one, of block 1 and the floor, comes behind that with block
-      ! 2.
+      ! Contacts are in the order of the lower block. The contact of block 1 with the floor follows that with block 2.
       worst = 0.0_wp
       associate (contacts => simulation%contacts)
          do c = 1, contacts%n

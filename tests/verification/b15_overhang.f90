@@ -1,13 +1,12 @@
-!> Benchmark B15: a stack of blocks that leans over as far as it can.
+!> Benchmark B15: a stack of blocks with the greatest overhang.
 !>
-!> Block i from the top, counted from 1, may stand out by w/(2 i) over the next lower one: then the centre of mass of
-!> what it carries, itself included, is above the edge. At 0.98 of all these overhangs the stack stands, at 1.02 it
-!> falls.
+!> The overhang of block i from the top, counted from 1, is at most w/(2 i): then the centre of mass of blocks 1 to i is
+!> above the edge of the next lower block. At 0.98 of all these overhangs the stack stands, at 1.02 it falls.
 !>
-!> That is for rigid blocks. At a share f of the overhangs every centre of mass is s = (1 - f) w/2 inside the edge. A
-!> soft edge gives way below s^3 = 3 H A/2, where A = m g l/E and H are the overlap and the height of the centre of
-!> mass of what it carries (`b08_incline`): for ten blocks and f = 0.98 that is E = 7e9, and all other edges tilt,
-!> too, so that ten blocks with E = 1e10 fall (shown).
+!> This holds for rigid blocks. At a share f of the overhangs every centre of mass is s = (1 - f) w/2 inside the edge. A
+!> soft edge fails below s^3 = 3 H A/2, where A = m g l/E is the overlap and H the height of the centre of mass of the
+!> load (`b08_incline`). For ten blocks and f = 0.98 this gives E = 7e9. All other edges also tilt, so ten blocks with
+!> E = 1e10 fall (shown).
 module b15_overhang
    use outlines, only: integrate_text
    use trial, only: begin, block_at, steps
@@ -26,11 +25,11 @@ module b15_overhang
 
 contains
 
-   !> Three blocks, and ten.
+   !> Run three blocks, and ten.
    subroutine run_overhang(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> The high stack as well
+      !> Whether to run the high stack as well
       logical, intent(in) :: thorough
       real(wp) :: fallen
 
@@ -56,7 +55,7 @@ contains
       call table%expect_true(name//'at 1.02: the top block falls by its height within 2 s', fallen > height)
    end subroutine lean
 
-   !> How far the top block sinks within a time, or until it has fallen by its height [m].
+   !> Let a stack fall for a time, or until its top block has fallen by its height.
    subroutine fall_within(table, n, share, young, time, fallen)
       type(table_t), intent(inout) :: table
       integer(ip), intent(in) :: n

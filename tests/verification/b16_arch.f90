@@ -1,12 +1,12 @@
 !> Benchmark B16: a semicircular arch of wedges under its own weight (Couplet's problem).
 !>
-!> The thinnest arch of this kind that stands is 0.1075 of its mean radius thick (M. Milankovitch 1907; J. Heyman:
-!> 0.106). With n wedges hinges can form at joints only, so it may be thinner. By the safe theorem an arch stands,
-!> friction given, if a line of thrust fits into it. For the part from the crown to the joint at angle a, with weight
-!> V at x, horizontal thrust H and its moment M at the crown, the thrust crosses the joint at the radius r = (M + V
-!> x)/(H cos a + V sin a). r_in <= r <= r_out for all joints are linear inequalities in H and M; the thickness at
-!> which they have but one solution is found here. So 0.12 must stand and 0.095 must fall; both are compared with that
-!> thickness.
+!> The thinnest stable arch of this kind is 0.1075 of its mean radius thick (M. Milankovitch 1907; J. Heyman: 0.106).
+!> With n wedges, hinges form at joints only, so the arch may be thinner. By the safe theorem an arch with enough
+!> friction stands if a line of thrust fits into it. For the part from the crown to the joint at angle a, with weight V
+!> at x, horizontal thrust H and its moment M at the crown, the thrust crosses the joint at the radius r = (M + V x)/(H
+!> cos a + V sin a). The conditions r_in <= r <= r_out for all joints are linear inequalities in H and M. This module
+!> finds the thickness at which they have exactly one solution. The thickness 0.12 must stand and 0.095 must fall; both
+!> are compared with that critical thickness.
 module b16_arch
    use outlines, only: gravity, integrate_text, pi
    use trial, only: begin, block_at, steps
@@ -23,11 +23,11 @@ module b16_arch
 
 contains
 
-   !> Arches of mean radius 1 m.
+   !> Run arches of mean radius 1 m.
    subroutine run_arch(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> 28 wedges as well as 14, and thicknesses nearer to the critical one
+      !> Whether to run 28 wedges as well as 14, and thicknesses nearer to the critical one
       logical, intent(in) :: thorough
       real(wp) :: sunk
 
@@ -35,7 +35,7 @@ contains
       call stand_or_fall(table, 14_ip, 0.12_wp, 0.095_wp, 1.0e10_wp)
       if (.not. thorough) return
       call stand_or_fall(table, 28_ip, 0.12_wp, 0.095_wp, 1.0e10_wp)
-      ! A hinge of a soft arch takes a share of its thickness, which falls with E^(-1/3) only (see b08_incline).
+      ! A hinge of a soft arch uses a share of its thickness, which falls only with E^(-1/3) (see b08_incline).
       call load(table, 28_ip, 1.03_wp*critical_thickness(28_ip), 1.0_wp, 1.0e10_wp, sunk)
       call table%show('28 wedges, E = 1e10, 1.03 of the critical t/R: the crown sinks in 1 s by [m]', sunk)
       call stand_or_fall(table, 28_ip, 1.03_wp*critical_thickness(28_ip), 0.97_wp*critical_thickness(28_ip), 1.0e12_wp)
@@ -58,7 +58,7 @@ contains
                              sunk > 0.2_wp)
    end subroutine stand_or_fall
 
-   !> How far the highest wedge sinks within a time, or until that is 0.2 m.
+   !> Load an arch with its weight for a time, or until its highest wedge has sunk by 0.2 m.
    subroutine load(table, n, thickness, time, young, sunk)
       type(table_t), intent(inout) :: table
       integer(ip), intent(in) :: n
@@ -127,7 +127,7 @@ contains
       end do
    end function critical_thickness
 
-   !> Greatest room for M over all H, negative if there is none; a concave function of H, so golden sections find it.
+   !> Greatest range of M over all H, negative if there is none. It is a concave function of H; golden-section search.
    pure real(wp) function widest_gap(n, thickness)
       integer(ip), intent(in) :: n
       real(wp), intent(in) :: thickness
@@ -149,7 +149,7 @@ contains
       widest_gap = gap(n, thickness, 0.5_wp*(low + high))
    end function widest_gap
 
-   !> Room for the moment M between the inequalities of all joints of the right half [N]
+   !> Range of the moment M between the inequalities of all joints of the right half [N]
    pure real(wp) function gap(n, thickness, thrust)
       integer(ip), intent(in) :: n
       real(wp), intent(in) :: thickness, thrust

@@ -1,20 +1,20 @@
 !> Benchmark B18: a dilute gas of 16-gons cools (P.K. Haff, J. Fluid Mech. 134 (1983) 401).
 !>
-!> With a constant restitution T = T0/(1 + t/tau)^2. The area law with damping by the rate of the area does not have
-!> one. Two round bodies overlap by an area A ~ x^(3/2) at the depth x, so m x'' = -k x^(3/2) - c x^(1/2) x', as for
+!> With a constant restitution T = T0/(1 + t/tau)^2. With the area law and rate damping, restitution depends on the
+!> speed. Two round bodies overlap by an area A ~ x^(3/2) at the depth x, so m x'' = -k x^(3/2) - c x^(1/2) x', as for
 !> viscoelastic spheres: in units of the greatest depth X ~ v^(4/5) the damping is proportional to v/X, and for weak
 !> damping the loss 1 - e^2 goes with v^p, p = 1/5 (N.V. Brilliantov & T. Poeschel, Phys. Rev. E 61 (2000) 5573; for a
 !> sharp corner on a face, A ~ x^2, it is 1/3). Then dT/dt ~ -T^(3/2 + p/2) and T = T0 (1 + t/tau)^(-2/(1 + p)), -5/3
 !> for round bodies instead of Haff's -2.
 !>
-!> So the loss of a collision is measured: for relative speeds c, at random orientations and impact parameters b up to
-!> b_max, the mean loss is L(c) = (m/4) c^2 C c^p. Then the energy T of a gas particle obeys
+!> The benchmark first measures the loss of a collision: for relative speeds c, at random orientations and impact
+!> parameters b up to b_max, the mean loss is L(c) = (m/4) c^2 C c^p. Then the energy T of a gas particle obeys
 !>
 !>     dT/dt = -(1/2) n chi int_0^inf 2 b_max c L(c) f(c) dc,     f(c) = (m c/(2 T)) exp(-m c^2/(4 T))
 !>           = -(1/4) n chi b_max m C (4 T/m)^((3 + p)/2) Gamma((5 + p)/2)
 !>
-!> with chi = (1 - 7 nu/16)/(1 - nu)^2 of hard discs (D. Henderson 1975). The particles do not turn, for
-!> a very large moment of inertia, and the walls lose nothing, for a very small mass in the damping.
+!> with chi = (1 - 7 nu/16)/(1 - nu)^2 of hard discs (D. Henderson 1975). The particles have a very large moment of
+!> inertia, so they do not turn. The damping at walls uses a very small mass, so impacts on walls lose no energy.
 module b18_cooling_gas
    use outlines, only: pi, regular_polygon
    use trial, only: begin, block_at, steps
@@ -36,17 +36,17 @@ module b18_cooling_gas
    real(wp), parameter :: mass = 2500.0_wp*area
    !> Damping coefficient of the gas
    real(wp), parameter :: gas_damping = 0.3_wp
-   !> Namelist but for the damping coefficient
+   !> Namelist without the damping coefficient
    character(len=*), parameter :: rest = ' gravity = 0, 0 friction = ''none'' stiffness = 1e8 / '// &
-      '&integrate dt = 1e-5 duration = 1000 / &output ledger = .false. /'
+      '&integrate dt = 1e-5 duration = 1000 / &output energy_balance = .false. /'
 
 contains
 
-   !> Losses of single collisions, and with `thorough` the gas.
+   !> Run single collisions, and with `thorough` the gas.
    subroutine run_cooling_gas(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> More collisions, and the gas
+      !> Whether to run more collisions, and the gas
       logical, intent(in) :: thorough
       real(wp) :: slope, factor
 
@@ -59,7 +59,7 @@ contains
       if (thorough) call cool(table, slope, factor)
    end subroutine run_cooling_gas
 
-   !> Mean share of the relative energy that is lost as factor c^slope, from speeds c of 0.25 to 2 m/s.
+   !> Fit the mean lost share of the relative energy by factor*c^slope, for speeds c of 0.25 to 2 m/s.
    subroutine measure_loss(table, n_corners, damping, n, slope, factor)
       type(table_t), intent(inout) :: table
       integer, intent(in) :: n_corners, n
@@ -77,8 +77,8 @@ contains
       factor = exp(sum(log(loss) - slope*log(speed))/real(n_speeds, wp))
    end subroutine measure_loss
 
-   !> Mean share of the relative energy that is lost, over evenly spread impact parameters, at the same random
-   !> orientations for all speeds.
+   !> Mean lost share of the relative energy, over evenly spaced impact parameters, at the same random orientations for
+   !> all speeds
    real(wp) function mean_loss(table, n_corners, damping, speed, n)
       type(table_t), intent(inout) :: table
       integer, intent(in) :: n_corners
@@ -113,7 +113,7 @@ contains
       end do
    end function mean_loss
 
-   !> Two particles that come towards each other, nearly in touch.
+   !> Two approaching particles, nearly in touch
    subroutine aim(n_corners, damping, offset, first, second, speed, simulation, error)
       integer, intent(in) :: n_corners
       real(wp), intent(in) :: damping, offset, first, second, speed
@@ -144,7 +144,7 @@ contains
       density = real(across**2, wp)/side**2
       chi = (1.0_wp - 7.0_wp*fraction/16.0_wp)/(1.0_wp - fraction)**2
       call fill(across, side, start, simulation, error)
-      ! The collisions of a few flights make the velocities Maxwellian.
+      ! A few collisions per particle make the velocities Maxwellian.
       if (.not. allocated(error)) call steps(simulation, 2500, error)
       temperature = energy(simulation)
       tau = temperature*2.0_wp/(1.0_wp + slope)/(0.25_wp*density*chi*2.0_wp*radius*mass*factor &
@@ -193,7 +193,7 @@ contains
       call begin('&forces damping_coefficient = '//to_text(gas_damping)//rest, list, simulation, error)
    end subroutine fill
 
-   !> Kinetic energy per particle, which is T in two dimensions [J/m]
+   !> Kinetic energy per particle, which equals T in two dimensions [J/m]
    pure real(wp) function energy(simulation)
       type(simulation_t), intent(in) :: simulation
       integer(ip) :: k

@@ -1,11 +1,11 @@
 !> Benchmark B19: flow out of a hopper.
 !>
 !> In two dimensions the rate is Q = C rho sqrt(g) (D - k d)^(3/2) (W.A. Beverloo, H.A. Leniger & J. van de Velde,
-!> Chem. Eng. Sci. 15 (1961) 260, with one dimension less), whatever the height of the grains. The exponent is the
-!> slope of log Q over log(D - k d) with the mean diameter d of the grains. It depends on k, which is taken as 1:
-!> centres of grains pass through D - d (C. Mankoc et al., Granular Matter 9 (2007) 407). The exponent for Beverloo's
-!> 1.4, which was found with spheres, and the k for which Q^(2/3) is linear in D are shown. Q is taken between a fifth
-!> and three fifths of the grains out, and in the two halves of that.
+!> Chem. Eng. Sci. 15 (1961) 260, with one dimension less), independent of the filling height. The exponent is the slope
+!> of log Q over log(D - k d) with the mean diameter d of the grains. It depends on k. Here k = 1, because centres of
+!> grains pass through D - d (C. Mankoc et al., Granular Matter 9 (2007) 407). Also shown are the exponent for
+!> Beverloo's k = 1.4, which was measured with spheres, and the k for which Q^(2/3) is linear in D. Q is measured while
+!> the discharged share of the grains grows from 20 % to 60 %, and in both halves of this interval.
 module b19_hopper
    use trial, only: steps
    use verification_table, only: table_t
@@ -26,7 +26,7 @@ module b19_hopper
 
 contains
 
-   !> Openings of 6 to 12 diameters; wider ones would empty the silo before the flow is steady.
+   !> Run openings of 6 to 12 diameters; wider ones would empty the silo before the flow is steady.
    subroutine run_hopper(table)
       !> Table to fill
       type(table_t), intent(inout) :: table
@@ -47,7 +47,7 @@ contains
       call table%expect_absolute('later over earlier rate, mean over openings', 1.0_wp, change, 0.05_wp)
    end subroutine run_hopper
 
-   !> Grains per second from 20 % to 40 % and from 40 % to 60 % out.
+   !> Grains per second while the discharged share grows from 20 % to 40 % and from 40 % to 60 %
    subroutine flow(table, opening, early, late)
       type(table_t), intent(inout) :: table
       real(wp), intent(in) :: opening
@@ -62,7 +62,8 @@ contains
       call read_settings_text('hopper.nml', '&scene name = ''hopper'' slope = 60 bodies = '//to_text(n_grains)// &
                               ' width = 0.45 opening = '//to_text(opening, 17)// &
                               ' / &forces friction_coefficient = 0.3 damping_coefficient = 0.3 stiffness = 1e6 /'// &
-                              ' &integrate duration = 100 / &output ledger = .false. /', no_overrides, settings, error)
+                              ' &integrate duration = 100 / &output energy_balance = .false. /', &
+                              no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
       times = 0.0_wp
       mark = 1
@@ -91,7 +92,7 @@ contains
       power_of = sum(x*y)/sum(x*x)
    end function power_of
 
-   !> Where a straight line through values, by least squares, is zero
+   !> Zero of the least-squares line through values
    pure real(wp) function offset_of(opening, values)
       real(wp), intent(in) :: opening(:), values(:)
       real(wp) :: x(size(opening)), mean

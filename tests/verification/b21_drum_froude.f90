@@ -1,9 +1,9 @@
-!> Benchmark B21: a drum at a tenth of the gravity, turned slower by the square root of that, looks the same.
+!> Benchmark B21: the flow in a drum is the same at a tenth of the gravity and the same Froude number.
 !>
 !> Without cohesion and for stiff grains the flow depends on the Froude number w^2 R/g alone (P. Sunday et al., Mon.
-!> Not. R. Astron. Soc. 498 (2020) 1062). Compared is the mean angle by which the centre of mass of the grains is
-!> turned from the vertical, over a revolution. Grains are stiff if E/(rho g R) is some thousands at least: it is
-!> about 3500 and 35000 here. With a tenth of that, 400 grains of one seed differed by 2.8 degrees.
+!> Not. R. Astron. Soc. 498 (2020) 1062). The benchmark compares the mean angle between the vertical and the direction
+!> of the centre of mass of the grains, over a revolution. Grains are stiff if E/(rho g R) is at least some thousands.
+!> Here it is about 3500 and 35000. With a tenth of that, 400 grains of one seed differed by 2.8 degrees.
 module b21_drum_froude
    use outlines, only: gravity, pi
    use trial, only: steps
@@ -21,7 +21,7 @@ module b21_drum_froude
 
 contains
 
-   !> A drum of 250 grains at both gravities, from three seeds.
+   !> Run a drum of 250 grains at both gravities, from three seeds.
    subroutine run_drum_froude(table)
       !> Table to fill
       type(table_t), intent(inout) :: table
@@ -41,7 +41,7 @@ contains
       call table%expect_absolute('at g/10: angle, mean over 3 seeds [degrees]', means(1), means(2), 1.0_wp)
    end subroutine run_drum_froude
 
-   !> Mean angle from 1 s to 3 s, or as many times of free fall.
+   !> Mean angle from 1 s to 3 s, or the same number of free-fall times at other gravities
    subroutine turn(table, share, seed, angle)
       type(table_t), intent(inout) :: table
       real(wp), intent(in) :: share
@@ -63,7 +63,7 @@ contains
                               ' / &forces gravity = 0, '//to_text(-share*gravity, 17)// &
                               ' friction_coefficient = 0.4 damping_coefficient = 0.5 stiffness = 1e7'// &
                               ' / &integrate duration = '//to_text(3.0_wp*stretch, 17)// &
-                              ' / &output ledger = .false. /', no_overrides, settings, error)
+                              ' / &output energy_balance = .false. /', no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
       if (.not. allocated(error)) call steps(simulation, int(simulation%n_steps/3), error)
       angle = 0.0_wp

@@ -1,7 +1,7 @@
-!> The list of the verification benchmarks, the only file that knows all of them.
+!> The list of the verification benchmarks, the only file with all of them.
 !>
-!> To add one: write a module with a procedure that fills the table (see `b09_stopping.f90`), and name it here and in
-!> `CMakeLists.txt`.
+!> To add a benchmark, write a module with a procedure that fills the table (see `b09_stopping.f90`), and name it here
+!> and in `CMakeLists.txt`.
 module benchmarks
    use b01_free_flight, only: run_free_flight
    use b02_mass_properties, only: run_mass_properties
@@ -36,7 +36,7 @@ module benchmarks
    character(len=8), parameter :: benchmark_names(*) = [character(len=8) :: &
       'B1', 'B2', 'B3', '3.2', '3.3', '3.4', 'B4', 'B5', 'B6', 'B7', 'B8', 'B9', 'B10', 'B11', 'B12', 'B13', &
       'B14', 'B15', 'B16', 'B17', 'B18', 'B19', 'B20', 'B21']
-   !> Those that have no short version
+   !> Benchmarks without a short version
    character(len=8), parameter :: long_names(*) = [character(len=8) :: 'B17', 'B19', 'B20', 'B21']
 
 contains
@@ -47,7 +47,7 @@ contains
       character(len=*), intent(in) :: name
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> Whether to run the long version; the long benchmarks have no other
+      !> Whether to run the long version; `long_names` have no short version
       logical, intent(in) :: thorough
 
       select case (name)

@@ -1,21 +1,21 @@
 !> Speed of a wave of falling dominoes in the theory of rigid bodies.
 !>
-!> The assumptions are those of J.M.J. van Leeuwen, Am. J. Phys. 78 (2010) 721: dominoes turn about their lower right
-!> corners, which do not slip; a domino that was hit leans on for good (plastic collisions); friction mu where an upper
-!> corner slides down the face of the next one. The equations are derived here and the steady state is found by
-!> integration.
+!> The assumptions are those of J.M.J. van Leeuwen, Am. J. Phys. 78 (2010) 721. Dominoes turn about their lower right
+!> corners, which do not slip. After a collision the two dominoes stay in contact (plastic collisions). An upper corner
+!> slides down the face of the next domino with friction mu. The equations are derived below, and the steady state is
+!> found by integration.
 !>
-!> With the angle t of a domino, t' of the one behind it, D = t' - t, height h, thickness d, gap s:
+!> With the angle t of a domino, t' of the domino behind it, D = t' - t, height h, thickness d, gap s:
 !>
 !>     (s + d) cos(t) - h sin(D) = d                 the corner lies on the face
-!>     w = dt'/dt = 1 - (s + d) sin(t)/(h cos(D))    rate of the one behind over that of the one before
-!>     a = h cos(D) - (s + d) sin(t) - mu d          torque on the one before per normal force
-!>     b = h (cos(D) + mu sin(D))                    torque on the one behind per normal force
+!>     w = dt'/dt = 1 - (s + d) sin(t)/(h cos(D))    ratio of the rate of the rear to that of the front domino
+!>     a = h cos(D) - (s + d) sin(t) - mu d          torque on the front domino per normal force
+!>     b = h (cos(D) + mu sin(D))                    torque on the rear domino per normal force
 !>     G = m g (h sin(t) - d cos(t))/2               torque of gravity; J = m (h^2 + d^2)/3
 !>
-!> So J t'' = G + (force from behind) a - (force from before) b for each, and all t'' follow from that of the head of
-!> the train. In a collision the same holds for impulses and changes of rates, with G = 0. The head hits at sin(t) =
-!> s/h.
+!> Each domino obeys J t'' = G + (force from behind) a - (force from the front) b, and all t'' follow from that of the
+!> head of the train. A collision obeys the same equation for impulses and changes of rates, with G = 0. The head hits
+!> the next domino at sin(t) = s/h.
 module domino_train
    use polydem_kinds, only: wp
    implicit none
@@ -36,7 +36,7 @@ module domino_train
       real(wp) :: gravity = 0.0_wp
    end type domino_t
 
-   !> Dominoes of the train that are followed; those behind lie still
+   !> Number of moving dominoes in the train; those behind are at rest
    integer, parameter :: n_followed = 16
 
 contains
@@ -58,7 +58,7 @@ contains
       wave_speed = (row%gap + row%thickness)/duration
    end function wave_speed
 
-   !> From a collision to the next one: the head falls from 0 to asin(s/h); fourth-order Runge-Kutta in time.
+   !> Integrate from one collision to the next with fourth-order Runge-Kutta: the head falls from 0 to asin(s/h).
    pure subroutine fall(row, n, rate, duration)
       type(domino_t), intent(in) :: row
       integer, intent(in) :: n
@@ -98,7 +98,7 @@ contains
 
    end subroutine fall
 
-   !> Angles of the train from the head (0) on, and for each pair w, its derivative dw/dt, a and b.
+   !> Compute the angles of the train from the head (0) on, and for each pair w, its derivative dw/dt, a and b.
    pure subroutine lean(row, head, t, w, curve, a, b)
       type(domino_t), intent(in) :: row
       real(wp), intent(in) :: head
@@ -122,7 +122,7 @@ contains
       end do
    end subroutine lean
 
-   !> Angular acceleration of the head [1/s2]; every quantity is linear in it: (1) times it plus (2).
+   !> Angular acceleration of the head [1/s2]. Each quantity q is linear in it: q(1) times it plus q(2)
    pure real(wp) function acceleration(row, rate, t, w, curve, a, b)
       type(domino_t), intent(in) :: row
       real(wp), intent(in) :: rate, t(0:), w(:), curve(:), a(:), b(:)
@@ -149,7 +149,7 @@ contains
       acceleration = -total(2)/total(1)
    end function acceleration
 
-   !> The head hits the next domino, which becomes the head; its rate comes out.
+   !> Let the head hit the next domino, which becomes the head, and compute its rate.
    pure subroutine collide(row, n, rate)
       type(domino_t), intent(in) :: row
       integer, intent(in) :: n

@@ -6,7 +6,7 @@ module outlines
    private
    public :: regular_polygon, inertia_ratio, integrate_text, pi, gravity
 
-   !> Circumference of a circle over its diameter
+   !> Ratio of the circumference of a circle to its diameter
    real(wp), parameter :: pi = 3.141592653589793238462643383279503_wp
    !> Acceleration of gravity, the default of the namelist [m/s2]
    real(wp), parameter :: gravity = 9.81_wp
@@ -40,13 +40,13 @@ contains
       inertia_ratio = (2.0_wp + cos(2.0_wp*pi/real(n, wp)))/6.0_wp
    end function inertia_ratio
 
-   !> Group &integrate with a step, for a duration longer than any benchmark; the books are off.
+   !> Group &integrate with a time step and a duration longer than any benchmark; the energy balance is off
    pure function integrate_text(dt) result(text)
-      !> Step [s]
+      !> Time step [s]
       real(wp), intent(in) :: dt
       character(len=:), allocatable :: text
 
-      text = ' &integrate dt = '//to_text(dt, 17)//' duration = 1000 / &output ledger = .false. /'
+      text = ' &integrate dt = '//to_text(dt, 17)//' duration = 1000 / &output energy_balance = .false. /'
    end function integrate_text
 
 end module outlines

@@ -18,7 +18,7 @@ module posed_pair
    !> Young's modulus of every pair [N/m2]
    real(wp), parameter :: young = 1.0e7_wp
 
-   !> Two bodies and what acts between them
+   !> Two bodies and their contact
    type :: pair_t
       !> The bodies; poses and velocities may be changed before `press`
       type(bodies_t) :: bodies
@@ -31,7 +31,7 @@ module posed_pair
 
 contains
 
-   !> Two bodies where their polygons are.
+   !> Create two bodies from their polygons.
    subroutine new_pair(law, first, second, pair)
       !> Entry `law` of &forces
       character(len=*), intent(in) :: law
@@ -54,7 +54,7 @@ contains
       pair%contacts%area_is_effective = pair%law%needs_effective_area
    end subroutine new_pair
 
-   !> Forces and torques of the poses.
+   !> Compute the forces and torques of the present poses.
    subroutine press(pair)
       !> The pair
       type(pair_t), intent(inout) :: pair

@@ -2,10 +2,10 @@
 !>
 !> With depth d of the overlap of width w, F = E w d/l: two equal squares have l = w, so k = E, m_eff = m/2, and the
 !> damping ratio zeta = c/(2 sqrt(k m_eff)) = gamma/2. Without damping the contact lasts pi/w0 and is v/w0 deep,
-!> w0 = sqrt(k/m_eff). With it, it ends where the force vanishes (no attraction), and the restitution is
+!> w0 = sqrt(k/m_eff). With damping, the contact ends where the force vanishes (no attraction), and the restitution is
 !> e = exp(-(zeta/s)(pi - atan2(2 zeta s, 1 - 2 zeta^2))), s = sqrt(1 - zeta^2) (T. Schwager & T. Poeschel, Granular
-!> Matter 9 (2007) 465). The dashpot acts with a jump at first touch, so e depends on when within a step that happens:
-!> the mean over phases converges with the second order of the step, the worst phase with the first.
+!> Matter 9 (2007) 465). The force of the dashpot jumps at first touch, so e depends on the phase of the step at first
+!> touch. The error of the mean over phases is of second order in the step, that of the worst phase of first order.
 module s32_flat_impact
    use outlines, only: gravity, integrate_text, pi
    use trial, only: begin, block_at, steps
@@ -31,11 +31,11 @@ module s32_flat_impact
 
 contains
 
-   !> Elastic and damped impact, and a block at rest on a floor.
+   !> Run an elastic and a damped impact, and a block at rest on a floor.
    subroutine run_flat_impact(table, thorough)
       !> Table to fill
       type(table_t), intent(inout) :: table
-      !> Five damping ratios instead of two
+      !> Whether to run five damping ratios instead of two
       logical, intent(in) :: thorough
       real(wp), parameter :: ratios(*) = [0.1_wp, 0.3_wp, 0.0343_wp, 0.5_wp, 0.7071_wp]
       integer :: k
@@ -67,12 +67,12 @@ contains
       end do
       call table%note_error(error)
       call table%expect_relative('elastic: greatest depth [m]', 2.0_wp*speed/frequency, deepest, 1.0e-4_wp)
-      ! Counted in whole steps of 0.002/w0.
+      ! The duration is a whole number of steps of 0.002/w0.
       call table%expect_relative('elastic: duration [s]', pi/frequency, touched, 1.5e-3_wp)
       call table%expect_relative('elastic: restitution', 1.0_wp, separation_speed(simulation)/(2.0_wp*speed), 1.0e-4_wp)
    end subroutine collide_elastically
 
-   !> Mean and worst over 64 phases of first touch, at two steps.
+   !> Compare mean and worst of 64 phases of first touch, for two time steps.
    subroutine compare(table, ratio)
       type(table_t), intent(inout) :: table
       real(wp), intent(in) :: ratio
@@ -88,7 +88,7 @@ contains
       call table%expect_least(name//'order of the worst', 0.8_wp, log(worst(2)/worst(1))/log(2.0_wp))
    end subroutine compare
 
-   !> Mean error and worst error of the restitution.
+   !> Find the mean and the worst error of the restitution.
    subroutine over_phases(table, ratio, step, mean, worst)
       type(table_t), intent(inout) :: table
       real(wp), intent(in) :: ratio, step
@@ -113,7 +113,7 @@ contains
       end do
    end subroutine over_phases
 
-   !> A square in its static position on a floor stays there: depth m g/k with k = E w/l.
+   !> Start a square at its static depth on a floor, m g/k with k = E w/l; it must stay there.
    subroutine rest_on_floor(table)
       type(table_t), intent(inout) :: table
       type(body_list_t) :: list
@@ -157,7 +157,7 @@ contains
       separation_speed = simulation%bodies%velocity(1, 2) - simulation%bodies%velocity(1, 1)
    end function separation_speed
 
-   !> Restitution of a damped spring that is let go when its force vanishes
+   !> Restitution of a damped spring that is released when its force vanishes
    pure real(wp) function restitution(ratio)
       real(wp), intent(in) :: ratio
       real(wp) :: s

@@ -1,10 +1,10 @@
 !> Normal impact of a right-angled corner on a floor.
 !>
-!> At depth d the overlap is a triangle with area A = d^2, whose centroid is 2 d/3 above the corner, so F = E d^2/l
-!> with l = 4 r1 r2/(r1 + r2), r1 = w/sqrt(2) - 2 d/3, and r2 = h/2 - d/3 for a floor of thickness h. Taking l as that
-!> of d = 0 gives d_max = (3 m v^2 l/(2 E))^(1/3) and the duration 2 I d_max/v with I = int_0^1 du/sqrt(1 - u^3) =
-!> 1.402182; with l as it is, both follow from the equation of motion, which is integrated here with steps so small
-!> that its error does not count.
+!> At depth d the overlap is a triangle with area A = d^2, whose centroid is 2 d/3 above the corner, so F = E d^2/l with
+!> l = 4 r1 r2/(r1 + r2), r1 = w/sqrt(2) - 2 d/3, and r2 = h/2 - d/3 for a floor of thickness h. With the constant l of
+!> d = 0, d_max = (3 m v^2 l/(2 E))^(1/3) and the duration is 2 I d_max/v with I = int_0^1 du/sqrt(1 - u^3) = 1.402182.
+!> With the variable l, both follow from the equation of motion, which is integrated here with such small steps that its
+!> error is negligible.
 module s33_corner_impact
    use outlines, only: integrate_text, pi
    use trial, only: begin, block_at
@@ -29,7 +29,7 @@ module s33_corner_impact
 
 contains
 
-   !> One elastic impact without gravity.
+   !> Run one elastic impact without gravity.
    subroutine run_corner_impact(table)
       !> Table to fill
       type(table_t), intent(inout) :: table
@@ -68,8 +68,8 @@ contains
                                  simulation%bodies%angular_velocity(1)*width/speed, 1.0e-9_wp)
    end subroutine run_corner_impact
 
-   !> Depth and duration from m d'' = -F(d) up to the deepest point, with a thousandth of the step of the simulation;
-   !> the way back is its mirror image.
+   !> Integrate m d'' = -F(d) up to the deepest point, with a thousandth of the step of the simulation, for depth and
+   !> duration; the way back is the mirror image.
    pure subroutine integrate(depth, duration)
       real(wp), intent(out) :: depth, duration
       real(wp), parameter :: h = 1.0e-3_wp*dt

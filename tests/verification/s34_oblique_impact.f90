@@ -1,10 +1,10 @@
-!> Oblique impact with gross sliding, of a corner right below the centre.
+!> Oblique impact with gross sliding, of a corner directly below the centre.
 !>
-!> While the corner slides all the time, the impulse is J = (1 + e) m v_n along the normal and mu J against the
-!> sliding, so that v_t' = v_t - s mu (1 + e) v_n and w' = w - s mu (1 + e) v_n m R/I, s the sign of the sliding v_t +
-!> R w. It slides to the end if |v_t + R w| > mu (1 + e) v_n beta, beta = 1 + m R^2/I: 4 for a square on its corner,
-!> nearly 3 for a 64-gon. The formula is that of a rigid body. A contact of finite duration lets the corner move along
-!> by s_t = v_t t_c, by which the normal force turns the body; this error falls with the stiffness (shown at 100 E).
+!> If the corner slides during the whole impact, the impulse is J = (1 + e) m v_n along the normal and mu J against the
+!> sliding. Then v_t' = v_t - s mu (1 + e) v_n and w' = w - s mu (1 + e) v_n m R/I, where s is the sign of the sliding
+!> velocity v_t + R w. It slides to the end if |v_t + R w| > mu (1 + e) v_n beta, beta = 1 + m R^2/I: 4 for a square on
+!> its corner, nearly 3 for a 64-gon. The formula holds for a rigid body. In a contact of finite duration t_c the corner
+!> moves by s_t = v_t t_c, and the normal force turns the body; this error falls with the stiffness (shown at 100 E).
 module s34_oblique_impact
    use outlines, only: inertia_ratio, integrate_text, pi, regular_polygon
    use trial, only: begin, block_at
@@ -23,7 +23,7 @@ module s34_oblique_impact
 
 contains
 
-   !> Square and 64-gon, at two stiffnesses.
+   !> Run a square and a 64-gon, at two stiffnesses.
    subroutine run_oblique_impact(table)
       !> Table to fill
       type(table_t), intent(inout) :: table

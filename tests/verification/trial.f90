@@ -1,4 +1,4 @@
-!> Simulations of a few bodies for the tests: from a namelist text and a list of polygons.
+!> Simulations of a few bodies for the tests, from a namelist text and a list of polygons.
 module trial
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
@@ -16,7 +16,7 @@ module trial
 
 contains
 
-   !> Start from a list of bodies and a namelist without the group &scene.
+   !> Create a simulation from a list of bodies and a namelist without the group &scene.
    subroutine begin(text, list, simulation, error, motion, moved)
       !> Groups of the namelist
       character(len=*), intent(in) :: text
@@ -28,7 +28,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Prescribed motion of some bodies
       type(motion_t), intent(in), optional :: motion
-      !> Slots of the bodies that it moves, given with it
+      !> Slots of the bodies that the motion moves, given with it
       integer(ip), intent(in), optional :: moved(:)
       type(settings_t) :: settings
       type(bodies_t) :: bodies
@@ -45,7 +45,7 @@ contains
       call start_simulation(settings, bodies, motions, simulation, error)
    end subroutine begin
 
-   !> Advance by a number of steps, or until something goes wrong.
+   !> Advance by a number of steps, or until an error.
    subroutine steps(simulation, n, error)
       !> The simulation
       type(simulation_t), intent(inout) :: simulation

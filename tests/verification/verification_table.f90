@@ -1,8 +1,7 @@
-!> The table of the verification benchmarks: what was expected, what came out, and whether that is near enough.
+!> The table of the verification benchmarks: expected values, simulated values and tolerances.
 !>
 !> A benchmark calls `begin` and then one of the `expect_` procedures per quantity; each prints its row at once.
-!> `show` records a number without a verdict, such as the same quantity at another stiffness, which tells why a row
-!> is off by what it is off.
+!> `show` records a number without a tolerance, such as the same quantity at another stiffness, which explains an error.
 module verification_table
    use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
    use, intrinsic :: iso_fortran_env, only: output_unit
@@ -18,9 +17,9 @@ module verification_table
       character(len=8) :: benchmark = ''
       !> Quantity with its unit
       character(len=72) :: quantity = ''
-      !> What it should be, or its bound
+      !> Expected value or bound
       character(len=16) :: expected = ''
-      !> What it is
+      !> Simulated value
       character(len=16) :: got = ''
       !> Distance from the expected value, relative or in the unit of the quantity
       character(len=12) :: error = ''
@@ -34,7 +33,7 @@ module verification_table
 
    !> The table
    type :: table_t
-      !> Rows that missed their tolerance
+      !> Number of rows that missed their tolerance
       integer :: n_missed = 0
       type(row_t), allocatable, private :: rows(:)
       character(len=8), private :: benchmark = ''
@@ -55,12 +54,12 @@ module verification_table
 
 contains
 
-   !> Begin a benchmark: its rows follow.
+   !> Begin a benchmark. Its rows follow.
    subroutine begin(self, benchmark, title)
       class(table_t), intent(inout) :: self
-      !> Its name in the table, such as B8
+      !> Name in the table, such as B8
       character(len=*), intent(in) :: benchmark
-      !> What it is
+      !> Title of the benchmark
       character(len=*), intent(in) :: title
 
       if (.not. allocated(self%rows)) then
@@ -74,14 +73,14 @@ contains
       flush (output_unit)
    end subroutine begin
 
-   !> A quantity that should have a value up to a relative tolerance.
+   !> Expect a value within a relative tolerance.
    subroutine expect_relative(self, quantity, expected, got, tolerance)
       class(table_t), intent(inout) :: self
       !> Quantity with its unit
       character(len=*), intent(in) :: quantity
-      !> What it should be, not 0
+      !> Expected value, not 0
       real(wp), intent(in) :: expected
-      !> What it is
+      !> Simulated value
       real(wp), intent(in) :: got
       !> Greatest relative error
       real(wp), intent(in) :: tolerance
@@ -89,14 +88,14 @@ contains
       call add(self, quantity, number(expected), got, abs(got - expected)/abs(expected), tolerance)
    end subroutine expect_relative
 
-   !> A quantity that should have a value up to a tolerance in its own unit.
+   !> Expect a value within a tolerance in its own unit.
    subroutine expect_absolute(self, quantity, expected, got, tolerance)
       class(table_t), intent(inout) :: self
       !> Quantity with its unit
       character(len=*), intent(in) :: quantity
-      !> What it should be
+      !> Expected value
       real(wp), intent(in) :: expected
-      !> What it is
+      !> Simulated value
       real(wp), intent(in) :: got
       !> Greatest error
       real(wp), intent(in) :: tolerance
@@ -104,14 +103,14 @@ contains
       call add(self, quantity, number(expected), got, abs(got - expected), tolerance)
    end subroutine expect_absolute
 
-   !> A quantity that must reach a bound, such as an order of convergence.
+   !> Expect a value of at least a bound, such as an order of convergence.
    subroutine expect_least(self, quantity, bound, got)
       class(table_t), intent(inout) :: self
       !> Quantity with its unit
       character(len=*), intent(in) :: quantity
-      !> Least value
+      !> Least accepted value
       real(wp), intent(in) :: bound
-      !> What it is
+      !> Simulated value
       real(wp), intent(in) :: got
 
       type(row_t) :: row
@@ -123,12 +122,12 @@ contains
       call append(self, row)
    end subroutine expect_least
 
-   !> Something that must be so.
+   !> Expect a condition to be true.
    subroutine expect_true(self, quantity, condition)
       class(table_t), intent(inout) :: self
-      !> What is asked
+      !> The condition in words
       character(len=*), intent(in) :: quantity
-      !> Whether it is so
+      !> Whether it is true
       logical, intent(in) :: condition
       type(row_t) :: row
 
@@ -139,12 +138,12 @@ contains
       call append(self, row)
    end subroutine expect_true
 
-   !> A number of which nothing is expected.
+   !> Show a number without an expected value.
    subroutine show(self, quantity, got)
       class(table_t), intent(inout) :: self
       !> Quantity with its unit
       character(len=*), intent(in) :: quantity
-      !> What it is
+      !> Simulated value
       real(wp), intent(in) :: got
       type(row_t) :: row
 
@@ -154,10 +153,10 @@ contains
       call append(self, row)
    end subroutine show
 
-   !> A row that is missed if a simulation ended with an error, and nothing otherwise.
+   !> Add a missed row if a simulation ended with an error.
    subroutine note_error(self, error)
       class(table_t), intent(inout) :: self
-      !> Error of a simulation, if it had one
+      !> Error of the simulation; not allocated if there is none
       type(error_t), allocatable, intent(in) :: error
       type(row_t) :: row
 
@@ -203,7 +202,7 @@ contains
       end do
    end function as_markdown
 
-   !> A row with an error and its tolerance; NaN fulfils no tolerance.
+   !> Add a row with an error and its tolerance; NaN exceeds any tolerance.
    subroutine add(self, quantity, expected, got, error, tolerance)
       type(table_t), intent(inout) :: self
       character(len=*), intent(in) :: quantity, expected
@@ -251,7 +250,7 @@ contains
       flush (output_unit)
    end subroutine print_columns
 
-   !> A number with six significant digits, as short as can be
+   !> A number with six significant digits in the shortest form
    pure function number(value) result(text)
       real(wp), intent(in) :: value
       character(len=:), allocatable :: text
@@ -267,7 +266,7 @@ contains
       text = trim(adjustl(buffer))
    end function number
 
-   !> Processor time of all threads so far: unlike elapsed time the same on a busy machine [s]
+   !> Processor time of all threads so far [s]. Unlike elapsed time it does not depend on the load of the machine
    real(dp) function processor_seconds()
       call cpu_time(processor_seconds)
    end function processor_seconds

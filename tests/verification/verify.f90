@@ -1,8 +1,8 @@
-!> The verification benchmarks: runs against what theory or a publication expects.
+!> The verification benchmarks: simulations compared with theory and publications.
 !>
 !> usage: verify [--quick] [NAME...]     all benchmarks or those named, such as B8
 !>
-!> --quick runs short versions, and leaves out those that have none unless they are named.
+!> --quick runs short versions. Benchmarks without a short version run only if they are named.
 !>
 !> The table is printed row by row and written to results/verify, as table.csv and table.md. The exit code is 1
 !> if a row misses its tolerance, 2 if there is no such benchmark, 3 if the table cannot be written.
@@ -20,7 +20,7 @@ program verify
    implicit none
 
    interface
-      !> C exit: ends the program with a code and without a word
+      !> C exit: ends the program with an exit code and without a message
       subroutine c_exit(code) bind(C, name='exit')
          import :: c_int
          integer(c_int), value :: code
@@ -50,7 +50,7 @@ program verify
 
 contains
 
-   !> Which benchmarks to run, and how.
+   !> Read the options and the names of the benchmarks from the command line.
    subroutine read_arguments(chosen, thorough)
       logical, intent(out) :: chosen(:)
       logical, intent(out) :: thorough
@@ -70,7 +70,7 @@ contains
          else if (any(benchmark_names == word)) then
             where (benchmark_names == word) chosen = .true.
          else
-            write (error_unit, '(3a, *(1x, a))') 'verify: there is no benchmark ', trim(word), '; there are', &
+            write (error_unit, '(3a, *(1x, a))') 'verify: unknown benchmark ', trim(word), '; choose from', &
                benchmark_names
             call c_exit(2_c_int)
          end if
@@ -81,7 +81,7 @@ contains
       end do
    end subroutine read_arguments
 
-   !> What ran where and when, for the table in Markdown
+   !> Version, machine and date of the run, for the table in Markdown
    function heading(thorough) result(text)
       logical, intent(in) :: thorough
       character(len=:), allocatable :: text

@@ -11,6 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from .former_names import COUNTERS, STAGES, present
 from .scene_kinds import making_of, settings_of
 from .trajectory import UNREADABLE, ResultError, open_file
 
@@ -334,7 +335,8 @@ def _columns(steps: h5py.Group, what: str) -> dict:
     if what not in steps:
         return {}
     names = steps[f"{what}_name"].asstr()[:]
-    return {str(name).strip(): column for name, column in zip(names, np.atleast_2d(steps[what][:]).T)}
+    former = {"count": COUNTERS, "stage": STAGES}.get(what, {})
+    return {present(former, str(name).strip()): column for name, column in zip(names, np.atleast_2d(steps[what][:]).T)}
 
 
 def _facts(group: h5py.Group) -> dict:

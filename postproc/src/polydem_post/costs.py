@@ -47,7 +47,7 @@ BARE = (
     "guards.step=off",
     "guards.overlap=off",
     "guards.passing=off",
-    "output.ledger=.false.",
+    "output.energy_balance=.false.",
     "output.trace_steps=0",
     "output.trace_start=0",
     "checkpoint.elapsed=0",
@@ -72,7 +72,7 @@ MODELS = (
     Model("conservative law", ("forces.law=conservative",)),
     Model("damping by the rate", ("forces.damping=rate",)),
     Model("damping from touch", ("forces.damping=rate", "forces.damping_from_touch=.true."), "damping by the rate"),
-    Model("damping of the book", ("forces.damping=book",)),
+    Model("damping of Matuttis & Chen", ("forces.damping=matuttis_chen",)),
     Model("damping (Hunt-Crossley)", ("forces.damping=hunt_crossley", "forces.damping_coefficient=300")),
     Model("damping of tilts", ("forces.tilt_damping=0.5",)),
     Model("friction (Cundall-Strack)", ("forces.friction=cundall_strack",)),
@@ -88,8 +88,8 @@ MODELS = (
     Model("guard: stable step", ("guards.step=stop",)),
     Model("guard: overlap", ("guards.overlap=warn",)),
     Model("guard: passing", ("guards.passing=warn",)),
-    Model("ledger", ("output.ledger=.true.",)),
-    Model("guard: energy", ("output.ledger=.true.", "guards.energy=warn"), off="ledger"),
+    Model("energy balance", ("output.energy_balance=.true.",)),
+    Model("guard: energy", ("output.energy_balance=.true.", "guards.energy=warn"), off="energy balance"),
     Model("a frame every 50 steps", ("output.frame_interval=1e-3",)),
     Model("frames with contacts", ("output.frame_interval=1e-3", "output.contacts=.true."), "a frame every 50 steps"),
     Model("times of every step", ("output.step_profile=.true.",)),
@@ -151,7 +151,7 @@ class Study:
         """The settled bed that drums are packed from; made if it is not there."""
         folder = self.output / "bed"
         if not (folder / "profile.h5").exists() or Trajectory(folder).status != "finished":
-            self.run("bed.nml", folder, ["output.frame_interval=0", "output.ledger=.false."])
+            self.run("bed.nml", folder, ["output.frame_interval=0", "output.energy_balance=.false."])
         return folder
 
     def overrides(self, model: Model, steps: int, boxes: int) -> list[str]:
@@ -325,7 +325,7 @@ def _note(samples: list) -> str:
         f"boxes, one thread, a hundred steps; the same on a busy machine. Memory: {WEIGHED[1]} boxes, to about 6 "
         "bytes. "
         "Against nothing, but each refinement against what it refines: damping from touch against damping by the rate, "
-        "slip in mid-step against friction, contacts against frames, the guard of energy against the ledger."
+        "slip in mid-step against friction, contacts against frames, the guard of energy against the energy balance."
     )
 
 

@@ -23,23 +23,23 @@ SHAPE, MARGIN = "run", 0.0
 
 #: Counters of a run of several processes, and what they are called here
 COUNTERS = {
-    "settlements": "settlements",
-    "divisions": "divisions of space",
+    "settlements": "redistributions",
+    "divisions": "partitions of space",
     "rectangles": "rectangles",
     "migrations": "migrations",
     "first_migrations": "migrations at the start",
-    "ghosts": "ghosts, summed over steps",
-    "messages": "messages to ghosts",
-    "bytes": "bytes to ghosts",
+    "ghosts": "halo bodies, summed over steps",
+    "messages": "halo messages",
+    "bytes": "halo bytes",
     "all_messages": "messages",
     "all_bytes": "bytes in messages",
     "first_messages": "messages at the start",
     "first_bytes": "bytes at the start",
-    "most_bodies": "most of a process: bodies",
-    "most_pairs": "most of a process: pairs",
-    "most_ghosts": "most of a process: ghosts",
-    "most_messages": "most of a process: messages",
-    "most_bytes": "most of a process: bytes",
+    "most_bodies": "maximum per rank: bodies",
+    "most_pairs": "maximum per rank: pairs",
+    "most_ghosts": "maximum per rank: halo bodies",
+    "most_messages": "maximum per rank: messages",
+    "most_bytes": "maximum per rank: bytes",
 }
 
 
@@ -114,12 +114,12 @@ def read_run(folder) -> RunCount:
     """Counts of the result in a folder."""
     result = Trajectory(folder)
     counters = result.counters
-    ranks = counters.get("processes", 1)
+    ranks = counters.get("ranks", 1)
     missing = [name for name in ("steps", "pairs", *(COUNTERS.values() if ranks > 1 else ())) if name not in counters]
     if missing or counters["steps"] < 1:
         raise ResultError(f"{folder}: the run lacks counts ({', '.join(missing) or 'no steps'})")
     resolved = str(result.provenance.get("resolved_input", ""))
-    group = re.search(r"^&exchange\b(.*?)^/", resolved, re.DOTALL | re.MULTILINE)
+    group = re.search(r"^&(?:decomposition|exchange)\b(.*?)^/", resolved, re.DOTALL | re.MULTILINE)
     entries = dict(re.findall(r"(\w+)\s*=\s*'?([^\s']+)", group[1])) if group else {}
     if len(result) == 0:
         raise ResultError(f"{folder}: holds no frames")
@@ -130,9 +130,10 @@ def read_run(folder) -> RunCount:
     try:
         margin = float(entries.get("margin", MARGIN))
     except ValueError as error:
-        raise ResultError(f"{folder}: its margin of exchange is no number: {entries['margin'][:40]!r}") from error
-    run = RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], cut=entries.get("cut", "bisection"),
-                   margin=margin, pairs=counters["pairs"], state_hash=result.state_hash,
+        raise ResultError(f"{folder}: its margin of decomposition is no number: {entries['margin'][:40]!r}") from error
+    cut = entries.get("partition", entries.get("cut", "bisection"))
+    run = RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], cut=cut, margin=margin,
+                   pairs=counters["pairs"], state_hash=result.state_hash,
                    revision=str(result.provenance.get("revision", NOT_RECORDED)), **counts)
     _insist_on_counts(folder, run)
     return run

@@ -33,7 +33,7 @@ SLIDING, FRICTION = (0.04, 0.06), 0.23
 BLOCKS = 5
 
 #: Damping -> damping coefficient: a restitution of about three quarters for a flat impact at SPEED
-DAMPING = {"rate": 0.2, "book": 0.2, "hunt_crossley": 250.0}
+DAMPING = {"rate": 0.2, "matuttis_chen": 0.2, "hunt_crossley": 250.0}
 
 
 @dataclass(frozen=True)
@@ -283,7 +283,7 @@ def energy_changes(run: Trajectory) -> np.ndarray:
     """Relative change of the kinetic energy at each frame; NaN where bodies touch."""
     with h5py.File(run.folder / "steps.h5", "r") as file:
         contacts = dict(zip(file["steps/step"][:].tolist(), file["steps/contacts"][:].tolist()))
-    kinetic = run.ledger["kinetic"]
+    kinetic = run.energy_balance["kinetic"]
     free = np.array([contacts.get(int(step), 0) == 0 for step in run.steps])
     return np.where(free, kinetic / kinetic[0] - 1.0, np.nan)[1:, None, None]
 
@@ -307,7 +307,7 @@ def restitution(model: Model) -> float | None:
     e = math.exp(-zeta / s * (math.pi - math.atan2(2.0 * zeta * s, 1.0 - 2.0 * zeta**2)))
     if model.damping == "rate":
         return e
-    if model.damping == "book":
+    if model.damping == "matuttis_chen":
         root = math.sqrt(5.0)
         theta = math.atan(0.5 * zeta * root)
         x, v = math.sin(theta) / root, math.cos(theta)
@@ -341,7 +341,7 @@ SCENES = {
     scene.name: scene
     for scene in [
         Scene("flat_impact", "Flat impact", "velocity after the impact",
-              _models("area/none/none", "area/rate/none", "area/book/none", "area/hunt_crossley/none",
+              _models("area/none/none", "area/rate/none", "area/matuttis_chen/none", "area/hunt_crossley/none",
                       "conservative/none/none", "conservative/rate/none", "conservative/hunt_crossley/none"),
               _doubled(8, 6), 4096, velocities_after, flat_impact,
               quantity=lambda result: float(result[-1, :, 1].mean()), quantity_name="restitution",

@@ -10,6 +10,8 @@ from __future__ import annotations
 import math
 import re
 
+from .former_names import ENTRIES, present
+
 #: Boxes of which it is not recorded how they were made
 UNKNOWN = "unknown"
 
@@ -44,7 +46,7 @@ def settings_of(text: str) -> dict[str, str]:
             group = words[1:].strip()
         key, equals, value = words.partition("=")
         if group and equals:
-            settings[f"{group}.{key.strip()}"] = value.strip().strip("'")
+            settings[present(ENTRIES, f"{group}.{key.strip()}")] = value.strip().strip("'")
     return settings
 
 
@@ -92,7 +94,7 @@ def making_of(settings: dict) -> tuple:
 def _kind_of_gas(settings: dict) -> str:
     if settings.get("scene.order", "natural") == "descending":
         return "worst"
-    if number_in(settings, "scene.movers") > 0.0:
+    if number_in(settings, "scene.moving_grains") > 0.0:
         return "rest"
     slender = number_in(settings, "scene.long_axis_min") >= SLENDER * number_in(settings, "scene.short_axis", math.inf)
     if slender:

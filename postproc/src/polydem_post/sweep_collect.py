@@ -1,4 +1,4 @@
-"""What came out of a sweep, in one table: parameters, final ledger, state hash, times, exit code, revision."""
+"""What came out of a sweep, in one table: parameters, final energy balance, state hash, times, exit code, revision."""
 
 from __future__ import annotations
 
@@ -42,16 +42,16 @@ class Outcome:
     parameters: dict[str, str]
     #: Values of COLUMNS
     facts: dict[str, object] = field(default_factory=dict)
-    #: Time in each stage [s], entries of the ledger at the end, exact counts
+    #: Time in each stage [s], entries of the energy balance at the end, exact counts
     stages: dict[str, float] = field(default_factory=dict)
-    ledger: dict[str, float] = field(default_factory=dict)
+    energy_balance: dict[str, float] = field(default_factory=dict)
     counters: dict[str, int] = field(default_factory=dict)
-    #: Units of the entries of the ledger
+    #: Units of the entries of the energy balance
     units: dict[str, str] = field(default_factory=dict)
 
     def groups(self) -> dict[str, dict]:
         """The three kinds of columns that depend on the runs."""
-        return {"stage": self.stages, "ledger": self.ledger, "counter": self.counters}
+        return {"stage": self.stages, "energy_balance": self.energy_balance, "counter": self.counters}
 
 
 def collect_sweep(sweep: Sweep, say=print) -> list[Outcome]:
@@ -92,8 +92,9 @@ def read_outcome(sweep: Sweep, run: Run) -> Outcome:
                           zip(profile["stage"], profile["total"], profile["calls"]) if calls > 0}
         outcome.stages["all"] = profile["seconds"]
         outcome.counters = result.counters
-        outcome.units = result.ledger_units
-        outcome.ledger = {name: float(values[-1]) for name, values in result.ledger.items() if len(values)}
+        outcome.units = result.balance_units
+        balance = result.energy_balance
+        outcome.energy_balance = {name: float(values[-1]) for name, values in balance.items() if len(values)}
     except (ResultError, KeyError, OSError) as error:
         facts.setdefault("message", str(error))
         if facts["state"] == FINISHED:
@@ -114,7 +115,7 @@ def _replace(path: Path, write) -> None:
 
 
 def _write_csv(path: Path, sweep: Sweep, outcomes: list[Outcome]) -> None:
-    groups = {group: _all_names(outcomes, group) for group in ("stage", "ledger", "counter")}
+    groups = {group: _all_names(outcomes, group) for group in ("stage", "energy_balance", "counter")}
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([NAME, *sweep.columns, *COLUMNS,
@@ -138,7 +139,7 @@ def _write_hdf5(path: Path, sweep: Sweep, outcomes: list[Outcome]) -> None:
             _put(file, column, [outcome.facts.get(column, missing) for outcome in outcomes], unit, meaning)
         units = {name: unit for outcome in outcomes for name, unit in outcome.units.items()}
         for group, unit, meaning in (("stage", "s", "time in this stage; all: of the whole run"),
-                                     ("ledger", "", "entry of the ledger at the end"),
+                                     ("energy_balance", "", "entry of the energy balance at the end"),
                                      ("counter", "1", "exact count")):
             for name in _all_names(outcomes, group):
                 values = [outcome.groups()[group].get(name, np.nan) for outcome in outcomes]

@@ -12,10 +12,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from .former_names import COUNTERS, STAGES, balance_of, present
 from .manifest import MANIFEST, ManifestError, check_bytes, check_hashes, read_manifest
 
 #: Newest layout of files that this reader knows
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 #: Name of a segment: trajectory_0001.h5, or trajectory_0001.h5.open while it is written
 SEGMENT_NAME = re.compile(r"trajectory_(\d{4,})\.h5(\.open)?")
@@ -263,28 +264,28 @@ class Trajectory:
             return walls
 
     @cached_property
-    def ledger(self) -> dict[str, np.ndarray]:
-        """Entries of the energy and momentum ledger, one value per frame; empty if it was not kept."""
+    def energy_balance(self) -> dict[str, np.ndarray]:
+        """Entries of the energy and momentum balance, one value per frame; empty if it was not computed."""
         columns: dict[str, list[np.ndarray]] = {}
         for segment in self._segments:
             self._check_bytes(segment.name)
             with _reading(segment.path) as file:
-                for name, values in file.get("ledger", {}).items():
+                for name, values in balance_of(file).items():
                     part = values[: len(segment.times)]
-                    _insist(segment.path, "ledger", {name: part}, {name: (len(segment.times),)}, finite=False)
+                    _insist(segment.path, "energy_balance", {name: part}, {name: (len(segment.times),)}, finite=False)
                     columns.setdefault(name, []).append(part)
         lengths = {sum(map(len, parts)) for parts in columns.values()}
         if lengths - {len(self)}:
-            raise ResultError(f"{self.folder}: the ledger lacks entries in some of its segments")
+            raise ResultError(f"{self.folder}: the energy balance lacks entries in some of its segments")
         return {name: np.concatenate(parts) for name, parts in columns.items()}
 
     @cached_property
-    def ledger_units(self) -> dict[str, str]:
-        """Unit of each entry of the ledger."""
+    def balance_units(self) -> dict[str, str]:
+        """Unit of each entry of the energy balance."""
         units: dict[str, str] = {}
         for segment in self._segments:
             with _reading(segment.path) as file:
-                for name, values in file.get("ledger", {}).items():
+                for name, values in balance_of(file).items():
                     units[name] = str(values.attrs.get("unit", ""))
         return units
 
@@ -294,7 +295,7 @@ class Trajectory:
         with self._open_profile() as file:
             group = file["profile"]
             profile = {name: group[name][:] for name in ("calls", "total", "least", "most")}
-            profile["stage"] = [str(name) for name in group["stage"].asstr()[:]]
+            profile["stage"] = [present(STAGES, str(name)) for name in group["stage"].asstr()[:]]
             n = len(profile["stage"])
             columns = {name: profile[name] for name in ("calls", "total", "least", "most")}
             _insist(self._profile_path, "profile", columns, dict.fromkeys(columns, (n,)), finite=False)
@@ -310,7 +311,8 @@ class Trajectory:
             if "counters" not in file:
                 return {}
             group = file["counters"]
-            return {str(name): int(value) for name, value in zip(group["name"].asstr()[:], group["value"][:])}
+            names = [present(COUNTERS, str(name)) for name in group["name"].asstr()[:]]
+            return dict(zip(names, map(int, group["value"][:])))
 
     @cached_property
     def provenance(self) -> dict:
@@ -479,7 +481,7 @@ def _complete_frames(file: h5py.File) -> int:
 
     A program that dies while it writes a frame may leave some data sets one row longer than others.
     """
-    growing = list(file["frames"].values()) + list(file.get("ledger", {}).values())
+    growing = list(file["frames"].values()) + list(balance_of(file).values())
     growing += [values for name, values in file.get("walls", {}).items() if name != "id"]
     n = min(len(values) for values in growing)
     if "contacts" in file:

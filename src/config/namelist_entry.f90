@@ -1,0 +1,38 @@
+!> A namelist entry: one row of the table of entries.
+module polydem_namelist_entry
+   implicit none
+   private
+   public :: entry_t, required, group_length, key_length, allowed_length, bench_group
+
+   !> Lengths of the character components of a row
+   integer, parameter :: group_length = 13, key_length = 24, allowed_length = 200
+
+   !> One row of the table
+   type :: entry_t
+      !> Namelist group
+      character(len=group_length) :: group
+      !> Key of the entry in its group
+      character(len=key_length) :: key
+      !> real, integer, logical, word (one of `allowed`) or path (any text)
+      character(len=7) :: type
+      !> Number of values; 0: a list, which is empty by default and has at least one value if given
+      integer :: count
+      !> Default in namelist syntax without quotes, or `required`
+      character(len=20) :: default
+      !> Unit; blank if dimensionless
+      character(len=8) :: unit
+      !> Choices of a word, or bounds of a number such as '>= 0, < 1'; blank: any (finite) value
+      character(len=allowed_length) :: allowed
+      !> Condition under which the entry is in use: 'key: word word' in the same group; blank: always
+      character(len=80) :: needs
+      !> Meaning in one sentence
+      character(len=100) :: meaning
+   end type entry_t
+
+   !> Default of an entry that must be given if it is in use
+   character(len=*), parameter :: required = '(required)'
+
+   !> Group of a bench. A bench uses only this group, and a run does not use it
+   character(len=*), parameter :: bench_group = 'bench'
+
+end module polydem_namelist_entry

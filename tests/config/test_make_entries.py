@@ -1,0 +1,45 @@
+"""The script that makes Fortran from the table of namelist entries: test_make_entries.py FOLDER_OF_CONFIG."""
+
+import sys
+import unittest
+
+sys.dont_write_bytecode = True
+sys.path.insert(0, sys.argv.pop(1))
+from make_entries import TableError, fill_module, read_table, settings_module, table_module  # noqa: E402
+
+GOOD = """# Comment
+list ways = slow fast
+group walk: how it goes
+walk | way | word | 1 | slow | - | {ways} none | - | Way to go
+walk | steps | integer | 2 | 0, 0 | m | >= 0 | way: {ways} | Steps, don't count
+walk | steps | integer | 2 | required | m | > 0 | way: none | Steps
+group bench
+bench | names | path | 0 | - | - | - | - | Names
+"""
+
+
+class TestMakeEntries(unittest.TestCase):
+    """One row makes a row, a component and a line that fills it; a bad row is named."""
+
+    def test_one_row_makes_all(self):
+        table = read_table(GOOD)
+        row = "entry_t('walk', 'way', 'word', 1, 'slow', '', &\n         'slow fast none'"
+        self.assertIn(row, table_module(*table))
+        self.assertIn("'Steps, don''t count'", table_module(*table))
+        self.assertEqual(settings_module(*table).count(":: steps(2) = 0_ip"), 1)
+        self.assertIn("type(text_t), allocatable :: names(:)", settings_module(*table))
+        self.assertEqual(fill_module(*table).count("'walk.steps', settings%steps"), 1)
+
+    def test_bad_rows_are_named(self):
+        for old, new, message in (("| 1 | slow", "| slow", "line 4: 8 fields, not 9"),
+                                  ("| 1 | slow", "| one | slow", "line 4: one is not a number of values"),
+                                  ("{ways} none", "{way} none", "line 4: there is no list way above it"),
+                                  ("way | word", "way | wort", "line 4: there is no entry of type wort"),
+                                  ("group bench", "group other", "line 8: the row is not in its group"),
+                                  ("integer | 2 | required", "real | 2 | 0", "line 6: steps has another type")):
+            with self.assertRaisesRegex(TableError, message):
+                read_table(GOOD.replace(old, new))
+
+
+if __name__ == "__main__":
+    unittest.main()
