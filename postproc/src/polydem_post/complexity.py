@@ -17,7 +17,7 @@ from .paper import COMPLEXITY
 SOURCES = Path(__file__).resolve().parents[3] / "src" / "neighbours"
 
 #: What to do when the tool is not there
-HOW_TO_GET = "lizard is not installed: .venv/bin/pip install './postproc[complexity]'"
+HOW_TO_GET = "lizard is not installed: .venv/bin/pip install --editable './postproc[complexity]'"
 
 #: What lizard does not see, found by trial with version 1.24
 BLIND_SPOTS = (
