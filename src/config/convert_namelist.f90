@@ -38,8 +38,9 @@ contains
       call split_tokens(source, tokens, error)
       if (allocated(error)) return
       do k = 1, size(tokens)
-         first = tokens(k)%first
-         word = text(first:tokens(k)%last)
+         ! The quotes of a text stay.
+         first = tokens(k)%first + merge(1, 0, tokens(k)%kind == quoted_token)
+         word = text(first:tokens(k)%last - (first - tokens(k)%first))
          present = word
          select case (tokens(k)%kind)
          case (group_token)
@@ -56,13 +57,11 @@ contains
                key = present
                change = renaming(group, lower_case(word), '', present)
             else
-               if (tokens(k)%kind == quoted_token) then
-                  first = first + 1
-                  word = word(2:len(word) - 1)
-               end if
                present = present_value(group, key, word)
                change = renaming(group, key, trim(word), present)
             end if
+         case default
+            cycle
          end select
          if (tokens(k)%kind == end_token .or. lower_case(present) == lower_case(word)) cycle
          converted = converted//text(written + 1:first - 1)//present

@@ -45,7 +45,7 @@ def read_table(text):
             row = Row(*(with_lists(field, lists, number) for field in fields))._replace(count=int(fields[3]))
             if row.group != next(reversed(groups), None):
                 raise TableError(f"line {number}: the row is not in its group")
-            if row.type not in (*TYPES, *TEXTS) or row.type == "logical" and row.count != 1:
+            if row.type not in (*TYPES, *TEXTS) or (row.type == "logical" and row.count != 1):
                 raise TableError(f"line {number}: there is no entry of type {row.type} with {row.count} values")
             earlier = [other for other in rows if (other.group, other.key) == (row.group, row.key)]
             if any((other.type, other.count) != (row.type, row.count) for other in earlier):

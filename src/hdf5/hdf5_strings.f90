@@ -248,10 +248,10 @@ contains
       integer(hid_t), intent(in) :: attribute
       integer(hid_t) :: kind_in_file, space
       integer(hsize_t) :: n
-      integer :: class, status, ignored
+      integer :: type_class, status, ignored
 
       n = 0_hsize_t
-      class = h5t_no_class_f
+      type_class = h5t_no_class_f
       call h5aget_space_f(attribute, space, status)
       if (status >= 0) then
          call h5sget_simple_extent_npoints_f(space, n, status)
@@ -259,10 +259,10 @@ contains
       end if
       call h5aget_type_f(attribute, kind_in_file, status)
       if (status >= 0) then
-         call h5tget_class_f(kind_in_file, class, status)
+         call h5tget_class_f(kind_in_file, type_class, status)
          call h5tclose_f(kind_in_file, ignored)
       end if
-      holds_one_number = n == 1_hsize_t .and. (class == h5t_float_f .or. class == h5t_integer_f)
+      holds_one_number = n == 1_hsize_t .and. (type_class == h5t_float_f .or. type_class == h5t_integer_f)
    end function holds_one_number
 
 end module polydem_hdf5_strings

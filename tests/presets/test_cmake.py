@@ -64,7 +64,7 @@ class Revision(Scene):
     def ask(self):
         """The revision in a new build_info.f90."""
         result = self.folder / "build_info.f90"
-        room = SOURCES / "src/output"
+        room = SOURCES / "src/system"
         code, _, message = call(CMAKE, "-D", f"TEMPLATE={room / 'build_info.f90.in'}", "-D", f"RESULT={result}",
                                 "-D", f"SOURCE_DIR={self.clone}", "-D", "VERSION=1", "-D", "BUILD_TYPE=Release",
                                 "-D", "NATIVE=OFF", "-P", room / "build_info.cmake")

@@ -13,7 +13,7 @@ import sys
 import tempfile
 import time
 
-from continued_run import assert_whole, totals_of, closed_segments, frames_of, run, start, write_scene
+from continued_run import assert_whole, closed_segments, frames_of, run, start, totals_of, write_scene
 
 #: Exit codes of a run, as inputs/getting_started.md lists them
 FAILED, BAD_INPUT, NO_FILE, EARLY = 1, 2, 3, 75

@@ -17,7 +17,7 @@ import tempfile
 import time
 
 from check_faults import environment
-from continued_run import totals_of, run, write_scene
+from continued_run import run, totals_of, write_scene
 
 #: A run of 20 steps with 7 frames in 4 segments or more, and checkpoints every 7 steps
 SHORT = ("--set", "integrate.duration=2e-4", "--set", "output.frames_per_segment=2", "--set", "checkpoint.steps=7")

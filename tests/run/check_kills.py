@@ -16,7 +16,7 @@ import sys
 import tempfile
 import time
 
-from continued_run import assert_whole, totals_of, closed_segments, run, start, write_scene
+from continued_run import assert_whole, closed_segments, run, start, totals_of, write_scene
 
 #: Checkpoints as often as frames
 OFTEN = ("--set", "checkpoint.steps=7")
