@@ -1,0 +1,101 @@
+!> The verbs of the program.
+module polydem_verbs
+   use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_get_thread_limit, omp_set_num_threads
+   use polydem_bench, only: run_bench
+   use polydem_bench_settings, only: bench_settings_t
+   use polydem_build_info, only: git_revision, program_version
+   use polydem_check, only: check_simulation
+   use polydem_check_result, only: check_result
+   use polydem_command_line, only: command_t, usage
+   use polydem_communicator, only: communicator_t
+   use polydem_convert_file, only: convert_file
+   use polydem_errors, only: error_t
+   use polydem_kinds, only: dp, ip
+   use polydem_oversubscription, only: oversubscription, oversubscription_text
+   use polydem_process_limits, only: check_threads
+   use polydem_read_bench, only: read_bench
+   use polydem_read_settings, only: read_settings
+   use polydem_replay, only: replay_trace
+   use polydem_result_info, only: describe_program, describe_result
+   use polydem_run, only: attempt_t
+   use polydem_run_simulation, only: run_simulation
+   use polydem_screen, only: print_line, warn
+   use polydem_settings, only: settings_t
+   implicit none
+   private
+   public :: execute
+
+contains
+
+   !> Execute the verb of the command line. Collective.
+   subroutine execute(command, comm, error)
+      !> Command line
+      type(command_t), intent(in) :: command
+      !> Ranks of the program
+      class(communicator_t), intent(inout) :: comm
+      !> Allocated if the verb fails
+      type(error_t), allocatable, intent(inout) :: error
+      type(settings_t) :: settings
+      type(bench_settings_t) :: bench
+      character(len=:), allocatable :: crowd, report
+
+      if (command%help .or. command%version) then
+         if (comm%is_root() .and. command%help) call print_line(usage(command%verb), error)
+         if (comm%is_root() .and. .not. command%help) call print_line('polydem '//program_version//' (git '// &
+                                                                      git_revision//')', error)
+         return
+      end if
+      call choose_threads(command, error)
+      if (command%verb == 'run') then
+         if (.not. allocated(error)) call read_settings(command%file, command%overrides, settings, error)
+         call comm%all_reduce_error(error)
+         if (.not. allocated(error)) call run_simulation(settings, command%force, error, attempt_t( &
+            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp)), comm)
+         return
+      end if
+      crowd = ''
+      if (command%verb == 'check') crowd = oversubscription(comm)
+      ! The root rank alone executes the other verbs.
+      if (allocated(error) .or. .not. comm%is_root()) return
+      select case (command%verb)
+      case ('check')
+         call read_settings(command%file, command%overrides, settings, error)
+         if (.not. allocated(error)) call check_simulation(settings, error, crowd)
+      case ('replay')
+         call warn(oversubscription_text(int(max(1, command%threads), ip), int(omp_get_num_procs(), ip)))
+         call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error, &
+                           int(command%steps, ip), command%samples, command%oracle)
+      case ('bench')
+         call read_bench(command%file, command%overrides, bench, error)
+         if (.not. allocated(error)) call check_threads(maxval(bench%threads), error)
+         if (.not. allocated(error)) call run_bench(bench, error)
+      case ('convert')
+         call convert_file(command%file, command%output, report, error)
+         if (.not. allocated(error)) call print_line(report, error)
+      case default
+         if (command%file == '') call describe_program(error)
+         if (command%checks) then
+            call check_result(command%file, error)
+         else if (command%file /= '') then
+            call describe_result(command%file, error)
+         end if
+      end select
+   end subroutine execute
+
+   !> Set the number of OpenMP threads: from the command line, otherwise the OpenMP default. Check it against system
+   !> limits.
+   subroutine choose_threads(command, error)
+      type(command_t), intent(in) :: command
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (command%verb == 'info' .or. command%verb == 'convert') return
+      if (command%threads > 0) then
+         call check_threads(int(command%threads, ip), error)
+         if (.not. allocated(error)) call omp_set_num_threads(command%threads)
+      else if (command%verb /= 'replay') then
+         call omp_set_num_threads(min(omp_get_max_threads(), omp_get_thread_limit()))
+         call check_threads(int(omp_get_max_threads(), ip), error)
+      end if
+   end subroutine choose_threads
+
+end module polydem_verbs
