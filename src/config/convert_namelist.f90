@@ -2,8 +2,8 @@
 module polydem_convert_namelist
    use polydem_errors, only: error_t
    use polydem_former_words, only: present_group, present_key, present_value, renaming
-   use polydem_namelist_tokens, only: bare_token, end_token, equals_token, group_token, quoted_token
-   use polydem_namelist_tokens, only: source_t, split_tokens, token_t
+   use polydem_namelist_tokens, only: bare_token, end_token, equals_token, group_token, quoted_token, source_t, &
+      split_tokens, token_t
    use polydem_strings, only: lower_case, text_t
    implicit none
    private

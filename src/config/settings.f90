@@ -2,9 +2,9 @@
 !>
 !> The types of the groups and the defaults follow from `entries.txt`.
 module polydem_settings
-   use polydem_group_settings, only: boxes_settings_t, checkpoint_settings_t, decomposition_settings_t
-   use polydem_group_settings, only: forces_settings_t, group_settings_t, guards_settings_t, integrate_settings_t
-   use polydem_group_settings, only: neighbours_settings_t, output_settings_t, overlap_settings_t, scene_settings_t
+   use polydem_group_settings, only: boxes_settings_t, checkpoint_settings_t, decomposition_settings_t, &
+      forces_settings_t, group_settings_t, guards_settings_t, integrate_settings_t, neighbours_settings_t, &
+      output_settings_t, overlap_settings_t, scene_settings_t
    use polydem_namelist_entries, only: first_row
    use polydem_strings, only: text_t
    implicit none

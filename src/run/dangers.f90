@@ -96,8 +96,8 @@ contains
       associate (dt => simulation%dt, stable => simulation%expected_stable_step)
          if (dt <= stable) return
          call writer%warn(log, 'dt = '//to_text(dt)//' s is '//to_text(dt/stable, 3)//' times the stable time step '// &
-                          to_text(stable, 3)//' s estimated from the shapes: contacts of these bodies will be '// &
-                          'unstable. Reduce dt, or omit it')
+                          to_text(stable, 3)//' s estimated from the shapes: the integration of contacts of '// &
+                          'these bodies will be unstable. Reduce dt, or omit it')
       end associate
    end subroutine warn_of_step
 
@@ -148,7 +148,8 @@ contains
          fastest = max(survey%wall_speed, merge(survey%fall_speed, 0.0_wp, size(s%bodies%free) > 0))
          if (move <= fast_fraction*survey%thickness .and. fastest*s%dt > fast_fraction*survey%thickness) &
             call writer%warn(log, 'walls reach '//to_text(survey%wall_speed, 3)//' m/s, a fall through the extent '// &
-            to_text(survey%fall_speed, 3)//' m/s: this is '//to_text(fastest*s%dt/survey%thickness, 3)//thinnest// &
+            to_text(survey%fall_speed, 3)//' m/s: the faster of them moves '//to_text(fastest*s%dt/survey%thickness, &
+               3)//thinnest// &
             ' in one step. Reduce dt')
          if (survey%impact > fast_fraction*survey%thickness) call writer%warn(log, 'body '// &
             to_text(s%bodies%id(survey%fastest))//' is so fast that stopping it takes an overlap of '// &

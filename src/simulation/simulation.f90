@@ -22,6 +22,12 @@ module polydem_simulation
    implicit none
    private
    public :: simulation_t, former_direction, time_of, compute_balance
+   public :: sum_pairs, sum_contacts, sum_began, sum_ended, sum_degenerate
+
+   !> Elements of `sums`: pairs, contacts, pairs that began, pairs that ended, contacts without direction
+   integer, parameter :: sum_pairs = 1, sum_contacts = 2, sum_began = 3, sum_ended = 4, sum_degenerate = 5
+   !> Number of these elements
+   integer, parameter :: n_sums = 5
 
    !> The complete state of a simulation on one rank
    type :: simulation_t
@@ -73,8 +79,8 @@ module polydem_simulation
       type(relaxation_t) :: relaxation
       !> Slots that may move: free bodies, then bodies with prescribed motion, then halo bodies
       integer(ip), allocatable :: moving(:)
-      !> Sums over all steps: 1 pairs, 2 contacts, 3 pairs that began, 4 pairs that ended, 5 contacts without direction
-      integer(lp) :: sums(5) = 0_lp
+      !> Sums over all steps, (`sum_pairs` to `sum_degenerate`)
+      integer(lp) :: sums(n_sums) = 0_lp
    end type simulation_t
 
    !> What the guard against passing bodies remembers

@@ -5,7 +5,7 @@ module polydem_simulation_counters
    use polydem_counters, only: counters_t
    use polydem_kinds, only: ip, lp
    use polydem_ownership, only: owns_pair
-   use polydem_simulation, only: simulation_t
+   use polydem_simulation, only: simulation_t, sum_pairs, sum_contacts, sum_began, sum_ended, sum_degenerate
    implicit none
    private
    public :: collect_counts, report_counters, count_own, count_contacts
@@ -43,11 +43,11 @@ contains
       call counters%set('steps', self%step)
       call counters%set('bodies', int(self%bodies%n_all, lp))
       call counters%set('boxes', counts(1))
-      call counters%set('pairs', self%sums(1))
-      call counters%set('pairs began', self%sums(3))
-      call counters%set('pairs ended', self%sums(4))
-      call counters%set('contacts', self%sums(2))
-      call counters%set('contacts without direction', self%sums(5))
+      call counters%set('pairs', self%sums(sum_pairs))
+      call counters%set('pairs began', self%sums(sum_began))
+      call counters%set('pairs ended', self%sums(sum_ended))
+      call counters%set('contacts', self%sums(sum_contacts))
+      call counters%set('contacts without direction', self%sums(sum_degenerate))
       call self%neighbours%report(counters)
       call counters%set('pairs', counts(2))
       if (allocated(self%law%constraint)) call self%law%constraint%report(counters)
@@ -75,7 +75,9 @@ contains
             end do
          end if
       end associate
-      self%sums([1, 2, 5]) = self%sums([1, 2, 5]) + n
+      associate (counted => [sum_pairs, sum_contacts, sum_degenerate])
+         self%sums(counted) = self%sums(counted) + n
+      end associate
    end subroutine count_own
 
    !> Number of contacts on all ranks; collective.

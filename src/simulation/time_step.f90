@@ -12,11 +12,11 @@ module polydem_time_step
    use polydem_kinds, only: ip, lp, wp
    use polydem_prescribed_motion, only: move_bodies
    use polydem_redistribution, only: restore_history, redistribute
-   use polydem_simulation, only: simulation_t, time_of
+   use polydem_simulation, only: simulation_t, time_of, sum_began, sum_ended
    use polydem_simulation_counters, only: count_own
    use polydem_strings, only: to_text
-   use polydem_timers, only: stage_boxes, stage_decomposition, stage_forces, stage_integrate, stage_neighbours
-   use polydem_timers, only: stage_overlap
+   use polydem_timers, only: stage_boxes, stage_decomposition, stage_forces, stage_integrate, stage_neighbours, &
+      stage_overlap
    implicit none
    private
    public :: advance, compute_forces, move_walls
@@ -105,7 +105,8 @@ contains
       call self%timers%lap(stage_neighbours)
       associate (pairs => self%neighbours%pairs)
          call find_contacts(self%bodies, pairs%n, pairs%first, pairs%second, self%history, self%contacts)
-         self%sums(3:4) = self%sums(3:4) + int([pairs%n_began, pairs%n_ended], lp)
+         self%sums(sum_began) = self%sums(sum_began) + int(pairs%n_began, lp)
+         self%sums(sum_ended) = self%sums(sum_ended) + int(pairs%n_ended, lp)
       end associate
       call count_own(self)
       call check_contacts(self%settings%overlap%degenerate, self%bodies, self%contacts, self%step, error)

@@ -1,9 +1,8 @@
 !> Contacts: pairs of bodies whose polygons overlap.
 !>
 !> Contacts are in ascending order of their pairs: of the first body, then of the second. The first body has the lower
-!> identifier. All vectors are in world coordinates. `cohesion` and `twist` are allocated only if a force part of the
-!> run
-!> needs them.
+!> identifier. All vectors are in world coordinates. `cohesion` and `twist` are allocated only if a force part of
+!> the run needs them.
 module polydem_contacts
    use polydem_kinds, only: ip, wp
    implicit none
