@@ -41,6 +41,7 @@ module polydem_timers
    contains
       procedure :: start
       procedure :: lap
+      procedure :: divide_lap
       procedure :: end_step
       procedure :: add_to_total
    end type timers_t
@@ -65,6 +66,21 @@ contains
       self%current(stage) = max(self%current(stage), 0.0_dp) + (now - self%began)
       self%began = now
    end subroutine lap
+
+   !> Add the time since the last lap to two stages that alternate.
+   subroutine divide_lap(self, stage, other, share)
+      class(timers_t), intent(inout) :: self
+      !> The two stages
+      integer, intent(in) :: stage, other
+      !> Share of the first stage
+      real(dp), intent(in) :: share
+      real(dp) :: now
+
+      now = wall_seconds()
+      self%current(stage) = max(self%current(stage), 0.0_dp) + share*(now - self%began)
+      self%current(other) = max(self%current(other), 0.0_dp) + (1.0_dp - share)*(now - self%began)
+      self%began = now
+   end subroutine divide_lap
 
    !> End the step: add its times to the totals, and update the shortest and longest times per step.
    subroutine end_step(self)

@@ -1,6 +1,6 @@
 !> Packed bodies: transfer of the constant fields of bodies between ranks (identifiers, masses, shapes).
 module polydem_packed_bodies
-   use polydem_bodies, only: bodies_t
+   use polydem_bodies, only: bodies_t, measure_radii
    use polydem_communicator, only: communicator_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_sort, only: sort_keys
@@ -120,6 +120,7 @@ contains
          call place(packed, k, start(k), s, bodies)
       end do
       bodies%free = pack([(s, s=1_ip, n)],.not. bodies%fixed)
+      call measure_radii(bodies)
    end subroutine unpack_bodies
 
    !> Allocate all fields of bodies and set them to zero.

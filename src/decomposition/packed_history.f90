@@ -67,7 +67,7 @@ contains
       do k = 1_ip, m
          p = pair(order(k))
          sent(1, k) = key_of(row, first(p), second(p))
-         sent(2, k) = int(history%separating_edge(p), lp)
+         sent(2, k) = int(history%memory(p), lp)
          do j = 1, n_columns
             value_sent(j, k) = history%column(j)%value(p)
          end do
@@ -144,7 +144,7 @@ contains
          if (k > size(packed%key)) return
          if (packed%key(k) /= key) cycle
          n_known = n_known + 1_ip
-         history%separating_edge(p) = packed%edge(k)
+         history%memory(p) = packed%edge(k)
          do j = 1, n_columns
             history%column(j)%value(p) = packed%value(j, k)
          end do

@@ -21,12 +21,13 @@
 !> bodies, and over bodies for gravity. Forces that cancel within a fixed body therefore add to the scale.
 module polydem_energy_balance
    use polydem_bodies, only: bodies_t
-   use polydem_body_contributions, only: add_rates, elastic_energy_of, motion_of, n_channels, n_motions, n_wall_channels
+   use polydem_body_contributions, only: add_wall, motion_of, n_channels, n_motions, n_wall_channels, powers_of
    use polydem_communicator, only: communicator_t
-   use polydem_contact_incidence, only: incidence_t
+   use polydem_contact_block, only: block_size, contact_block_t, load_block
    use polydem_contacts, only: contacts_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
+   use polydem_force_sums, only: contact_terms_t, force_sums_t, sum_energy, term_of, terms_of_block
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
    use polydem_serializer, only: serializer_t
    implicit none
@@ -104,7 +105,7 @@ module polydem_energy_balance
 contains
 
    !> Start the balance with the bodies and forces of step 0. Collective.
-   subroutine start_energy_balance(sums, comm, gravity, bodies, incidence, contacts)
+   subroutine start_energy_balance(sums, comm, gravity, bodies, forces, walls)
       !> Running sums
       type(energy_balance_t), intent(out) :: sums
       !> Ranks that share the bodies
@@ -113,41 +114,41 @@ contains
       real(wp), intent(in) :: gravity(2)
       !> Bodies with their forces
       type(bodies_t), intent(in) :: bodies
-      !> Contacts of each body
-      type(incidence_t), intent(in) :: incidence
-      !> Contacts with their forces
-      type(contacts_t), intent(in) :: contacts
+      !> Sums of the contact forces on each body
+      type(force_sums_t), intent(in) :: forces
+      !> Contacts with fixed bodies
+      type(contacts_t), intent(in) :: walls
       real(wp) :: total(n_totals)
 
       call allocate_channels(sums, bodies%n)
-      call accumulate_rates(sums, 0.5_wp, gravity, bodies, incidence, contacts)
+      call accumulate_rates(sums, 0.5_wp, gravity, bodies, forces, walls)
       sums%is_current = .true.
-      total = totals(sums, comm, gravity, bodies, incidence, contacts)
+      total = totals(sums, comm, gravity, bodies, forces, walls)
       sums%energy_scale = total(1)
       sums%start = [total(1) + total(2), total(3:5)]
       sums%elastic_start = total(at_energy)
    end subroutine start_energy_balance
 
    !> Accumulate one step. To be called at its end.
-   subroutine accumulate_step(sums, gravity, bodies, incidence, contacts)
+   subroutine accumulate_step(sums, gravity, bodies, forces, walls)
       !> Running sums
       type(energy_balance_t), intent(inout) :: sums
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
       !> Bodies at the end of this step
       type(bodies_t), intent(in) :: bodies
-      !> Contacts of each body
-      type(incidence_t), intent(in) :: incidence
-      !> Contacts with the forces of this step
-      type(contacts_t), intent(in) :: contacts
+      !> Sums of the contact forces on each body
+      type(force_sums_t), intent(in) :: forces
+      !> Contacts with fixed bodies
+      type(contacts_t), intent(in) :: walls
 
-      call accumulate_rates(sums, 1.0_wp, gravity, bodies, incidence, contacts)
+      call accumulate_rates(sums, 1.0_wp, gravity, bodies, forces, walls)
       sums%steps = sums%steps + 1_lp
       sums%is_current = .true.
    end subroutine accumulate_step
 
    !> Evaluate all terms and residuals. Collective.
-   subroutine evaluate_balance(sums, comm, dt, gravity, bodies, incidence, contacts, balance)
+   subroutine evaluate_balance(sums, comm, dt, gravity, bodies, forces, walls, balance)
       !> Running sums
       type(energy_balance_t), intent(inout) :: sums
       !> Ranks that share the bodies
@@ -158,30 +159,30 @@ contains
       real(wp), intent(in) :: gravity(2)
       !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies
-      !> Contacts of each body
-      type(incidence_t), intent(in) :: incidence
-      !> Contacts with the forces of this step
-      type(contacts_t), intent(in) :: contacts
+      !> Sums of the contact forces on each body
+      type(force_sums_t), intent(in) :: forces
+      !> Contacts with fixed bodies
+      type(contacts_t), intent(in) :: walls
       !> Terms and residuals
       type(balance_t), intent(out) :: balance
       real(wp) :: total(n_totals)
 
-      total = totals(sums, comm, gravity, bodies, incidence, contacts)
+      total = totals(sums, comm, gravity, bodies, forces, walls)
       balance%kinetic = total(1)
       balance%potential = total(2)
       balance%momentum = total(3:4)
       balance%angular_momentum = total(5)
-      associate (works => dt*total(at_channels + 1:at_walls), walls => dt*total(at_walls + 1:), &
+      associate (works => dt*total(at_channels + 1:at_walls), on_walls => dt*total(at_walls + 1:), &
                  mass_time => dt*total(at_mass), torques => dt*total(at_torque:at_torque + 1))
          balance%elastic_work = works(1)
-         if (contacts%energy_is_quadratic .and. .not. total(at_unknown) > 0.0_wp) &
+         if (walls%energy_is_quadratic .and. .not. total(at_unknown) > 0.0_wp) &
             balance%elastic_work = sums%elastic_start - total(at_energy)
          balance%damping_work = works(2)
          balance%friction_work = works(3)
-         balance%wall_work = walls(1)
-         balance%impulse = walls(2:3) + mass_time*gravity
-         balance%angular_impulse = walls(4) + torques(1)
-         call find_residuals(sums, walls(5) + mass_time*(abs(gravity(1)) + abs(gravity(2))), walls(6) + torques(2), &
+         balance%wall_work = on_walls(1)
+         balance%impulse = on_walls(2:3) + mass_time*gravity
+         balance%angular_impulse = on_walls(4) + torques(1)
+         call find_residuals(sums, on_walls(5) + mass_time*(abs(gravity(1)) + abs(gravity(2))), on_walls(6) + torques(2), &
                              balance)
       end associate
    end subroutine evaluate_balance
@@ -262,76 +263,81 @@ contains
    end function share
 
    !> Add the present rates, times a weight, to the channels of all bodies of this rank.
-   subroutine accumulate_rates(sums, weight, gravity, bodies, incidence, contacts)
+   subroutine accumulate_rates(sums, weight, gravity, bodies, forces, walls, energy)
       type(energy_balance_t), intent(inout) :: sums
       real(wp), intent(in) :: weight, gravity(2)
       type(bodies_t), intent(in) :: bodies
-      type(incidence_t), intent(in) :: incidence
-      type(contacts_t), intent(in) :: contacts
-      integer(ip) :: b, n, n_blocks
-
-      n = size(bodies%free, kind=ip)
-      n_blocks = max(1_ip, n/min_parallel_size)
-      !$omp parallel do if (n_blocks > 1_ip) schedule(static) default(none) &
-      !$omp    shared(sums, weight, gravity, bodies, incidence, contacts, n, n_blocks) private(b)
-      do b = 1_ip, n_blocks
-         call accumulate_rates_of_some(sums, weight, gravity, bodies, incidence, contacts, &
-                          bodies%free(end_of(b - 1_ip, n_blocks, n) + 1_ip:end_of(b, n_blocks, n)))
-      end do
-      !$omp end parallel do
-   end subroutine accumulate_rates
-
-   !> Add the present rates to the channels of some bodies. A separate procedure: its arguments do not alias, and the
-   !> compiler can optimize its loops.
-   pure subroutine accumulate_rates_of_some(sums, weight, gravity, bodies, incidence, contacts, slots)
-      type(energy_balance_t), intent(inout) :: sums
-      real(wp), intent(in) :: weight, gravity(2)
-      type(bodies_t), intent(in) :: bodies
-      type(incidence_t), intent(in) :: incidence
-      type(contacts_t), intent(in) :: contacts
-      integer(ip), intent(in), contiguous :: slots(:)
+      type(force_sums_t), intent(in) :: forces
+      type(contacts_t), intent(in) :: walls
+      !> Elastic energy of each body; the shares of fixed bodies are added [J/m]
+      real(wp), intent(inout), optional :: energy(:)
       integer(ip) :: k, s
 
-      do k = 1_ip, size(slots, kind=ip)
-         s = slots(k)
+      !$omp parallel do if (size(bodies%free) > min_parallel_size) schedule(static) default(none) &
+      !$omp    shared(sums, weight, gravity, bodies, forces) private(k, s)
+      do k = 1_ip, size(bodies%free, kind=ip)
+         s = bodies%free(k)
          sums%torque(s) = sums%torque(s) + weight*torque_of(gravity, bodies, s)
+         sums%power_sum(:, s) = sums%power_sum(:, s) + weight*powers_of(bodies, forces, s)
       end do
-      do k = 1_ip, size(slots, kind=ip)
-         s = slots(k)
-         if (has_contacts(incidence, s)) &
-            call add_rates(bodies, incidence, contacts, s, weight, sums%power_sum(:, s), sums%wall_sum(:, s))
+      !$omp end parallel do
+      call add_walls(bodies, walls, weight, sums, energy)
+   end subroutine accumulate_rates
+
+   !> Add the action of fixed bodies on free ones to the channels, and their share of the elastic energy.
+   pure subroutine add_walls(bodies, walls, weight, sums, energy)
+      type(bodies_t), intent(in) :: bodies
+      type(contacts_t), intent(in) :: walls
+      real(wp), intent(in) :: weight
+      type(energy_balance_t), intent(inout) :: sums
+      !> Elastic energy of each body [J/m]
+      real(wp), intent(inout), optional :: energy(:)
+      type(contact_block_t) :: block
+      type(contact_terms_t) :: terms
+      integer(ip) :: c, high, wall, body
+      logical :: first_is_wall
+
+      do high = walls%n, 1_ip, -block_size
+         call load_block(bodies, walls, max(1_ip, high - block_size + 1_ip), high, block)
+         call terms_of_block(block, terms)
+         do c = 1_ip, block%n
+            first_is_wall = bodies%fixed(block%first(c))
+            wall = merge(block%first(c), block%second(c), first_is_wall)
+            body = merge(block%second(c), block%first(c), first_is_wall)
+            call add_wall(bodies, wall, term_of(terms, c, first_is_wall), weight, sums%power_sum(:, body), &
+                          sums%wall_sum(:, body))
+            if (present(energy)) energy(body) = energy(body) + terms%first(c, sum_energy)
+         end do
       end do
-   end subroutine accumulate_rates_of_some
-
-   !> Whether a body has contacts; without contacts its powers are zero
-   pure logical function has_contacts(incidence, s)
-      type(incidence_t), intent(in) :: incidence
-      integer(ip), intent(in) :: s
-
-      has_contacts = incidence%start_first(s + 1_ip) > incidence%start_first(s) &
-         .or. incidence%start_second(s + 1_ip) > incidence%start_second(s)
-   end function has_contacts
+   end subroutine add_walls
 
    !> Totals over all bodies of the communicator
-   function totals(sums, comm, gravity, bodies, incidence, contacts) result(total)
+   function totals(sums, comm, gravity, bodies, forces, walls) result(total)
       type(energy_balance_t), intent(in) :: sums
       class(communicator_t), intent(inout) :: comm
       real(wp), intent(in) :: gravity(2)
       type(bodies_t), intent(in) :: bodies
-      type(incidence_t), intent(in) :: incidence
-      type(contacts_t), intent(in) :: contacts
+      type(force_sums_t), intent(in) :: forces
+      type(contacts_t), intent(in) :: walls
       real(wp) :: total(n_totals)
       type(exact_sum_t), allocatable :: partial_sums(:, :)
+      type(energy_balance_t) :: now
+      real(wp), allocatable :: energy(:)
       integer(ip) :: b, n, n_blocks
       integer :: i
 
+      ! The last rates have half their weight.
+      now = sums
+      energy = forces%value(sum_energy, :)
+      if (sums%is_current) call accumulate_rates(now, -0.5_wp, gravity, bodies, forces, walls, energy)
+      if (.not. walls%energy_is_quadratic) energy = 0.0_wp
       n = size(bodies%free, kind=ip)
       n_blocks = max(1_ip, min(n/block, most_blocks))
       allocate (partial_sums(n_totals, n_blocks))
       !$omp parallel do if (n_blocks > 1_ip) schedule(static) default(none) &
-      !$omp    shared(n, n_blocks, partial_sums, sums, gravity, bodies, incidence, contacts) private(b)
+      !$omp    shared(n, n_blocks, partial_sums, now, energy, gravity, bodies) private(b)
       do b = 1_ip, n_blocks
-         call add_block(sums, gravity, bodies, incidence, contacts, &
+         call add_block(now, energy, gravity, bodies, &
                         end_of(b - 1_ip, n_blocks, n) + 1_ip, end_of(b, n_blocks, n), partial_sums(:, b))
       end do
       !$omp end parallel do
@@ -352,12 +358,12 @@ contains
    end function end_of
 
    !> Add the contributions of some free bodies to the sums.
-   subroutine add_block(sums, gravity, bodies, incidence, contacts, low, high, partial_sums)
+   subroutine add_block(sums, energy, gravity, bodies, low, high, partial_sums)
       type(energy_balance_t), intent(in) :: sums
+      !> Elastic energy of each body [J/m]
+      real(wp), intent(in) :: energy(:)
       real(wp), intent(in) :: gravity(2)
       type(bodies_t), intent(in) :: bodies
-      type(incidence_t), intent(in) :: incidence
-      type(contacts_t), intent(in) :: contacts
       !> First and last index in `bodies%free`
       integer(ip), intent(in) :: low, high
       type(exact_sum_t), intent(inout) :: partial_sums(n_totals)
@@ -367,21 +373,18 @@ contains
 
       do k = low, high
          s = bodies%free(k)
-         row = 0.0_wp
          row(:n_motions) = motion_of(gravity, bodies, s)
          row(at_mass) = bodies%mass(s)*real(sums%steps, wp)
          row(at_torque) = sums%torque(s)
-         row(at_channels + 1:at_walls) = sums%power_sum(:, s)
-         row(at_walls + 1:) = sums%wall_sum(:, s)
-         if (sums%is_current) then
-            row(at_torque) = row(at_torque) - 0.5_wp*torque_of(gravity, bodies, s)
-            call add_rates(bodies, incidence, contacts, s, -0.5_wp, row(at_channels + 1:at_walls), row(at_walls + 1:))
-            if (contacts%energy_is_quadratic) row(at_energy) = elastic_energy_of(bodies, incidence, contacts, s)
-         else
+         row(at_torque + 1) = abs(sums%torque(s))
+         row(at_energy) = energy(s)
+         row(at_unknown) = 0.0_wp
+         if (.not. sums%is_current) then
             row(at_mass) = row(at_mass) + 0.5_wp*bodies%mass(s)
             row(at_unknown) = 1.0_wp
          end if
-         row(at_torque + 1) = abs(row(at_torque))
+         row(at_channels + 1:at_walls) = sums%power_sum(:, s)
+         row(at_walls + 1:) = sums%wall_sum(:, s)
          do i = 1, n_totals
             call partial_sums(i)%add(row(i))
          end do

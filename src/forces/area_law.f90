@@ -5,11 +5,12 @@
 !> from the centres of mass. Two equal squares face to face have the stiffness E.
 module polydem_area_law
    use polydem_bodies, only: bodies_t
+   use polydem_contact_block, only: contact_block_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t
-   use polydem_contacts, only: contacts_t, is_degenerate
+   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_elastic, force_part_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -49,14 +50,14 @@ contains
    end subroutine choose
 
    !> Set the characteristic length and add the elastic force. It acts at the centroid of the overlap.
-   subroutine add(self, bodies, dt, contacts, history)
+   subroutine add(self, bodies, dt, block, history)
       class(area_law_t), intent(in) :: self
       !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
       !> Contacts; `inverse_length`, `lever`, `elastic` and `normal_force` change
-      type(contacts_t), intent(inout) :: contacts
+      type(contact_block_t), intent(inout) :: block
       !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
       real(wp) :: r1, r2, length, force
@@ -64,22 +65,17 @@ contains
 
       associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
       end associate
-      contacts%energy_is_quadratic = .false.
-      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, contacts) private(c, r1, r2, length, force)
-      do c = 1_ip, contacts%n
-         r1 = sqrt(contacts%arm_first(1, c)**2 + contacts%arm_first(2, c)**2)
-         r2 = sqrt(contacts%arm_second(1, c)**2 + contacts%arm_second(2, c)**2)
-         length = least_length*sqrt(contacts%area(c))
-         if (is_degenerate(contacts, c)) length = contacts%length(c)
-         if (r1 + r2 > 0.0_wp) length = max(length, 4.0_wp*r1*r2/(r1 + r2))
-         contacts%inverse_length(c) = 1.0_wp/length
-         contacts%lever(c) = 0.0_wp
-         force = self%stiffness*contacts%area(c)*contacts%inverse_length(c)
-         contacts%elastic(c) = contacts%elastic(c) + force
-         contacts%normal_force(c) = contacts%normal_force(c) + force
+      do c = 1_ip, block%n
+         r1 = sqrt(block%arm_first(c, 1)**2 + block%arm_first(c, 2)**2)
+         r2 = sqrt(block%arm_second(c, 1)**2 + block%arm_second(c, 2)**2)
+         length = max(least_length*sqrt(block%area(c)), block%degenerate(c)*block%length(c))
+         length = max(length, 4.0_wp*(r1*r2)/max(r1 + r2, tiny(r1)))
+         block%inverse_length(c) = 1.0_wp/length
+         block%lever(c) = 0.0_wp
+         force = self%stiffness*block%area(c)*block%inverse_length(c)
+         block%elastic(c) = block%elastic(c) + force
+         block%normal_force(c) = block%normal_force(c) + force
       end do
-      !$omp end parallel do
    end subroutine add
 
    !> Add the stiffness E L/l. An expected contact is a face on the edge with the greatest ratio L/l, where l is twice

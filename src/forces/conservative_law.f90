@@ -22,11 +22,12 @@
 !> degenerate = 'stop' in &overlap to stop the run instead.
 module polydem_conservative_law
    use polydem_bodies, only: bodies_t
+   use polydem_contact_block, only: contact_block_t
    use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_elastic, force_part_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -64,6 +65,7 @@ contains
       self%name = 'conservative law'
       self%stage = acts_elastic
       self%needs_effective_area = .true.
+      self%energy_is_quadratic = .true.
       self%stiffness = settings%stiffness
    end subroutine choose
 
@@ -95,35 +97,39 @@ contains
       end do
    end function area_of
 
-   !> Add the elastic force, and set its lever and the characteristic length, here l b/L.
-   subroutine add(self, bodies, dt, contacts, history)
+   !> Add the elastic force, and set its lever and the characteristic length, here l b/L. The lever is the moment of N
+   !> about the force point over L. It is computed from the nearer centre for the least rounding error, and from both
+   !> if they are equally near.
+   subroutine add(self, bodies, dt, block, history)
       class(conservative_law_t), intent(in) :: self
       !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
       !> Contacts with the effective area; `inverse_length`, `lever`, `elastic` and `normal_force` change
-      type(contacts_t), intent(inout) :: contacts
+      type(contact_block_t), intent(inout) :: block
       !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
-      real(wp) :: p, q, force
+      real(wp) :: p, q, force, moment_first, moment_second, nearer
       integer(ip) :: c
 
       associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
       end associate
-      contacts%energy_is_quadratic = .true.
-      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, contacts) private(c, p, q, force)
-      do c = 1_ip, contacts%n
-         p = self%inverse_size(contacts%first(c))
-         q = self%inverse_size(contacts%second(c))
-         contacts%inverse_length(c) = contacts%length(c)*(0.5_wp*(p + q)*max(p, q))
-         contacts%lever(c) = -moment_about_force_point(contacts, c)/contacts%length(c)
-         force = self%stiffness*contacts%area(c)*contacts%inverse_length(c)
-         contacts%elastic(c) = contacts%elastic(c) + force
-         contacts%normal_force(c) = contacts%normal_force(c) + force
+      do c = 1_ip, block%n
+         p = self%inverse_size(block%first(c))
+         q = self%inverse_size(block%second(c))
+         block%inverse_length(c) = block%length(c)*(0.5_wp*(p + q)*max(p, q))
+         associate (r => block%arm_first(c, :), s => block%arm_second(c, :), n => block%normal(c, :))
+            moment_first = block%moment(c, 1) - (r(1)*n(2) - r(2)*n(1))
+            moment_second = block%moment(c, 2) - (s(1)*n(2) - s(2)*n(1))
+            nearer = (s(1)*s(1) + s(2)*s(2)) - (r(1)*r(1) + r(2)*r(2))
+         end associate
+         nearer = 0.5_wp + sign(0.5_wp, nearer) - 0.5_wp*merge(1.0_wp, 0.0_wp, abs(nearer) <= 0.0_wp)
+         block%lever(c) = -(nearer*moment_first + (1.0_wp - nearer)*moment_second)/block%length(c)
+         force = self%stiffness*block%area(c)*block%inverse_length(c)
+         block%elastic(c) = block%elastic(c) + force
+         block%normal_force(c) = block%normal_force(c) + force
       end do
-      !$omp end parallel do
    end subroutine add
 
    !> Add upper bounds of the stiffness. K_n is E L^2/(l b), the characteristic length being l b/L.
@@ -197,19 +203,5 @@ contains
       s2 = sqrt(support(1)*support(2))
       depth = load/(self%stiffness*block(1))*(2.0_wp*s1*s2*min(s1, s2)/((s1 + s2)*block(1)))
    end function static_depth
-
-   !> Moment of N about the force point [m2], computed from the nearer centre for the least rounding error
-   pure real(wp) function moment_about_force_point(contacts, c) result(moment)
-      type(contacts_t), intent(in) :: contacts
-      integer(ip), intent(in) :: c
-
-      associate (r => contacts%arm_first(:, c), s => contacts%arm_second(:, c), n => contacts%normal(:, c))
-         if (r(1)*r(1) + r(2)*r(2) <= s(1)*s(1) + s(2)*s(2)) then
-            moment = contacts%moment(1, c) - (r(1)*n(2) - r(2)*n(1))
-         else
-            moment = contacts%moment(2, c) - (s(1)*n(2) - s(2)*n(1))
-         end if
-      end associate
-   end function moment_about_force_point
 
 end module polydem_conservative_law

@@ -13,11 +13,12 @@
 !> the positions: it is of second order, and stable up to w dt = 2 with velocity Verlet.
 module polydem_cundall_strack
    use polydem_bodies, only: bodies_t
+   use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_last, force_part_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -71,38 +72,42 @@ contains
    end function stored
 
    !> Add the tangential force and store the spring force.
-   subroutine add(self, bodies, dt, contacts, history)
+   subroutine add(self, bodies, dt, block, history)
       class(cundall_strack_t), intent(in) :: self
       !> Bodies, for their masses and velocities
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]
       real(wp), intent(in) :: dt
       !> Contacts; `tangential_force` changes
-      type(contacts_t), intent(inout) :: contacts
+      type(contact_block_t), intent(inout) :: block
       !> Contact history; the spring force is read and set
       type(contact_history_t), intent(inout) :: history
-      real(wp) :: slip, mean, limit, spring
+      real(wp) :: slip(block_size), mean(block_size), spring(block_size), root(block_size), limit
       integer(ip) :: c
 
-      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, dt, contacts, history) &
-      !$omp    private(c, slip, mean, limit, spring)
-      do c = 1_ip, contacts%n
-         slip = slip_of(bodies%velocity, bodies%angular_velocity, contacts, c)
-         mean = slip
-         if (self%midstep) mean = slip &
-            - 0.5_wp*dt*slip_of(bodies%acceleration, bodies%angular_acceleration, contacts, c)
-         limit = self%coefficient*max(0.0_wp, contacts%normal_force(c))
-         spring = history%column(self%first_column)%value(contacts%pair(c)) - self%stiffness*mean*dt
-         spring = max(-limit, min(limit, spring))
-         history%column(self%first_column)%value(contacts%pair(c)) = spring
-         if (self%damping > 0.0_wp) then
-            spring = spring - self%damping*sqrt(self%stiffness/tangential_mobility(bodies, contacts, c))*slip
-            spring = max(-limit, min(limit, spring))
-         end if
-         contacts%tangential_force(c) = contacts%tangential_force(c) + spring
+      call find_slip(block, slip)
+      mean(:block%n) = slip(:block%n)
+      if (self%midstep) call move_to_midstep(bodies, dt, block, mean)
+      do c = 1_ip, block%n
+         spring(c) = history%column(self%first_column)%value(block%pair(c))
       end do
-      !$omp end parallel do
+      do c = 1_ip, block%n
+         limit = self%coefficient*max(0.0_wp, block%normal_force(c))
+         spring(c) = max(-limit, min(limit, spring(c) - self%stiffness*mean(c)*dt))
+      end do
+      do c = 1_ip, block%n
+         history%column(self%first_column)%value(block%pair(c)) = spring(c)
+      end do
+      if (self%damping > 0.0_wp) then
+         call find_dashpots(self, bodies, block, root)
+         do c = 1_ip, block%n
+            limit = self%coefficient*max(0.0_wp, block%normal_force(c))
+            spring(c) = max(-limit, min(limit, spring(c) - root(c)*slip(c)))
+         end do
+      end if
+      do c = 1_ip, block%n
+         block%tangential_force(c) = block%tangential_force(c) + spring(c)
+      end do
    end subroutine add
 
    !> Add the spring and its dashpot.
@@ -122,37 +127,60 @@ contains
          + self%damping*sqrt(element%tangential_mass*self%stiffness)
    end subroutine stiffen
 
-   !> Velocity (or acceleration) of the first body relative to the second at the force point, along (-direction_y,
-   !> direction_x) [m/s]. The centripetal acceleration of the arms does not extend the spring and is left out
-   pure real(wp) function slip_of(velocity, angular_velocity, contacts, c)
-      !> Velocities (2, body) [m/s] and angular velocities (body) [rad/s] of all bodies, or accelerations
-      real(wp), intent(in) :: velocity(:, :), angular_velocity(:)
-      type(contacts_t), intent(in) :: contacts
-      integer(ip), intent(in) :: c
+   !> Velocity of the first body relative to the second at the force point, along (-direction_y, direction_x) [m/s]
+   pure subroutine find_slip(block, slip)
+      type(contact_block_t), intent(in) :: block
+      real(wp), intent(inout) :: slip(block_size)
       real(wp) :: vx, vy
+      integer(ip) :: c
 
-      associate (i => contacts%first(c), j => contacts%second(c))
-         vx = (velocity(1, i) - angular_velocity(i)*contacts%arm_first(2, c)) &
-            - (velocity(1, j) - angular_velocity(j)*contacts%arm_second(2, c))
-         vy = (velocity(2, i) + angular_velocity(i)*contacts%arm_first(1, c)) &
-            - (velocity(2, j) + angular_velocity(j)*contacts%arm_second(1, c))
-      end associate
-      slip_of = contacts%direction(1, c)*vy - contacts%direction(2, c)*vx
-   end function slip_of
+      do c = 1_ip, block%n
+         vx = (block%velocity_first(c, 1) - block%angular_velocity(c, 1)*block%arm_first(c, 2)) &
+            - (block%velocity_second(c, 1) - block%angular_velocity(c, 2)*block%arm_second(c, 2))
+         vy = (block%velocity_first(c, 2) + block%angular_velocity(c, 1)*block%arm_first(c, 1)) &
+            - (block%velocity_second(c, 2) + block%angular_velocity(c, 2)*block%arm_second(c, 1))
+         slip(c) = block%direction(c, 1)*vy - block%direction(c, 2)*vx
+      end do
+   end subroutine find_slip
 
-   !> Reciprocal of the tangential effective mass m_t [m/kg]
-   pure real(wp) function tangential_mobility(bodies, contacts, c)
+   !> Subtract half of the change of the slip velocity in a step. The centripetal acceleration of the arms does not extend
+   !> the spring and is left out.
+   pure subroutine move_to_midstep(bodies, dt, block, slip)
+      !> Bodies, for their accelerations
       type(bodies_t), intent(in) :: bodies
-      type(contacts_t), intent(in) :: contacts
-      integer(ip), intent(in) :: c
-      real(wp) :: square_first, square_second
+      real(wp), intent(in) :: dt
+      type(contact_block_t), intent(in) :: block
+      real(wp), intent(inout) :: slip(block_size)
+      real(wp) :: x, y
+      integer(ip) :: c
 
-      square_first = contacts%arm_first(1, c)**2 + contacts%arm_first(2, c)**2
-      square_second = contacts%arm_second(1, c)**2 + contacts%arm_second(2, c)**2
-      associate (i => contacts%first(c), j => contacts%second(c))
-         tangential_mobility = bodies%inverse_mass(i) + bodies%inverse_mass(j) &
-            + square_first*bodies%inverse_inertia(i) + square_second*bodies%inverse_inertia(j)
-      end associate
-   end function tangential_mobility
+      do c = 1_ip, block%n
+         associate (i => block%first(c), j => block%second(c), a => bodies%acceleration, &
+                    b => bodies%angular_acceleration)
+            x = (a(1, i) - b(i)*block%arm_first(c, 2)) - (a(1, j) - b(j)*block%arm_second(c, 2))
+            y = (a(2, i) + b(i)*block%arm_first(c, 1)) - (a(2, j) + b(j)*block%arm_second(c, 1))
+         end associate
+         slip(c) = slip(c) - 0.5_wp*dt*(block%direction(c, 1)*y - block%direction(c, 2)*x)
+      end do
+   end subroutine move_to_midstep
+
+   !> Dashpots d sqrt(k_t m_t) of all contacts [N s/m2]
+   pure subroutine find_dashpots(self, bodies, block, dashpot)
+      class(cundall_strack_t), intent(in) :: self
+      !> Bodies, for their moments of inertia
+      type(bodies_t), intent(in) :: bodies
+      type(contact_block_t), intent(in) :: block
+      real(wp), intent(inout) :: dashpot(block_size)
+      real(wp) :: square_first, square_second, mobility
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         square_first = block%arm_first(c, 1)**2 + block%arm_first(c, 2)**2
+         square_second = block%arm_second(c, 1)**2 + block%arm_second(c, 2)**2
+         mobility = block%mobility(c) + (square_first*bodies%inverse_inertia(block%first(c)) &
+                                         + square_second*bodies%inverse_inertia(block%second(c)))
+         dashpot(c) = self%damping*sqrt(self%stiffness/mobility)
+      end do
+   end subroutine find_dashpots
 
 end module polydem_cundall_strack

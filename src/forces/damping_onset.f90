@@ -8,10 +8,10 @@
 !> their weight, between 1/2 and 1, does not change the order.)
 module polydem_damping_onset
    use polydem_bodies, only: bodies_t
+   use polydem_contact_block, only: contact_block_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
-   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_on_damping, force_part_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -52,14 +52,14 @@ contains
    end function stored
 
    !> Weight the damping of new contacts, limit the normal force to repulsion, and store the areas.
-   subroutine add(self, bodies, dt, contacts, history)
+   subroutine add(self, bodies, dt, block, history)
       class(damping_onset_t), intent(in) :: self
       !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0: no contact is new
       real(wp), intent(in) :: dt
       !> Contacts; `normal_force` changes
-      type(contacts_t), intent(inout) :: contacts
+      type(contact_block_t), intent(inout) :: block
       !> Contact history; the area is read and set
       type(contact_history_t), intent(inout) :: history
       real(wp) :: growth, damping
@@ -67,17 +67,14 @@ contains
 
       associate (unused_bodies => bodies)
       end associate
-      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, dt, contacts, history) private(c, growth, damping)
-      do c = 1_ip, contacts%n
-         growth = contacts%rate(c)*dt
-         if (history%column(self%first_column)%value(contacts%pair(c)) <= 0.0_wp .and. contacts%area(c) < growth) then
-            damping = contacts%normal_force(c) - contacts%elastic(c)
-            contacts%normal_force(c) = max(0.0_wp, contacts%elastic(c) + (contacts%area(c)/growth + 0.5_wp)*damping)
+      do c = 1_ip, block%n
+         growth = block%rate(c)*dt
+         if (history%column(self%first_column)%value(block%pair(c)) <= 0.0_wp .and. block%area(c) < growth) then
+            damping = block%normal_force(c) - block%elastic(c)
+            block%normal_force(c) = max(0.0_wp, block%elastic(c) + (block%area(c)/growth + 0.5_wp)*damping)
          end if
-         history%column(self%first_column)%value(contacts%pair(c)) = contacts%area(c)
+         history%column(self%first_column)%value(block%pair(c)) = block%area(c)
       end do
-      !$omp end parallel do
    end subroutine add
 
 end module polydem_damping_onset

@@ -7,6 +7,7 @@ module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
    use polydem_conservative_law, only: conservative_law_t
+   use polydem_contact_block, only: block_size, contact_block_t, load_block, store_forces
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contacts, only: contacts_t
@@ -46,6 +47,8 @@ module polydem_force_law
       logical :: needs_cohesion = .false.
       !> Whether a part adds to the column `twist`
       logical :: needs_twist = .false.
+      !> Whether the energy of all elastic forces is half of elastic area/length
+      logical :: energy_is_quadratic = .false.
       !> Names of the parts, for `polydem check` and the log
       character(len=:), allocatable :: description
    contains
@@ -55,6 +58,7 @@ module polydem_force_law
       generic :: offer => offer_part, offer_constraint
       procedure :: collect_needs
       procedure :: measure
+      procedure :: apply
       procedure :: stiffen
       procedure :: static_depth
       procedure :: undamped_warning
@@ -156,6 +160,7 @@ contains
             law%needs_effective_area = law%needs_effective_area .or. part%needs_effective_area
             law%needs_cohesion = law%needs_cohesion .or. part%needs_cohesion
             law%needs_twist = law%needs_twist .or. part%needs_twist
+            law%energy_is_quadratic = law%energy_is_quadratic .or. part%energy_is_quadratic
             part%first_column = size(law%stored) + 1
             law%stored = [law%stored, part%stored()]
             if (k > 1 .and. part%stage /= acts_on_damping) law%description = law%description//','
@@ -167,6 +172,7 @@ contains
          law%stored = [law%stored, law%constraint%stored()]
          law%description = law%description//', '//trim(law%constraint%name)
       end if
+      if (law%needs_cohesion) law%energy_is_quadratic = .false.
       law%description = trim(adjustl(law%description))
    end subroutine collect_needs
 
@@ -202,7 +208,33 @@ contains
       if (allocated(law%constraint)) call law%constraint%check(settings, n_processes, error)
    end subroutine check_law
 
-   !> Compute the normal and tangential forces of all contacts.
+   !> Compute the normal and tangential forces of a block of contacts.
+   subroutine apply(law, bodies, dt, block, history)
+      !> The law
+      class(force_law_t), intent(in) :: law
+      !> Bodies with the positions and velocities of this step
+      type(bodies_t), intent(in) :: bodies
+      !> Time since the last evaluation [s]; 0 at the start of a run
+      real(wp), intent(in) :: dt
+      !> Contacts; `elastic`, `cohesion`, `normal_force`, `tangential_force` and `twist` are set
+      type(contact_block_t), intent(inout) :: block
+      !> Contact history; only the pairs of these contacts change
+      type(contact_history_t), intent(inout) :: history
+      integer :: k
+
+      associate (n => block%n)
+         block%elastic(:n) = 0.0_wp
+         block%cohesion(:n) = 0.0_wp
+         block%normal_force(:n) = 0.0_wp
+         block%tangential_force(:n) = 0.0_wp
+         block%twist(:n) = 0.0_wp
+      end associate
+      do k = 1, size(law%parts)
+         call law%parts(k)%part%add(bodies, dt, block, history)
+      end do
+   end subroutine apply
+
+   !> Compute the normal and tangential forces of a table of contacts.
    subroutine evaluate_law(law, bodies, dt, contacts, history)
       !> The law
       type(force_law_t), intent(in) :: law
@@ -210,19 +242,20 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0 at the start of a run
       real(wp), intent(in) :: dt
-      !> Contacts; `elastic`, `cohesion`, `normal_force`, `tangential_force` and `twist` are set
+      !> Contacts; the columns from `inverse_length` on are set
       type(contacts_t), intent(inout) :: contacts
       !> Contact history
       type(contact_history_t), intent(inout) :: history
-      integer :: k
+      type(contact_block_t) :: block
+      integer(ip) :: b, high
 
-      contacts%elastic(1:contacts%n) = 0.0_wp
-      contacts%normal_force(1:contacts%n) = 0.0_wp
-      contacts%tangential_force(1:contacts%n) = 0.0_wp
-      if (contacts%has_cohesion) contacts%cohesion(1:contacts%n) = 0.0_wp
-      if (contacts%has_twist) contacts%twist(1:contacts%n) = 0.0_wp
-      do k = 1, size(law%parts)
-         call law%parts(k)%part%add(bodies, dt, contacts, history)
+      contacts%energy_is_quadratic = law%energy_is_quadratic
+      do high = contacts%n, 1_ip, -block_size
+         call load_block(bodies, contacts, max(1_ip, high - block_size + 1_ip), high, block)
+         call law%apply(bodies, dt, block, history)
+         do b = 1_ip, block%n
+            call store_forces(block, b, contacts, high - b + 1_ip)
+         end do
       end do
    end subroutine evaluate_law
 

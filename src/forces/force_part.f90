@@ -1,7 +1,6 @@
 !> Base type of a part of the contact force.
 !>
-!> A part adds to columns of the table of contacts in one loop over all contacts. It never overwrites values of other
-!> parts. The columns decide the channel of the energy balance:
+!> A part adds to columns of a block of contacts in one loop over the block. It never overwrites values of other parts. The columns decide the channel of the energy balance:
 !>
 !> * `elastic` and `normal_force`: repulsion of the overlap, work of elastic forces;
 !> * `cohesion` and `normal_force`: another force with a potential, which may attract, also work of elastic forces;
@@ -9,17 +8,15 @@
 !> * `twist`: torque of the contact itself, work of damping;
 !> * `tangential_force`: work of tangential forces.
 !>
-!> `energy_is_quadratic` of the table is true if the energy of all elastic forces is half of elastic area/length. The
-!> elastic part sets it; a part with cohesion sets it to false.
-!>
 !> The order in which parts are listed does not matter; they act in the order of their stages. A part is immutable once
 !> it is chosen and has measured the bodies. Its contact history is in columns of `contact_history_t`, with one entry
 !> per pair of the pair list.
 module polydem_force_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t
+   use polydem_contact_block, only: contact_block_t, load_block, store_forces, block_size
    use polydem_contacts, only: contacts_t
-   use polydem_kinds, only: wp
+   use polydem_kinds, only: ip, wp
    use polydem_law_part, only: law_part_t
    implicit none
    private
@@ -40,11 +37,15 @@ module polydem_force_part
       logical :: needs_cohesion = .false.
       !> Whether it adds to the column `twist`
       logical :: needs_twist = .false.
+      !> Whether the energy of its elastic force is half of elastic area/length
+      logical :: energy_is_quadratic = .false.
       !> Whether it dissipates energy in every normal impact
       logical :: dissipates = .false.
    contains
-      !> Add this part to the forces of all contacts
+      !> Add this part to the forces of a block of contacts
       procedure(add), deferred :: add
+      !> Add this part to the forces of a table of contacts
+      procedure, non_overridable :: add_to_table
       !> Depth at which this part carries a load at rest
       procedure :: static_depth
       !> Warning if no part of the law dissipates
@@ -52,22 +53,45 @@ module polydem_force_part
    end type force_part_t
 
    abstract interface
-      !> Add this part to the forces of all contacts.
-      subroutine add(self, bodies, dt, contacts, history)
-         import :: bodies_t, contact_history_t, contacts_t, force_part_t, wp
+      !> Add this part to the forces of a block of contacts. Several threads work on different blocks.
+      subroutine add(self, bodies, dt, block, history)
+         import :: bodies_t, contact_history_t, contact_block_t, force_part_t, wp
          class(force_part_t), intent(in) :: self
          !> Bodies with the positions and velocities of this step
          type(bodies_t), intent(in) :: bodies
          !> Time since the last evaluation [s]; 0 at the start of a run
          real(wp), intent(in) :: dt
-         !> Contacts of this step
-         type(contacts_t), intent(inout) :: contacts
-         !> Contact history
+         !> Some contacts of this step
+         type(contact_block_t), intent(inout) :: block
+         !> Contact history; only the pairs of these contacts may change
          type(contact_history_t), intent(inout) :: history
       end subroutine add
    end interface
 
 contains
+
+   !> Add this part to the forces of a table of contacts.
+   subroutine add_to_table(self, bodies, dt, contacts, history)
+      class(force_part_t), intent(in) :: self
+      !> Bodies with the positions and velocities of this step
+      type(bodies_t), intent(in) :: bodies
+      !> Time since the last evaluation [s]; 0 at the start of a run
+      real(wp), intent(in) :: dt
+      !> Contacts of this step
+      type(contacts_t), intent(inout) :: contacts
+      !> Contact history
+      type(contact_history_t), intent(inout) :: history
+      type(contact_block_t) :: block
+      integer(ip) :: b, high
+
+      do high = contacts%n, 1_ip, -block_size
+         call load_block(bodies, contacts, max(1_ip, high - block_size + 1_ip), high, block)
+         call self%add(bodies, dt, block, history)
+         do b = 1_ip, block%n
+            call store_forces(block, b, contacts, high - b + 1_ip)
+         end do
+      end do
+   end subroutine add_to_table
 
    !> Depth at which this part of a flat contact carries a load at rest [m]. Default: 0, it carries no load
    real(wp) function static_depth(self, load, block, support, offset)

@@ -4,11 +4,10 @@
 !> is at most four times the elastic force (p. 227). The sum with the elastic force is never attractive (p. 277). This
 !> law is for comparison; `rate_damping` is the same law without the artefacts of the difference.
 module polydem_matuttis_chen_damping
-   use polydem_bodies, only: bodies_t
+   use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
-   use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
-   use polydem_normal_damping, only: block_size, normal_damping_t
+   use polydem_normal_damping, only: normal_damping_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -52,34 +51,29 @@ contains
    end function stored
 
    !> Compute the damping forces of one block of contacts, and store the areas.
-   subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
+   subroutine find_forces(self, dt, block, history, force)
       class(matuttis_chen_damping_t), intent(in) :: self
-      !> Bodies, for their masses
-      type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0: the rate is unknown, and there is no damping
       real(wp), intent(in) :: dt
       !> Contacts with their elastic forces
-      type(contacts_t), intent(in) :: contacts
+      type(contact_block_t), intent(in) :: block
       !> Contact history; the area is read and set
       type(contact_history_t), intent(inout) :: history
-      !> First and last contact of the block
-      integer(ip), intent(in) :: low, high
-      !> Damping force of contact c at index c - low + 1 [N/m]
+      !> Damping force of each contact [N/m]
       real(wp), intent(inout) :: force(block_size)
-      real(wp) :: mobility, difference
+      real(wp) :: difference
       integer(ip) :: c
 
       associate (area => history%column(self%first_column)%value)
-         do c = low, high
+         do c = 1_ip, block%n
             difference = 0.0_wp
             if (dt > 0.0_wp) then
-               mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
-               difference = self%coefficient*sqrt(self%stiffness/mobility)*contacts%inverse_length(c) &
-                  *((contacts%area(c) - area(contacts%pair(c)))/dt)
-               difference = min(difference, approach_limit*contacts%elastic(c))
+               difference = self%coefficient*sqrt(self%stiffness/block%mobility(c))*block%inverse_length(c) &
+                  *((block%area(c) - area(block%pair(c)))/dt)
+               difference = min(difference, approach_limit*block%elastic(c))
             end if
-            force(c - low + 1_ip) = difference
-            area(contacts%pair(c)) = contacts%area(c)
+            force(c) = difference
+            area(block%pair(c)) = block%area(c)
          end do
       end associate
    end subroutine find_forces

@@ -4,18 +4,16 @@
 !> Chen, Understanding the Discrete Element Method, Wiley 2014, p. 277). An attraction by another part is not changed.
 module polydem_normal_damping
    use polydem_bodies, only: bodies_t
+   use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_damping, force_part_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: normal_damping_t, block_size
-
-   !> Largest number of contacts in one call of `find_forces`
-   integer(ip), parameter :: block_size = 256_ip
 
    !> A normal damping
    type, abstract, extends(force_part_t) :: normal_damping_t
@@ -33,20 +31,16 @@ module polydem_normal_damping
 
    abstract interface
       !> Compute the damping forces of one block of contacts, without a limit.
-      subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
-         import :: block_size, bodies_t, contact_history_t, contacts_t, ip, normal_damping_t, wp
+      subroutine find_forces(self, dt, block, history, force)
+         import :: block_size, contact_history_t, contact_block_t, normal_damping_t, wp
          class(normal_damping_t), intent(in) :: self
-         !> Bodies with the positions and velocities of this step
-         type(bodies_t), intent(in) :: bodies
          !> Time since the last evaluation [s]; 0 at the start of a run
          real(wp), intent(in) :: dt
-         !> Contacts of this step with their elastic forces
-         type(contacts_t), intent(in) :: contacts
+         !> Contacts with their elastic forces
+         type(contact_block_t), intent(in) :: block
          !> Contact history; only the pairs of these contacts may change
          type(contact_history_t), intent(inout) :: history
-         !> First and last contact of the block, at most `block_size` contacts
-         integer(ip), intent(in) :: low, high
-         !> Damping force of contact c at index c - low + 1, positive in repulsion [N/m]
+         !> Damping force of each contact, positive in repulsion [N/m]
          real(wp), intent(inout) :: force(block_size)
       end subroutine find_forces
    end interface
@@ -54,29 +48,25 @@ module polydem_normal_damping
 contains
 
    !> Add the damping force. Its sum with the elastic force is limited to repulsion.
-   subroutine add(self, bodies, dt, contacts, history)
+   subroutine add(self, bodies, dt, block, history)
       class(normal_damping_t), intent(in) :: self
-      !> Bodies, for their masses
+      !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0 at the start of a run
       real(wp), intent(in) :: dt
       !> Contacts; `normal_force` changes
-      type(contacts_t), intent(inout) :: contacts
+      type(contact_block_t), intent(inout) :: block
       !> Contact history
       type(contact_history_t), intent(inout) :: history
       real(wp) :: force(block_size)
-      integer(ip) :: c, low, high
+      integer(ip) :: c
 
-      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, dt, contacts, history) private(c, low, high, force)
-      do low = 1_ip, contacts%n, block_size
-         high = min(low + block_size - 1_ip, contacts%n)
-         call self%find_forces(bodies, dt, contacts, history, low, high, force)
-         do c = low, high
-            contacts%normal_force(c) = contacts%normal_force(c) + max(-contacts%elastic(c), force(c - low + 1_ip))
-         end do
+      associate (unused_bodies => bodies)
+      end associate
+      call self%find_forces(dt, block, history, force)
+      do c = 1_ip, block%n
+         block%normal_force(c) = block%normal_force(c) + max(-block%elastic(c), force(c))
       end do
-      !$omp end parallel do
    end subroutine add
 
    !> Add the dashpot gamma sqrt(m E) L/l.

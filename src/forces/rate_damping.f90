@@ -3,11 +3,10 @@
 !> Matuttis & Chen 2014, Eq. 7.13, with dA/dt from positions and velocities instead of a backward difference. There is
 !> no contact history, no lag of half a step and no jump in the first step of a contact.
 module polydem_rate_damping
-   use polydem_bodies, only: bodies_t
+   use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t
-   use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
-   use polydem_normal_damping, only: block_size, normal_damping_t
+   use polydem_normal_damping, only: normal_damping_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -38,29 +37,23 @@ contains
    end subroutine choose
 
    !> Compute the damping forces of one block of contacts.
-   subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
+   subroutine find_forces(self, dt, block, history, force)
       class(rate_damping_t), intent(in) :: self
-      !> Bodies, for their masses
-      type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
-      !> Contacts
-      type(contacts_t), intent(in) :: contacts
+      !> Contacts with their elastic forces
+      type(contact_block_t), intent(in) :: block
       !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
-      !> First and last contact of the block
-      integer(ip), intent(in) :: low, high
-      !> Damping force of contact c at index c - low + 1 [N/m]
+      !> Damping force of each contact [N/m]
       real(wp), intent(inout) :: force(block_size)
-      real(wp) :: mobility
       integer(ip) :: c
 
       associate (unused_dt => dt, unused_history => history)
       end associate
-      do c = low, high
-         mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
-         force(c - low + 1_ip) = self%coefficient*sqrt(self%stiffness/mobility)*contacts%rate(c) &
-            *contacts%inverse_length(c)
+      do c = 1_ip, block%n
+         force(c) = self%coefficient*sqrt(self%stiffness/block%mobility(c))*block%rate(c) &
+            *block%inverse_length(c)
       end do
    end subroutine find_forces
 

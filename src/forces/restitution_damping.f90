@@ -14,11 +14,12 @@
 !> that of a central impact; eccentric impacts lose more energy.
 module polydem_restitution_damping
    use polydem_bodies, only: bodies_t
+   use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
-   use polydem_normal_damping, only: block_size, normal_damping_t
+   use polydem_normal_damping, only: normal_damping_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -54,31 +55,26 @@ contains
    end subroutine choose
 
    !> Compute the damping forces of one block of contacts.
-   subroutine find_forces(self, bodies, dt, contacts, history, low, high, force)
+   subroutine find_forces(self, dt, block, history, force)
       class(restitution_damping_t), intent(in) :: self
-      !> Bodies, for their masses
-      type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
-      !> Contacts
-      type(contacts_t), intent(in) :: contacts
+      !> Contacts with their elastic forces
+      type(contact_block_t), intent(in) :: block
       !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
-      !> First and last contact of the block
-      integer(ip), intent(in) :: low, high
-      !> Damping force of contact c at index c - low + 1 [N/m]
+      !> Damping force of each contact [N/m]
       real(wp), intent(inout) :: force(block_size)
-      real(wp) :: mobility, reach
+      real(wp) :: reach
       integer(ip) :: c
 
       associate (unused_dt => dt, unused_history => history)
       end associate
-      do c = low, high
-         mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
+      do c = 1_ip, block%n
          ! Bars that nearly cross turn without approach. L is at least the side of a square of the same area.
-         reach = max(contacts%length(c), sqrt(contacts%area(c)))
-         force(c - low + 1_ip) = 2.0_wp*self%ratio*sqrt(self%stiffness/mobility) &
-            *sqrt(contacts%inverse_length(c)/reach)*contacts%rate(c)
+         reach = max(block%length(c), sqrt(block%area(c)))
+         force(c) = 2.0_wp*self%ratio*sqrt(self%stiffness/block%mobility(c)) &
+            *sqrt(block%inverse_length(c)/reach)*block%rate(c)
       end do
    end subroutine find_forces
 

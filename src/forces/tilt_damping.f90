@@ -10,11 +10,12 @@
 !> contact under tension has no such torque.
 module polydem_tilt_damping
    use polydem_bodies, only: bodies_t
+   use polydem_contact_block, only: contact_block_t
    use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_last, force_part_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -52,14 +53,14 @@ contains
    end subroutine choose
 
    !> Add the torque; the normal forces must be complete.
-   subroutine add(self, bodies, dt, contacts, history)
+   subroutine add(self, bodies, dt, block, history)
       class(tilt_damping_t), intent(in) :: self
       !> Bodies, for their moments of inertia
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
       !> Contacts; `twist` changes
-      type(contacts_t), intent(inout) :: contacts
+      type(contact_block_t), intent(inout) :: block
       !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
       real(wp) :: mobility, stiffness, limit, torque
@@ -67,20 +68,17 @@ contains
 
       associate (unused_dt => dt, unused_history => history)
       end associate
-      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, contacts) private(c, mobility, stiffness, limit, torque)
-      do c = 1_ip, contacts%n
+      do c = 1_ip, block%n
          ! The same as face_tilt_stiffness; calling a procedure of another file here costs 0.3 % of a step.
-         stiffness = self%stiffness*contacts%length(c)**3*contacts%inverse_length(c)/12.0_wp
-         associate (i => contacts%first(c), j => contacts%second(c))
+         stiffness = self%stiffness*block%length(c)**3*block%inverse_length(c)/12.0_wp
+         associate (i => block%first(c), j => block%second(c))
             mobility = bodies%inverse_inertia(i) + bodies%inverse_inertia(j)
             torque = -self%share*sqrt(stiffness/mobility) &
                *(bodies%angular_velocity(i) - bodies%angular_velocity(j))
          end associate
-         limit = 0.5_wp*contacts%length(c)*max(0.0_wp, contacts%normal_force(c))
-         contacts%twist(c) = contacts%twist(c) + max(-limit, min(limit, torque))
+         limit = 0.5_wp*block%length(c)*max(0.0_wp, block%normal_force(c))
+         block%twist(c) = block%twist(c) + max(-limit, min(limit, torque))
       end do
-      !$omp end parallel do
    end subroutine add
 
    !> Add the dashpot s sqrt(k I_eff).

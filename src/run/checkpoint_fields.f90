@@ -60,6 +60,9 @@ contains
          call turn_bodies(s%bodies, s%moving)
          s%contacts%n = 0_ip
          s%contacts%n_degenerate = 0_ip
+         s%walls%n = 0_ip
+         s%suspects%n = 0_ip
+         s%passing_pair = 0_ip
       end associate
    end subroutine serialize_run
 
@@ -126,7 +129,6 @@ contains
          call serializer%match('/pairs/second', int(s%bodies%id(pairs%second(:n)), lp), '1', &
             'higher identifier of each pair')
          call serialize_history(serializer, n, s%history)
-         call expect_edges(serializer, s)
          call serializer%field('/run/finder_counts', work%value, '1', 'statistics of the finder so far')
          call serializer%seconds_field('/run/finder_seconds', work%seconds, 'time of each phase of the finder')
       end associate
@@ -140,9 +142,7 @@ contains
       type(contact_history_t), intent(inout) :: history
       integer :: k
 
-      if (serializer%is_reading) history%separating_edge = spread(0_ip, 1, n)
-      call serializer%field('/pairs/separating_edge', history%separating_edge(:n), '1', &
-                        'last edge that separated the pair: +k of the first body, -k of the second, 0 unknown')
+      if (serializer%is_reading) history%memory = spread(0_ip, 1, n)
       if (.not. allocated(history%column)) return
       do k = 1, size(history%column)
          associate (kind => history%column(k)%kind)
@@ -151,27 +151,6 @@ contains
          end associate
       end do
    end subroutine serialize_history
-
-   !> Check that the bodies of each pair have the stored separating edge.
-   subroutine expect_edges(serializer, s)
-      class(serializer_t), intent(inout) :: serializer
-      type(simulation_t), intent(in) :: s
-      integer(ip) :: edge, k
-
-      if (.not. serializer%is_reading .or. allocated(serializer%error)) return
-      associate (pairs => s%neighbours%pairs, start => s%bodies%vertex_start)
-         do k = 1_ip, pairs%n
-            edge = s%history%separating_edge(k)
-            if (edge <= start(pairs%first(k) + 1_ip) - start(pairs%first(k)) .and. &
-                -edge <= start(pairs%second(k) + 1_ip) - start(pairs%second(k))) cycle
-            call raise(serializer%error, input_error, '/pairs/separating_edge of the bodies '// &
-                       to_text(int(s%bodies%id(pairs%first(k)), lp))//' and '// &
-                       to_text(int(s%bodies%id(pairs%second(k)), lp))//' is '//to_text(edge)// &
-                       ', but they have no such edge')
-            return
-         end do
-      end associate
-   end subroutine expect_edges
 
    !> Serialize a column over pairs.
    subroutine serialize_column(serializer, name, n, column, unit, meaning)

@@ -3,15 +3,13 @@
 !>
 !> A guard that is off takes no time and allocates no array.
 module polydem_monitor
-   use polydem_body_sizes, only: thickness_of_bodies
    use polydem_contact_depth, only: any_deeper, deepest_contact, depth_share, depth_text
-   use polydem_contact_history, only: column_of
    use polydem_energy_guard, only: check_energy, energy_guard_t, open_energy_guard
    use polydem_errors, only: error_t
    use polydem_guards, only: place_of
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
-   use polydem_passing, only: find_passing, least_depth, passing_text
+   use polydem_passing, only: passing_text
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
    use polydem_stability_check, only: check_stability
@@ -19,15 +17,11 @@ module polydem_monitor
    use polydem_warning, only: warning_t
    implicit none
    private
-   public :: monitor_t, new_monitor, look, report_pending_warnings, write_warning_counts, serialize_monitor, &
+   public :: monitor_t, new_monitor, look, checks_contacts, report_pending_warnings, write_warning_counts, serialize_monitor, &
       warning_counts, set_warning_counts
 
    !> Guards and their findings
    type :: monitor_t
-      !> Thickness of each body, (slot) [m]; allocated only if the overlap or passing guard is on
-      real(wp), allocatable :: thickness(:)
-      !> Generation of the bodies that `thickness` belongs to
-      integer(ip), private :: generation = 0_ip
       !> Warnings of deep contacts
       type(warning_t) :: overlap
       !> Warnings of bodies passing through each other
@@ -57,8 +51,6 @@ contains
       type(simulation_t), intent(in) :: simulation
 
       associate (settings => simulation%settings%guards)
-         if (settings%overlap /= 'off' .or. settings%passing /= 'off') &
-            monitor%thickness = thickness_of_bodies(simulation%bodies)
          if (settings%energy /= 'off') call open_energy_guard(monitor%energy, simulation%contacts)
       end associate
    end subroutine new_monitor
@@ -94,7 +86,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: check_all
 
-      check_all = is_last .or. mod(simulation%step, interval) == 0_lp
+      check_all = is_last .or. is_checked(simulation%step)
       associate (settings => simulation%settings%guards)
          if (settings%overlap /= 'off' .or. settings%passing /= 'off') &
             call check_contact_guards(monitor, simulation, error)
@@ -105,6 +97,25 @@ contains
       if (check_all .or. simulation%comm%size == 1_ip) call report_pending_warnings(monitor, simulation, log)
       call write_pending(monitor%energy%warning, log)
    end subroutine look
+
+   !> Whether the monitor checks all that it can after a step
+   pure logical function is_checked(step)
+      integer(lp), intent(in) :: step
+
+      is_checked = mod(step, interval) == 0_lp
+   end function is_checked
+
+   !> Whether the monitor needs the table of contacts of a step
+   pure logical function checks_contacts(simulation, step, is_last)
+      !> The simulation
+      type(simulation_t), intent(in) :: simulation
+      !> The step
+      integer(lp), intent(in) :: step
+      !> As in `look`
+      logical, intent(in) :: is_last
+
+      checks_contacts = simulation%settings%guards%step /= 'off' .and. (is_last .or. is_checked(step))
+   end function checks_contacts
 
    !> Write the pending warnings of all ranks, and all-reduce their counts; collective.
    subroutine report_pending_warnings(monitor, simulation, log)
@@ -206,45 +217,31 @@ contains
       type(monitor_t), intent(inout) :: monitor
       type(simulation_t), intent(inout) :: simulation
       type(error_t), allocatable, intent(inout) :: error
-      real(wp) :: limit
-      integer(ip) :: found
-      logical :: any_deep
 
-      associate (s => simulation, settings => simulation%settings%guards)
-         if (monitor%generation /= s%generation) monitor%thickness = thickness_of_bodies(s%bodies)
-         monitor%generation = s%generation
-         limit = huge(limit)
-         if (settings%overlap /= 'off') limit = settings%overlap_limit
-         found = 0_ip
-         if (settings%passing /= 'off') then
-            call find_passing(s%bodies, s%contacts, monitor%thickness, s%guard%radius, limit, &
-                              s%history%column(column_of(s%history, 'direction'))%value, found, any_deep)
-         end if
-         ! The search for passing bodies skips contacts below `least_depth`.
-         if (settings%passing == 'off' .or. limit < least_depth) &
-            any_deep = any_deeper(s%contacts, monitor%thickness, limit)
-         if (settings%overlap /= 'off') call respond_to_depth(monitor, simulation, any_deep, error)
-         if (found > 0_ip .and. .not. allocated(error)) call respond_to_passing(monitor, simulation, found, error)
+      associate (settings => simulation%settings%guards)
+         if (settings%overlap /= 'off') call respond_to_depth(monitor, simulation, error)
+         if (simulation%passing_pair > 0_ip .and. .not. allocated(error)) &
+            call respond_to_passing(monitor, simulation, error)
       end associate
    end subroutine check_contact_guards
 
    !> Respond to the deepest contact. The rank with the deepest contact of all ranks reports it, at once if it stops the
    !> run.
-   subroutine respond_to_depth(monitor, simulation, any_deep, error)
+   subroutine respond_to_depth(monitor, simulation, error)
       type(monitor_t), intent(inout) :: monitor
       type(simulation_t), intent(inout) :: simulation
-      logical, intent(in) :: any_deep
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
       integer(ip) :: worst
       real(dp) :: share
 
       share = 0.0_dp
-      associate (s => simulation, settings => simulation%settings%guards)
-         if (any_deep) then
-            worst = deepest_contact(s%contacts, monitor%thickness)
-            text = depth_text(s%bodies, s%contacts, monitor%thickness, worst)
-            share = real(depth_share(s%contacts, monitor%thickness, worst), dp)
+      associate (s => simulation, settings => simulation%settings%guards, &
+                 thickness => simulation%contact_guard%thickness)
+         if (any_deeper(s%suspects, thickness, settings%overlap_limit)) then
+            worst = deepest_contact(s%suspects, thickness)
+            text = depth_text(s%bodies, s%suspects, thickness, worst)
+            share = real(depth_share(s%suspects, thickness, worst), dp)
          end if
          if (settings%overlap == 'stop') call s%comm%all_reduce_text(text, share)
          if (.not. allocated(text)) return
@@ -255,18 +252,18 @@ contains
    end subroutine respond_to_depth
 
    !> Respond to bodies passing through each other. The rank with the first such pair of all ranks reports it.
-   subroutine respond_to_passing(monitor, simulation, found, error)
+   subroutine respond_to_passing(monitor, simulation, error)
       type(monitor_t), intent(inout) :: monitor
       type(simulation_t), intent(inout) :: simulation
-      !> Index of the contact
-      integer(ip), intent(in) :: found
       type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: found
       integer(lp) :: place
 
       associate (s => simulation)
-         place = place_of(s%bodies, s%contacts%first(found), s%contacts%second(found))
+         found = findloc(s%suspects%pair(:s%suspects%n), s%passing_pair, dim=1)
+         place = place_of(s%bodies, s%suspects%first(found), s%suspects%second(found))
          call monitor%passing%respond(s%settings%guards%passing, 'step '//to_text(s%step)//': '// &
-                                    passing_text(s%bodies, s%contacts, s%guard%radius, found), error, &
+                                    passing_text(s%bodies, s%suspects, s%guard%radius, found), error, &
                                     -real(place, dp))
          if (allocated(error)) error%place = place
       end associate

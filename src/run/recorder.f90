@@ -126,7 +126,7 @@ contains
          self%stage_seconds = simulation%timers%total
          call self%meter%look(simulation%neighbours%finder, row%phase, row%count)
          row%pairs = simulation%neighbours%pairs%n
-         row%contacts = simulation%contacts%n
+         row%contacts = simulation%n_contacts
       end associate
       call self%steps%add(self%row, error)
    end subroutine record

@@ -11,7 +11,7 @@ module polydem_run_output
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_counters, write_hash, write_ranks, write_timings
-   use polydem_monitor, only: look, write_warning_counts, report_pending_warnings
+   use polydem_monitor, only: checks_contacts, look, write_warning_counts, report_pending_warnings
    use polydem_profile_file, only: write_profile
    use polydem_result_files, only: profile_path
    use polydem_run, only: run_t
@@ -22,7 +22,7 @@ module polydem_run_output
    use polydem_wall_forces, only: complete_wall_forces
    implicit none
    private
-   public :: choose_intervals, count_frames, end_step, finish
+   public :: choose_intervals, choose_tables, count_frames, end_step, finish
 
    !> Number of lines of the log if the settings give no interval
    integer(lp), parameter :: default_lines = 20_lp
@@ -40,7 +40,7 @@ contains
 
       associate (s => run%simulation)
          frame_due = s%step == s%n_steps .or. is_due(s%step, run%frame_steps)
-         line_due = s%step == s%n_steps .or. is_due(s%step, run%log_steps)
+         line_due = is_line_due(run, s%step)
          call look(run%monitor, s, line_due, run%log, error)
          if (allocated(error)) return
          if (frame_due .or. line_due) call update_balance(run)
@@ -53,6 +53,25 @@ contains
          call run%log%show_progress(s%step, s%n_steps)
       end associate
    end subroutine end_step
+
+   !> Choose whether the next step keeps the table of contacts: for output, or for the monitor.
+   subroutine choose_tables(run)
+      !> The run
+      type(run_t), intent(inout) :: run
+
+      associate (s => run%simulation)
+         s%keeps_contacts = s%settings%output%contacts .or. &
+            checks_contacts(s, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
+      end associate
+   end subroutine choose_tables
+
+   !> Whether the log gets a line after a step
+   pure logical function is_line_due(run, step)
+      type(run_t), intent(in) :: run
+      integer(lp), intent(in) :: step
+
+      is_line_due = step == run%simulation%n_steps .or. is_due(step, run%log_steps)
+   end function is_line_due
 
    !> Evaluate the energy and momentum balance of this step if output.energy_balance is on; collective.
    subroutine update_balance(run)
@@ -70,7 +89,7 @@ contains
 
       if (run%simulation%step <= run%earlier%last_frame) return
       associate (s => run%simulation, output => run%simulation%settings%output)
-         call complete_wall_forces(run%comm, s%bodies, s%contacts)
+         call complete_wall_forces(run%comm, s%walls, s%bodies)
          if (output%contacts .and. output%energy_balance) then
             call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, row=run%row, &
                                             manifest=run%manifest)

@@ -1,14 +1,17 @@
 !> Parts of a simulation that depend on the bodies of a rank: force law, boxes, pair list with contact history, guards.
 module polydem_local_bodies
    use polydem_box_maker, only: new_box_maker
-   use polydem_contact_history, only: contact_history_t, add_column
+   use polydem_contact_history, only: add_column, column_of, contact_history_t
    use polydem_contact_incidence, only: incidence_t
+   use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_errors, only: error_t, raise, run_error
    use polydem_finder_statistics, only: finder_statistics_t
-   use polydem_force_law, only: new_force_law
+   use polydem_force_law, only: force_law_t, new_force_law
+   use polydem_force_sums, only: start_sums
    use polydem_guards, only: motion_guard_t, new_motion_guard
    use polydem_kinds, only: ip, lp, wp
    use polydem_neighbours, only: new_neighbours
+   use polydem_passing, only: new_contact_guard
    use polydem_simulation, only: simulation_t, former_direction
    implicit none
    private
@@ -26,10 +29,12 @@ contains
       real(wp), intent(in), optional :: median_diameter
 
       call new_force_law(self%settings%forces, self%bodies, self%law)
-      self%contacts%area_is_effective = self%law%needs_effective_area
-      self%contacts%has_cohesion = self%law%needs_cohesion
-      self%contacts%has_twist = self%law%needs_twist
-      self%contacts%n = 0_ip
+      call fit_table(self%law, self%contacts)
+      call fit_table(self%law, self%walls)
+      call fit_table(self%law, self%suspects)
+      self%n_contacts = 0_ip
+      self%passing_pair = 0_ip
+      call start_sums(self%bodies%n, self%force_sums)
       self%incidence = incidence_t()
       call list_moving(self)
       call rebuild_guard(self)
@@ -40,8 +45,21 @@ contains
       if (allocated(error)) return
       call rebuild_neighbours(self, error)
       call allocate_history(self)
+      call new_contact_guard(self%contact_guard, self%settings%guards, self%bodies, column_of(self%history, 'direction'))
       self%generation = self%generation + 1_ip
    end subroutine fit_to_bodies
+
+   !> Empty a table of contacts, and give it the columns that the law needs.
+   subroutine fit_table(law, contacts)
+      type(force_law_t), intent(in) :: law
+      type(contacts_t), intent(out) :: contacts
+
+      contacts%area_is_effective = law%needs_effective_area
+      contacts%energy_is_quadratic = law%energy_is_quadratic
+      contacts%has_cohesion = law%needs_cohesion
+      contacts%has_twist = law%needs_twist
+      call reserve_contacts(contacts, 0_ip)
+   end subroutine fit_table
 
    !> Rebuild the guard for the present bodies. Limit and warnings of the run are preserved.
    subroutine rebuild_guard(self)
@@ -79,7 +97,7 @@ contains
       integer :: k
 
       self%history = contact_history_t()
-      allocate (self%history%separating_edge(0))
+      allocate (self%history%memory(0))
       do k = 1, size(self%law%stored)
          call add_column(self%history, self%law%stored(k), 0_ip)
       end do

@@ -4,7 +4,6 @@ module polydem_parallel_start
    use polydem_broadcast_scene, only: broadcast_fixed_bodies, broadcast_motions
    use polydem_communicator, only: communicator_t
    use polydem_contact_incidence, only: index_contacts
-   use polydem_contacts, only: reserve_contacts
    use polydem_domain, only: new_domain
    use polydem_errors, only: error_t
    use polydem_integrator_factory, only: new_integrator
@@ -76,7 +75,6 @@ contains
       end do
       call fit_to_bodies(self, error, median_diameter)
       if (allocated(error)) return
-      call reserve_contacts(self%contacts, 0_ip)
       call index_contacts(self%bodies%n, self%contacts, self%incidence)
       call self%integrator%start(self%bodies)
    end subroutine begin_without_free_bodies

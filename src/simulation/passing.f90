@@ -12,67 +12,107 @@
 !> reverses, but this is harmless.
 module polydem_passing
    use polydem_bodies, only: bodies_t
+   use polydem_body_sizes, only: thickness_of_bodies
+   use polydem_contact_block, only: block_size, contact_block_t
+   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
+   use polydem_settings, only: guards_settings_t
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: find_passing, passing_text, packed_direction, is_reversed, centre_inside, least_depth
+   public :: contact_guard_t, new_contact_guard, test_block, passing_text, packed_direction, is_reversed, centre_inside, least_depth
 
    !> Minimum depth of the tested contacts, as a fraction of the thickness of the thinner body
    real(wp), parameter :: least_depth = 0.0625_wp
 
+   !> Guard of the contacts
+   type :: contact_guard_t
+      !> Thickness of each body, (slot) [m]
+      real(wp), allocatable :: thickness(:)
+      !> Contacts deeper than this fraction of the thickness of the thinner body are suspects; huge: only degenerate ones
+      real(wp) :: least_depth = huge(1.0_wp)
+      !> Column of the contact history with the directions of the last step; 0 if there is none
+      integer :: column = 0
+   end type contact_guard_t
+
 contains
 
-   !> In one loop over all contacts, find the first contact whose bodies pass through each other, test whether any
-   !> contact is deeper than a limit, and store the directions.
-   subroutine find_passing(bodies, contacts, thickness, radius, limit, history, found, any_deep)
-      !> Bodies at the end of a step
+   !> Set up the guard for the present bodies.
+   subroutine new_contact_guard(guard, settings, bodies, column)
+      !> The guard
+      type(contact_guard_t), intent(out) :: guard
+      !> Group &guards
+      type(guards_settings_t), intent(in) :: settings
+      !> Bodies, for their shapes
       type(bodies_t), intent(in) :: bodies
-      !> Contacts of the step
-      type(contacts_t), intent(in) :: contacts
-      !> Thickness of each body, (slot) [m]
-      real(wp), intent(in) :: thickness(:)
-      !> Greatest distance of a vertex from the centre of each body, (slot) [m]
-      real(wp), intent(in) :: radius(:)
-      !> Limit of the depth as a fraction of the thickness of the thinner body
-      real(wp), intent(in) :: limit
-      !> Packed directions of the pairs, 0 without overlap, (pair). On entry those of the last step, on return those of
-      !> this step
-      real(wp), intent(inout) :: history(:)
-      !> Index of the contact, 0 if there is none
-      integer(ip), intent(out) :: found
-      !> Whether any contact is deeper than the limit
-      logical, intent(out) :: any_deep
-      real(wp) :: before, now, share
-      integer(ip) :: c, first
-      logical :: deep
+      !> Column of the contact history with the directions of the last step; 0 if there is none
+      integer, intent(in) :: column
 
-      first = huge(first)
-      deep = .false.
-      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(bodies, contacts, thickness, radius, limit, history) private(c, before, now, share) &
-      !$omp    reduction(min:first) reduction(.or.:deep)
-      do c = 1_ip, contacts%n
-         now = packed_direction(contacts%direction(1, c), contacts%direction(2, c))
-         before = history(contacts%pair(c))
-         history(contacts%pair(c)) = now
-         share = contacts%length(c)*min(thickness(contacts%first(c)), thickness(contacts%second(c)))
-         if (contacts%area(c) <= least_depth*share) cycle
-         deep = deep .or. contacts%area(c) > limit*share
-         if (is_reversed(before, now)) then
-            first = min(first, c)
-         else if (centre_inside(bodies, radius, contacts%first(c), contacts%second(c))) then
-            first = min(first, c)
-         else if (centre_inside(bodies, radius, contacts%second(c), contacts%first(c))) then
-            first = min(first, c)
-         end if
+      guard%column = column
+      if (settings%overlap /= 'off') guard%least_depth = settings%overlap_limit
+      if (settings%passing /= 'off') guard%least_depth = min(guard%least_depth, least_depth)
+      guard%thickness = thickness_of_bodies(bodies)
+   end subroutine new_contact_guard
+
+
+   !> Test the contacts of a block, and store their directions.
+   subroutine test_block(guard, bodies, block, history, suspect, passing_pair)
+      !> The guard
+      type(contact_guard_t), intent(in) :: guard
+      !> Bodies with the positions of this step
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts in descending order of their pairs
+      type(contact_block_t), intent(in) :: block
+      !> Contact history; the direction is read and set
+      type(contact_history_t), intent(inout) :: history
+      !> Whether each contact is deep or degenerate
+      logical, intent(out) :: suspect(block_size)
+      !> Lowest index in the pair list of a contact whose bodies pass through each other; changes if there is one
+      integer(ip), intent(inout) :: passing_pair
+      real(wp) :: before(block_size), now(block_size)
+      integer(ip) :: c
+
+      if (guard%least_depth < huge(1.0_wp)) then
+         do c = 1_ip, block%n
+            suspect(c) = block%degenerate(c) > 0.0_wp .or. block%area(c) > guard%least_depth*block%length(c) &
+               *min(guard%thickness(block%first(c)), guard%thickness(block%second(c)))
+         end do
+      else
+         suspect(:block%n) = block%degenerate(:block%n) > 0.0_wp
+      end if
+      if (guard%column == 0) return
+      do c = 1_ip, block%n
+         now(c) = packed_direction(block%direction(c, 1), block%direction(c, 2))
       end do
-      !$omp end parallel do
-      found = 0_ip
-      if (first < huge(first)) found = first
-      any_deep = deep
-   end subroutine find_passing
+      associate (stored => history%column(guard%column)%value)
+         do c = 1_ip, block%n
+            before(c) = stored(block%pair(c))
+            stored(block%pair(c)) = now(c)
+         end do
+      end associate
+      do c = 1_ip, block%n
+         if (.not. suspect(c)) cycle
+         if (passes(guard, bodies, block, c, is_reversed(before(c), now(c)))) passing_pair = block%pair(c)
+      end do
+   end subroutine test_block
+
+   !> Whether the bodies of a contact pass through each other
+   pure logical function passes(guard, bodies, block, c, reversed)
+      type(contact_guard_t), intent(in) :: guard
+      type(bodies_t), intent(in) :: bodies
+      type(contact_block_t), intent(in) :: block
+      integer(ip), intent(in) :: c
+      !> Whether the direction of the contact is reversed
+      logical, intent(in) :: reversed
+
+      associate (i => block%first(c), j => block%second(c))
+         passes = block%area(c) > least_depth*block%length(c)*min(guard%thickness(i), guard%thickness(j))
+         if (.not. passes .or. reversed) return
+         passes = centre_inside(bodies, bodies%radius, i, j)
+         if (.not. passes) passes = centre_inside(bodies, bodies%radius, j, i)
+      end associate
+   end function passes
 
    !> Message about a contact whose bodies pass through each other
    function passing_text(bodies, contacts, radius, c) result(text)

@@ -10,12 +10,15 @@ module polydem_simulation
    use polydem_domain, only: domain_t
    use polydem_energy_balance, only: energy_balance_t, evaluate_balance, balance_t
    use polydem_force_law, only: force_law_t
+   use polydem_force_sums, only: force_sums_t
    use polydem_guards, only: motion_guard_t
    use polydem_integrator, only: integrator_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_neighbours, only: neighbours_t
+   use polydem_passing, only: contact_guard_t
    use polydem_packed_history, only: packed_history_t
    use polydem_prescribed_motion, only: motion_t
+   use polydem_range_results, only: range_results_t
    use polydem_relaxation, only: relaxation_t
    use polydem_settings, only: settings_t
    use polydem_timers, only: timers_t
@@ -49,8 +52,24 @@ module polydem_simulation
       type(boxes_t) :: boxes
       !> Pairs of bodies whose boxes overlap
       type(neighbours_t) :: neighbours
-      !> Contacts of the last step
+      !> Table of the contacts of this step; empty if it was not kept
       type(contacts_t) :: contacts
+      !> Whether to keep the table of contacts; who needs it asks for it before the step
+      logical :: keeps_contacts = .true.
+      !> Whether the table of contacts is that of this step
+      logical :: has_contacts = .false.
+      !> Contacts with fixed bodies, and contacts that are deep or degenerate
+      type(contacts_t) :: walls, suspects
+      !> Number of contacts that this rank owns
+      integer(ip) :: n_contacts = 0_ip
+      !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none
+      integer(ip) :: passing_pair = 0_ip
+      !> Guard of the contacts
+      type(contact_guard_t) :: contact_guard
+      !> Sums of the contact forces on each body
+      type(force_sums_t) :: force_sums
+      !> Results of the ranges of pairs, one per thread
+      type(range_results_t), allocatable :: ranges(:)
       !> Contact history of the pairs
       type(contact_history_t) :: history
       !> Contact history received by a redistribution, until the pairs are found again; unallocated between steps
@@ -105,7 +124,7 @@ contains
       type(balance_t), intent(out) :: balance
 
       call evaluate_balance(self%energy_balance, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
-                            self%incidence, self%contacts, balance)
+                            self%force_sums, self%walls, balance)
    end subroutine compute_balance
 
 end module polydem_simulation

@@ -1,14 +1,13 @@
 !> Exact counters of a simulation, summed over all ranks.
 module polydem_simulation_counters
    use polydem_communication_counters, only: report_communication
-   use polydem_contacts, only: is_degenerate
    use polydem_counters, only: counters_t
    use polydem_kinds, only: ip, lp
    use polydem_ownership, only: owns_pair
    use polydem_simulation, only: simulation_t, sum_pairs, sum_contacts, sum_began, sum_ended, sum_degenerate
    implicit none
    private
-   public :: collect_counts, report_counters, count_own, count_contacts
+   public :: collect_counts, report_counters, count_pairs, count_contacts
 
 contains
 
@@ -55,46 +54,33 @@ contains
                            int(self%neighbours%pairs%n, lp), counters)
    end subroutine report_counters
 
-   !> Add the pairs, the contacts and the contacts without direction that this rank owns to the sums over steps.
-   subroutine count_own(self)
-      !> The simulation, after the contacts of a step were found
+   !> Count the pairs that this rank owns.
+   subroutine count_pairs(self)
+      !> The simulation
       type(simulation_t), intent(inout) :: self
-      integer(lp) :: n(3)
-      integer(ip) :: c, p
+      integer(lp) :: n
+      integer(ip) :: p
 
-      associate (pairs => self%neighbours%pairs, contacts => self%contacts, bodies => self%bodies)
-         n = int([pairs%n, contacts%n, contacts%n_degenerate], lp)
+      associate (pairs => self%neighbours%pairs)
+         n = int(pairs%n, lp)
          if (self%comm%size > 1_ip) then
             do p = 1_ip, pairs%n
-               if (.not. owns_pair(bodies, pairs%first(p), pairs%second(p))) n(1) = n(1) - 1_lp
-            end do
-            do c = 1_ip, contacts%n
-               if (owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
-               n(2) = n(2) - 1_lp
-               if (contacts%n_degenerate > 0_ip) n(3) = n(3) - merge(1_lp, 0_lp, is_degenerate(contacts, c))
+               if (.not. owns_pair(self%bodies, pairs%first(p), pairs%second(p))) n = n - 1_lp
             end do
          end if
       end associate
-      associate (counted => [sum_pairs, sum_contacts, sum_degenerate])
-         self%sums(counted) = self%sums(counted) + n
-      end associate
-   end subroutine count_own
+      self%sums(sum_pairs) = self%sums(sum_pairs) + n
+   end subroutine count_pairs
 
-   !> Number of contacts on all ranks; collective.
+   !> Count the contacts of all ranks. Collective.
    subroutine count_contacts(simulation, n)
       !> The simulation
       type(simulation_t), intent(inout) :: simulation
       !> Number of contacts
       integer(ip), intent(out) :: n
       integer(lp) :: counts(1)
-      integer(ip) :: c
 
-      counts = 0_lp
-      associate (contacts => simulation%contacts)
-         do c = 1_ip, contacts%n
-            if (owns_pair(simulation%bodies, contacts%first(c), contacts%second(c))) counts = counts + 1_lp
-         end do
-      end associate
+      counts = int(simulation%n_contacts, lp)
       call simulation%comm%all_reduce_sum(counts)
       n = int(counts(1), ip)
    end subroutine count_contacts

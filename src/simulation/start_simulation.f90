@@ -54,7 +54,7 @@ contains
       if (allocated(error)) return
       call start_integration(self)
       if (settings%output%energy_balance) call start_energy_balance( &
-         self%energy_balance, self%comm, settings%forces%gravity, self%bodies, self%incidence, self%contacts)
+         self%energy_balance, self%comm, settings%forces%gravity, self%bodies, self%force_sums, self%walls)
       self%timers = timers_t()
    end subroutine start_simulation
 

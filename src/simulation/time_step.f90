@@ -1,19 +1,19 @@
 !> The time step of a simulation.
 module polydem_time_step
-   use polydem_assemble_forces, only: assemble_forces
    use polydem_bodies, only: turn_bodies
    use polydem_box_maker, only: update_boxes
    use polydem_contact_incidence, only: index_contacts
+   use polydem_contact_walk, only: walk_contacts
+   use polydem_contacts, only: copy_contact, set_force_of_contact
    use polydem_energy_balance, only: accumulate_step
    use polydem_errors, only: error_t, raise, run_error
-   use polydem_find_contacts, only: find_contacts
-   use polydem_force_law, only: evaluate_law
+   use polydem_force_sums, only: sum_contacts, total_forces
    use polydem_guards, only: check_contacts, check_motion, check_poses
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_prescribed_motion, only: move_bodies
    use polydem_redistribution, only: restore_history, redistribute
    use polydem_simulation, only: simulation_t, time_of, sum_began, sum_ended
-   use polydem_simulation_counters, only: count_own
+   use polydem_simulation_counters, only: count_pairs
    use polydem_strings, only: to_text
    use polydem_timers, only: stage_boxes, stage_decomposition, stage_forces, stage_integrate, stage_neighbours, &
       stage_overlap
@@ -47,8 +47,8 @@ contains
       call self%integrator%correct(self%dt, self%bodies)
       call self%timers%lap(stage_integrate)
       if (self%settings%output%energy_balance) then
-         call accumulate_step(self%energy_balance, self%settings%forces%gravity, self%bodies, self%incidence, &
-                              self%contacts)
+         call accumulate_step(self%energy_balance, self%settings%forces%gravity, self%bodies, self%force_sums, &
+                              self%walls)
          call self%timers%lap(stage_forces)
       end if
       call check_motion(self%guard, self%bodies, self%step, self%dt, error)
@@ -92,6 +92,7 @@ contains
       real(wp), intent(in) :: dt
       !> Names the step and the contact or the finder that failed
       type(error_t), allocatable, intent(inout) :: error
+      real(dp) :: overlap_share
 
       call self%neighbours%update(self%boxes)
       if (self%neighbours%pairs%contradictions > 0_lp) then
@@ -104,16 +105,15 @@ contains
       call restore_history(self)
       call self%timers%lap(stage_neighbours)
       associate (pairs => self%neighbours%pairs)
-         call find_contacts(self%bodies, pairs%n, pairs%first, pairs%second, self%history, self%contacts)
          self%sums(sum_began) = self%sums(sum_began) + int(pairs%n_began, lp)
          self%sums(sum_ended) = self%sums(sum_ended) + int(pairs%n_ended, lp)
       end associate
-      call count_own(self)
-      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%contacts, self%step, error)
-      call self%timers%lap(stage_overlap)
-      call evaluate_law(self%law, self%bodies, dt, self%contacts, self%history)
-      call index_contacts(self%bodies%n, self%contacts, self%incidence)
-      call assemble_forces(self%settings%forces%gravity, self%incidence, self%contacts, self%bodies)
+      call count_pairs(self)
+      if (allocated(self%law%constraint)) self%keeps_contacts = .true.
+      call walk_contacts(self, dt, overlap_share)
+      call self%timers%divide_lap(stage_overlap, stage_forces, overlap_share)
+      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%suspects, self%step, error)
+      if (self%keeps_contacts) call index_contacts(self%bodies%n, self%contacts, self%incidence)
       if (allocated(self%law%constraint)) call constrain(self, error)
       call self%timers%lap(stage_forces)
    end subroutine compute_forces
@@ -122,11 +122,22 @@ contains
    subroutine constrain(self, error)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: c
 
       if (allocated(error)) return
       call self%law%constraint%apply(self%dt, self%incidence, self%bodies, self%contacts, self%history, error)
       if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
-      call assemble_forces(self%settings%forces%gravity, self%incidence, self%contacts, self%bodies)
+      call sum_contacts(self%bodies, self%contacts, self%force_sums)
+      call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
+      self%walls%n = 0_ip
+      associate (contacts => self%contacts, walls => self%walls, fixed => self%bodies%fixed)
+         do c = 1_ip, contacts%n
+            call set_force_of_contact(contacts, c)
+            if (.not. (fixed(contacts%first(c)) .or. fixed(contacts%second(c)))) cycle
+            walls%n = walls%n + 1_ip
+            call copy_contact(contacts, c, walls, walls%n)
+         end do
+      end associate
    end subroutine constrain
 
    !> Apply the moves of the pair list to the columns of the contact history.
@@ -135,7 +146,7 @@ contains
       integer :: k
 
       associate (pairs => self%neighbours%pairs, history => self%history)
-         call pairs%carry(history%separating_edge, 0_ip)
+         call pairs%carry(history%memory, 0_ip)
          if (.not. allocated(history%column)) return
          do k = 1, size(history%column)
             call pairs%carry(history%column(k)%value, 0.0_wp)

@@ -17,7 +17,7 @@ module polydem_bodies
    use polydem_kinds, only: ip, lp, wp, dp, min_parallel_size
    implicit none
    private
-   public :: bodies_t, turn_bodies, state_hash, state_words
+   public :: bodies_t, turn_bodies, measure_radii, state_hash, state_words
 
    !> Structure of arrays over slots 1..n
    type :: bodies_t
@@ -65,6 +65,8 @@ module polydem_bodies
       integer(ip), allocatable :: vertex_start(:)
       !> Vertices in the body frame, (2, vertex) [m]
       real(wp), allocatable :: shape(:, :)
+      !> Greatest distance of a vertex from the centre of mass [m]
+      real(wp), allocatable :: radius(:)
       !> Vertices turned by the angle, relative to the centre of mass, (2, vertex) [m]
       real(wp), allocatable :: turned(:, :)
    end type bodies_t
@@ -97,6 +99,24 @@ contains
       end do
       !$omp end parallel do
    end subroutine turn_bodies
+
+   !> Compute the radii of all bodies from their shapes.
+   subroutine measure_radii(bodies)
+      !> Bodies; only `radius` changes
+      type(bodies_t), intent(inout) :: bodies
+      real(wp) :: square
+      integer(ip) :: s, v
+
+      if (allocated(bodies%radius)) deallocate (bodies%radius)
+      allocate (bodies%radius(bodies%n))
+      do s = 1_ip, bodies%n
+         square = 0.0_wp
+         do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
+            square = max(square, bodies%shape(1, v)*bodies%shape(1, v) + bodies%shape(2, v)*bodies%shape(2, v))
+         end do
+         bodies%radius(s) = sqrt(square)
+      end do
+   end subroutine measure_radii
 
    !> Hash of the bits of every body's identifier, position, angle and velocities in identifier order.
    !>

@@ -1,6 +1,6 @@
 !> A list to which generators and readers append bodies one by one, and its conversion to the arrays of `bodies_t`.
 module polydem_body_list
-   use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_bodies, only: bodies_t, measure_radii, turn_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
    use polydem_polygon, only: clean_polygon, mass_properties
@@ -225,6 +225,7 @@ contains
       n_vertices = bodies%vertex_start(bodies%n + 1_ip) - 1_ip
       bodies%shape = bodies%shape(:, 1:n_vertices)
       allocate (bodies%turned(2, n_vertices))
+      call measure_radii(bodies)
       bodies%inverse_mass = 0.0_wp
       bodies%inverse_inertia = 0.0_wp
       where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass

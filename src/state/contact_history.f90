@@ -1,8 +1,7 @@
 !> Contact history: the values that force parts, the search for contacts and the guards store per pair of bodies.
 !>
 !> The history follows the list of pairs: entry `p` belongs to pair `p`, moves with it when the list changes, and is set
-!> to
-!> zero when the polygons separate. Force parts and guards declare the columns that they need; there are no others.
+!> to zero when the polygons separate. Force parts and guards declare the columns that they need; there are no others.
 module polydem_contact_history
    use polydem_kinds, only: ip, wp
    implicit none
@@ -30,8 +29,8 @@ module polydem_contact_history
 
    !> Contact history of all pairs
    type :: contact_history_t
-      !> Last edge that separated the pair: +k of the first body, -k of the second, 0 unknown
-      integer(ip), allocatable :: separating_edge(:)
+      !> What the search for overlaps remembers of each pair, 0 nothing. It saves time and changes no result
+      integer(ip), allocatable :: memory(:)
       !> Columns: those of the force law in the order of its parts, then those of the guards; not allocated if there is
       !> none
       type(history_column_t), allocatable :: column(:)

@@ -7,7 +7,7 @@ module polydem_contacts
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: contacts_t, reserve_contacts, is_degenerate
+   public :: contacts_t, reserve_contacts, grow_contacts, copy_contact, set_force_of_contact, is_degenerate
 
    !> Structure of arrays over contacts 1..n; the arrays may be longer
    type :: contacts_t
@@ -103,5 +103,100 @@ contains
       if (contacts%has_cohesion) allocate (contacts%cohesion(m))
       if (contacts%has_twist) allocate (contacts%twist(m))
    end subroutine reserve_contacts
+
+   !> Make room for at least `capacity` contacts without losing contacts 1..n.
+   subroutine grow_contacts(contacts, capacity)
+      !> Table of contacts
+      type(contacts_t), intent(inout) :: contacts
+      !> Number of contacts to make room for
+      integer(ip), intent(in) :: capacity
+      type(contacts_t) :: larger
+      integer(ip) :: c
+
+      if (allocated(contacts%pair)) then
+         if (size(contacts%pair) >= capacity) return
+      end if
+      larger%has_cohesion = contacts%has_cohesion
+      larger%has_twist = contacts%has_twist
+      larger%area_is_effective = contacts%area_is_effective
+      larger%energy_is_quadratic = contacts%energy_is_quadratic
+      call reserve_contacts(larger, 2_ip*capacity)
+      larger%n = contacts%n
+      do c = 1_ip, contacts%n
+         call copy_contact(contacts, c, larger, c)
+      end do
+      call move_contacts(larger, contacts)
+   end subroutine grow_contacts
+
+   !> Copy a contact from one table to another.
+   pure subroutine copy_contact(from, c, to, d)
+      !> The one table
+      type(contacts_t), intent(in) :: from
+      !> Index of the contact in it
+      integer(ip), intent(in) :: c
+      !> The other table, with room for the contact
+      type(contacts_t), intent(inout) :: to
+      !> Index of the copy
+      integer(ip), intent(in) :: d
+
+      to%pair(d) = from%pair(c)
+      to%first(d) = from%first(c)
+      to%second(d) = from%second(c)
+      to%area(d) = from%area(c)
+      to%rate(d) = from%rate(c)
+      to%normal(:, d) = from%normal(:, c)
+      to%moment(:, d) = from%moment(:, c)
+      to%arm_first(:, d) = from%arm_first(:, c)
+      to%arm_second(:, d) = from%arm_second(:, c)
+      to%direction(:, d) = from%direction(:, c)
+      to%length(d) = from%length(c)
+      to%inverse_length(d) = from%inverse_length(c)
+      to%lever(d) = from%lever(c)
+      to%elastic(d) = from%elastic(c)
+      if (to%has_cohesion) to%cohesion(d) = from%cohesion(c)
+      to%normal_force(d) = from%normal_force(c)
+      to%tangential_force(d) = from%tangential_force(c)
+      if (to%has_twist) to%twist(d) = from%twist(c)
+      to%force(:, d) = from%force(:, c)
+   end subroutine copy_contact
+
+   !> Set the force of a contact from its normal and tangential force.
+   pure subroutine set_force_of_contact(contacts, c)
+      !> Table of contacts
+      type(contacts_t), intent(inout) :: contacts
+      !> Index of the contact
+      integer(ip), intent(in) :: c
+
+      contacts%force(1, c) = contacts%normal_force(c)*contacts%direction(1, c) &
+         - contacts%tangential_force(c)*contacts%direction(2, c)
+      contacts%force(2, c) = contacts%normal_force(c)*contacts%direction(2, c) &
+         + contacts%tangential_force(c)*contacts%direction(1, c)
+   end subroutine set_force_of_contact
+
+   !> Replace a table by another without copying its columns.
+   subroutine move_contacts(from, to)
+      type(contacts_t), intent(inout) :: from, to
+
+      to%n = from%n
+      call move_alloc(from%pair, to%pair)
+      call move_alloc(from%first, to%first)
+      call move_alloc(from%second, to%second)
+      call move_alloc(from%area, to%area)
+      call move_alloc(from%rate, to%rate)
+      call move_alloc(from%normal, to%normal)
+      call move_alloc(from%moment, to%moment)
+      call move_alloc(from%arm_first, to%arm_first)
+      call move_alloc(from%arm_second, to%arm_second)
+      call move_alloc(from%direction, to%direction)
+      call move_alloc(from%length, to%length)
+      call move_alloc(from%inverse_length, to%inverse_length)
+      call move_alloc(from%lever, to%lever)
+      call move_alloc(from%elastic, to%elastic)
+      if (from%has_cohesion) call move_alloc(from%cohesion, to%cohesion)
+      call move_alloc(from%normal_force, to%normal_force)
+      call move_alloc(from%tangential_force, to%tangential_force)
+      if (from%has_twist) call move_alloc(from%twist, to%twist)
+      call move_alloc(from%force, to%force)
+   end subroutine move_contacts
 
 end module polydem_contacts

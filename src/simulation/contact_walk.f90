@@ -1,0 +1,210 @@
+!> From pairs to forces on bodies in one walk over blocks of contacts: overlaps, force law, guards, sums per body.
+!>
+!> A block of contacts stays in the first-level cache from its overlaps to the sums of its forces; a table of contacts is
+!> written only for those who ask for it. Each thread walks over one range of pairs. Sums of forces are in the same order
+!> for any number of threads (see `polydem_force_sums`).
+module polydem_contact_walk
+   use omp_lib, only: omp_get_max_threads
+   use polydem_clock, only: wall_seconds
+   use polydem_contact_block, only: block_size, contact_block_t
+   use polydem_contact_rows, only: append_rows, gather_rows, start_rows
+   use polydem_contacts, only: contacts_t
+   use polydem_fill_block, only: fill_block
+   use polydem_force_sums, only: add_late_terms, add_terms, contact_terms_t, start_sums, terms_of_block, total_forces
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_ownership, only: owns_pair
+   use polydem_pair_ranges, only: divide_pairs, most_ranges
+   use polydem_passing, only: test_block
+   use polydem_range_results, only: range_results_t
+   use polydem_simulation, only: simulation_t, sum_contacts_own => sum_contacts, sum_degenerate
+   implicit none
+   private
+   public :: walk_contacts
+
+   !> One of so many blocks is timed
+   integer(ip), parameter :: timed_blocks = 8_ip
+
+contains
+
+   !> Compute the forces on all bodies from the pairs of this step.
+   subroutine walk_contacts(self, dt, overlap_share)
+      !> The simulation with its pair list; forces, contact history and the results of the walk are set
+      type(simulation_t), intent(inout) :: self
+      !> Time since the last evaluation [s]
+      real(wp), intent(in) :: dt
+      !> Share of the time spent in the search for overlaps, in a walk of which some blocks were timed
+      real(dp), intent(out) :: overlap_share
+      integer(ip) :: ends(0:most_ranges), last(most_ranges)
+      integer(ip) :: n, r, k, low, high
+
+      associate (pairs => self%neighbours%pairs)
+         n = min(int(omp_get_max_threads(), ip), most_ranges)
+         call divide_pairs(pairs%n, pairs%first, n, ends)
+         call reserve_ranges(self, n)
+         do r = 1_ip, n - 1_ip
+            last(r) = pairs%first(ends(r))
+         end do
+         last(n) = self%bodies%n
+      end associate
+      call start_sums(self%bodies%n, self%force_sums)
+      !$omp parallel num_threads(n) default(none) shared(self, dt, ends, last, n) private(r, k, low, high)
+      !$omp do schedule(static, 1)
+      do r = 1_ip, n
+         call walk_range(self, dt, ends(r - 1_ip:r), last(r), self%ranges(r))
+      end do
+      !$omp end do
+      ! Bodies beyond the first range share their late terms out evenly.
+      !$omp do schedule(static, 1)
+      do k = 1_ip, n
+         low = last(1) + share_of(self%bodies%n - last(1), k - 1_ip, n) + 1_ip
+         high = last(1) + share_of(self%bodies%n - last(1), k, n)
+         do r = n - 1_ip, 1_ip, -1_ip
+            call add_late_terms(self%ranges(r)%late, low, high, self%force_sums)
+         end do
+      end do
+      !$omp end do
+      !$omp end parallel
+      call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
+      call gather_results(self, n)
+      overlap_share = 0.5_dp
+      associate (seconds => self%ranges(1)%seconds)
+         if (sum(seconds) > 0.0_dp) overlap_share = seconds(1)/sum(seconds)
+      end associate
+   end subroutine walk_contacts
+
+   !> Number of n items before part k + 1 of n_parts
+   pure integer(ip) function share_of(n, k, n_parts)
+      integer(ip), intent(in) :: n, k, n_parts
+
+      share_of = int(int(n, lp)*int(k, lp)/int(n_parts, lp), ip)
+   end function share_of
+
+   !> Make room for the results of n ranges.
+   subroutine reserve_ranges(self, n)
+      type(simulation_t), intent(inout) :: self
+      integer(ip), intent(in) :: n
+
+      if (allocated(self%ranges)) then
+         if (size(self%ranges) >= n) return
+         deallocate (self%ranges)
+      end if
+      allocate (self%ranges(n))
+   end subroutine reserve_ranges
+
+   !> Walk over the pairs of one range in descending order.
+   subroutine walk_range(self, dt, ends, last, results)
+      type(simulation_t), intent(inout) :: self
+      real(wp), intent(in) :: dt
+      !> Index of the last pair before the range, and of its last pair
+      integer(ip), intent(in) :: ends(2)
+      !> Last slot whose sums this thread may change
+      integer(ip), intent(in) :: last
+      type(range_results_t), intent(inout) :: results
+      type(contact_block_t) :: block
+      type(contact_terms_t) :: terms
+      real(dp) :: clock(3)
+      integer(ip) :: next, n_blocks
+      logical :: timed
+
+      call start_results(self%contacts, results)
+      next = ends(2)
+      n_blocks = 0_ip
+      do while (next > ends(1))
+         timed = mod(n_blocks, timed_blocks) == 0_ip
+         n_blocks = n_blocks + 1_ip
+         if (timed) clock(1) = wall_seconds()
+         associate (pairs => self%neighbours%pairs)
+            call fill_block(self%bodies, pairs%first, pairs%second, self%law%needs_effective_area, ends(1) + 1_ip, &
+                            next, self%history, block)
+         end associate
+         if (timed) clock(2) = wall_seconds()
+         call self%law%apply(self%bodies, dt, block, self%history)
+         call terms_of_block(block, terms)
+         call add_terms(block, terms, last, self%force_sums, results%late)
+         call keep_contacts(self, block, results)
+         if (.not. timed) cycle
+         clock(3) = wall_seconds()
+         results%seconds = results%seconds + (clock(2:3) - clock(1:2))
+      end do
+   end subroutine walk_range
+
+   !> Empty the results of a range.
+   subroutine start_results(contacts, results)
+      type(contacts_t), intent(in) :: contacts
+      type(range_results_t), intent(inout) :: results
+
+      results%late%n = 0_ip
+      call start_rows(contacts, results%all)
+      call start_rows(contacts, results%walls)
+      call start_rows(contacts, results%suspects)
+      results%n_contacts = 0_ip
+      results%n_degenerate = 0_ip
+      results%passing_pair = 0_ip
+      results%seconds = 0.0_dp
+   end subroutine start_results
+
+   !> Count the contacts of a block, test them by the guards, and keep those that are needed after the walk.
+   subroutine keep_contacts(self, block, results)
+      type(simulation_t), intent(inout) :: self
+      type(contact_block_t), intent(in) :: block
+      type(range_results_t), intent(inout) :: results
+      logical :: chosen(block_size)
+      integer(ip) :: c
+
+      call count_block(self, block, results)
+      if (self%keeps_contacts) call append_rows(block, results%all, with_forces=.true.)
+      do c = 1_ip, block%n
+         chosen(c) = self%bodies%fixed(block%first(c)) .or. self%bodies%fixed(block%second(c))
+      end do
+      if (any(chosen(:block%n))) call append_rows(block, results%walls, with_forces=.true., chosen=chosen)
+      call test_block(self%contact_guard, self%bodies, block, self%history, chosen, results%passing_pair)
+      if (any(chosen(:block%n))) call append_rows(block, results%suspects, with_forces=.true., chosen=chosen)
+   end subroutine keep_contacts
+
+   !> Count the contacts that this rank owns, and those without direction.
+   subroutine count_block(self, block, results)
+      type(simulation_t), intent(in) :: self
+      type(contact_block_t), intent(in) :: block
+      type(range_results_t), intent(inout) :: results
+      integer(ip) :: c, i, j
+
+      if (self%comm%size == 1_ip) then
+         results%n_contacts = results%n_contacts + block%n
+         results%n_degenerate = results%n_degenerate + nint(sum(block%degenerate(:block%n)), ip)
+         return
+      end if
+      do c = 1_ip, block%n
+         i = min(block%first(c), block%second(c))
+         j = max(block%first(c), block%second(c))
+         if (.not. owns_pair(self%bodies, i, j)) cycle
+         results%n_contacts = results%n_contacts + 1_ip
+         if (block%degenerate(c) > 0.0_wp) results%n_degenerate = results%n_degenerate + 1_ip
+      end do
+   end subroutine count_block
+
+   !> Join the results of n ranges.
+   subroutine gather_results(self, n)
+      type(simulation_t), intent(inout) :: self
+      integer(ip), intent(in) :: n
+      integer(ip) :: r
+
+      self%has_contacts = self%keeps_contacts
+      self%contacts%n = 0_ip
+      self%contacts%n_degenerate = 0_ip
+      self%n_contacts = 0_ip
+      self%passing_pair = 0_ip
+      associate (ranges => self%ranges(:n))
+         do r = n, 1_ip, -1_ip
+            self%n_contacts = self%n_contacts + ranges(r)%n_contacts
+            self%contacts%n_degenerate = self%contacts%n_degenerate + ranges(r)%n_degenerate
+            if (ranges(r)%passing_pair > 0_ip) self%passing_pair = ranges(r)%passing_pair
+         end do
+         if (self%keeps_contacts) call gather_rows(ranges%all, self%contacts)
+         call gather_rows(ranges%walls, self%walls)
+         call gather_rows(ranges%suspects, self%suspects)
+      end associate
+      self%sums(sum_contacts_own) = self%sums(sum_contacts_own) + int(self%n_contacts, lp)
+      self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(self%contacts%n_degenerate, lp)
+   end subroutine gather_results
+
+end module polydem_contact_walk

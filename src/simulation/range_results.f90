@@ -1,0 +1,28 @@
+!> What one thread finds in its range of pairs. The arrays stay from step to step, so that a step allocates no memory.
+module polydem_range_results
+   use polydem_contact_rows, only: contact_rows_t
+   use polydem_force_sums, only: late_terms_t
+   use polydem_kinds, only: dp, ip
+   implicit none
+   private
+   public :: range_results_t
+
+   !> Results of a range of pairs
+   type :: range_results_t
+      !> Terms of bodies beyond the range
+      type(late_terms_t) :: late
+      !> All contacts, if the table is asked for
+      type(contact_rows_t) :: all
+      !> Contacts with fixed bodies
+      type(contact_rows_t) :: walls
+      !> Contacts that are deep or degenerate
+      type(contact_rows_t) :: suspects
+      !> Number of contacts that this rank owns, and of those without direction
+      integer(ip) :: n_contacts = 0_ip, n_degenerate = 0_ip
+      !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none
+      integer(ip) :: passing_pair = 0_ip
+      !> Time spent in the search for overlaps and in the forces, measured for some of the blocks [s]
+      real(dp) :: seconds(2) = 0.0_dp
+   end type range_results_t
+
+end module polydem_range_results

@@ -1,0 +1,208 @@
+!> A block of contacts: what one thread works on between the overlaps of pairs and the forces on bodies.
+!>
+!> A block has fixed size and stays in the first-level cache. Its columns are like those of the table of contacts
+!> (`contacts_t`), but with the contact as first index, so that loops over contacts vectorise. In a block the *first*
+!> body of a contact is the one with the smaller radius; of equal radii it is the one with the lower identifier. These
+!> roles never change. A table has the body with the lower identifier first. Exchanging the bodies of a contact changes
+!> the signs of normal, direction, lever and twist, and nothing else.
+module polydem_contact_block
+   use polydem_bodies, only: bodies_t
+   use polydem_contacts, only: contacts_t, is_degenerate, set_force_of_contact
+   use polydem_kinds, only: ip, wp
+   implicit none
+   private
+   public :: contact_block_t, block_size, load_block, store_forces, store_contact, copy_motion, is_exchanged
+
+   !> Largest number of contacts in a block
+   integer(ip), parameter :: block_size = 64_ip
+
+   !> Structure of arrays over contacts 1..n
+   type :: contact_block_t
+      !> Number of contacts
+      integer(ip) :: n = 0_ip
+      !> Index in the pair list
+      integer(ip) :: pair(block_size) = 0_ip
+      !> Slots of the first and of the second body
+      integer(ip) :: first(block_size) = 0_ip, second(block_size) = 0_ip
+      !> Area of the overlap, true or effective [m2]
+      real(wp) :: area(block_size)
+      !> Rate of change of the area [m2/s]
+      real(wp) :: rate(block_size)
+      !> Integral of the outward normal over the outline of the first body inside the second, (contact, x or y) [m]
+      real(wp) :: normal(block_size, 2)
+      !> Moments of that integral about the centres of the first and of the second body, (contact, body) [m2]
+      real(wp) :: moment(block_size, 2)
+      !> Centroid of the overlap relative to the centre of each body, (contact, x or y) [m]
+      real(wp) :: arm_first(block_size, 2), arm_second(block_size, 2)
+      !> Unit vector from the second body to the first, (contact, x or y)
+      real(wp) :: direction(block_size, 2)
+      !> Length of the contact |normal|, or the square root of the area if degenerate [m]
+      real(wp) :: length(block_size)
+      !> 1 for a degenerate contact, else 0
+      real(wp) :: degenerate(block_size)
+      !> Velocities of the centres of both bodies, (contact, x or y) [m/s]
+      real(wp) :: velocity_first(block_size, 2), velocity_second(block_size, 2)
+      !> Angular velocities of the first and of the second body, (contact, body) [rad/s]
+      real(wp) :: angular_velocity(block_size, 2)
+      !> Sum of the reciprocal masses [m/kg]
+      real(wp) :: mobility(block_size)
+      !> Reciprocal of the characteristic length of the force model [1/m]
+      real(wp) :: inverse_length(block_size)
+      !> Torque of the normal force about the centroid of the overlap, on the first body, per unit of force [m]
+      real(wp) :: lever(block_size)
+      !> Elastic repulsion of the overlap, a part of the normal force: not negative [N/m]
+      real(wp) :: elastic(block_size)
+      !> Part of the normal force whose work is elastic, too, but which may attract: negative in attraction [N/m]
+      real(wp) :: cohesion(block_size)
+      !> Normal force, positive in repulsion: `elastic`, `cohesion` and all other normal forces [N/m]
+      real(wp) :: normal_force(block_size)
+      !> Tangential force on the first body along (-direction_y, direction_x) [N/m]
+      real(wp) :: tangential_force(block_size)
+      !> Torque on the first body in addition to those of the forces; the opposite acts on the second [N]
+      real(wp) :: twist(block_size)
+   end type contact_block_t
+
+contains
+
+   !> Whether the first body of a contact is the one with the higher slot, the second of the table
+   pure logical function is_exchanged(bodies, low, high)
+      !> Bodies with their radii
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the two bodies, low < high
+      integer(ip), intent(in) :: low, high
+
+      is_exchanged = bodies%radius(high) < bodies%radius(low)
+   end function is_exchanged
+
+   !> Copy velocities and masses of the bodies to the contacts of a block.
+   pure subroutine copy_motion(bodies, block)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts; `velocity_first` to `mobility` are set
+      type(contact_block_t), intent(inout) :: block
+      integer(ip) :: c, i, j
+
+      do c = 1_ip, block%n
+         i = block%first(c)
+         j = block%second(c)
+         block%velocity_first(c, 1) = bodies%velocity(1, i)
+         block%velocity_first(c, 2) = bodies%velocity(2, i)
+         block%velocity_second(c, 1) = bodies%velocity(1, j)
+         block%velocity_second(c, 2) = bodies%velocity(2, j)
+         block%angular_velocity(c, 1) = bodies%angular_velocity(i)
+         block%angular_velocity(c, 2) = bodies%angular_velocity(j)
+         block%mobility(c) = bodies%inverse_mass(i) + bodies%inverse_mass(j)
+      end do
+   end subroutine copy_motion
+
+   !> Copy some contacts of a table into a block.
+   pure subroutine load_block(bodies, contacts, low, high, block)
+      !> Bodies with the velocities of this step
+      type(bodies_t), intent(in) :: bodies
+      !> Table of contacts
+      type(contacts_t), intent(in) :: contacts
+      !> First and last contact, at most `block_size` contacts. They are copied in descending order
+      integer(ip), intent(in) :: low, high
+      !> The block
+      type(contact_block_t), intent(inout) :: block
+      real(wp) :: side
+      integer(ip) :: b, c
+      logical :: exchanged
+
+      block%n = high - low + 1_ip
+      do b = 1_ip, block%n
+         c = high - b + 1_ip
+         block%pair(b) = contacts%pair(c)
+         exchanged = is_exchanged(bodies, contacts%first(c), contacts%second(c))
+         if (exchanged) then
+            block%first(b) = contacts%second(c)
+            block%second(b) = contacts%first(c)
+            block%moment(b, :) = [-contacts%moment(2, c), -contacts%moment(1, c)]
+            block%arm_first(b, :) = contacts%arm_second(:, c)
+            block%arm_second(b, :) = contacts%arm_first(:, c)
+         else
+            block%first(b) = contacts%first(c)
+            block%second(b) = contacts%second(c)
+            block%moment(b, :) = contacts%moment(:, c)
+            block%arm_first(b, :) = contacts%arm_first(:, c)
+            block%arm_second(b, :) = contacts%arm_second(:, c)
+         end if
+         side = merge(-1.0_wp, 1.0_wp, exchanged)
+         block%area(b) = contacts%area(c)
+         block%rate(b) = contacts%rate(c)
+         block%normal(b, :) = side*contacts%normal(:, c)
+         block%direction(b, :) = side*contacts%direction(:, c)
+         block%length(b) = contacts%length(c)
+         block%degenerate(b) = merge(1.0_wp, 0.0_wp, is_degenerate(contacts, c))
+         block%inverse_length(b) = contacts%inverse_length(c)
+         block%lever(b) = side*contacts%lever(c)
+         block%elastic(b) = contacts%elastic(c)
+         block%normal_force(b) = contacts%normal_force(c)
+         block%tangential_force(b) = contacts%tangential_force(c)
+         block%cohesion(b) = 0.0_wp
+         if (contacts%has_cohesion) block%cohesion(b) = contacts%cohesion(c)
+         block%twist(b) = 0.0_wp
+         if (contacts%has_twist) block%twist(b) = side*contacts%twist(c)
+      end do
+      call copy_motion(bodies, block)
+   end subroutine load_block
+
+   !> Copy what the force law has computed for contact b of a block to contact c of a table, and set `force`.
+   pure subroutine store_forces(block, b, contacts, c)
+      !> The block
+      type(contact_block_t), intent(in) :: block
+      !> Index in the block
+      integer(ip), intent(in) :: b
+      !> Table of contacts; `first` and `direction` of contact c must be set
+      type(contacts_t), intent(inout) :: contacts
+      !> Index in the table
+      integer(ip), intent(in) :: c
+      real(wp) :: side
+
+      side = merge(1.0_wp, -1.0_wp, contacts%first(c) == block%first(b))
+      contacts%inverse_length(c) = block%inverse_length(b)
+      contacts%lever(c) = side*block%lever(b)
+      contacts%elastic(c) = block%elastic(b)
+      contacts%normal_force(c) = block%normal_force(b)
+      contacts%tangential_force(c) = block%tangential_force(b)
+      if (contacts%has_cohesion) contacts%cohesion(c) = block%cohesion(b)
+      if (contacts%has_twist) contacts%twist(c) = side*block%twist(b)
+      call set_force_of_contact(contacts, c)
+   end subroutine store_forces
+
+   !> Copy contact b of a block to contact c of a table.
+   pure subroutine store_contact(block, b, contacts, c)
+      !> The block
+      type(contact_block_t), intent(in) :: block
+      !> Index in the block
+      integer(ip), intent(in) :: b
+      !> Table of contacts
+      type(contacts_t), intent(inout) :: contacts
+      !> Index in the table
+      integer(ip), intent(in) :: c
+      real(wp) :: side
+
+      contacts%pair(c) = block%pair(b)
+      if (block%first(b) < block%second(b)) then
+         side = 1.0_wp
+         contacts%first(c) = block%first(b)
+         contacts%second(c) = block%second(b)
+         contacts%moment(:, c) = block%moment(b, :)
+         contacts%arm_first(:, c) = block%arm_first(b, :)
+         contacts%arm_second(:, c) = block%arm_second(b, :)
+      else
+         side = -1.0_wp
+         contacts%first(c) = block%second(b)
+         contacts%second(c) = block%first(b)
+         contacts%moment(:, c) = [-block%moment(b, 2), -block%moment(b, 1)]
+         contacts%arm_first(:, c) = block%arm_second(b, :)
+         contacts%arm_second(:, c) = block%arm_first(b, :)
+      end if
+      contacts%area(c) = block%area(b)
+      contacts%rate(c) = block%rate(b)
+      contacts%normal(:, c) = side*block%normal(b, :)
+      contacts%direction(:, c) = side*block%direction(b, :)
+      contacts%length(c) = block%length(b)
+   end subroutine store_contact
+
+end module polydem_contact_block

@@ -1,0 +1,82 @@
+!> Contacts that one thread has collected from its blocks, and their union in one table.
+!>
+!> Threads walk over ranges of pairs in descending order. The table is in ascending order.
+module polydem_contact_rows
+   use polydem_contact_block, only: contact_block_t, store_contact, store_forces
+   use polydem_contacts, only: contacts_t, copy_contact, grow_contacts, reserve_contacts
+   use polydem_kinds, only: ip, min_parallel_size
+   implicit none
+   private
+   public :: contact_rows_t, start_rows, append_rows, gather_rows
+
+   !> Contacts of one thread
+   type :: contact_rows_t
+      !> The contacts, in descending order
+      type(contacts_t) :: contacts
+   end type contact_rows_t
+
+contains
+
+   !> Empty the rows. They get the same columns as a table.
+   pure subroutine start_rows(contacts, rows)
+      !> The table
+      type(contacts_t), intent(in) :: contacts
+      !> The rows
+      type(contact_rows_t), intent(inout) :: rows
+
+      rows%contacts%n = 0_ip
+      rows%contacts%has_cohesion = contacts%has_cohesion
+      rows%contacts%has_twist = contacts%has_twist
+   end subroutine start_rows
+
+   !> Append contacts of a block.
+   subroutine append_rows(block, rows, with_forces, chosen)
+      !> The block
+      type(contact_block_t), intent(in) :: block
+      !> The rows
+      type(contact_rows_t), intent(inout) :: rows
+      !> Whether the block has forces
+      logical, intent(in) :: with_forces
+      !> Contacts to append, (block%n) or longer; default: all
+      logical, intent(in), optional :: chosen(:)
+      integer(ip) :: b
+
+      associate (table => rows%contacts)
+         call grow_contacts(table, table%n + block%n)
+         do b = 1_ip, block%n
+            if (present(chosen)) then
+               if (.not. chosen(b)) cycle
+            end if
+            table%n = table%n + 1_ip
+            call store_contact(block, b, table, table%n)
+            if (with_forces) call store_forces(block, b, table, table%n)
+         end do
+      end associate
+   end subroutine append_rows
+
+   !> Join the rows of all threads in one table.
+   subroutine gather_rows(rows, contacts)
+      !> Rows of the ranges, in ascending order of the ranges
+      type(contact_rows_t), intent(in) :: rows(:)
+      !> The table; its columns are replaced
+      type(contacts_t), intent(inout) :: contacts
+      integer(ip) :: base(0:size(rows)), c
+      integer :: r
+
+      base(0) = 0_ip
+      do r = 1, size(rows)
+         base(r) = base(r - 1) + rows(r)%contacts%n
+      end do
+      contacts%n = base(size(rows))
+      call reserve_contacts(contacts, contacts%n)
+      !$omp parallel do schedule(static, 1) if (contacts%n > min_parallel_size) default(none) &
+      !$omp    shared(rows, contacts, base) private(r, c)
+      do r = 1, size(rows)
+         do c = 1_ip, rows(r)%contacts%n
+            call copy_contact(rows(r)%contacts, c, contacts, base(r) + 1_ip - c)
+         end do
+      end do
+      !$omp end parallel do
+   end subroutine gather_rows
+
+end module polydem_contact_rows

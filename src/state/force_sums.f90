@@ -1,0 +1,265 @@
+!> Sums of the contact forces on each body, separately for elastic, normal and tangential forces.
+!>
+!> The force of a contact acts at the centroid of the overlap. Two torques are added: `lever` times the normal force,
+!> because its line of action may miss the centroid, and `twist`, the contact's own torque. The second body feels the
+!> opposite force and torques.
+!>
+!> Each body sums over its contacts in descending order of the partner's identifier. A walk over all contacts in
+!> descending order adds them in this order. So does every thread that walks over a range of contacts and keeps the
+!> terms of bodies beyond its range: they follow those of the range itself, in descending order of the ranges. The sums
+!> therefore have the same bits for any number of threads and ranks, and need no index from bodies to contacts.
+module polydem_force_sums
+   use polydem_bodies, only: bodies_t
+   use polydem_contact_block, only: block_size, contact_block_t, load_block
+   use polydem_contacts, only: contacts_t
+   use polydem_kinds, only: ip, wp, min_parallel_size
+   implicit none
+   private
+   public :: force_sums_t, contact_terms_t, late_terms_t, n_terms, sum_elastic, sum_normal, sum_tangential, sum_energy
+   public :: start_sums, terms_of_block, term_of, add_terms, add_late_terms, sum_contacts, total_forces, set_force
+
+   !> Rows of a term: force along x and y and torque of the elastic forces with cohesion, of all normal forces with the
+   !> twist, and of the tangential forces [N/m, N/m, N]; elastic energy [J/m]
+   integer, parameter :: sum_elastic = 0, sum_normal = 3, sum_tangential = 6, sum_energy = 10
+   !> Number of rows
+   integer, parameter :: n_terms = 10
+
+   !> Sums of all bodies
+   type :: force_sums_t
+      !> Sums over the contacts of each body, (n_terms, slot)
+      real(wp), allocatable :: value(:, :)
+   end type force_sums_t
+
+   !> Terms of the contacts of a block
+   type :: contact_terms_t
+      !> Terms of the first body of each contact, (contact, row)
+      real(wp) :: first(block_size, n_terms)
+      !> Torques on the second body of each contact, (contact, kind of force); its forces are opposite to the others
+      real(wp) :: torque_second(block_size, 3)
+   end type contact_terms_t
+
+   !> Terms of bodies beyond the range of a thread
+   type :: late_terms_t
+      !> Number of terms
+      integer(ip) :: n = 0_ip
+      !> Slot of the body of each term, (n) or longer
+      integer(ip), allocatable :: slot(:)
+      !> The terms, (n_terms, n) or longer
+      real(wp), allocatable :: value(:, :)
+   end type late_terms_t
+
+contains
+
+   !> Set the sums of all bodies to zero.
+   subroutine start_sums(n, sums)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> Sums of the bodies
+      type(force_sums_t), intent(inout) :: sums
+      integer(ip) :: s
+
+      if (allocated(sums%value)) then
+         if (size(sums%value, 2) /= n) deallocate (sums%value)
+      end if
+      if (.not. allocated(sums%value)) allocate (sums%value(n_terms, n))
+      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(n, sums) private(s)
+      do s = 1_ip, n
+         sums%value(:, s) = 0.0_wp
+      end do
+      !$omp end parallel do
+   end subroutine start_sums
+
+   !> Compute the terms of all contacts of a block.
+   pure subroutine terms_of_block(block, terms)
+      !> Contacts with their forces
+      type(contact_block_t), intent(in) :: block
+      !> The terms
+      type(contact_terms_t), intent(inout) :: terms
+      real(wp) :: elastic, normal, tangential, x, y, lever_first, lever_second
+      integer(ip) :: c
+
+      associate (first => terms%first, second => terms%torque_second)
+         do c = 1_ip, block%n
+            x = block%direction(c, 1)
+            y = block%direction(c, 2)
+            elastic = block%elastic(c) + block%cohesion(c)
+            normal = block%normal_force(c)
+            tangential = block%tangential_force(c)
+            lever_first = (block%arm_first(c, 1)*y - block%arm_first(c, 2)*x) + block%lever(c)
+            lever_second = (block%arm_second(c, 1)*y - block%arm_second(c, 2)*x) + block%lever(c)
+            first(c, 1) = elastic*x
+            first(c, 2) = elastic*y
+            first(c, 3) = elastic*lever_first
+            second(c, 1) = elastic*lever_second
+            first(c, 4) = normal*x
+            first(c, 5) = normal*y
+            first(c, 6) = normal*lever_first + block%twist(c)
+            second(c, 2) = normal*lever_second + block%twist(c)
+            first(c, 7) = -tangential*y
+            first(c, 8) = tangential*x
+            first(c, 9) = tangential*(block%arm_first(c, 1)*x + block%arm_first(c, 2)*y)
+            second(c, 3) = tangential*(block%arm_second(c, 1)*x + block%arm_second(c, 2)*y)
+            first(c, 10) = 0.25_wp*block%elastic(c)*block%area(c)/block%length(c)
+         end do
+      end associate
+   end subroutine terms_of_block
+
+   !> Term of one body of a contact. The energy of a contact is divided between its two bodies.
+   pure function term_of(terms, c, is_first) result(term)
+      !> Terms of a block
+      type(contact_terms_t), intent(in) :: terms
+      !> Index in the block
+      integer(ip), intent(in) :: c
+      !> Whether the body is the first of the contact
+      logical, intent(in) :: is_first
+      real(wp) :: term(n_terms)
+
+      term = terms%first(c, :)
+      if (is_first) return
+      term(1:9) = -term(1:9)
+      term(3) = -terms%torque_second(c, 1)
+      term(6) = -terms%torque_second(c, 2)
+      term(9) = -terms%torque_second(c, 3)
+   end function term_of
+
+   !> Add the terms of a block to the sums of its bodies, in the order of the block. Terms of bodies after the last slot
+   !> of this thread are appended to the late terms.
+   pure subroutine add_terms(block, terms, last, sums, late)
+      !> Contacts in descending order
+      type(contact_block_t), intent(in) :: block
+      !> Their terms
+      type(contact_terms_t), intent(in) :: terms
+      !> Last slot whose sums this thread may change
+      integer(ip), intent(in) :: last
+      !> Sums of the bodies
+      type(force_sums_t), intent(inout) :: sums
+      !> Terms of the bodies after `last`
+      type(late_terms_t), intent(inout) :: late
+      integer(ip) :: c, i, j
+      real(wp) :: t(n_terms)
+
+      call reserve_late(late, block%n)
+      do c = 1_ip, block%n
+         i = block%first(c)
+         j = block%second(c)
+         t = terms%first(c, :)
+         if (i <= last) then
+            sums%value(:, i) = sums%value(:, i) + t
+         else
+            call append_late(i, t, late)
+         end if
+         t(1:9) = -t(1:9)
+         t(3) = -terms%torque_second(c, 1)
+         t(6) = -terms%torque_second(c, 2)
+         t(9) = -terms%torque_second(c, 3)
+         if (j <= last) then
+            sums%value(:, j) = sums%value(:, j) + t
+         else
+            call append_late(j, t, late)
+         end if
+      end do
+   end subroutine add_terms
+
+   !> Make room for more late terms.
+   pure subroutine reserve_late(late, more)
+      type(late_terms_t), intent(inout) :: late
+      integer(ip), intent(in) :: more
+      integer(ip), allocatable :: slot(:)
+      real(wp), allocatable :: value(:, :)
+      integer(ip) :: m
+
+      if (.not. allocated(late%slot)) allocate (late%slot(block_size), late%value(n_terms, block_size))
+      if (late%n + more <= size(late%slot)) return
+      m = 2_ip*(late%n + more)
+      allocate (slot(m), value(n_terms, m))
+      slot(:late%n) = late%slot(:late%n)
+      value(:, :late%n) = late%value(:, :late%n)
+      call move_alloc(slot, late%slot)
+      call move_alloc(value, late%value)
+   end subroutine reserve_late
+
+   !> Append a term to the late terms.
+   pure subroutine append_late(slot, term, late)
+      integer(ip), intent(in) :: slot
+      real(wp), intent(in) :: term(n_terms)
+      type(late_terms_t), intent(inout) :: late
+
+      late%n = late%n + 1_ip
+      late%slot(late%n) = slot
+      late%value(:, late%n) = term
+   end subroutine append_late
+
+   !> Add late terms to the sums of some bodies, in the order of the terms.
+   pure subroutine add_late_terms(late, low, high, sums)
+      !> Late terms of one thread
+      type(late_terms_t), intent(in) :: late
+      !> First and last slot whose sums may change
+      integer(ip), intent(in) :: low, high
+      !> Sums of the bodies
+      type(force_sums_t), intent(inout) :: sums
+      integer(ip) :: k
+
+      do k = 1_ip, late%n
+         associate (s => late%slot(k))
+            if (s >= low .and. s <= high) sums%value(:, s) = sums%value(:, s) + late%value(:, k)
+         end associate
+      end do
+   end subroutine add_late_terms
+
+   !> Sum the forces of a whole table of contacts.
+   subroutine sum_contacts(bodies, contacts, sums)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with their forces, in ascending order
+      type(contacts_t), intent(in) :: contacts
+      !> Sums of the bodies
+      type(force_sums_t), intent(inout) :: sums
+      type(contact_block_t) :: block
+      type(contact_terms_t) :: terms
+      type(late_terms_t) :: none
+      integer(ip) :: high
+
+      call start_sums(bodies%n, sums)
+      do high = contacts%n, 1_ip, -block_size
+         call load_block(bodies, contacts, max(1_ip, high - block_size + 1_ip), high, block)
+         call terms_of_block(block, terms)
+         call add_terms(block, terms, bodies%n, sums, none)
+      end do
+   end subroutine sum_contacts
+
+   !> Set the forces and torques on all bodies from the sums, and add gravity to free bodies.
+   subroutine total_forces(gravity, sums, bodies)
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Sums of the bodies
+      type(force_sums_t), intent(in) :: sums
+      !> Bodies; `force` and `torque` are set
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: s
+
+      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
+      !$omp    shared(gravity, sums, bodies) private(s)
+      do s = 1_ip, bodies%n
+         call set_force(sums%value(:, s), s, bodies)
+         if (bodies%fixed(s)) cycle
+         bodies%force(1, s) = bodies%force(1, s) + bodies%mass(s)*gravity(1)
+         bodies%force(2, s) = bodies%force(2, s) + bodies%mass(s)*gravity(2)
+      end do
+      !$omp end parallel do
+   end subroutine total_forces
+
+   !> Set the force and torque on one body from the sum of its terms.
+   pure subroutine set_force(total, s, bodies)
+      !> Sum of the terms
+      real(wp), intent(in) :: total(n_terms)
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      !> Bodies; `force` and `torque` of body s are set
+      type(bodies_t), intent(inout) :: bodies
+
+      bodies%force(1, s) = total(sum_normal + 1) + total(sum_tangential + 1)
+      bodies%force(2, s) = total(sum_normal + 2) + total(sum_tangential + 2)
+      bodies%torque(s) = total(sum_normal + 3) + total(sum_tangential + 3)
+   end subroutine set_force
+
+end module polydem_force_sums
