@@ -8,7 +8,7 @@ module polydem_contact_walk
    use polydem_clock, only: wall_seconds
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_rows, only: append_rows, gather_rows, start_rows
-   use polydem_contacts, only: contacts_t
+   use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_fill_block, only: fill_block
    use polydem_force_sums, only: add_late_terms, add_terms, contact_terms_t, start_sums, terms_of_block, total_forces
    use polydem_kinds, only: dp, ip, lp, wp
@@ -186,25 +186,29 @@ contains
    subroutine gather_results(self, n)
       type(simulation_t), intent(inout) :: self
       integer(ip), intent(in) :: n
-      integer(ip) :: r
+      integer(ip) :: c, r, n_degenerate
 
       self%has_contacts = self%keeps_contacts
       self%contacts%n = 0_ip
-      self%contacts%n_degenerate = 0_ip
+      n_degenerate = 0_ip
       self%n_contacts = 0_ip
       self%passing_pair = 0_ip
       associate (ranges => self%ranges(:n))
          do r = n, 1_ip, -1_ip
             self%n_contacts = self%n_contacts + ranges(r)%n_contacts
-            self%contacts%n_degenerate = self%contacts%n_degenerate + ranges(r)%n_degenerate
+            n_degenerate = n_degenerate + ranges(r)%n_degenerate
             if (ranges(r)%passing_pair > 0_ip) self%passing_pair = ranges(r)%passing_pair
          end do
          if (self%keeps_contacts) call gather_rows(ranges%all, self%contacts)
          call gather_rows(ranges%walls, self%walls)
          call gather_rows(ranges%suspects, self%suspects)
       end associate
+      associate (suspects => self%suspects)
+         suspects%n_degenerate = count([(is_degenerate(suspects, c), c=1_ip, suspects%n)], kind=ip)
+      end associate
+      self%contacts%n_degenerate = self%suspects%n_degenerate
       self%sums(sum_contacts_own) = self%sums(sum_contacts_own) + int(self%n_contacts, lp)
-      self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(self%contacts%n_degenerate, lp)
+      self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(n_degenerate, lp)
    end subroutine gather_results
 
 end module polydem_contact_walk

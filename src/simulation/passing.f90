@@ -28,7 +28,7 @@ module polydem_passing
 
    !> Guard of the contacts
    type :: contact_guard_t
-      !> Thickness of each body, (slot) [m]
+      !> Thickness of each body, (slot) [m]; not allocated if the guards are off
       real(wp), allocatable :: thickness(:)
       !> Contacts deeper than this fraction of the thickness of the thinner body are suspects; huge: only degenerate ones
       real(wp) :: least_depth = huge(1.0_wp)
@@ -52,7 +52,7 @@ contains
       guard%column = column
       if (settings%overlap /= 'off') guard%least_depth = settings%overlap_limit
       if (settings%passing /= 'off') guard%least_depth = min(guard%least_depth, least_depth)
-      guard%thickness = thickness_of_bodies(bodies)
+      if (guard%least_depth < huge(1.0_wp)) guard%thickness = thickness_of_bodies(bodies)
    end subroutine new_contact_guard
 
 

@@ -4,10 +4,9 @@ module polydem_time_step
    use polydem_box_maker, only: update_boxes
    use polydem_contact_incidence, only: index_contacts
    use polydem_contact_walk, only: walk_contacts
-   use polydem_contacts, only: copy_contact, set_force_of_contact
    use polydem_energy_balance, only: accumulate_step
    use polydem_errors, only: error_t, raise, run_error
-   use polydem_force_sums, only: sum_contacts, total_forces
+   use polydem_force_sums, only: assemble_forces, select_walls
    use polydem_guards, only: check_contacts, check_motion, check_poses
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_prescribed_motion, only: move_bodies
@@ -122,22 +121,12 @@ contains
    subroutine constrain(self, error)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: c
 
       if (allocated(error)) return
       call self%law%constraint%apply(self%dt, self%incidence, self%bodies, self%contacts, self%history, error)
       if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
-      call sum_contacts(self%bodies, self%contacts, self%force_sums)
-      call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
-      self%walls%n = 0_ip
-      associate (contacts => self%contacts, walls => self%walls, fixed => self%bodies%fixed)
-         do c = 1_ip, contacts%n
-            call set_force_of_contact(contacts, c)
-            if (.not. (fixed(contacts%first(c)) .or. fixed(contacts%second(c)))) cycle
-            walls%n = walls%n + 1_ip
-            call copy_contact(contacts, c, walls, walls%n)
-         end do
-      end associate
+      call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%force_sums)
+      call select_walls(self%bodies, self%contacts, self%walls)
    end subroutine constrain
 
    !> Apply the moves of the pair list to the columns of the contact history.

@@ -77,7 +77,7 @@ contains
       is_degenerate = contacts%normal(1, c)**2 + contacts%normal(2, c)**2 < 0.25_wp*contacts%length(c)**2
    end function is_degenerate
 
-   !> Make room for at least `capacity` contacts. If the arrays grow, their contents are lost.
+   !> Make room for at least `capacity` contacts. If the arrays grow, their contents are lost, and all values are zero.
    subroutine reserve_contacts(contacts, capacity)
       !> Table of contacts
       type(contacts_t), intent(inout) :: contacts
@@ -95,13 +95,13 @@ contains
          if (allocated(contacts%twist)) deallocate (contacts%twist)
       end if
       m = capacity + capacity/4_ip + 16_ip
-      allocate (contacts%pair(m), contacts%first(m), contacts%second(m), contacts%area(m), &
-                contacts%rate(m), contacts%normal(2, m), contacts%moment(2, m), &
-                contacts%arm_first(2, m), contacts%arm_second(2, m), contacts%direction(2, m), &
-                contacts%length(m), contacts%inverse_length(m), contacts%lever(m), &
-                contacts%elastic(m), contacts%normal_force(m), contacts%tangential_force(m), contacts%force(2, m))
-      if (contacts%has_cohesion) allocate (contacts%cohesion(m))
-      if (contacts%has_twist) allocate (contacts%twist(m))
+      allocate (contacts%pair(m), contacts%first(m), contacts%second(m), source=0_ip)
+      allocate (contacts%area(m), contacts%rate(m), contacts%length(m), contacts%inverse_length(m), contacts%lever(m), &
+                contacts%elastic(m), contacts%normal_force(m), contacts%tangential_force(m), source=0.0_wp)
+      allocate (contacts%normal(2, m), contacts%moment(2, m), contacts%arm_first(2, m), contacts%arm_second(2, m), &
+                contacts%direction(2, m), contacts%force(2, m), source=0.0_wp)
+      if (contacts%has_cohesion) allocate (contacts%cohesion(m), source=0.0_wp)
+      if (contacts%has_twist) allocate (contacts%twist(m), source=0.0_wp)
    end subroutine reserve_contacts
 
    !> Make room for at least `capacity` contacts without losing contacts 1..n.

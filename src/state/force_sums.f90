@@ -11,12 +11,12 @@
 module polydem_force_sums
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t, load_block
-   use polydem_contacts, only: contacts_t
+   use polydem_contacts, only: contacts_t, copy_contact, grow_contacts, set_force_of_contact
    use polydem_kinds, only: ip, wp, min_parallel_size
    implicit none
    private
    public :: force_sums_t, contact_terms_t, late_terms_t, n_terms, sum_elastic, sum_normal, sum_tangential, sum_energy
-   public :: start_sums, terms_of_block, term_of, add_terms, add_late_terms, sum_contacts, total_forces, set_force
+   public :: start_sums, terms_of_block, term_of, add_terms, add_late_terms, assemble_forces, select_walls, total_forces, set_force
 
    !> Rows of a term: force along x and y and torque of the elastic forces with cohesion, of all normal forces with the
    !> twist, and of the tangential forces [N/m, N/m, N]; elastic energy [J/m]
@@ -206,18 +206,20 @@ contains
       end do
    end subroutine add_late_terms
 
-   !> Sum the forces of a whole table of contacts.
-   subroutine sum_contacts(bodies, contacts, sums)
-      !> Bodies
-      type(bodies_t), intent(in) :: bodies
-      !> Contacts with their forces, in ascending order
-      type(contacts_t), intent(in) :: contacts
+   !> Sum the forces of a whole table of contacts, and set the forces and torques on all bodies.
+   subroutine assemble_forces(gravity, contacts, bodies, sums)
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Contacts with normal and tangential forces, in ascending order; `force` is set
+      type(contacts_t), intent(inout) :: contacts
+      !> Bodies; `force` and `torque` are set
+      type(bodies_t), intent(inout) :: bodies
       !> Sums of the bodies
       type(force_sums_t), intent(inout) :: sums
       type(contact_block_t) :: block
       type(contact_terms_t) :: terms
       type(late_terms_t) :: none
-      integer(ip) :: high
+      integer(ip) :: c, high
 
       call start_sums(bodies%n, sums)
       do high = contacts%n, 1_ip, -block_size
@@ -225,7 +227,33 @@ contains
          call terms_of_block(block, terms)
          call add_terms(block, terms, bodies%n, sums, none)
       end do
-   end subroutine sum_contacts
+      do c = 1_ip, contacts%n
+         call set_force_of_contact(contacts, c)
+      end do
+      call total_forces(gravity, sums, bodies)
+   end subroutine assemble_forces
+
+   !> Select the contacts with fixed bodies from a table.
+   subroutine select_walls(bodies, contacts, walls)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> All contacts
+      type(contacts_t), intent(in) :: contacts
+      !> Those with fixed bodies
+      type(contacts_t), intent(inout) :: walls
+      integer(ip) :: c
+
+      walls%has_cohesion = contacts%has_cohesion
+      walls%has_twist = contacts%has_twist
+      walls%energy_is_quadratic = contacts%energy_is_quadratic
+      walls%n = 0_ip
+      do c = 1_ip, contacts%n
+         if (.not. (bodies%fixed(contacts%first(c)) .or. bodies%fixed(contacts%second(c)))) cycle
+         call grow_contacts(walls, walls%n + 1_ip)
+         walls%n = walls%n + 1_ip
+         call copy_contact(contacts, c, walls, walls%n)
+      end do
+   end subroutine select_walls
 
    !> Set the forces and torques on all bodies from the sums, and add gravity to free bodies.
    subroutine total_forces(gravity, sums, bodies)

@@ -1,8 +1,8 @@
 !> Two attractive parts of a force law for tests, one with and one without potential energy.
 module pulls
    use polydem_bodies, only: bodies_t
+   use polydem_contact_block, only: contact_block_t
    use polydem_contact_history, only: contact_history_t
-   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: acts_normal, force_part_t
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
@@ -45,20 +45,19 @@ contains
    end subroutine choose_cohesion
 
    !> Add the attraction.
-   subroutine add_cohesion(self, bodies, dt, contacts, history)
+   subroutine add_cohesion(self, bodies, dt, block, history)
       class(cohesion_t), intent(in) :: self
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: dt
-      type(contacts_t), intent(inout) :: contacts
+      type(contact_block_t), intent(inout) :: block
       type(contact_history_t), intent(inout) :: history
       integer(ip) :: c
 
       associate (unused_bodies => bodies, unused_dt => dt, unused_memory => history)
       end associate
-      contacts%energy_is_quadratic = .false.
-      do c = 1_ip, contacts%n
-         contacts%cohesion(c) = contacts%cohesion(c) - self%pull
-         contacts%normal_force(c) = contacts%normal_force(c) - self%pull
+      do c = 1_ip, block%n
+         block%cohesion(c) = block%cohesion(c) - self%pull
+         block%normal_force(c) = block%normal_force(c) - self%pull
       end do
    end subroutine add_cohesion
 
@@ -76,18 +75,18 @@ contains
    end subroutine choose_drag
 
    !> Add the attraction.
-   subroutine add_drag(self, bodies, dt, contacts, history)
+   subroutine add_drag(self, bodies, dt, block, history)
       class(drag_t), intent(in) :: self
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: dt
-      type(contacts_t), intent(inout) :: contacts
+      type(contact_block_t), intent(inout) :: block
       type(contact_history_t), intent(inout) :: history
       integer(ip) :: c
 
       associate (unused_bodies => bodies, unused_dt => dt, unused_memory => history)
       end associate
-      do c = 1_ip, contacts%n
-         contacts%normal_force(c) = contacts%normal_force(c) - self%pull
+      do c = 1_ip, block%n
+         block%normal_force(c) = block%normal_force(c) - self%pull
       end do
    end subroutine add_drag
 

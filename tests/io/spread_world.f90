@@ -2,10 +2,9 @@
 !>
 !> It is only written to files. Its numbers are arbitrary and use all bits.
 module spread_world
-   use polydem_assemble_forces, only: assemble_forces
    use polydem_bodies, only: bodies_t, turn_bodies
-   use polydem_contact_incidence, only: incidence_t, index_contacts
    use polydem_contacts, only: contacts_t, reserve_contacts
+   use polydem_force_sums, only: assemble_forces, force_sums_t
    use polydem_hash, only: mix_word
    use polydem_kinds, only: ip, lp, wp
    implicit none
@@ -85,13 +84,12 @@ contains
       !> Whether each body is present on this rank, and whether it is a halo body, (global index)
       logical, intent(in) :: here(:), in_halo(:)
       type(world_t), intent(out) :: world
-      type(incidence_t) :: incidence
+      type(force_sums_t) :: sums
       integer(ip) :: b, s
 
       call make_bodies(step, here, in_halo, world%bodies)
       call make_contacts(step, world%bodies, world%contacts, world%pair_value)
-      call index_contacts(world%bodies%n, world%contacts, incidence)
-      call assemble_forces([0.0_wp, -9.81_wp], incidence, world%contacts, world%bodies)
+      call assemble_forces([0.0_wp, -9.81_wp], world%contacts, world%bodies, sums)
       associate (bodies => world%bodies)
          world%box_body = [((s, b=1_ip, 1_ip + mod(bodies%global_index(s), 3_ip)), s=1_ip, bodies%n)]
          world%box_value = reshape([((some_number(step, bodies%global_index(s), b), &

@@ -1,14 +1,13 @@
 !> Two bodies in given poses and the elastic forces between them, without a time step.
 module posed_pair
-   use polydem_assemble_forces, only: assemble_forces
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_contact_history, only: contact_history_t
-   use polydem_contact_incidence, only: incidence_t, index_contacts
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_find_contacts, only: find_contacts
    use polydem_force_law, only: evaluate_law, force_law_t, new_force_law
+   use polydem_force_sums, only: assemble_forces, force_sums_t
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -25,7 +24,7 @@ module posed_pair
       !> Their contact, if there is one
       type(contacts_t) :: contacts
       type(contact_history_t) :: history
-      type(incidence_t) :: incidence
+      type(force_sums_t) :: sums
       type(force_law_t) :: law
    end type pair_t
 
@@ -62,8 +61,7 @@ contains
       call turn_bodies(pair%bodies, [1_ip, 2_ip])
       call find_contacts(pair%bodies, 1_ip, [1_ip], [2_ip], pair%history, pair%contacts)
       call evaluate_law(pair%law, pair%bodies, 0.0_wp, pair%contacts, pair%history)
-      call index_contacts(2_ip, pair%contacts, pair%incidence)
-      call assemble_forces([0.0_wp, 0.0_wp], pair%incidence, pair%contacts, pair%bodies)
+      call assemble_forces([0.0_wp, 0.0_wp], pair%contacts, pair%bodies, pair%sums)
    end subroutine press
 
 end module posed_pair
