@@ -1,22 +1,28 @@
 !> Fills a block with the next contacts of the pair list: overlapping polygons with overlap area, its rate of change,
 !> contact point and direction.
 !>
+!> Most pairs are like those of the last step: an edge still separates the polygons, or their outlines cross at the same
+!> edges. The contact history remembers either. Contacts of the second kind are evaluated together, as a batch. All other
+!> pairs are searched one by one. The result is the same, whatever is remembered.
+!>
 !> A contact is *degenerate* if it has no direction: |N| is negligible against the square root of the area, because one
 !> body is inside the other, or bars cross. A degenerate contact gets the direction of the line of centres (or of the x
 !> axis if the centres coincide) and the side of a square of the same area as its length. With this length no force or
 !> stiffness overflows, and the run can continue or stop with a message. `normal`, `moment` and `rate` are not changed.
+!> A contact of a batch is never degenerate.
 module polydem_fill_block
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t, copy_motion, is_exchanged
    use polydem_contact_history, only: contact_history_t
-   use polydem_convex_overlap, only: overlap_polygons, overlap_t
+   use polydem_convex_overlap, only: find_overlap, overlap_t
    use polydem_kinds, only: ip, wp
+   use polydem_lens_kernel, only: evaluate_batch
+   use polydem_overlap_batch, only: add_lane, copy_lane, overlap_batch_t
+   use polydem_overlap_tolerances, only: no_length
+   use polydem_separation, only: test_separation
    implicit none
    private
    public :: fill_block
-
-   !> Ratio of a length to the square root of the area below which the length is rounding error
-   real(wp), parameter :: no_length = 4096.0_wp*epsilon(1.0_wp)
 
 contains
 
@@ -37,72 +43,175 @@ contains
       type(contact_history_t), intent(inout) :: history
       !> Contacts; the columns that the force law fills are not changed
       type(contact_block_t), intent(inout) :: block
-      type(overlap_t) :: overlap
-      integer(ip) :: i, j, p
+      type(overlap_batch_t) :: batch
+      logical :: in_batch(block_size), exists(block_size)
+      integer(ip) :: c
 
-      block%n = 0_ip
-      do p = next, low, -1_ip
-         if (block%n == block_size) exit
-         i = first(p)
-         j = second(p)
-         if (is_exchanged(bodies, i, j)) then
-            i = second(p)
-            j = first(p)
-         end if
-         call find_one(bodies, p, i, j, effective, history, overlap)
-         if (overlap%area > 0.0_wp) call append(overlap, p, i, j, bodies, block)
+      call collect_pairs(bodies, first, second, low, next, history, block, batch, in_batch)
+      call evaluate(bodies, effective, block%n, in_batch, batch)
+      call copy_batch(batch, block)
+      do c = 1_ip, block%n
+         exists(c) = in_batch(c)
+         if (in_batch(c)) exists(c) = batch%certified(c) > 0.0_wp
+         if (.not. exists(c)) call search(bodies, effective, c, history, block, exists(c))
       end do
-      next = p
+      if (.not. all(exists(:block%n))) call remove_others(exists, block)
       call copy_motion(bodies, block)
       call find_rates(block)
       call find_directions(bodies, block)
    end subroutine fill_block
 
-   !> Find the overlap of one pair.
-   subroutine find_one(bodies, p, i, j, effective, history, overlap)
+   !> Collect the next pairs that may be contacts: those that no remembered edge separates.
+   subroutine collect_pairs(bodies, first, second, low, next, history, block, batch, in_batch)
       type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: p
-      !> Slots of the body with the smaller and with the greater radius
-      integer(ip), intent(in) :: i, j
-      logical, intent(in) :: effective
+      integer(ip), intent(in) :: first(:), second(:), low
+      integer(ip), intent(inout) :: next
       type(contact_history_t), intent(inout) :: history
-      type(overlap_t), intent(out) :: overlap
+      type(contact_block_t), intent(inout) :: block
+      type(overlap_batch_t), intent(inout) :: batch
+      !> Whether the pair has a lane in the batch
+      logical, intent(inout) :: in_batch(block_size)
+      integer(ip) :: i, j, n, p
+      logical :: apart, remembers
+
+      remembers = allocated(history%memory)
+      n = 0_ip
+      associate (start => bodies%vertex_start, turned => bodies%turned, radius => bodies%radius)
+         do p = next, low, -1_ip
+            if (n == block_size) exit
+            i = first(p)
+            j = second(p)
+            if (is_exchanged(bodies, i, j)) then
+               i = second(p)
+               j = first(p)
+            end if
+            if (remembers) then
+               if (history%memory(p) < 0_ip) then
+                  call test_separation(turned(:, start(i):start(i + 1_ip) - 1_ip), &
+                                       turned(:, start(j):start(j + 1_ip) - 1_ip), offset_of(bodies, i, j), radius(i), &
+                                       history%memory(p), apart)
+                  if (apart) cycle
+               end if
+            end if
+            n = n + 1_ip
+            block%pair(n) = p
+            block%first(n) = i
+            block%second(n) = j
+            in_batch(n) = .false.
+            if (.not. remembers) cycle
+            call add_lane(batch, n, history%memory(p), &
+                          [start(i), start(i + 1_ip) - 1_ip, start(j), start(j + 1_ip) - 1_ip], offset_of(bodies, i, j), &
+                          radius(i), radius(j), in_batch(n))
+         end do
+      end associate
+      next = p
+      block%n = n
+   end subroutine collect_pairs
+
+   !> Centre of the second body minus centre of the first [m]
+   pure function offset_of(bodies, i, j) result(offset)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: i, j
+      real(wp) :: offset(2)
+
+      offset(1) = bodies%position(1, j) - bodies%position(1, i)
+      offset(2) = bodies%position(2, j) - bodies%position(2, i)
+   end function offset_of
+
+   !> Evaluate the batch. Lanes without a pair get copies of another, so that there is no gap.
+   pure subroutine evaluate(bodies, effective, n, in_batch, batch)
+      type(bodies_t), intent(in) :: bodies
+      logical, intent(in) :: effective
+      integer(ip), intent(in) :: n
+      logical, intent(in) :: in_batch(block_size)
+      type(overlap_batch_t), intent(inout) :: batch
+      integer(ip) :: c, filled
+
+      filled = findloc(in_batch(:n), .true., dim=1)
+      if (filled == 0_ip) return
+      do c = 1_ip, n
+         if (.not. in_batch(c)) call copy_lane(batch, filled, c)
+      end do
+      call evaluate_batch(batch, 1_ip, n, bodies%turned, effective)
+   end subroutine evaluate
+
+   !> Copy the results of the batch to the block.
+   pure subroutine copy_batch(batch, block)
+      type(overlap_batch_t), intent(in) :: batch
+      type(contact_block_t), intent(inout) :: block
+
+      associate (n => block%n)
+         block%area(:n) = batch%area(:n)
+         block%normal(:n, :) = batch%normal(:n, :)
+         block%length(:n) = batch%length(:n)
+         block%moment(:n, :) = batch%moment(:n, :)
+         block%arm_first(:n, :) = batch%centroid(:n, 1:2)
+         block%arm_second(:n, :) = batch%centroid(:n, 3:4)
+         block%degenerate(:n) = 0.0_wp
+      end associate
+   end subroutine copy_batch
+
+   !> Search the overlap of one pair without memory.
+   subroutine search(bodies, effective, c, history, block, exists)
+      type(bodies_t), intent(in) :: bodies
+      logical, intent(in) :: effective
+      !> Index in the block
+      integer(ip), intent(in) :: c
+      type(contact_history_t), intent(inout) :: history
+      type(contact_block_t), intent(inout) :: block
+      !> Whether the polygons overlap
+      logical, intent(out) :: exists
+      type(overlap_t) :: overlap
       integer(ip) :: memory
       integer :: k
 
-      memory = 0_ip
-      if (allocated(history%memory)) memory = history%memory(p)
-      associate (start => bodies%vertex_start, turned => bodies%turned)
-         call overlap_polygons(turned(:, start(i):start(i + 1_ip) - 1_ip), &
-                               turned(:, start(j):start(j + 1_ip) - 1_ip), &
-                               bodies%position(:, j) - bodies%position(:, i), memory, overlap, effective)
+      associate (start => bodies%vertex_start, turned => bodies%turned, radius => bodies%radius, i => block%first(c), &
+                 j => block%second(c), p => block%pair(c))
+         call find_overlap(turned(:, start(i):start(i + 1_ip) - 1_ip), turned(:, start(j):start(j + 1_ip) - 1_ip), &
+                           offset_of(bodies, i, j), radius(i), radius(j), effective, overlap, memory)
+         if (allocated(history%memory)) history%memory(p) = memory
+         exists = overlap%area > 0.0_wp
+         if (.not. exists) then
+            if (.not. allocated(history%column)) return
+            do k = 1, size(history%column)
+               history%column(k)%value(p) = 0.0_wp
+            end do
+            return
+         end if
       end associate
-      if (allocated(history%memory)) history%memory(p) = overlap%separating_edge
-      if (overlap%area > 0.0_wp .or. .not. allocated(history%column)) return
-      do k = 1, size(history%column)
-         history%column(k)%value(p) = 0.0_wp
-      end do
-   end subroutine find_one
-
-   !> Append an overlap to a block.
-   pure subroutine append(overlap, p, i, j, bodies, block)
-      type(overlap_t), intent(in) :: overlap
-      integer(ip), intent(in) :: p, i, j
-      type(bodies_t), intent(in) :: bodies
-      type(contact_block_t), intent(inout) :: block
-      integer(ip) :: c
-
-      c = block%n + 1_ip
-      block%n = c
-      block%pair(c) = p
-      block%first(c) = i
-      block%second(c) = j
       block%area(c) = overlap%area
       block%normal(c, :) = overlap%normal
+      block%length(c) = length_of(overlap%normal(1), overlap%normal(2))
       block%moment(c, :) = [overlap%moment_a, overlap%moment_b]
       block%arm_first(c, :) = overlap%centroid
-      block%arm_second(c, :) = overlap%centroid - (bodies%position(:, j) - bodies%position(:, i))
-   end subroutine append
+      block%arm_second(c, :) = overlap%centroid_b
+      block%degenerate(c) = merge(1.0_wp, 0.0_wp, block%length(c) <= no_length*sqrt(overlap%area))
+   end subroutine search
+
+   !> Remove the pairs that are no contacts.
+   pure subroutine remove_others(exists, block)
+      logical, intent(in) :: exists(block_size)
+      type(contact_block_t), intent(inout) :: block
+      integer(ip) :: b, c
+
+      b = 0_ip
+      do c = 1_ip, block%n
+         if (.not. exists(c)) cycle
+         b = b + 1_ip
+         if (b == c) cycle
+         block%pair(b) = block%pair(c)
+         block%first(b) = block%first(c)
+         block%second(b) = block%second(c)
+         block%area(b) = block%area(c)
+         block%normal(b, :) = block%normal(c, :)
+         block%length(b) = block%length(c)
+         block%moment(b, :) = block%moment(c, :)
+         block%arm_first(b, :) = block%arm_first(c, :)
+         block%arm_second(b, :) = block%arm_second(c, :)
+         block%degenerate(b) = block%degenerate(c)
+      end do
+      block%n = b
+   end subroutine remove_others
 
    !> Compute the rates of change of the areas.
    pure subroutine find_rates(block)
@@ -116,23 +225,21 @@ contains
       end do
    end subroutine find_rates
 
-   !> Find the directions from the second bodies to the first, and the lengths of the contacts.
+   !> Find the directions from the second bodies to the first.
    pure subroutine find_directions(bodies, block)
       type(bodies_t), intent(in) :: bodies
       type(contact_block_t), intent(inout) :: block
-      real(wp) :: length
+      real(wp) :: inverse
       integer(ip) :: c
 
       do c = 1_ip, block%n
-         length = length_of(block%normal(c, 1), block%normal(c, 2))
-         block%length(c) = length
-         length = max(length, tiny(length))
-         block%direction(c, 1) = -block%normal(c, 1)/length
-         block%direction(c, 2) = -block%normal(c, 2)/length
-         block%degenerate(c) = 0.0_wp
+         inverse = -1.0_wp/max(block%length(c), tiny(inverse))
+         block%direction(c, 1) = block%normal(c, 1)*inverse
+         block%direction(c, 2) = block%normal(c, 2)*inverse
       end do
+      if (.not. any(block%degenerate(:block%n) > 0.0_wp)) return
       do c = 1_ip, block%n
-         if (block%length(c) <= no_length*sqrt(block%area(c))) call direct_from_centres(bodies, c, block)
+         if (block%degenerate(c) > 0.0_wp) call direct_from_centres(bodies, c, block)
       end do
    end subroutine find_directions
 
@@ -141,15 +248,13 @@ contains
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: c
       type(contact_block_t), intent(inout) :: block
-      real(wp) :: offset(2), distance, side
+      real(wp) :: offset(2), distance
 
-      side = sqrt(block%area(c))
-      offset = bodies%position(:, block%second(c)) - bodies%position(:, block%first(c))
-      distance = length_of(offset(1), offset(2))
-      block%degenerate(c) = 1.0_wp
-      block%length(c) = side
+      block%length(c) = sqrt(block%area(c))
       block%direction(c, :) = [1.0_wp, 0.0_wp]
-      if (distance > no_length*side) block%direction(c, :) = -offset/distance
+      offset = offset_of(bodies, block%first(c), block%second(c))
+      distance = length_of(offset(1), offset(2))
+      if (distance > no_length*block%length(c)) block%direction(c, :) = -offset/distance
    end subroutine direct_from_centres
 
    !> Length of a vector
