@@ -22,6 +22,8 @@ module polydem_overlap_integrals
       real(wp) :: area = 0.0_wp
       !> Centroid relative to the centre of a [m]
       real(wp) :: centroid(2) = 0.0_wp
+      !> Centroid relative to the centre of b [m]
+      real(wp) :: centroid_b(2) = 0.0_wp
       !> Integral of the outward normal of a over its outline inside b, the gradient of the area [m]
       real(wp) :: normal(2) = 0.0_wp
       !> Moment of that integral about the centre of a [m2]

@@ -12,7 +12,7 @@
 !> A contact of a batch is never degenerate.
 module polydem_fill_block
    use polydem_bodies, only: bodies_t
-   use polydem_contact_block, only: block_size, contact_block_t, copy_motion, is_exchanged
+   use polydem_contact_block, only: block_size, contact_block_t, copy_motion
    use polydem_contact_history, only: contact_history_t
    use polydem_convex_overlap, only: find_overlap, overlap_t
    use polydem_kinds, only: ip, wp
@@ -31,7 +31,7 @@ contains
       !> Bodies with rotated polygons
       type(bodies_t), intent(in) :: bodies
       !> Lower and higher slot of each pair
-      integer(ip), intent(in) :: first(:), second(:)
+      integer(ip), intent(in), contiguous :: first(:), second(:)
       !> Whether to compute the effective area
       logical, intent(in) :: effective
       !> Last pair to examine
@@ -64,7 +64,8 @@ contains
    !> Collect the next pairs that may be contacts: those that no remembered edge separates.
    subroutine collect_pairs(bodies, first, second, low, next, history, block, batch, in_batch)
       type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: first(:), second(:), low
+      integer(ip), intent(in), contiguous :: first(:), second(:)
+      integer(ip), intent(in) :: low
       integer(ip), intent(inout) :: next
       type(contact_history_t), intent(inout) :: history
       type(contact_block_t), intent(inout) :: block
@@ -81,7 +82,8 @@ contains
             if (n == block_size) exit
             i = first(p)
             j = second(p)
-            if (is_exchanged(bodies, i, j)) then
+            ! As `is_exchanged`; a call costs 2 % of a step here.
+            if (radius(j) < radius(i)) then
                i = second(p)
                j = first(p)
             end if

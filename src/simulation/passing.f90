@@ -183,10 +183,10 @@ contains
    pure real(wp) function packed_direction(x, y)
       !> Components of the vector
       real(wp), intent(in) :: x, y
-      real(wp) :: share
+      real(wp) :: side
 
-      share = y/(abs(x) + abs(y))
-      packed_direction = merge(2.0_wp + share, 4.0_wp - share, x >= 0.0_wp)
+      side = sign(1.0_wp, x)
+      packed_direction = 3.0_wp + side*(y/(abs(x) + abs(y)) - 1.0_wp)
    end function packed_direction
 
    !> Whether two directions differ by more than a right angle; false if there is no previous direction

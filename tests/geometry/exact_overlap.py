@@ -56,34 +56,37 @@ def intervals(edges, other_edges, keep_common):
     return found
 
 
-def reach(polygon):
+def radius(polygon):
     """Size of a polygon by which the program chooses the smaller of two."""
-    return max(abs(x) + abs(y) for x, y in polygon)
+    return max(math.sqrt(x * x + y * y) for x, y in polygon)
 
 
 def exact_overlap(a, b, offset):
     """Area of the overlap as a fraction, and (N, M_a, M_b) as real numbers.
 
-    The integrals leave edges that both outlines share to the larger polygon, as the program does.
+    The integrals leave edges that both outlines share to the larger polygon, and half of them to each if the polygons
+    are equally large, as the program does.
     """
     exponents = [math.frexp(v)[1] for v in itertools.chain(*a, *b, offset) if v != 0.0]
     bits = 54 - min(exponents)
     a_edges = edges_of(to_integers(a, (0.0, 0.0), bits))
     b_edges = edges_of(to_integers(b, offset, bits))
-    common_on_a = reach(a) > reach(b)
-    on_a = intervals(a_edges, b_edges, common_on_a)
-    on_b = intervals(b_edges, a_edges, not common_on_a)
-    if on_a is None or on_b is None:
+    with_common, without = intervals(a_edges, b_edges, True), intervals(a_edges, b_edges, False)
+    on_b = intervals(b_edges, a_edges, False)
+    if on_b is None or with_common is None:
         return Fraction(0), None
-    twice = sum((t1 - t0) * (x * dy - y * dx) for t0, t1, x, y, dx, dy in on_a + on_b)
+    twice = sum((t1 - t0) * (x * dy - y * dx) for t0, t1, x, y, dx, dy in with_common + on_b)
     unit = Fraction(1, 2**bits)
     cx, cy = int(Fraction(offset[0]) * 2**bits), int(Fraction(offset[1]) * 2**bits)
-    normal = [sum((t1 - t0) * dy for t0, t1, x, y, dx, dy in on_a),
-              -sum((t1 - t0) * dx for t0, t1, x, y, dx, dy in on_a)]
+    share = Fraction(1, 2) if radius(a) == radius(b) else Fraction(int(radius(a) > radius(b)))
+    weighted = [(share, edge) for edge in with_common] + [(1 - share, edge) for edge in without]
+    normal = [sum(w * (t1 - t0) * dy for w, (t0, t1, x, y, dx, dy) in weighted),
+              -sum(w * (t1 - t0) * dx for w, (t0, t1, x, y, dx, dy) in weighted)]
 
     def moment(centre_x, centre_y):
-        return -sum((t1 - t0) * (dx * (x - centre_x + dx * (t0 + t1) / 2) + dy * (y - centre_y + dy * (t0 + t1) / 2))
-                    for t0, t1, x, y, dx, dy in on_a)
+        return -sum(w * (t1 - t0) * (dx * (x - centre_x + dx * (t0 + t1) / 2)
+                                     + dy * (y - centre_y + dy * (t0 + t1) / 2))
+                    for w, (t0, t1, x, y, dx, dy) in weighted)
 
     integrals = [float(normal[0] * unit), float(normal[1] * unit),
                  float(moment(0, 0) * unit**2), float(moment(cx, cy) * unit**2)]

@@ -1,0 +1,248 @@
+!> Effective area of lenses (see `polydem_effective_area`), for all lanes of a batch at a time.
+!>
+!> The coordinates are x along the chord z from the first crossing X to the second one Y, in units of its length, and
+!> y across it, so scaled that the greatest is 1; h is the area of their unit square. Then X is at (-1/2, 0), Y at
+!> (1/2, 0), and P's arc lies at negative y. The second moments of the lens about its centroid c are the sums over
+!> both arcs.
+!>
+!> The gradient is the integral of (G/4) q n over P's arc. By the divergence theorem it is the same integral over the
+!> chord plus the integral of the gradient of (G/4) q over the part of the lens on P's side; the moment likewise. With
+!> the moments m of the lens, the form L(x, y) = m_yy x^2 - 2 m_xy x y + m_xx y^2 = q det, and the first and second
+!> moments F and D of P's part about c, the integrals over the chord are closed forms in m and c, those over the part
+!> linear in F and D. The moments of Q's part are opposite, since those about c vanish for the whole. So half the
+!> difference of both parts serves as F and D, and an exchange of P and Q changes no bit but signs.
+module polydem_lens_effective_area
+   use polydem_kinds, only: ip, wp
+   use polydem_overlap_batch, only: column_length, overlap_batch_t
+   use polydem_overlap_tolerances, only: least_square, no_length, sure_area
+   implicit none
+   private
+   public :: integrate_effective_area
+
+   !> Greatest coordinate along the chord in units of the chord; lenses that are longer are not certified
+   real(wp), parameter :: longest = 64.0_wp
+   !> Least determinant of the second moments. A lens contains a triangle of base 1 and height 1, so its own is 1/1728
+   !> at least
+   real(wp), parameter :: least_determinant = 2.0_wp**(-11)
+   !> Least ratio of the determinant to the product of both moments; below, digits would be lost
+   real(wp), parameter :: least_ratio = 2.0_wp**(-4)
+   real(wp), parameter :: third = 1.0_wp/3.0_wp, sixth = 1.0_wp/6.0_wp, twelfth = 1.0_wp/12.0_wp
+
+   !> Work space of a batch
+   type :: work_t
+      !> Chord [m], square of its length, area of the unit square [m2]
+      real(wp) :: chord(column_length, 2), square(column_length), unit_area(column_length)
+      !> Corners, those of P relative to X, those of Q relative to Y (lane, x or y, corner, P or Q)
+      real(wp) :: place(column_length, 2, 2, 2)
+      !> Twice the area of each part, and six times its first moments about X (P) and Y (Q)
+      real(wp) :: fan(column_length, 3, 2)
+      !> Centroid relative to the middle of the chord
+      real(wp) :: centroid(column_length, 2)
+      !> Integrals over each arc for the second moments xx, xy, yy about the centroid
+      real(wp) :: second(column_length, 3, 2)
+   end type work_t
+
+contains
+
+   !> Effective area, its gradient, moments, and the centroid of all lenses.
+   pure subroutine integrate_effective_area(from, to, batch)
+      !> First lane
+      integer(ip), intent(in) :: from
+      !> Last lane
+      integer(ip), intent(in) :: to
+      !> The batch with crossings
+      type(overlap_batch_t), intent(inout) :: batch
+      type(work_t) :: work
+
+      call straighten(from, to, batch, work)
+      call find_fan(from, to, work%place(:, :, :, 1), 1.0_wp, work%fan(:, :, 1))
+      call find_fan(from, to, work%place(:, :, :, 2), -1.0_wp, work%fan(:, :, 2))
+      call find_centroid(from, to, work%fan(:, :, 1), work%fan(:, :, 2), work%centroid)
+      call find_second_moments(from, to, work%place(:, :, :, 1), work%centroid, -0.5_wp, work%second(:, :, 1))
+      call find_second_moments(from, to, work%place(:, :, :, 2), work%centroid, 0.5_wp, work%second(:, :, 2))
+      call weigh(from, to, work, batch)
+   end subroutine integrate_effective_area
+
+   !> Find the coordinates of the corners along and across the chord.
+   pure subroutine straighten(from, to, batch, work)
+      integer(ip), intent(in) :: from
+      integer(ip), intent(in) :: to
+      type(overlap_batch_t), intent(inout) :: batch
+      type(work_t), intent(inout) :: work
+      real(wp) :: zx, zy, least, along(4), across(4), ax, ay, scale_x, scale_y
+      integer(ip) :: i
+
+      do i = from, to
+         zx = batch%crossing(i, 1, 2) - batch%crossing(i, 1, 1)
+         zy = batch%crossing(i, 2, 2) - batch%crossing(i, 2, 1)
+         least = least_square*batch%scale(i, 1)*batch%scale(i, 1)
+         ax = batch%some(i, 1)*((batch%corner(i, 1, 2, 1) + batch%centre(i, 1)) - batch%crossing(i, 1, 1))
+         ay = batch%some(i, 1)*((batch%corner(i, 2, 2, 1) + batch%centre(i, 2)) - batch%crossing(i, 2, 1))
+         along(1) = zx*ax + zy*ay
+         across(1) = zx*ay - zy*ax
+         ax = batch%some(i, 1)*((batch%corner(i, 1, 3, 1) + batch%centre(i, 1)) - batch%crossing(i, 1, 1))
+         ay = batch%some(i, 1)*((batch%corner(i, 2, 3, 1) + batch%centre(i, 2)) - batch%crossing(i, 2, 1))
+         along(2) = zx*ax + zy*ay
+         across(2) = zx*ay - zy*ax
+         ax = batch%some(i, 2)*((batch%corner(i, 1, 2, 2) + batch%centre(i, 3)) - batch%crossing(i, 1, 2))
+         ay = batch%some(i, 2)*((batch%corner(i, 2, 2, 2) + batch%centre(i, 4)) - batch%crossing(i, 2, 2))
+         along(3) = zx*ax + zy*ay
+         across(3) = zx*ay - zy*ax
+         ax = batch%some(i, 2)*((batch%corner(i, 1, 3, 2) + batch%centre(i, 3)) - batch%crossing(i, 1, 2))
+         ay = batch%some(i, 2)*((batch%corner(i, 2, 3, 2) + batch%centre(i, 4)) - batch%crossing(i, 2, 2))
+         along(4) = zx*ax + zy*ay
+         across(4) = zx*ay - zy*ax
+         work%chord(i, 1) = zx
+         work%chord(i, 2) = zy
+         work%square(i) = max(zx*zx + zy*zy, least)
+         work%unit_area(i) = max(max(max(abs(across(1)), abs(across(2))), max(abs(across(3)), abs(across(4)))), least)
+         scale_x = 1.0_wp/work%square(i)
+         scale_y = 1.0_wp/work%unit_area(i)
+         batch%certified(i) = min(batch%certified(i), longest - scale_x*max(max(abs(along(1)), abs(along(2))), &
+                                                                            max(abs(along(3)), abs(along(4)))))
+         work%place(i, 1, 1, 1) = max(-longest, min(longest, along(1)*scale_x))
+         work%place(i, 2, 1, 1) = across(1)*scale_y
+         work%place(i, 1, 2, 1) = max(-longest, min(longest, along(2)*scale_x))
+         work%place(i, 2, 2, 1) = across(2)*scale_y
+         work%place(i, 1, 1, 2) = max(-longest, min(longest, along(3)*scale_x))
+         work%place(i, 2, 1, 2) = across(3)*scale_y
+         work%place(i, 1, 2, 2) = max(-longest, min(longest, along(4)*scale_x))
+         work%place(i, 2, 2, 2) = across(4)*scale_y
+      end do
+   end subroutine straighten
+
+   !> Integrate over the part between an arc and the chord, as a fan from the start of the arc.
+   pure subroutine find_fan(from, to, place, end, fan)
+      integer(ip), intent(in) :: from
+      integer(ip), intent(in) :: to
+      real(wp), intent(in) :: place(column_length, 2, 2)
+      !> End of the arc along the chord, relative to its start
+      real(wp), intent(in) :: end
+      real(wp), intent(inout) :: fan(column_length, 3)
+      real(wp) :: part(2)
+      integer(ip) :: i
+
+      do i = from, to
+         part(1) = place(i, 1, 1)*place(i, 2, 2) - place(i, 2, 1)*place(i, 1, 2)
+         part(2) = -end*place(i, 2, 2)
+         fan(i, 1) = part(1) + part(2)
+         fan(i, 2) = part(1)*(place(i, 1, 1) + place(i, 1, 2)) + part(2)*(place(i, 1, 2) + end)
+         fan(i, 3) = part(1)*(place(i, 2, 1) + place(i, 2, 2)) + part(2)*place(i, 2, 2)
+      end do
+   end subroutine find_fan
+
+   !> Find the centroid relative to the middle of the chord.
+   pure subroutine find_centroid(from, to, fan_p, fan_q, centroid)
+      integer(ip), intent(in) :: from
+      integer(ip), intent(in) :: to
+      real(wp), intent(in) :: fan_p(column_length, 3)
+      real(wp), intent(in) :: fan_q(column_length, 3)
+      real(wp), intent(inout) :: centroid(column_length, 2)
+      real(wp) :: scale
+      integer(ip) :: i
+
+      do i = from, to
+         scale = 1.0_wp/max(fan_p(i, 1) + fan_q(i, 1), sure_area)
+         centroid(i, 1) = scale*(0.5_wp*(fan_q(i, 1) - fan_p(i, 1)) + third*(fan_p(i, 2) + fan_q(i, 2)))
+         centroid(i, 2) = scale*third*(fan_p(i, 3) + fan_q(i, 3))
+         ! It is among the corners; without a certificate it might be anywhere.
+         centroid(i, 1) = max(-2.0_wp*longest, min(2.0_wp*longest, centroid(i, 1)))
+         centroid(i, 2) = max(-2.0_wp, min(2.0_wp, centroid(i, 2)))
+      end do
+   end subroutine find_centroid
+
+   !> Integrate over an arc for the second moments about the centroid.
+   pure subroutine find_second_moments(from, to, place, centroid, start, second)
+      integer(ip), intent(in) :: from
+      integer(ip), intent(in) :: to
+      real(wp), intent(in) :: place(column_length, 2, 2)
+      real(wp), intent(in) :: centroid(column_length, 2)
+      !> Start of the arc, relative to the middle of the chord; the end is opposite
+      real(wp), intent(in) :: start
+      real(wp), intent(inout) :: second(column_length, 3)
+      real(wp) :: x(4), y(4), part(3)
+      integer(ip) :: i
+
+      do i = from, to
+         x(1) = start - centroid(i, 1)
+         y(1) = -centroid(i, 2)
+         x(2) = (place(i, 1, 1) + start) - centroid(i, 1)
+         y(2) = place(i, 2, 1) - centroid(i, 2)
+         x(3) = (place(i, 1, 2) + start) - centroid(i, 1)
+         y(3) = place(i, 2, 2) - centroid(i, 2)
+         x(4) = -start - centroid(i, 1)
+         y(4) = y(1)
+         part(1) = twelfth*(x(1)*y(2) - y(1)*x(2))
+         part(2) = twelfth*(x(2)*y(3) - y(2)*x(3))
+         part(3) = twelfth*(x(3)*y(4) - y(3)*x(4))
+         second(i, 1) = part(1)*(x(1)*x(1) + x(1)*x(2) + x(2)*x(2)) + part(2)*(x(2)*x(2) + x(2)*x(3) + x(3)*x(3)) &
+                        + part(3)*(x(3)*x(3) + x(3)*x(4) + x(4)*x(4))
+         second(i, 2) = part(1)*(x(1)*y(1) + x(2)*y(2) + 0.5_wp*(x(1)*y(2) + x(2)*y(1))) &
+                        + part(2)*(x(2)*y(2) + x(3)*y(3) + 0.5_wp*(x(2)*y(3) + x(3)*y(2))) &
+                        + part(3)*(x(3)*y(3) + x(4)*y(4) + 0.5_wp*(x(3)*y(4) + x(4)*y(3)))
+         second(i, 3) = part(1)*(y(1)*y(1) + y(1)*y(2) + y(2)*y(2)) + part(2)*(y(2)*y(2) + y(2)*y(3) + y(3)*y(3)) &
+                        + part(3)*(y(3)*y(3) + y(3)*y(4) + y(4)*y(4))
+      end do
+   end subroutine find_second_moments
+
+   !> Compute the results from the moments.
+   pure subroutine weigh(from, to, work, batch)
+      integer(ip), intent(in) :: from
+      integer(ip), intent(in) :: to
+      type(work_t), intent(in) :: work
+      type(overlap_batch_t), intent(inout) :: batch
+      real(wp) :: zx, zy, zz, h, cx, cy, mxx, mxy, myy, dxx, dxy, dyy, fx, fy
+      real(wp) :: determinant, product, safe, root, unit, on_chord, slope, along, across, turn, gx, gy, area, worst
+      integer(ip) :: i
+
+      do i = from, to
+         zx = work%chord(i, 1)
+         zy = work%chord(i, 2)
+         zz = work%square(i)
+         h = work%unit_area(i)
+         cx = work%centroid(i, 1)
+         cy = work%centroid(i, 2)
+         mxx = work%second(i, 1, 1) + work%second(i, 1, 2)
+         mxy = work%second(i, 2, 1) + work%second(i, 2, 2)
+         myy = work%second(i, 3, 1) + work%second(i, 3, 2)
+         determinant = mxx*myy - mxy*mxy
+         product = mxx*myy
+         safe = max(determinant, least_determinant)
+         root = sqrt(12.0_wp*sqrt(safe))
+         unit = root/(24.0_wp*safe)
+         area = 0.5_wp*h*(work%fan(i, 1, 1) + work%fan(i, 1, 2))
+         ! First moments of P's part, and its second moments: its arc and the chord back
+         fx = 0.5_wp*((sixth*work%fan(i, 2, 1) - 0.5_wp*work%fan(i, 1, 1)*(cx + 0.5_wp)) &
+                      - (sixth*work%fan(i, 2, 2) - 0.5_wp*work%fan(i, 1, 2)*(cx - 0.5_wp)))
+         fy = 0.5_wp*((sixth*work%fan(i, 3, 1) - 0.5_wp*work%fan(i, 1, 1)*cy) &
+                      - (sixth*work%fan(i, 3, 2) - 0.5_wp*work%fan(i, 1, 2)*cy))
+         dxx = 0.5_wp*(work%second(i, 1, 1) - work%second(i, 1, 2)) - cy*(0.25_wp*twelfth + 0.25_wp*cx*cx)
+         dxy = 0.5_wp*(work%second(i, 2, 1) - work%second(i, 2, 2)) - 0.25_wp*cx*cy*cy
+         dyy = 0.5_wp*(work%second(i, 3, 1) - work%second(i, 3, 2)) - 0.25_wp*cy*cy*cy
+         ! Six times the mean of the form L on the chord, and half its derivative along the chord at the middle
+         on_chord = 0.5_wp*myy + 6.0_wp*((myy*cx*cx + mxx*cy*cy) - 2.0_wp*mxy*cx*cy)
+         slope = myy*cx - mxy*cy
+         along = 12.0_wp*unit*(h/zz)*(myy*fx - mxy*fy)
+         across = unit*(on_chord - 12.0_wp*(mxx*fy - mxy*fx))
+         turn = unit*(zz*((cx*on_chord + slope) + 12.0_wp*(mxx*dxy - mxy*dxx)) &
+                      - 12.0_wp*(h*(h/zz))*(myy*dxy - mxy*dyy))
+         gx = (0.5_wp*(batch%crossing(i, 1, 1) + batch%crossing(i, 1, 2)) + cx*zx) - (h/zz)*cy*zy
+         gy = (0.5_wp*(batch%crossing(i, 2, 1) + batch%crossing(i, 2, 2)) + cx*zy) + (h/zz)*cy*zx
+         batch%area(i) = h*root
+         batch%normal(i, 1) = across*zy + along*zx
+         batch%normal(i, 2) = along*zy - across*zx
+         batch%length(i) = sqrt(batch%normal(i, 1)*batch%normal(i, 1) + batch%normal(i, 2)*batch%normal(i, 2))
+         batch%centroid(i, 1) = gx - batch%centre(i, 1)
+         batch%centroid(i, 2) = gy - batch%centre(i, 2)
+         batch%centroid(i, 3) = gx - batch%centre(i, 3)
+         batch%centroid(i, 4) = gy - batch%centre(i, 4)
+         batch%moment(i, 1) = turn + (batch%centroid(i, 1)*batch%normal(i, 2) - batch%centroid(i, 2)*batch%normal(i, 1))
+         batch%moment(i, 2) = turn + (batch%centroid(i, 3)*batch%normal(i, 2) - batch%centroid(i, 4)*batch%normal(i, 1))
+         worst = min(zz - 4.0_wp*no_length**2*area, batch%length(i)*batch%length(i) - 4.0_wp*no_length**2*batch%area(i))
+         worst = min(worst, min(determinant - least_determinant, determinant - least_ratio*product))
+         worst = min(worst, area - sure_area*batch%scale(i, 1)*batch%scale(i, 1))
+         batch%certified(i) = min(batch%certified(i), worst)
+      end do
+   end subroutine weigh
+
+end module polydem_lens_effective_area
