@@ -3,6 +3,7 @@
 !> P. L'Ecuyer, Operations Research 47 (1999) 159, Fig. I. The arithmetic is exact in 64-bit integers. The same seed
 !> therefore gives the same numbers with every compiler, and a namelist reproduces its scene.
 module polydem_random
+   use polydem_elementary, only: cosine, logarithm
    use polydem_kinds, only: ip, lp, wp
    implicit none
    private
@@ -87,8 +88,8 @@ contains
       real(wp), parameter :: two_pi = 6.283185307179586476925286766559_wp
       real(wp) :: radius
 
-      radius = sqrt(-2.0_wp*log(self%uniform()))
-      normal = radius*cos(two_pi*self%uniform())
+      radius = sqrt(-2.0_wp*logarithm(self%uniform()))
+      normal = radius*cosine(two_pi*self%uniform())
    end function normal
 
 end module polydem_random

@@ -40,6 +40,7 @@ contains
       call compare('/provenance/options', provenance%options)
       call compare('/provenance/precision', provenance%precision)
       call compare('/provenance/processor', provenance%processor)
+      call compare('/provenance/instruction_set', provenance%instruction_set)
       call compare('/provenance/binding', provenance%binding)
       call compare('/provenance/wait_policy', provenance%wait_policy)
       call file%close(ignored)

@@ -6,6 +6,7 @@
 !> the body: a small body inside a large one always meets a piece. The number of pieces is proportional to the
 !> circumference of the body, not to its area.
 module polydem_body_pieces
+   use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
    use polydem_polygon, only: clip_half_plane, diameter
    implicit none
@@ -138,7 +139,7 @@ contains
          edge = outline(:, 1_ip + modulo(v, n)) - outline(:, v)
          depth = cross(edge, centre - outline(:, v)) - half(1)*abs(cross(edge, grid%direction(:, 1))) &
                  - half(2)*abs(cross(edge, grid%direction(:, 2)))
-         if (depth < nearly*maxval(half)*hypot(edge(1), edge(2))) return
+         if (depth < nearly*maxval(half)*hypotenuse(edge(1), edge(2))) return
       end do
       lies_deep = .true.
    end function lies_deep
@@ -164,8 +165,8 @@ contains
       direction = [1.0_wp, 0.0_wp]
       do v = 1_ip, n
          edge = vertices(:, 1_ip + modulo(v, n)) - vertices(:, v)
-         if (hypot(edge(1), edge(2)) <= longest) cycle
-         longest = hypot(edge(1), edge(2))
+         if (hypotenuse(edge(1), edge(2)) <= longest) cycle
+         longest = hypotenuse(edge(1), edge(2))
          direction = edge/longest
       end do
    end function longest_edge

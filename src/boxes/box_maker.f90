@@ -11,7 +11,7 @@
 !> For interactions with a range, all boxes can be padded by a margin. If the distance of two bodies is less than twice
 !> the margin, their boxes overlap.
 module polydem_box_maker
-   use polydem_bodies, only: bodies_t
+   use polydem_bodies, only: block_size, bodies_t, turn_block
    use polydem_body_pieces, only: cut_body, pieces_t
    use polydem_boxes, only: boxes_t
    use polydem_errors, only: error_t, input_error, raise
@@ -21,7 +21,7 @@ module polydem_box_maker
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: box_maker_t, new_box_maker, update_boxes
+   public :: box_maker_t, new_box_maker, turn_and_bound, update_boxes
 
    !> Allowance for rounding, in units of epsilon times the diameter of a body
    real(wp), parameter :: roundings = 64.0_wp
@@ -151,6 +151,33 @@ contains
       end do
    end subroutine set_reach
 
+   !> Turn bodies to their angles and update their boxes in one pass, block by block, while a block is in the cache: the
+   !> same as `turn_bodies` and then `update_boxes`.
+   subroutine turn_and_bound(maker, moving, isa, bodies, boxes)
+      !> From `new_box_maker`
+      type(box_maker_t), intent(in) :: maker
+      !> Slots of the bodies that may have moved since the last call
+      integer(ip), intent(in) :: moving(:)
+      !> Instruction set of the kernels
+      integer, intent(in) :: isa
+      !> Bodies; only `direction` and `turned` change
+      type(bodies_t), intent(inout) :: bodies
+      !> Boxes; only `bounds` changes
+      type(boxes_t), intent(inout) :: boxes
+      integer(ip) :: low, high, k
+
+      !$omp parallel do if (size(moving) > min_parallel_size) schedule(static) default(none) &
+      !$omp    shared(maker, moving, isa, bodies, boxes) private(low, high, k)
+      do low = 1_ip, size(moving, kind=ip), block_size
+         high = min(low + block_size - 1_ip, size(moving, kind=ip))
+         call turn_block(bodies, moving(low:high), isa)
+         do k = low, high
+            call bound_body(maker, bodies, moving(k), boxes)
+         end do
+      end do
+      !$omp end parallel do
+   end subroutine turn_and_bound
+
    !> Update the boxes of the given bodies to their positions. The boxes of other bodies do not change.
    subroutine update_boxes(maker, bodies, moving, boxes)
       !> From `new_box_maker`
@@ -161,26 +188,36 @@ contains
       integer(ip), intent(in) :: moving(:)
       !> Boxes; only `bounds` changes
       type(boxes_t), intent(inout) :: boxes
-      integer(ip) :: k, s, b
+      integer(ip) :: k
 
       !$omp parallel do if (size(moving) > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(maker, bodies, moving, boxes) private(k, s, b)
+      !$omp    shared(maker, bodies, moving, boxes) private(k)
       do k = 1_ip, size(moving, kind=ip)
-         s = moving(k)
-         b = maker%first_box(s)
-         if (maker%piece_start(b + 1_ip) == maker%piece_start(b)) then
-            call bound(bodies%turned(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip), &
-                       maker%padding(b), bodies%position(:, s), boxes%bounds(:, b))
-            cycle
-         end if
-         do b = maker%first_box(s), maker%first_box(s + 1_ip) - 1_ip
-            call bound(turn(maker%piece(:, maker%piece_start(b):maker%piece_start(b + 1_ip) - 1_ip), &
-                            bodies%direction(:, s)), &
-                       maker%padding(b), bodies%position(:, s), boxes%bounds(:, b))
-         end do
+         call bound_body(maker, bodies, moving(k), boxes)
       end do
       !$omp end parallel do
    end subroutine update_boxes
+
+   !> Update the boxes of a body.
+   pure subroutine bound_body(maker, bodies, s, boxes)
+      type(box_maker_t), intent(in) :: maker
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      type(boxes_t), intent(inout) :: boxes
+      integer(ip) :: b
+
+      b = maker%first_box(s)
+      if (maker%piece_start(b + 1_ip) == maker%piece_start(b)) then
+         call bound(bodies%turned(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip), &
+                    maker%padding(b), bodies%position(:, s), boxes%bounds(:, b))
+         return
+      end if
+      do b = maker%first_box(s), maker%first_box(s + 1_ip) - 1_ip
+         call bound(turn(maker%piece(:, maker%piece_start(b):maker%piece_start(b + 1_ip) - 1_ip), &
+                         bodies%direction(:, s)), &
+                    maker%padding(b), bodies%position(:, s), boxes%bounds(:, b))
+      end do
+   end subroutine bound_body
 
    !> Box of turned vertices. The padding is applied before the position is added: rounding then remains monotonic.
    pure subroutine bound(turned, padding, position, box)

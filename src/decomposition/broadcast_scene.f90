@@ -2,6 +2,7 @@
 module polydem_broadcast_scene
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_communicator, only: communicator_t
+   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_packed_bodies, only: packed_bodies_t, pack_bodies, unpack_bodies
    use polydem_prescribed_motion, only: motion_names, motion_t
@@ -54,7 +55,7 @@ contains
       bodies%position(1, :) = real(pose(:, 1), wp)
       bodies%position(2, :) = real(pose(:, 2), wp)
       bodies%angle = real(pose(:, 3), wp)
-      call turn_bodies(bodies, slots)
+      call turn_bodies(bodies, slots, isa_base)
    end subroutine broadcast_fixed_bodies
 
    !> Broadcast the prescribed motions of the root rank. Collective.

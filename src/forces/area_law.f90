@@ -9,6 +9,7 @@ module polydem_area_law
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
+   use polydem_elementary, only: hypotenuse
    use polydem_force_part, only: acts_elastic, force_part_t
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
@@ -134,7 +135,7 @@ contains
       depth = 0.0_wp
       do k = 1, 12
          r1 = 0.5_wp*(block(2) - depth)
-         r2 = hypot(0.5_wp*(support(2) - depth), offset)
+         r2 = hypotenuse(0.5_wp*(support(2) - depth), offset)
          depth = load/(self%stiffness*block(1))*4.0_wp*r1*r2/(r1 + r2)
       end do
    end function static_depth

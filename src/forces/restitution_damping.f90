@@ -18,6 +18,7 @@ module polydem_restitution_damping
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
+   use polydem_elementary, only: arc_cosine, exponential, logarithm
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
    use polydem_settings, only: forces_settings_t
@@ -102,11 +103,11 @@ contains
 
       root = sqrt(abs((1.0_wp - ratio)*(1.0_wp + ratio)))
       if (ratio < 1.0_wp) then
-         restitution = exp(-2.0_wp*ratio*atan2(root, ratio)/root)
+         restitution = exponential(-2.0_wp*ratio*arc_cosine(ratio)/root)
       else if (ratio > 1.0_wp) then
-         restitution = exp(-2.0_wp*ratio*log(ratio + root)/root)
+         restitution = exponential(-2.0_wp*ratio*logarithm(ratio + root)/root)
       else
-         restitution = exp(-2.0_wp)
+         restitution = exponential(-2.0_wp)
       end if
    end function restitution_of
 

@@ -4,8 +4,9 @@
 !> depends on the polygons alone. So does the result: what is remembered from the last step only saves time.
 module polydem_convex_overlap
    use polydem_clipping, only: clip_overlap
+   use polydem_evaluate_batch, only: evaluate_batch
+   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, wp
-   use polydem_lens_kernel, only: evaluate_batch
    use polydem_lens_search, only: search_pair
    use polydem_overlap_batch, only: add_lane, overlap_batch_t
    use polydem_overlap_integrals, only: overlap_t
@@ -72,7 +73,7 @@ contains
       certified = .false.
       call add_lane(batch, 1_ip, memory, [1_ip, n, n + 1_ip, n + m], offset, radius_p, radius_q, usable)
       if (.not. usable) return
-      call evaluate_batch(batch, 1_ip, 1_ip, vertices, effective)
+      call evaluate_batch(batch, 1_ip, vertices, effective, isa_base)
       certified = batch%certified(1) > 0.0_wp
       if (.not. certified) return
       overlap%area = batch%area(1)

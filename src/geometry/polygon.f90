@@ -4,6 +4,7 @@
 !> spacing of floating-point numbers at its coordinates.
 module polydem_polygon
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
    use polydem_strings, only: to_text
    implicit none
@@ -98,11 +99,11 @@ contains
       real(wp), intent(in) :: leaving(2)
       real(wp), intent(in) :: tolerance
 
-      if (hypot(leaving(1), leaving(2)) <= tolerance) then
+      if (hypotenuse(leaving(1), leaving(2)) <= tolerance) then
          is_redundant = .true.
       else
          is_redundant = abs(cross(arriving, leaving)) <= &
-                   tolerance*hypot(arriving(1) + leaving(1), arriving(2) + leaving(2)) .and. &
+                   tolerance*hypotenuse(arriving(1) + leaving(1), arriving(2) + leaving(2)) .and. &
                    arriving(1)*leaving(1) + arriving(2)*leaving(2) > 0.0_wp
       end if
    end function is_redundant
@@ -187,7 +188,7 @@ contains
       diameter = 0.0_wp
       do k = 2_ip, size(vertices, 2, kind=ip)
          do j = 1_ip, k - 1_ip
-            diameter = max(diameter, hypot(vertices(1, k) - vertices(1, j), vertices(2, k) - vertices(2, j)))
+            diameter = max(diameter, hypotenuse(vertices(1, k) - vertices(1, j), vertices(2, k) - vertices(2, j)))
          end do
       end do
    end function diameter

@@ -26,6 +26,7 @@ contains
                             p%precision//' precision, '//p%compiler//', HDF5 '//p%hdf5_version)
          call write_wrapped(log, 'options    '//p%options)
          call write_wrapped(log, 'machine    '//p%host//', '//p%processor)
+         call write_wrapped(log, 'kernels    '//p%instruction_set)
          call write_wrapped(log, 'caches     '//p%caches)
          if (p%processes > 1_ip) call write_wrapped(log, 'processes  '//to_text(p%processes)//', by MPI, each with')
          call write_wrapped(log, 'threads    '//to_text(p%threads)//' on '//to_text(p%processors)// &

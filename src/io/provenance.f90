@@ -3,10 +3,12 @@ module polydem_provenance
    use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version
    use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_get_proc_bind, omp_proc_bind_false
    use polydem_build_info, only: build_type, git_revision, program_version
+   use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t, library_version
    use polydem_host, only: cache_sizes, cores_online, environment, frequency_governor, host_name, kernel_release, &
       load_average, memory_size, processor_clock, processor_name, utc_now
+   use polydem_instruction_set, only: isa_names
    use polydem_kinds, only: dp, ip, precision_name
    implicit none
    private
@@ -32,6 +34,8 @@ module polydem_provenance
       character(len=:), allocatable :: host
       !> Processor model
       character(len=:), allocatable :: processor
+      !> Instruction set of the kernels
+      character(len=:), allocatable :: instruction_set
       !> Clock of the first processor at the start
       character(len=:), allocatable :: clock
       !> Cache sizes
@@ -91,7 +95,11 @@ contains
       character(len=*), intent(in) :: resolved_input
       !> Seed of the scene
       integer(ip), intent(in) :: seed
+      type(error_t), allocatable :: ignored
+      integer :: isa
 
+      call choose_instruction_set(isa, ignored)
+      provenance%instruction_set = isa_names(isa)
       provenance%version = program_version
       provenance%revision = git_revision
       provenance%build_type = build_type
@@ -147,6 +155,7 @@ contains
       call file%write('/provenance/hdf5_version', provenance%hdf5_version, error)
       call file%write('/provenance/host', provenance%host, error)
       call file%write('/provenance/processor', provenance%processor, error)
+      call file%write('/provenance/instruction_set', provenance%instruction_set, error)
       call file%write('/provenance/clock', provenance%clock, error)
       call file%write('/provenance/caches', provenance%caches, error)
       call file%write('/provenance/memory', provenance%memory, error)

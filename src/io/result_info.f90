@@ -1,5 +1,6 @@
 !> Descriptions for `polydem info`: of the program itself, and of a result.
 module polydem_result_info
+   use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_checksum, only: verify_checksum
    use polydem_file_system, only: exists
@@ -17,8 +18,8 @@ module polydem_result_info
 
    !> Entries of the provenance that are printed for a profile; for other files only the first two
    character(len=*), parameter :: facts(*) = [character(len=16) :: 'version', 'revision', 'build_type', 'compiler', &
-                                              'options', 'precision', 'host', 'processor', 'caches', 'input_file', &
-                                              'started', 'written']
+                                              'options', 'precision', 'host', 'processor', 'instruction_set', &
+                                              'caches', 'input_file', 'started', 'written']
 
 contains
 
@@ -29,7 +30,10 @@ contains
       type(provenance_t) :: provenance
       type(log_t) :: log
       character(len=:), allocatable :: warning
+      integer :: isa
 
+      call choose_instruction_set(isa, error)
+      if (allocated(error)) return
       call collect_provenance(provenance, '-', '', '', 0_ip)
       call log%open('', error)
       call write_header(log, provenance, '-')

@@ -3,6 +3,7 @@ module polydem_trajectory_reader
    use polydem_bodies, only: bodies_t
    use polydem_bodies_reader, only: read_bodies_file
    use polydem_body_list, only: body_list_t, new_bodies
+   use polydem_elementary, only: sine_and_cosine
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: is_folder
    use polydem_hdf5_file, only: hdf5_file_t
@@ -67,8 +68,7 @@ contains
       end if
       last = size(angle, 2, kind=ip)
       do k = 1_ip, size(fixed, kind=ip)
-         c = cos(real(angle(k, last), wp))
-         s = sin(real(angle(k, last), wp))
+         call sine_and_cosine(real(angle(k, last), wp), s, c)
          corners = real(shape(:, start(k) + 1_ip:start(k + 1_ip)), wp)
          do v = 1_ip, size(corners, 2, kind=ip)
             corners(:, v) = [c*corners(1, v) - s*corners(2, v), s*corners(1, v) + c*corners(2, v)] &

@@ -25,6 +25,7 @@ module polydem_quadtree
    use omp_lib, only: omp_get_max_threads
    use polydem_boxes, only: boxes_t
    use polydem_candidates, only: candidates_t, overlapping, index_list_t
+   use polydem_exponential, only: exponential, logarithm
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_leaf_changes, &
       count_left_leaf, count_nodes, count_searches, count_tests, count_visits, phase_filter, phase_search, &
@@ -170,12 +171,12 @@ contains
          reach = real(boxes%reach(i), dp)
          if (.not. (reach > 0.0_dp .and. reach < huge(1.0_dp))) cycle
          n = n + 1_ip
-         logarithms = logarithms + log(reach)
+         logarithms = logarithms + logarithm(reach)
          least = min(least, reach)
       end do
       finest_cell = 1.0_dp
       if (n == 0_ip) return
-      finest_cell = typical_share*exp(logarithms/real(n, dp))
+      finest_cell = typical_share*exponential(logarithms/real(n, dp))
       do level = 1, most_levels
          if (finest_cell <= least) exit
          finest_cell = 0.5_dp*finest_cell

@@ -11,6 +11,7 @@
 !> If all boxes have nearly the same size, the solution is one level, as with linked cells.
 module polydem_size_levels
    use polydem_boxes, only: boxes_t
+   use polydem_exponential, only: exponential, logarithm
    use polydem_kinds, only: dp, ip, wp
    implicit none
    private
@@ -91,10 +92,10 @@ contains
       do i = 1_ip, boxes%n
          if (boxes%fixed(i) .or. .not. side_of(boxes, i) > 0.0_dp) cycle
          n = n + 1_ip
-         logarithms = logarithms + log(side_of(boxes, i))
+         logarithms = logarithms + logarithm(side_of(boxes, i))
       end do
       typical_side = 0.0_wp
-      if (n > 0_ip) typical_side = real(exp(logarithms/real(n, dp)), wp)
+      if (n > 0_ip) typical_side = real(exponential(logarithms/real(n, dp)), wp)
    end function typical_side
 
    !> Count the free boxes of each size class. Fixed boxes get class 1 but are not counted.
@@ -128,7 +129,7 @@ contains
       do i = 1_ip, boxes%n
          if (boxes%fixed(i)) cycle
          side = max(side_of(boxes, i) + real(margin, dp), least)
-         class(i) = 1 + int(real(classes_per_octave, dp)*log(side/least)/log(2.0_dp))
+         class(i) = 1 + int(real(classes_per_octave, dp)*logarithm(side/least)/logarithm(2.0_dp))
          class(i) = min(class(i), most_classes)
          spectrum%n = max(spectrum%n, class(i))
          spectrum%boxes(class(i)) = spectrum%boxes(class(i)) + 1.0_dp

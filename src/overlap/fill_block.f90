@@ -15,8 +15,8 @@ module polydem_fill_block
    use polydem_contact_block, only: block_size, contact_block_t, copy_motion
    use polydem_contact_history, only: contact_history_t
    use polydem_convex_overlap, only: find_overlap, overlap_t
+   use polydem_evaluate_batch, only: evaluate_batch
    use polydem_kinds, only: ip, wp
-   use polydem_lens_kernel, only: evaluate_batch
    use polydem_overlap_batch, only: add_lane, copy_lane, overlap_batch_t
    use polydem_overlap_tolerances, only: no_length
    use polydem_separation, only: test_separation
@@ -27,13 +27,15 @@ module polydem_fill_block
 contains
 
    !> Fill a block with contacts of pairs in descending order.
-   subroutine fill_block(bodies, first, second, effective, low, next, history, block)
+   subroutine fill_block(bodies, first, second, effective, isa, low, next, history, block)
       !> Bodies with rotated polygons
       type(bodies_t), intent(in) :: bodies
       !> Lower and higher slot of each pair
       integer(ip), intent(in), contiguous :: first(:), second(:)
       !> Whether to compute the effective area
       logical, intent(in) :: effective
+      !> Instruction set of the kernels
+      integer, intent(in) :: isa
       !> Last pair to examine
       integer(ip), intent(in) :: low
       !> First pair to examine, at least `low`; afterwards the next one, less than `low` if there is none
@@ -48,7 +50,7 @@ contains
       integer(ip) :: c
 
       call collect_pairs(bodies, first, second, low, next, history, block, batch, in_batch)
-      call evaluate(bodies, effective, block%n, in_batch, batch)
+      call evaluate(bodies, effective, isa, block%n, in_batch, batch)
       call copy_batch(batch, block)
       do c = 1_ip, block%n
          exists(c) = in_batch(c)
@@ -121,9 +123,10 @@ contains
    end function offset_of
 
    !> Evaluate the batch. Lanes without a pair get copies of another, so that there is no gap.
-   pure subroutine evaluate(bodies, effective, n, in_batch, batch)
+   pure subroutine evaluate(bodies, effective, isa, n, in_batch, batch)
       type(bodies_t), intent(in) :: bodies
       logical, intent(in) :: effective
+      integer, intent(in) :: isa
       integer(ip), intent(in) :: n
       logical, intent(in) :: in_batch(block_size)
       type(overlap_batch_t), intent(inout) :: batch
@@ -134,7 +137,7 @@ contains
       do c = 1_ip, n
          if (.not. in_batch(c)) call copy_lane(batch, filled, c)
       end do
-      call evaluate_batch(batch, 1_ip, n, bodies%turned, effective)
+      call evaluate_batch(batch, n, bodies%turned, effective, isa)
    end subroutine evaluate
 
    !> Copy the results of the batch to the block.

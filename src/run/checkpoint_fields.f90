@@ -57,7 +57,7 @@ contains
                            'xmin, ymin, xmax, ymax at the last search for pairs')
          call serialize_pairs(serializer, s)
          if (.not. serializer%is_reading .or. allocated(serializer%error)) return
-         call turn_bodies(s%bodies, s%moving)
+         call turn_bodies(s%bodies, s%moving, s%isa)
          s%contacts%n = 0_ip
          s%contacts%n_degenerate = 0_ip
          s%walls%n = 0_ip

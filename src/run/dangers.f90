@@ -5,6 +5,7 @@
 module polydem_dangers
    use polydem_body_sizes, only: thickness_of_bodies
    use polydem_contact_depth, only: count_deeper, deepest_contact, depth_share, depth_text
+   use polydem_elementary, only: hypotenuse
    use polydem_guards, only: greatest_displacement
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
@@ -76,7 +77,7 @@ contains
             to_text(density(1), 3)//' to '//to_text(density(2), 3)//' kg/m3, which no solid has; check the units')
       end associate
       associate (g => simulation%settings%forces%gravity)
-         gravity = hypot(g(1), g(2))
+         gravity = hypotenuse(g(1), g(2))
       end associate
       if (gravity > strongest_gravity) call writer%warn(log, &
          'gravity is in m/s2: '//to_text(gravity, 3)//' m/s2 is '//to_text(gravity/9.81_wp, 3)// &

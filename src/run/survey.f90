@@ -2,6 +2,7 @@
 module polydem_survey
    use polydem_bodies, only: bodies_t
    use polydem_body_sizes, only: measure_body
+   use polydem_elementary, only: hypotenuse
    use polydem_energy_guard, only: stored_energy
    use polydem_kinds, only: ip, wp
    use polydem_polygon, only: diameter
@@ -66,7 +67,7 @@ contains
          do k = 1, size(s%motions)
             survey%wall_speed = max(survey%wall_speed, greatest_speed(s%motions(k), s%guard%radius))
          end do
-         gravity = hypot(s%settings%forces%gravity(1), s%settings%forces%gravity(2))
+         gravity = hypotenuse(s%settings%forces%gravity(1), s%settings%forces%gravity(2))
          if (gravity > 0.0_wp) then
             down = abs(s%settings%forces%gravity)/gravity
             survey%potential = gravity*survey%mass(3)*along(survey%extent)
@@ -142,7 +143,7 @@ contains
             length = diameter(shape)
             density = bodies%mass(s)/area_of(shape)
          end associate
-         speed = hypot(bodies%velocity(1, s), bodies%velocity(2, s))
+         speed = hypotenuse(bodies%velocity(1, s), bodies%velocity(2, s))
          survey%diameter([1, 3]) = [min(survey%diameter(1), length), max(survey%diameter(3), length)]
          survey%mass = [min(survey%mass(1), bodies%mass(s)), max(survey%mass(2), bodies%mass(s)), &
                         survey%mass(3) + bodies%mass(s)]
@@ -181,13 +182,13 @@ contains
       select case (motion%kind)
       case ('rotation')
          do k = 1, size(motion%slots)
-            greatest_speed = max(greatest_speed, abs(motion%rate)*(radius(motion%slots(k)) + hypot( &
+            greatest_speed = max(greatest_speed, abs(motion%rate)*(radius(motion%slots(k)) + hypotenuse( &
                              motion%position(1, k) - motion%pivot(1), motion%position(2, k) - motion%pivot(2))))
          end do
       case ('translation')
-         greatest_speed = hypot(motion%velocity(1), motion%velocity(2))
+         greatest_speed = hypotenuse(motion%velocity(1), motion%velocity(2))
       case default
-         greatest_speed = motion%frequency*hypot(motion%amplitude(1), motion%amplitude(2))
+         greatest_speed = motion%frequency*hypotenuse(motion%amplitude(1), motion%amplitude(2))
       end select
    end function greatest_speed
 

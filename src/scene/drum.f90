@@ -4,6 +4,7 @@
 !> prescribed rotation about the pivot (0, 0) turns the ring.
 module polydem_drum
    use polydem_body_list, only: body_list_t
+   use polydem_elementary, only: sine_and_cosine
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: pi, settled_area
    use polydem_kinds, only: ip, wp
@@ -89,13 +90,14 @@ contains
       integer(ip), intent(in) :: n
       !> Corners, (2, n) [m]
       real(wp), allocatable, intent(out) :: corners(:, :)
-      real(wp) :: angle
+      real(wp) :: angle, c, s
       integer(ip) :: k
 
       allocate (corners(2, n))
       do k = 1_ip, n
          angle = 2.0_wp*pi*real(k - 1_ip, wp)/real(n, wp)
-         corners(:, k) = [radius*cos(angle), radius*sin(angle)]
+         call sine_and_cosine(angle, s, c)
+         corners(:, k) = [radius*c, radius*s]
       end do
    end subroutine draw_ring
 

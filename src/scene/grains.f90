@@ -5,6 +5,7 @@
 !> differ in size, both axes are multiplied by the size factor of the grain.
 module polydem_grains
    use polydem_body_list, only: body_list_t
+   use polydem_elementary, only: sine_and_cosine
    use polydem_kinds, only: ip, wp
    use polydem_polygon, only: mass_properties
    use polydem_random, only: random_t
@@ -136,7 +137,7 @@ contains
       real(wp), allocatable, intent(out) :: corners(:, :)
       real(wp), intent(out) :: length
       real(wp), allocatable :: gaps(:)
-      real(wp) :: long_half, short_half, turn, place, total, x, y
+      real(wp) :: long_half, short_half, turn, place, total, x, y, c, s
       integer(ip) :: k, n
 
       n = random%whole(scene%corners_min, scene%corners_max)
@@ -152,10 +153,12 @@ contains
          total = total + gaps(k)
       end do
       do k = 1_ip, n
-         x = long_half*cos(place)
-         y = short_half*sin(place)
-         corners(1, k) = cos(turn)*x - sin(turn)*y
-         corners(2, k) = sin(turn)*x + cos(turn)*y
+         call sine_and_cosine(place, s, c)
+         x = long_half*c
+         y = short_half*s
+         call sine_and_cosine(turn, s, c)
+         corners(1, k) = c*x - s*y
+         corners(2, k) = s*x + c*y
          place = place + 2.0_wp*pi*gaps(k)/total
       end do
    end subroutine draw_corners

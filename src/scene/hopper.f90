@@ -3,6 +3,7 @@
 !> The opening is at y = 0. Each of the five walls is one polygon (Krengel et al. 2026, Fig. 7).
 module polydem_hopper
    use polydem_body_list, only: body_list_t
+   use polydem_elementary, only: cosine, tangent
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: pi, settled_area
    use polydem_kinds, only: wp
@@ -33,13 +34,13 @@ contains
          call raise(error, input_error, 'opening must be less than width')
          return
       end if
-      rise = (half - lip)*tan(scene%slope*pi/180.0_wp)
+      rise = (half - lip)*tangent(scene%slope*pi/180.0_wp)
       top = rise + max(lattice_height(scene%bodies, 2.0_wp*half, loose_spacing(scene)), thickness)
       call place_grains(list, scene, funnel(half, lip, rise, top), scene%bodies, error)
       if (allocated(error)) return
-      bottom = -bin_depth(scene, half) - thickness/cos(scene%slope*pi/180.0_wp)
+      bottom = -bin_depth(scene, half) - thickness/cosine(scene%slope*pi/180.0_wp)
       call append_box(list, rectangle(-half, half, bottom, top), thickness, closed=.false.)
-      call append_inclines(list, half, lip, rise, thickness/cos(scene%slope*pi/180.0_wp))
+      call append_inclines(list, half, lip, rise, thickness/cosine(scene%slope*pi/180.0_wp))
    end subroutine list_hopper
 
    !> Given width, or the width of a square silo that is at least three openings wide [m]

@@ -3,6 +3,7 @@
 !> The centre of the contact is at the origin at the start. The slope falls to the right and has a stop at each end.
 module polydem_incline
    use polydem_body_list, only: body_list_t
+   use polydem_elementary, only: cosine, sine
    use polydem_grains, only: pi
    use polydem_kinds, only: wp
    use polydem_settings, only: settings_t
@@ -27,7 +28,7 @@ contains
       type(body_list_t), intent(inout) :: list
       real(wp) :: along(2), depth, load, top, bottom
 
-      along = [cos(settings%scene%slope*pi/180.0_wp), -sin(settings%scene%slope*pi/180.0_wp)]
+      along = [cosine(settings%scene%slope*pi/180.0_wp), -sine(settings%scene%slope*pi/180.0_wp)]
       associate (width => settings%scene%width, height => settings%scene%height, &
                  density => settings%scene%density, gravity => settings%forces%gravity)
          load = density*width*height*max(0.0_wp, gravity(1)*along(2) - gravity(2)*along(1))

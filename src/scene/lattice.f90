@@ -1,5 +1,6 @@
 !> Positions for grains: points of a hexagonal lattice inside a convex outline, from the bottom up.
 module polydem_lattice
+   use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
    implicit none
    private
@@ -80,7 +81,7 @@ contains
       do k = 1, size(outline, 2)
          next = modulo(k, size(outline, 2)) + 1
          edge = outline(:, next) - outline(:, k)
-         length = hypot(edge(1), edge(2))
+         length = hypotenuse(edge(1), edge(2))
          if (abs(edge(2)) <= epsilon(1.0_wp)*length) cycle
          bound = outline(1, k) + (edge(1)*(y - outline(2, k)) - clearance*length)/edge(2)
          if (edge(2) > 0.0_wp) then

@@ -3,6 +3,7 @@
 !> The copies lie side by side and on top of each other. Only grains wholly inside the container are used, from the
 !> lowest to the highest. Time and memory are proportional to the number of grains.
 module polydem_packing
+   use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: grain_t, pi
    use polydem_kinds, only: ip, wp
@@ -126,7 +127,7 @@ contains
       allocate (outline%normals(2, size(corners, 2)))
       do k = 1, size(corners, 2)
          edge = corners(:, modulo(k, size(corners, 2)) + 1) - corners(:, k)
-         outline%normals(:, k) = [edge(2), -edge(1)]/hypot(edge(1), edge(2))
+         outline%normals(:, k) = [edge(2), -edge(1)]/hypotenuse(edge(1), edge(2))
          outline%radius = min(outline%radius, outline%normals(1, k)*(corners(1, k) - outline%middle(1)) &
                               + outline%normals(2, k)*(corners(2, k) - outline%middle(2)))
       end do
@@ -141,7 +142,7 @@ contains
       integer :: k, v
 
       arm = place - outline%middle
-      holds = hypot(arm(1), arm(2)) + 0.5_wp*grain%length <= outline%radius
+      holds = hypotenuse(arm(1), arm(2)) + 0.5_wp*grain%length <= outline%radius
       if (holds) return
       do k = 1, size(outline%corners, 2)
          arm = place - outline%corners(:, k)

@@ -6,6 +6,7 @@
 module polydem_patch
    use polydem_bodies, only: bodies_t
    use polydem_convex_overlap, only: overlap_polygons, overlap_t
+   use polydem_elementary, only: hypotenuse
    use polydem_errors, only: error_t, input_error, raise
    use polydem_grains, only: grain_t
    use polydem_kinds, only: ip, wp
@@ -81,7 +82,7 @@ contains
             patch%grains(k)%corners = bodies%turned(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip)
          end associate
          associate (corners => patch%grains(k)%corners)
-            patch%grains(k)%length = 2.0_wp*maxval(hypot(corners(1, :), corners(2, :)))
+            patch%grains(k)%length = 2.0_wp*maxval(hypotenuse(corners(1, :), corners(2, :)))
          end associate
       end do
       call drop_overlaps(patch)

@@ -114,8 +114,8 @@ contains
          n_blocks = n_blocks + 1_ip
          if (timed) clock(1) = wall_seconds()
          associate (pairs => self%neighbours%pairs)
-            call fill_block(self%bodies, pairs%first, pairs%second, self%law%needs_effective_area, ends(1) + 1_ip, &
-                            next, self%history, block)
+            call fill_block(self%bodies, pairs%first, pairs%second, self%law%needs_effective_area, self%isa, &
+                            ends(1) + 1_ip, next, self%history, block)
          end associate
          if (timed) clock(2) = wall_seconds()
          call self%law%apply(self%bodies, dt, block, self%history)

@@ -2,6 +2,7 @@
 !> free bodies are distributed by the first step (polydem_redistribution).
 module polydem_parallel_start
    use polydem_broadcast_scene, only: broadcast_fixed_bodies, broadcast_motions
+   use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_communicator, only: communicator_t
    use polydem_contact_incidence, only: index_contacts
    use polydem_domain, only: new_domain
@@ -46,6 +47,7 @@ contains
             self%guard%limit = real(numbers(4), wp)
             ! The limit is that of the whole run. It does not depend on the bodies of this rank.
             self%generation = 1_ip
+            call choose_instruction_set(self%isa, error)
             call new_integrator(settings%integrate, self%integrator)
             allocate (self%motions(counts(3)))
          end if

@@ -107,7 +107,7 @@ contains
          self%motions(k)%slots = slots_of_global_indices(self%bodies%global_index, self%motions(k)%slots)
       end do
       call self%domain%halo%follow(self%comm, self%bodies)
-      call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
+      call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)], self%isa)
       call fit_to_bodies(self, error, self%domain%median_diameter)
       call self%domain%set_reference(self%boxes%bounds(:, :self%boxes%n), self%step)
       associate (domain => self%domain)
@@ -165,7 +165,7 @@ contains
       call unpack_bodies(packed, (self%bodies%n_all), self%bodies, buffer%slots)
       call self%integrator%start(self%bodies)
       call serialize_columns(buffer, self)
-      call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)])
+      call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)], self%isa)
    end subroutine send_bodies
 
    !> Publish the bounds of the bodies of this rank, and receive the nearby bodies of other ranks as the halo.

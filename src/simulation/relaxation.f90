@@ -17,6 +17,7 @@ module polydem_relaxation
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_find_contacts, only: find_contacts
+   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_settings, only: settings_t
@@ -111,7 +112,7 @@ contains
       end do
       !$omp end parallel do
       call move_free(contacts, incidence, impulse, bodies)
-      call turn_bodies(bodies, bodies%free)
+      call turn_bodies(bodies, bodies%free, isa_base)
    end subroutine push_apart
 
    !> Displacement of a point of a body along a direction per unit impulse, times the number of contacts of the body

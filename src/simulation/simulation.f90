@@ -13,6 +13,7 @@ module polydem_simulation
    use polydem_force_sums, only: force_sums_t
    use polydem_guards, only: motion_guard_t
    use polydem_integrator, only: integrator_t
+   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
    use polydem_neighbours, only: neighbours_t
    use polydem_passing, only: contact_guard_t
@@ -36,6 +37,8 @@ module polydem_simulation
    type :: simulation_t
       !> Settings of the run
       type(settings_t) :: settings
+      !> Instruction set of the kernels
+      integer :: isa = isa_base
       !> Communicator of the ranks that share the bodies
       class(communicator_t), allocatable :: comm
       !> Part of space of this rank, and its halo

@@ -2,6 +2,7 @@
 module polydem_start_simulation
    use polydem_bodies, only: bodies_t
    use polydem_box_maker, only: update_boxes
+   use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_energy_balance, only: start_energy_balance
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_law, only: check_law, choose_parts, force_law_t
@@ -38,6 +39,7 @@ contains
       !> Allocated if bodies or settings are invalid
       type(error_t), allocatable, intent(inout) :: error
 
+      call choose_instruction_set(self%isa, error)
       call check_law(settings, 1_ip, error)
       if (allocated(error)) return
       allocate (serial_communicator_t :: self%comm)

@@ -1,7 +1,6 @@
 !> The time step of a simulation.
 module polydem_time_step
-   use polydem_bodies, only: turn_bodies
-   use polydem_box_maker, only: update_boxes
+   use polydem_box_maker, only: turn_and_bound
    use polydem_contact_incidence, only: index_contacts
    use polydem_contact_walk, only: walk_contacts
    use polydem_energy_balance, only: accumulate_step
@@ -72,9 +71,7 @@ contains
          call self%timers%lap(stage_decomposition)
       end if
       if (.not. allocated(error)) then
-         call turn_bodies(self%bodies, self%moving)
-         call self%timers%lap(stage_integrate)
-         call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
+         call turn_and_bound(self%maker, self%moving, self%isa, self%bodies, self%boxes)
          call self%timers%lap(stage_boxes)
       end if
       call redistribute(self, error)

@@ -13,11 +13,15 @@
 !> World coordinates are `position + turned`. They are not stored. Vectors between two near bodies start from the
 !> difference of their positions, which is exact; the precision is then independent of the distance from the origin.
 module polydem_bodies
+   use polydem_elementary, only: sines_and_cosines
    use polydem_hash, only: mix_word
    use polydem_kinds, only: ip, lp, wp, dp, min_parallel_size
    implicit none
    private
-   public :: bodies_t, turn_bodies, measure_radii, state_hash, state_words
+   public :: bodies_t, turn_bodies, turn_block, block_size, measure_radii, state_hash, state_words
+
+   !> Greatest number of bodies of a block for `turn_block`
+   integer(ip), parameter :: block_size = 64_ip
 
    !> Structure of arrays over slots 1..n
    type :: bodies_t
@@ -74,28 +78,19 @@ module polydem_bodies
 contains
 
    !> Update `direction` and `turned` of the given bodies to their angles.
-   !>
-   !> No other procedure of the program takes the sine or cosine of the angle of a body.
-   subroutine turn_bodies(bodies, slots)
+   subroutine turn_bodies(bodies, slots, isa)
       !> Bodies; only `direction` and `turned` change
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies that may have turned
       integer(ip), intent(in) :: slots(:)
-      integer(ip) :: k, s, v
-      real(wp) :: c, si
+      !> Instruction set of the kernels
+      integer, intent(in) :: isa
+      integer(ip) :: low
 
       !$omp parallel do if (size(slots) > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(bodies, slots) private(k, s, v, c, si)
-      do k = 1_ip, size(slots, kind=ip)
-         s = slots(k)
-         c = cos(bodies%angle(s))
-         si = sin(bodies%angle(s))
-         bodies%direction(1, s) = c
-         bodies%direction(2, s) = si
-         do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-            bodies%turned(1, v) = c*bodies%shape(1, v) - si*bodies%shape(2, v)
-            bodies%turned(2, v) = si*bodies%shape(1, v) + c*bodies%shape(2, v)
-         end do
+      !$omp    shared(bodies, slots, isa) private(low)
+      do low = 1_ip, size(slots, kind=ip), block_size
+         call turn_block(bodies, slots(low:min(low + block_size - 1_ip, size(slots, kind=ip))), isa)
       end do
       !$omp end parallel do
    end subroutine turn_bodies
@@ -117,6 +112,35 @@ contains
          bodies%radius(s) = sqrt(square)
       end do
    end subroutine measure_radii
+
+   !> Update `direction` and `turned` of up to `block_size` bodies to their angles.
+   !>
+   !> No other procedure of the program takes the sine or cosine of the angle of a body.
+   subroutine turn_block(bodies, slots, isa)
+      !> Bodies; only `direction` and `turned` of these bodies change
+      type(bodies_t), intent(inout) :: bodies
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Instruction set of the kernels
+      integer, intent(in) :: isa
+      real(wp) :: angle(block_size), c(block_size), si(block_size)
+      integer(ip) :: k, s, v, n
+
+      n = size(slots, kind=ip)
+      do k = 1_ip, n
+         angle(k) = bodies%angle(slots(k))
+      end do
+      call sines_and_cosines(isa, angle(1:n), si(1:n), c(1:n))
+      do k = 1_ip, n
+         s = slots(k)
+         bodies%direction(1, s) = c(k)
+         bodies%direction(2, s) = si(k)
+         do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
+            bodies%turned(1, v) = c(k)*bodies%shape(1, v) - si(k)*bodies%shape(2, v)
+            bodies%turned(2, v) = si(k)*bodies%shape(1, v) + c(k)*bodies%shape(2, v)
+         end do
+      end do
+   end subroutine turn_block
 
    !> Hash of the bits of every body's identifier, position, angle and velocities in identifier order.
    !>

@@ -2,6 +2,7 @@
 module polydem_body_list
    use polydem_bodies, only: bodies_t, measure_radii, turn_bodies
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
    use polydem_polygon, only: clean_polygon, mass_properties
    use polydem_sort, only: sort_keys
@@ -234,7 +235,7 @@ contains
       bodies%global_index = [(s, s=1_ip, bodies%n)]
       bodies%in_halo = spread(.false., 1, bodies%n)
       bodies%free = pack([(s, s=1_ip, bodies%n)],.not. bodies%fixed)
-      call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
+      call turn_bodies(bodies, [(s, s=1_ip, bodies%n)], isa_base)
    end subroutine finish
 
 end module polydem_body_list

@@ -1,6 +1,7 @@
 !> Thickness and radius of bodies, measured from their centres of mass.
 module polydem_body_sizes
    use polydem_bodies, only: bodies_t
+   use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
    implicit none
    private
@@ -28,8 +29,8 @@ contains
          do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
             edge = shape(:, v) - shape(:, w)
             thickness = min(thickness, &
-                            2.0_wp*abs(edge(1)*shape(2, w) - edge(2)*shape(1, w))/hypot(edge(1), edge(2)))
-            radius = max(radius, hypot(shape(1, v), shape(2, v)))
+                            2.0_wp*abs(edge(1)*shape(2, w) - edge(2)*shape(1, w))/hypotenuse(edge(1), edge(2)))
+            radius = max(radius, hypotenuse(shape(1, v), shape(2, v)))
             w = v
          end do
       end associate

@@ -4,6 +4,7 @@
 !> the ramp the rate rises as s(u) = u^2 (3 - 2 u) with u = (t - start)/ramp; the integral of s is u^3 - u^4/2.
 module polydem_prescribed_motion
    use polydem_bodies, only: bodies_t
+   use polydem_elementary, only: sine_and_cosine
    use polydem_kinds, only: ip, wp
    implicit none
    private
@@ -87,8 +88,7 @@ contains
       turn = motion%rate*elapsed(motion, time)
       rate = motion%rate*ramp_factor(motion, time)
       growth = motion%rate*ramp_growth(motion, time)
-      c = cos(turn)
-      s = sin(turn)
+      call sine_and_cosine(turn, s, c)
       do k = 1_ip, size(motion%slots, kind=ip)
          slot = motion%slots(k)
          arm = motion%position(:, k) - motion%pivot
@@ -122,16 +122,17 @@ contains
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: time
       type(bodies_t), intent(inout) :: bodies
-      real(wp) :: phase, rate, speed, change
+      real(wp) :: phase, rate, speed, change, c, s
       integer(ip) :: k
 
       phase = motion%frequency*elapsed(motion, time)
       rate = motion%frequency*ramp_factor(motion, time)
-      speed = rate*cos(phase)
-      change = motion%frequency*ramp_growth(motion, time)*cos(phase) - rate**2*sin(phase)
+      call sine_and_cosine(phase, s, c)
+      speed = rate*c
+      change = motion%frequency*ramp_growth(motion, time)*c - rate**2*s
       do k = 1_ip, size(motion%slots, kind=ip)
          associate (slot => motion%slots(k))
-            bodies%position(:, slot) = motion%position(:, k) + motion%amplitude*sin(phase)
+            bodies%position(:, slot) = motion%position(:, k) + motion%amplitude*s
             bodies%velocity(:, slot) = motion%amplitude*speed
             bodies%acceleration(:, slot) = motion%amplitude*change
          end associate

@@ -4,7 +4,7 @@ module polydem_host
    use polydem_kinds, only: dp, ip, lp
    implicit none
    private
-   public :: host_name, processor_name, processor_clock, cache_sizes, memory_size, frequency_governor
+   public :: host_name, processor_name, processor_clock, processor_has, cache_sizes, memory_size, frequency_governor
    public :: kernel_release, boot_identity, cores_online
    public :: load_average, environment, utc_now, is_terminal, resident_memory
 
@@ -96,11 +96,20 @@ contains
       text = trim(adjustl(number))//' GHz'
    end function processor_clock
 
+   !> Whether the first processor has a feature of /proc/cpuinfo, like 'avx2'. Linux lists only what it supports itself:
+   !> without XSAVE for the wide registers it removes AVX and all that needs it. Without /proc no feature is known.
+   logical function processor_has(feature)
+      !> Name of the feature
+      character(len=*), intent(in) :: feature
+
+      processor_has = index(' '//processor_fact('flags')//' ', ' '//feature//' ') > 0
+   end function processor_has
+
    !> First entry of a name in /proc/cpuinfo
    function processor_fact(name) result(fact)
       character(len=*), intent(in) :: name
       character(len=:), allocatable :: fact
-      character(len=512) :: line
+      character(len=8192) :: line
       integer :: unit, status
 
       fact = unknown

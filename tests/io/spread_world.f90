@@ -6,6 +6,7 @@ module spread_world
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_force_sums, only: assemble_forces, force_sums_t
    use polydem_hash, only: mix_word
+   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
    implicit none
    private
@@ -131,7 +132,7 @@ contains
                                              [7_ip, 8_ip]*(v - bodies%vertex_start(s) + 1_ip))
          end do
       end do
-      call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
+      call turn_bodies(bodies, [(s, s=1_ip, bodies%n)], isa_base)
    end subroutine make_bodies
 
    !> Contacts of the bodies that this rank owns, in ascending order

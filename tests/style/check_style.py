@@ -16,6 +16,10 @@ TEXTS = (".f90", ".in", ".pf", ".py", ".cmake", ".txt", ".md", ".json", ".toml",
 TREES = ("src", "tests", "postproc", "inputs")
 REAL_LITERAL = re.compile(r"(?<![\w.])(?:\d+\.\d*|\.\d+)(?:[ed][+-]?\d+)?(?![\w.])|(?<![\w.])\d+[ed][+-]?\d+\b")
 
+#: Functions whose bits depend on the processor and its library
+INTRINSIC = re.compile(r"(?<![%\w])(a?(?:sin|cos|tan)h?|atan2|exp|log|log10|log_gamma|gamma|hypot|norm2|erfc?|"
+                       r"erfc_scaled|bessel_[jy][01n])\s*\(")
+REAL_POWER = re.compile(r"\*\*\s*\(?\s*[-+]?\s*(?:\d+\.|\.\d|sqrt\b|real\b)")
 
 # --- rules of one line -------------------------------------------------------------------------------------------
 
@@ -40,6 +44,12 @@ def check_lines(path, lines):
 def check_statements(source, room):
     """Rules that need to see a statement and its scopes."""
     for statement in source.statements:
+        if os.path.basename(source.path) != "elementary_quadruple.f90":
+            for name in INTRINSIC.findall(statement.code):
+                yield statement.line, (f"{name}: the bits of this intrinsic depend on the machine; "
+                                       "see base/elementary_own.f90")
+        if REAL_POWER.search(statement.code):
+            yield statement.line, "the bits of a power with a real exponent depend on the machine"
         for message in [*of_any(statement, room), *of_declaration(statement), *of_directive(statement)]:
             yield statement.line, message
         if is_pointer(statement) and not any("c_f_pointer" in other.code
