@@ -161,15 +161,15 @@ contains
       !> Whether to compute the effective area
       logical, intent(in) :: by_shape
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: vertex(usual_corners, 2, 2), depth(usual_corners), level(usual_corners)
+      real(wp) :: vertex(usual_corners, 2, 2), work(usual_corners, 2)
       logical :: on_clipper(usual_corners, 2)
       integer(ip) :: corners
 
       ! Each edge of the clipper adds at most one vertex.
       corners = size(subject, 2, kind=ip) + size(clipper, 2, kind=ip)
       if (corners <= usual_corners) then
-         call clip_in(subject, clipper, offset, scale, by_shape, usual_corners, vertex, on_clipper, depth, &
-                      level, overlap)
+         call clip_in(subject, clipper, offset, scale, by_shape, usual_corners, vertex, on_clipper, work, &
+                      overlap)
       else
          call clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
       end if
@@ -184,15 +184,14 @@ contains
       logical, intent(in) :: by_shape
       integer(ip), intent(in) :: corners
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: vertex(corners, 2, 2), depth(corners), level(corners)
+      real(wp) :: vertex(corners, 2, 2), work(corners, 2)
       logical :: on_clipper(corners, 2)
 
-      call clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, depth, level, overlap)
+      call clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, work, overlap)
    end subroutine clip_many
 
    !> As `clip`, in given work arrays; their last index selects the loop before or after a cut
-   pure subroutine clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, depth, &
-                           level, overlap)
+   pure subroutine clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, work, overlap)
       real(wp), intent(in), contiguous :: subject(:, :)
       real(wp), intent(in), contiguous :: clipper(:, :)
       real(wp), intent(in) :: offset(2)
@@ -204,10 +203,8 @@ contains
       real(wp), intent(inout) :: vertex(corners, 2, 2)
       !> Whether the edge that starts at a vertex lies on the clipper's outline
       logical, intent(inout) :: on_clipper(corners, 2)
-      !> Depth of each vertex below the clip line, times the length of the edge
-      real(wp), intent(inout) :: depth(corners)
-      !> Depth of the subject's centre below each clip line, times the length of the edge
-      real(wp), intent(inout) :: level(corners)
+      !> Depths times the length of the edge: of each vertex below the clip line, and of the centre below each line
+      real(wp), intent(inout) :: work(corners, 2)
       type(overlap_t), intent(inout) :: overlap
       integer(ip) :: i, k, m, n, now
       real(wp) :: edge(2), lowest, highest
@@ -220,19 +217,19 @@ contains
          on_clipper(i, 1) = .false.
       end do
       now = 1_ip
-      call find_levels(clipper, offset, scale, level, k)
+      call find_levels(clipper, offset, scale, work(:, 2), k)
       do i = 1_ip, m
          edge = clipper(:, merge(1_ip, k + 1_ip, k == m)) - clipper(:, k)
          ! An edge farther from the centre than the size of the subject cuts nothing: its length is sqrt(2) max at most.
-         if (level(k) <= 1.43_wp*scale*max(abs(edge(1)), abs(edge(2)))) then
-            call measure(n, corners, vertex(:, :, now), edge, level(k), scale, depth, lowest, highest)
+         if (work(k, 2) <= 1.43_wp*scale*max(abs(edge(1)), abs(edge(2)))) then
+            call measure(n, corners, vertex(:, :, now), edge, work(k, 2), scale, work(:, 1), lowest, highest)
             if (.not. highest > 0.0_wp) return
             if (lowest < 0.0_wp) then
-               call cut(n, corners, vertex(:, :, now), on_clipper(:, now), depth, &
+               call cut(n, corners, vertex(:, :, now), on_clipper(:, now), work(:, 1), &
                         vertex(:, :, 3_ip - now), on_clipper(:, 3_ip - now))
                now = 3_ip - now
             else if (.not. lowest > 0.0_wp) then
-               call mark_edges_on_line(n, depth, on_clipper(:, now))
+               call mark_edges_on_line(n, work(:, 1), on_clipper(:, now))
             end if
          end if
          k = merge(1_ip, k + 1_ip, k == m)

@@ -1,0 +1,379 @@
+!> The former overlap of two convex polygons, by clipping in all cases: the reference for the present one.
+!>
+!> One polygon, the *subject*, is clipped by the half-planes of the edges of the other, the *clipper*
+!> (Sutherland & Hodgman, Commun. ACM 17 (1974) 32). Each edge of the result has a flag: it lies on the outline
+!> of the clipper, or on that of the subject. The result is a closed loop by construction. Vertices on edges,
+!> common edges, containment and any number of crossings therefore need no special case, and no part of the
+!> outline is counted twice or left out.
+!>
+!> Accuracy. The subject is the smaller body, and coordinates are relative to its centre. Errors therefore scale
+!> with its size, even against a wall a thousand times as long. A vertex lies on a clip line if its distance is
+!> at most `roundoff` times that size. An edge on the clip line belongs to the clipper. Hence bodies that touch
+!> up to rounding do not overlap, and a body inside another is pushed out through an edge that they share.
+module reference_overlap
+   use polydem_effective_area, only: weigh_by_shape
+   use polydem_exact_cross, only: exact_cross
+   use polydem_kinds, only: ip, wp
+   use polydem_overlap_integrals, only: integrate_loop, overlap_t
+   implicit none
+   private
+   public :: reference_polygons
+
+   !> Tolerance: a vertex this close to a line lies on the line, as a fraction of the size of the smaller body
+   real(wp), parameter :: roundoff = 4.0_wp*epsilon(1.0_wp)
+   !> Line equations are formed without rounding for points farther away than this multiple of that size
+   real(wp), parameter :: far = 8.0_wp
+   !> Greatest area of an overlap that an edge can still separate, as a fraction of the square of that size
+   real(wp), parameter :: separable_area = 64.0_wp*epsilon(1.0_wp)
+   !> Capacity of the work arrays of fixed size, in vertices of both polygons together
+   integer(ip), parameter :: usual_corners = 48_ip
+
+contains
+
+   !> Overlap of two convex polygons.
+   !>
+   !> Complexity: O(n m) at worst for n and m vertices; O(n) or O(m) if `separating_edge` still separates them.
+   pure subroutine reference_polygons(a, b, offset, separating_edge, overlap, effective)
+      !> Vertices of the first polygon, anticlockwise, relative to its centre, which is inside, (2, n) [m]
+      real(wp), intent(in), contiguous :: a(:, :)
+      !> Vertices of the second polygon, anticlockwise, relative to its own centre, (2, m) [m]
+      real(wp), intent(in), contiguous :: b(:, :)
+      !> Centre of b minus centre of a [m]
+      real(wp), intent(in) :: offset(2)
+      !> Edge to try first: +k from vertex k of a, -k from vertex k of b, 0 none
+      integer(ip), intent(in) :: separating_edge
+      !> The overlap
+      type(overlap_t), intent(out) :: overlap
+      !> Whether area, normal and moments are those of the effective area (see `polydem_effective_area`); default: no
+      logical, intent(in), optional :: effective
+      real(wp) :: reach_a, reach_b, scale
+      integer(ip) :: edge
+      logical :: by_shape
+
+      by_shape = .false.
+      if (present(effective)) by_shape = effective
+
+      reach_a = reach(a)
+      reach_b = reach(b)
+      scale = min(reach_a, reach_b)
+      overlap%separating_edge = separating_edge
+      if (separating_edge > 0_ip) then
+         if (separates(a, separating_edge, b, offset, reach_b, scale)) return
+      else if (separating_edge < 0_ip) then
+         if (separates(b, -separating_edge, a, -offset, reach_a, scale)) return
+      end if
+
+      if (reach_a <= reach_b) then
+         call clip(a, b, offset, scale, by_shape, overlap)
+         overlap%normal = -overlap%normal
+         overlap%moment_a = -overlap%moment_a
+         overlap%moment_b = -overlap%moment_b
+      else
+         call clip(b, a, -offset, scale, by_shape, overlap)
+         call swap(overlap%moment_a, overlap%moment_b)
+         overlap%centroid = overlap%centroid + offset
+      end if
+
+      overlap%separating_edge = 0_ip
+      if (overlap%area > separable_area*scale*scale) return
+      edge = first_separating(a, b, offset, reach_b, scale)
+      if (edge == 0_ip) edge = -first_separating(b, a, -offset, reach_a, scale)
+      if (edge /= 0_ip .or. .not. overlap%area > 0.0_wp) overlap = overlap_t(separating_edge=edge)
+   end subroutine reference_polygons
+
+   !> Size of a polygon: an upper bound of the distance of its vertices from its centre [m]
+   pure real(wp) function reach(vertices)
+      real(wp), intent(in), contiguous :: vertices(:, :)
+      integer(ip) :: k
+
+      reach = 0.0_wp
+      do k = 1_ip, size(vertices, 2, kind=ip)
+         reach = max(reach, abs(vertices(1, k)) + abs(vertices(2, k)))
+      end do
+   end function reach
+
+   !> First edge of one polygon that separates it from another, 0 if there is none
+   pure integer(ip) function first_separating(polygon, other, offset, reach_other, scale)
+      real(wp), intent(in), contiguous :: polygon(:, :)
+      real(wp), intent(in), contiguous :: other(:, :)
+      !> Centre of the other minus centre of the polygon
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: reach_other
+      !> Size of the smaller of the two
+      real(wp), intent(in) :: scale
+
+      do first_separating = 1_ip, size(polygon, 2, kind=ip)
+         if (separates(polygon, first_separating, other, offset, reach_other, scale)) return
+      end do
+      first_separating = 0_ip
+   end function first_separating
+
+   !> Whether an edge separates the polygons: no vertex of the other polygon lies on its inner side
+   pure logical function separates(polygon, k, other, offset, reach_other, scale)
+      real(wp), intent(in), contiguous :: polygon(:, :)
+      integer(ip), intent(in) :: k
+      real(wp), intent(in), contiguous :: other(:, :)
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: reach_other
+      real(wp), intent(in) :: scale
+      real(wp) :: start(2), end(2), edge(2), tolerance, level, depth
+      integer(ip) :: i
+
+      start = polygon(:, k)
+      end = polygon(:, merge(1_ip, k + 1_ip, k == size(polygon, 2, kind=ip)))
+      edge = end - start
+      tolerance = roundoff*scale*(abs(edge(1)) + abs(edge(2)))
+      level = depth_of(offset, start, end, scale)
+      separates = .false.
+      ! The other polygon contains its centre. If the centre is on the inner side, the edge does not separate.
+      if (level > tolerance) return
+      depth = level
+      if (reach_other <= far*scale) then
+         do i = 1_ip, size(other, 2, kind=ip)
+            depth = max(depth, (edge(1)*other(2, i) - edge(2)*other(1, i)) + level)
+         end do
+      else
+         do i = 1_ip, size(other, 2, kind=ip)
+            depth = max(depth, exact_cross(start, end, offset, other(:, i)))
+         end do
+      end if
+      separates = depth <= tolerance
+   end function separates
+
+   !> Depth of a point below the line of an edge, positive on its inner side, times the length of the edge [m2]
+   pure real(wp) function depth_of(point, start, end, scale)
+      real(wp), intent(in) :: point(2)
+      real(wp), intent(in) :: start(2)
+      real(wp), intent(in) :: end(2)
+      real(wp), intent(in) :: scale
+      real(wp) :: arm(2)
+
+      arm = point - start
+      if (max(abs(arm(1)), abs(arm(2))) <= far*scale) then
+         depth_of = (end(1) - start(1))*arm(2) - (end(2) - start(2))*arm(1)
+      else
+         depth_of = exact_cross(start, end, point, [0.0_wp, 0.0_wp])
+      end if
+   end function depth_of
+
+   !> Clip the subject by all edges of the clipper, and integrate over the remaining loop.
+   !>
+   !> The normal and the moments are those of the clipper's outline inside the subject; `moment_a` is about
+   !> the subject's centre, `moment_b` about the clipper's.
+   pure subroutine clip(subject, clipper, offset, scale, by_shape, overlap)
+      real(wp), intent(in), contiguous :: subject(:, :)
+      real(wp), intent(in), contiguous :: clipper(:, :)
+      !> Centre of the clipper minus centre of the subject
+      real(wp), intent(in) :: offset(2)
+      !> Size of the subject
+      real(wp), intent(in) :: scale
+      !> Whether to compute the effective area
+      logical, intent(in) :: by_shape
+      type(overlap_t), intent(inout) :: overlap
+      real(wp) :: vertex(usual_corners, 2, 2), work(usual_corners, 2)
+      logical :: on_clipper(usual_corners, 2)
+      integer(ip) :: corners
+
+      ! Each edge of the clipper adds at most one vertex.
+      corners = size(subject, 2, kind=ip) + size(clipper, 2, kind=ip)
+      if (corners <= usual_corners) then
+         call clip_in(subject, clipper, offset, scale, by_shape, usual_corners, vertex, on_clipper, work, &
+                      overlap)
+      else
+         call clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
+      end if
+   end subroutine clip
+
+   !> As `clip`, with work arrays for `corners` vertices
+   pure subroutine clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
+      real(wp), intent(in), contiguous :: subject(:, :)
+      real(wp), intent(in), contiguous :: clipper(:, :)
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: scale
+      logical, intent(in) :: by_shape
+      integer(ip), intent(in) :: corners
+      type(overlap_t), intent(inout) :: overlap
+      real(wp) :: vertex(corners, 2, 2), work(corners, 2)
+      logical :: on_clipper(corners, 2)
+
+      call clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, work, overlap)
+   end subroutine clip_many
+
+   !> As `clip`, in given work arrays; their last index selects the loop before or after a cut
+   pure subroutine clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, work, overlap)
+      real(wp), intent(in), contiguous :: subject(:, :)
+      real(wp), intent(in), contiguous :: clipper(:, :)
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: scale
+      logical, intent(in) :: by_shape
+      !> Capacity of the arrays, in vertices
+      integer(ip), intent(in) :: corners
+      !> Vertices (corner, x or y, loop)
+      real(wp), intent(inout) :: vertex(corners, 2, 2)
+      !> Whether the edge that starts at a vertex lies on the clipper's outline
+      logical, intent(inout) :: on_clipper(corners, 2)
+      !> Depths times the length of the edge: of each vertex below the clip line, and of the centre below each line
+      real(wp), intent(inout) :: work(corners, 2)
+      type(overlap_t), intent(inout) :: overlap
+      integer(ip) :: i, k, m, n, now
+      real(wp) :: edge(2), lowest, highest
+
+      n = size(subject, 2, kind=ip)
+      m = size(clipper, 2, kind=ip)
+      do i = 1_ip, n
+         vertex(i, 1, 1) = subject(1, i)
+         vertex(i, 2, 1) = subject(2, i)
+         on_clipper(i, 1) = .false.
+      end do
+      now = 1_ip
+      call find_levels(clipper, offset, scale, work(:, 2), k)
+      do i = 1_ip, m
+         edge = clipper(:, merge(1_ip, k + 1_ip, k == m)) - clipper(:, k)
+         if (work(k, 2) <= 1.01_wp*scale*max(abs(edge(1)), abs(edge(2)))) then
+            call measure(n, corners, vertex(:, :, now), edge, work(k, 2), scale, work(:, 1), lowest, highest)
+            if (.not. highest > 0.0_wp) return
+            if (lowest < 0.0_wp) then
+               call cut(n, corners, vertex(:, :, now), on_clipper(:, now), work(:, 1), &
+                        vertex(:, :, 3_ip - now), on_clipper(:, 3_ip - now))
+               now = 3_ip - now
+            else if (.not. lowest > 0.0_wp) then
+               call mark_edges_on_line(n, work(:, 1), on_clipper(:, now))
+            end if
+         end if
+         k = merge(1_ip, k + 1_ip, k == m)
+      end do
+      call integrate_loop(n, corners, vertex(:, :, now), on_clipper(:, now), offset, overlap)
+      if (.not. (by_shape .and. overlap%area > 0.0_wp)) return
+      call weigh_by_shape(n, corners, vertex(:, :, now), on_clipper(:, now), offset, vertex(:, :, 3_ip - now), overlap)
+   end subroutine clip_in
+
+   !> Depth of the subject's centre below all edges of the clipper
+   pure subroutine find_levels(clipper, offset, scale, level, lowest)
+      real(wp), intent(in), contiguous :: clipper(:, :)
+      real(wp), intent(in) :: offset(2)
+      real(wp), intent(in) :: scale
+      real(wp), intent(inout) :: level(:)
+      !> Edge with the least depth; the cuts start with it because it removes most of the subject
+      integer(ip), intent(out) :: lowest
+      real(wp) :: least
+      integer(ip) :: k, m
+
+      m = size(clipper, 2, kind=ip)
+      least = huge(1.0_wp)
+      lowest = 1_ip
+      do k = 1_ip, m
+         level(k) = depth_of(-offset, clipper(:, k), clipper(:, merge(1_ip, k + 1_ip, k == m)), scale)
+         if (level(k) < least) lowest = k
+         least = min(least, level(k))
+      end do
+   end subroutine find_levels
+
+   !> Depth of all vertices below a clip line; zero for those on it
+   pure subroutine measure(n, corners, vertex, edge, level, scale, depth, lowest, highest)
+      integer(ip), intent(in) :: n
+      integer(ip), intent(in) :: corners
+      real(wp), intent(in) :: vertex(corners, 2)
+      real(wp), intent(in) :: edge(2)
+      !> Depth of the origin, times the length of the edge
+      real(wp), intent(in) :: level
+      real(wp), intent(in) :: scale
+      real(wp), intent(inout) :: depth(n)
+      !> Least depth
+      real(wp), intent(out) :: lowest
+      !> Greatest depth
+      real(wp), intent(out) :: highest
+      real(wp) :: tolerance
+      integer(ip) :: i
+
+      tolerance = roundoff*scale*(abs(edge(1)) + abs(edge(2)))
+      lowest = huge(1.0_wp)
+      highest = -huge(1.0_wp)
+      do i = 1_ip, n
+         depth(i) = (edge(1)*vertex(i, 2) - edge(2)*vertex(i, 1)) + level
+         depth(i) = merge(0.0_wp, depth(i), abs(depth(i)) <= tolerance)
+         lowest = min(lowest, depth(i))
+         highest = max(highest, depth(i))
+      end do
+   end subroutine measure
+
+   !> Mark the edges that lie on the clip line as edges of the clipper.
+   pure subroutine mark_edges_on_line(n, depth, on_clipper)
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: depth(n)
+      logical, intent(inout) :: on_clipper(n)
+      integer(ip) :: i
+
+      do i = 1_ip, n
+         if (max(depth(i), depth(merge(1_ip, i + 1_ip, i == n))) <= 0.0_wp) on_clipper(i) = .true.
+      end do
+   end subroutine mark_edges_on_line
+
+   !> Keep the vertices around the deepest one up to the clip line, and close the loop along that line.
+   !>
+   !> The remaining vertices are consecutive even if rounding has made the loop slightly concave. A cut therefore
+   !> adds at most two vertices and drops at least one.
+   pure subroutine cut(n, corners, vertex, on_clipper, depth, vertex_cut, on_clipper_cut)
+      !> Number of vertices before and after
+      integer(ip), intent(inout) :: n
+      integer(ip), intent(in) :: corners
+      real(wp), intent(in) :: vertex(corners, 2)
+      logical, intent(in) :: on_clipper(corners)
+      real(wp), intent(in) :: depth(n)
+      real(wp), intent(inout) :: vertex_cut(corners, 2)
+      logical, intent(inout) :: on_clipper_cut(corners)
+      integer(ip) :: i, m, before, after
+
+      before = maxloc(depth, dim=1)
+      do while (depth(before) >= 0.0_wp)
+         before = merge(n, before - 1_ip, before == 1_ip)
+      end do
+      i = merge(1_ip, before + 1_ip, before == n)
+      m = 0_ip
+      if (depth(i) > 0.0_wp) then
+         m = 1_ip
+         vertex_cut(m, :) = crossing(i, before)
+         on_clipper_cut(m) = on_clipper(before)
+      end if
+      do
+         m = m + 1_ip
+         vertex_cut(m, 1) = vertex(i, 1)
+         vertex_cut(m, 2) = vertex(i, 2)
+         after = merge(1_ip, i + 1_ip, i == n)
+         on_clipper_cut(m) = on_clipper(i) .or. max(depth(i), depth(after)) <= 0.0_wp
+         if (depth(after) < 0.0_wp) exit
+         i = after
+      end do
+      if (depth(i) > 0.0_wp) then
+         m = m + 1_ip
+         vertex_cut(m, :) = crossing(i, after)
+         on_clipper_cut(m) = .true.
+      end if
+      n = m
+
+   contains
+
+      !> Intersection of the line with the edge from a vertex below it to a vertex above it
+      pure function crossing(below, above) result(point)
+         integer(ip), intent(in) :: below
+         integer(ip), intent(in) :: above
+         real(wp) :: point(2)
+         real(wp) :: share
+
+         share = depth(below)/(depth(below) - depth(above))
+         point(1) = vertex(below, 1) + share*(vertex(above, 1) - vertex(below, 1))
+         point(2) = vertex(below, 2) + share*(vertex(above, 2) - vertex(below, 2))
+      end function crossing
+   end subroutine cut
+
+   !> Exchange two numbers.
+   elemental subroutine swap(a, b)
+      real(wp), intent(inout) :: a
+      real(wp), intent(inout) :: b
+      real(wp) :: a_before
+
+      a_before = a
+      a = b
+      b = a_before
+   end subroutine swap
+
+end module reference_overlap
