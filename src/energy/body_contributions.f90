@@ -6,11 +6,14 @@
 !> force and torque of the fixed body; the velocities of fixed bodies are known on every rank.
 module polydem_body_contributions
    use polydem_bodies, only: bodies_t
-   use polydem_force_sums, only: force_sums_t, n_terms, sum_elastic, sum_normal, sum_tangential
+   use polydem_contact_block, only: block_size, contact_block_t, load_block
+   use polydem_contacts, only: contacts_t
+   use polydem_force_sums, only: contact_terms_t, force_sums_t, n_terms, sum_elastic, sum_energy, sum_normal, &
+      sum_tangential, term_of, terms_of_block
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: n_channels, n_wall_channels, n_motions, powers_of, add_wall, motion_of
+   public :: n_channels, n_wall_channels, n_motions, powers_of, add_walls, motion_of
 
    !> Number of channels of a body: powers of the elastic normal forces with cohesion, of the other normal forces with
    !> the damping of tilts, and of the tangential forces [W/m]
@@ -81,6 +84,39 @@ contains
       wall_channels(5) = wall_channels(5) + weight*(abs(fx) + abs(fy))
       wall_channels(6) = wall_channels(6) + weight*abs(torque)
    end subroutine add_wall
+
+   !> Add the action of fixed bodies on free ones to the channels, and their share of the elastic energy.
+   pure subroutine add_walls(bodies, walls, weight, channels, wall_channels, energy)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with fixed bodies
+      type(contacts_t), intent(in) :: walls
+      !> Factor of all that is added to the channels
+      real(wp), intent(in) :: weight
+      !> Channels of all bodies, (n_channels, slot)
+      real(wp), intent(inout) :: channels(:, :)
+      !> Wall channels of all bodies, (n_wall_channels, slot)
+      real(wp), intent(inout) :: wall_channels(:, :)
+      !> Elastic energy of each body [J/m]
+      real(wp), intent(inout), optional :: energy(:)
+      type(contact_block_t) :: block
+      type(contact_terms_t) :: terms
+      integer(ip) :: c, high, wall, body
+      logical :: first_is_wall
+
+      do high = walls%n, 1_ip, -block_size
+         call load_block(bodies, walls, max(1_ip, high - block_size + 1_ip), high, block)
+         call terms_of_block(block, terms)
+         do c = 1_ip, block%n
+            first_is_wall = bodies%fixed(block%first(c))
+            wall = merge(block%first(c), block%second(c), first_is_wall)
+            body = merge(block%second(c), block%first(c), first_is_wall)
+            call add_wall(bodies, wall, term_of(terms, c, first_is_wall), weight, channels(:, body), &
+                          wall_channels(:, body))
+            if (present(energy)) energy(body) = energy(body) + terms%first(c, sum_energy)
+         end do
+      end do
+   end subroutine add_walls
 
    !> Kinetic energy [J/m], potential energy [J/m], momentum along x and y [N s/m] and angular momentum about the origin
    !> [N s] of a free body

@@ -21,13 +21,12 @@
 !> bodies, and over bodies for gravity. Forces that cancel within a fixed body therefore add to the scale.
 module polydem_energy_balance
    use polydem_bodies, only: bodies_t
-   use polydem_body_contributions, only: add_wall, motion_of, n_channels, n_motions, n_wall_channels, powers_of
+   use polydem_body_contributions, only: add_walls, motion_of, n_channels, n_motions, n_wall_channels, powers_of
    use polydem_communicator, only: communicator_t
-   use polydem_contact_block, only: block_size, contact_block_t, load_block
    use polydem_contacts, only: contacts_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
-   use polydem_force_sums, only: contact_terms_t, force_sums_t, sum_energy, term_of, terms_of_block
+   use polydem_force_sums, only: force_sums_t, sum_energy
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
    use polydem_serializer, only: serializer_t
    implicit none
@@ -281,35 +280,8 @@ contains
          sums%power_sum(:, s) = sums%power_sum(:, s) + weight*powers_of(bodies, forces, s)
       end do
       !$omp end parallel do
-      call add_walls(bodies, walls, weight, sums, energy)
+      call add_walls(bodies, walls, weight, sums%power_sum, sums%wall_sum, energy)
    end subroutine accumulate_rates
-
-   !> Add the action of fixed bodies on free ones to the channels, and their share of the elastic energy.
-   pure subroutine add_walls(bodies, walls, weight, sums, energy)
-      type(bodies_t), intent(in) :: bodies
-      type(contacts_t), intent(in) :: walls
-      real(wp), intent(in) :: weight
-      type(energy_balance_t), intent(inout) :: sums
-      !> Elastic energy of each body [J/m]
-      real(wp), intent(inout), optional :: energy(:)
-      type(contact_block_t) :: block
-      type(contact_terms_t) :: terms
-      integer(ip) :: c, high, wall, body
-      logical :: first_is_wall
-
-      do high = walls%n, 1_ip, -block_size
-         call load_block(bodies, walls, max(1_ip, high - block_size + 1_ip), high, block)
-         call terms_of_block(block, terms)
-         do c = 1_ip, block%n
-            first_is_wall = bodies%fixed(block%first(c))
-            wall = merge(block%first(c), block%second(c), first_is_wall)
-            body = merge(block%second(c), block%first(c), first_is_wall)
-            call add_wall(bodies, wall, term_of(terms, c, first_is_wall), weight, sums%power_sum(:, body), &
-                          sums%wall_sum(:, body))
-            if (present(energy)) energy(body) = energy(body) + terms%first(c, sum_energy)
-         end do
-      end do
-   end subroutine add_walls
 
    !> Totals over all bodies of the communicator
    function totals(sums, comm, gravity, bodies, forces, walls) result(total)

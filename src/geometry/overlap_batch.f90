@@ -125,8 +125,11 @@ contains
 
    !> Copy the inputs of a lane to another.
    pure subroutine copy_lane(batch, from, to)
+      !> The batch
       type(overlap_batch_t), intent(inout) :: batch
+      !> The lane
       integer(ip), intent(in) :: from
+      !> Lane of the copy
       integer(ip), intent(in) :: to
 
       batch%vertex(to, :) = batch%vertex(from, :)

@@ -3,7 +3,7 @@ module remembered_overlap
    use overlap_cases, only: median_diameter, rectangle, regular, turned, two_pi
    use polydem_convex_overlap, only: find_overlap, overlap_t
    use polydem_kinds, only: ip, lp, wp
-   use polydem_lens_kernel, only: evaluate_batch
+   use polydem_lens_kernel_base, only: evaluate_batch
    use polydem_overlap_batch, only: add_lane, overlap_batch_t
    use polydem_random, only: random_t
    use polydem_separation, only: test_separation
