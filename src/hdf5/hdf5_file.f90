@@ -8,22 +8,22 @@ module polydem_hdf5_file
    use, intrinsic :: iso_c_binding, only: c_loc
    use hdf5, only: hsize_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_hdf5_appender, only: hdf5_appender_t
    use polydem_hdf5_dataset, only: double_type, holds_integers, holds_reals, library_version, long_type, read_dataset, &
       start_library
    use polydem_hdf5_hyperslab, only: part_t
    use polydem_hdf5_location, only: place_t
    use polydem_hdf5_shape_check, only: checked_shape, shape_text
    use polydem_hdf5_strings, only: read_attribute_value, read_text
+   use polydem_hdf5_writer, only: hdf5_writer_t, many_rows, one_row
    use polydem_kinds, only: dp, ip, lp
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: hdf5_file_t, part_t, library_version, start_library
+   public :: hdf5_file_t, part_t, one_row, many_rows, library_version, start_library
 
-   !> An HDF5 file: create, join (for parallel writing), open (for reading), flush, close, has, shape_of, write, append,
-   !> append_rows, write_attribute, read
-   type, extends(hdf5_appender_t) :: hdf5_file_t
+   !> An HDF5 file: create, join (for parallel writing), open (for reading), flush, close, has, shape_of, write,
+   !> write_attribute, read
+   type, extends(hdf5_writer_t) :: hdf5_file_t
    contains
       !> Read a data set into an allocatable: read(name, values, error). Integers in the file may have any width, or be
       !> booleans of h5py.
