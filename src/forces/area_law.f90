@@ -8,7 +8,7 @@ module polydem_area_law
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t, is_degenerate
-   use polydem_force_part, only: stage_elastic, force_part_t
+   use polydem_force_part, only: force_part_t, stage_elastic
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_settings, only: forces_settings_t
    implicit none

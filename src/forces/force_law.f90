@@ -1,8 +1,8 @@
 !> The force law of a run, a list of parts, and its factory, the only code that lists all parts.
 !>
-!> To add a part, write it as a `force_part_t` in a file of its own, and add a `use` and a line of
-!> `choose_parts` here. The order of the lines does not matter, because the `stage` of a part gives its place. A law may have a constraint on velocities,
-!> which acts when all other forces on the bodies are known.
+!> To add a part, write it as a `force_part_t` in a file of its own, and add a `use` and a line of `choose_parts` here.
+!> The order of the lines does not matter, because the `stage` of a part gives its place. A law may have a constraint on
+!> velocities, which acts when all other forces on the bodies are known.
 module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
@@ -14,7 +14,7 @@ module polydem_force_law
    use polydem_damping_onset, only: damping_onset_t
    use polydem_errors, only: error_t
    use polydem_exact_friction, only: exact_friction_t
-   use polydem_force_part, only: stage_on_damping, force_part_t
+   use polydem_force_part, only: force_part_t, stage_on_damping
    use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
    use polydem_matuttis_chen_damping, only: matuttis_chen_damping_t

@@ -13,8 +13,8 @@
 !> elastic part sets it; a part with cohesion sets it to false.
 !>
 !> The order in which parts are listed does not matter; they act in the order of their stages. A part is immutable once
-!> it is configured and has measured the bodies. Its contact history is in columns of `contact_history_t`, with one entry
-!> per pair of the pair list.
+!> it is configured and has measured the bodies. Its contact history is in columns of `contact_history_t`, with one
+!> entry per pair of the pair list.
 module polydem_force_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t

@@ -2,7 +2,8 @@
 !>
 !> A member copies its parameters from the settings, refuses settings that exclude it, declares its contact history, and
 !> adds its stiffness to that of a contact. The names of members occur only in their own files and in the factory
-!> (`force_law`), which adds the members that the settings ask for. A member overrides only the defaults that do not fit.
+!> (`force_law`), which adds the members that the settings ask for. A member overrides only those defaults that do not
+!> fit.
 module polydem_law_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t

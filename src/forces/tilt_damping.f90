@@ -13,7 +13,7 @@ module polydem_tilt_damping
    use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: stage_last, force_part_t
+   use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_settings, only: forces_settings_t
    implicit none

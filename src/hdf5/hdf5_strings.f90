@@ -3,8 +3,7 @@
 !> HDF5 handles such strings as addresses of null-terminated texts. In a file that is written in parallel, it can write
 !> attributes of this type but not data sets.
 module polydem_hdf5_strings
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_loc, c_null_char, c_null_ptr, c_ptr, &
-      c_size_t
+   use, intrinsic :: iso_c_binding, only: c_char, c_loc, c_null_char, c_null_ptr, c_ptr
    use hdf5, only: h5aclose_f, h5acreate_f, h5adelete_f, h5aexists_f, h5aget_space_f, h5aget_type_f, h5aopen_f, &
       h5aread_f, h5awrite_f, h5dclose_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dvlen_reclaim_f, &
       h5oclose_f, h5oopen_f, h5sclose_f, h5screate_f, h5sget_simple_extent_npoints_f, h5tclose_f, h5tcopy_f, &
@@ -15,17 +14,10 @@ module polydem_hdf5_strings
    use polydem_hdf5_hyperslab, only: slab_of
    use polydem_hdf5_links, only: raise_external, is_external_link
    use polydem_hdf5_location, only: expect, place_t
+   use polydem_posix, only: text_at
    implicit none
    private
    public :: write_texts, read_text, write_attribute_value, read_attribute_value, write_text_attribute
-
-   interface
-      !> C strlen
-      integer(c_size_t) function c_strlen(text) bind(C, name='strlen')
-         import :: c_ptr, c_size_t
-         type(c_ptr), value :: text
-      end function c_strlen
-   end interface
 
 contains
 
@@ -116,7 +108,7 @@ contains
          call h5dread_f(dataset, kind_in_file, buffer, status)
          call expect(status, 'read', place, error)
          if (.not. allocated(error)) then
-            call copy_text(address, text)
+            text = text_at(address)
             call h5dget_space_f(dataset, space, ignored)
             call h5dvlen_reclaim_f(kind_in_file, space, h5p_default_f, buffer, ignored)
             call h5sclose_f(space, ignored)
@@ -128,24 +120,6 @@ contains
       call h5tclose_f(kind_in_file, ignored)
       call h5dclose_f(dataset, ignored)
    end subroutine read_text
-
-   !> Copy a null-terminated text.
-   subroutine copy_text(address, text)
-      type(c_ptr), intent(in) :: address
-      character(len=:), allocatable, intent(out) :: text
-      character(kind=c_char), pointer :: characters(:)
-      integer :: k
-
-      if (.not. c_associated(address)) then
-         text = ''
-         return
-      end if
-      call c_f_pointer(address, characters, [c_strlen(address)])
-      allocate (character(len=size(characters)) :: text)
-      do k = 1, size(characters)
-         text(k:k) = characters(k)
-      end do
-   end subroutine copy_text
 
    !> Write a text attribute of a group or data set. An existing attribute of this name is replaced.
    subroutine write_text_attribute(place, name, text, error)

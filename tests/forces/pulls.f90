@@ -3,7 +3,7 @@ module pulls
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: stage_normal, force_part_t
+   use polydem_force_part, only: force_part_t, stage_normal
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
