@@ -23,7 +23,6 @@ contains
       !> Allocated if they differ; names the entry
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      type(error_t), allocatable :: ignored
 
       call file%open(path, error)
       if (allocated(error)) return
@@ -42,7 +41,7 @@ contains
       call compare('/provenance/processor', provenance%processor)
       call compare('/provenance/binding', provenance%binding)
       call compare('/provenance/wait_policy', provenance%wait_policy)
-      call file%close(ignored)
+      call file%close(error)
 
    contains
 

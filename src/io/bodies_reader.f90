@@ -68,7 +68,6 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
       type(table_t) :: table
-      type(error_t), allocatable :: ignored
       integer :: bytes
       logical :: is_present
 
@@ -83,10 +82,6 @@ contains
       if (allocated(error)) return
       call check_names(file, path, error)
       if (.not. allocated(error)) call read_table(file, path, real(density, dp), table, error)
-      if (allocated(error)) then
-         call file%close(ignored)
-         return
-      end if
       call file%close(error)
       if (allocated(error)) return
       call list_table(table, list)

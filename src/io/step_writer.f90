@@ -12,7 +12,7 @@ module polydem_step_writer
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t, many_rows
    use polydem_kinds, only: dp, ip, lp
-   use polydem_provenance, only: provenance_t, write_provenance, schema_version
+   use polydem_provenance, only: provenance_t, write_provenance
    implicit none
    private
    public :: step_writer_t, step_row_t
@@ -81,13 +81,11 @@ contains
       if (allocated(error)) return
       self%is_open = .true.
       associate (file => self%file)
-         call file%write_attribute('/', 'content', 'steps of a run by polydem', error)
-         call file%write_attribute('/', 'schema_version', schema_version, error)
+         call write_provenance(file, 'steps of a run by polydem', provenance, error)
          call file%write('/steps/stage_name', stage_names, error, '1', 'stages of the time step')
          call file%write('/steps/phase_name', phase_names, error, '1', 'phases of the neighbour finder')
          call file%write('/steps/count_name', count_names, error, '1', 'statistics of the neighbour finder')
       end associate
-      if (.not. allocated(error)) call write_provenance(provenance, self%file, error)
       if (allocated(error)) call close_steps(self, error)
    end subroutine open_steps
 

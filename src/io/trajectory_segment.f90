@@ -23,7 +23,7 @@ module polydem_trajectory_segment
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_named_values, only: named_values_t
    use polydem_ownership, only: order_bodies, order_pairs, order_parts
-   use polydem_provenance, only: provenance_t, write_provenance, schema_version
+   use polydem_provenance, only: provenance_t, write_provenance
    implicit none
    private
    public :: start_segment, write_bodies, add_frame, add_walls, add_contacts, add_balance
@@ -39,9 +39,7 @@ contains
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
-      call file%write_attribute('/', 'content', 'segment of a trajectory by polydem', error)
-      call file%write_attribute('/', 'schema_version', schema_version, error)
-      call write_provenance(provenance, file, error)
+      call write_provenance(file, 'segment of a trajectory by polydem', provenance, error)
    end subroutine start_segment
 
    !> Write the constant properties of the bodies: identifier, fixed flag, mass, inertia and shape.

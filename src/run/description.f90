@@ -6,7 +6,7 @@ module polydem_description
    use polydem_kinds, only: ip, wp
    use polydem_log, only: log_t
    use polydem_overlap_table, only: write_overlap_table
-   use polydem_result_files, only: overlaps_path
+   use polydem_result_files, only: overlaps_name
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers, stable_step_of_contacts
    use polydem_strings, only: to_text
@@ -144,8 +144,8 @@ contains
          if (folder == '') then
             call log%write_line('           (a run lists them in overlaps.csv)')
          else
-            call write_overlap_table(overlaps_path(folder), s%bodies, s%contacts, thickness, limit, error)
-            call log%write_line('           full list: '//overlaps_path(folder))
+            call write_overlap_table(folder//'/'//overlaps_name, s%bodies, s%contacts, thickness, limit, error)
+            call log%write_line('           full list: '//folder//'/'//overlaps_name)
          end if
       end associate
    end subroutine list_overlaps

@@ -4,7 +4,8 @@ module polydem_file_system
    use polydem_errors, only: error_t, io_error, raise
    use polydem_kinds, only: lp
    use polydem_posix, only: c_access, c_close, c_fallocate, c_fsync, c_lseek, c_mkdir, c_open, c_rename, c_strerror, &
-      c_umask, c_unlink, c_user, error_number, is_written, text_at
+      c_unlink, error_number, is_written, text_at
+   use polydem_posix_processes, only: c_umask, c_user
    implicit none
    private
    public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_space, sync_file, overwrite_start

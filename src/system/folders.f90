@@ -5,7 +5,8 @@ module polydem_folders
       c_ptr
    use polydem_errors, only: error_t, io_error, raise
    use polydem_file_system, only: last_failure
-   use polydem_posix, only: c_closedir, c_faccessat, c_free, c_opendir, c_readdir, c_realpath, c_rmdir, text_at
+   use polydem_posix, only: c_closedir, c_faccessat, c_opendir, c_readdir, c_realpath, c_rmdir, text_at
+   use polydem_posix_processes, only: c_free
    implicit none
    private
    public :: link_exists, list_names, read_bytes, remove_folder, canonical_path

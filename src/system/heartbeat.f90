@@ -10,7 +10,8 @@ module polydem_heartbeat
    use polydem_clock, only: wall_seconds
    use polydem_kinds, only: dp
    use polydem_lock_file, only: lock_file_t, read_record, record_length
-   use polydem_posix, only: c_close, c_free, c_malloc, c_pipe2, c_poll, pthread_create, pthread_join
+   use polydem_posix, only: c_close
+   use polydem_posix_processes, only: c_free, c_malloc, c_pipe2, c_poll, pthread_create, pthread_join
    implicit none
    private
    public :: heartbeat_t, n_digits

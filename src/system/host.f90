@@ -2,7 +2,7 @@
 module polydem_host
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_null_ptr, c_size_t
    use polydem_kinds, only: dp, ip, lp
-   use polydem_posix, only: c_time, gethostname, gmtime, isatty, strftime, sysconf
+   use polydem_posix_processes, only: c_time, gethostname, gmtime, isatty, strftime, sysconf
    implicit none
    private
    public :: host_name, processor_name, processor_clock, cache_sizes, memory_size, frequency_governor

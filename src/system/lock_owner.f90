@@ -16,7 +16,7 @@ module polydem_lock_owner
    use polydem_host, only: boot_identity, host_name, utc_now
    use polydem_kinds, only: ip, lp
    use polydem_lock_file, only: read_record, record_length
-   use polydem_posix, only: c_getrandom
+   use polydem_posix_processes, only: c_getrandom
    use polydem_processes, only: own_process
    use polydem_strings, only: to_text
    implicit none

@@ -9,7 +9,8 @@ module polydem_process_limits
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: errno_message, last_failure
    use polydem_kinds, only: ip, lp
-   use polydem_posix, only: c_attributes_init, c_attributes_stack, c_close, c_getaffinity, c_getrlimit, c_pipe, &
+   use polydem_posix, only: c_close
+   use polydem_posix_processes, only: c_attributes_init, c_attributes_stack, c_getaffinity, c_getrlimit, c_pipe, &
       c_read, limit_t, pthread_create, pthread_join
    use polydem_strings, only: to_text
    implicit none

@@ -2,7 +2,8 @@
 module polydem_processes
    use, intrinsic :: iso_c_binding, only: c_int, c_null_ptr, c_size_t
    use polydem_kinds, only: dp, ip
-   use polydem_posix, only: c_getpid, c_kill, c_poll, error_number
+   use polydem_posix, only: error_number
+   use polydem_posix_processes, only: c_getpid, c_kill, c_poll
    use polydem_strings, only: to_text
    implicit none
    private

@@ -7,7 +7,7 @@
 module polydem_signals
    use, intrinsic :: iso_c_binding, only: c_associated, c_funloc, c_funptr, c_int, c_intptr_t, c_loc, c_long, &
       c_null_funptr, c_null_ptr
-   use polydem_posix, only: c_sigaction
+   use polydem_posix_processes, only: c_sigaction
    implicit none
    private
    public :: await_signals, caught_signal, release_signals, ignore_write_signals

@@ -9,7 +9,8 @@ module polydem_time_limit
       c_null_char, c_null_ptr, c_ptr, c_size_t
    use polydem_errors, only: io_error
    use polydem_kinds, only: dp, ip, lp
-   use polydem_posix, only: c_exit_now, c_free, c_strdup, c_strlen, c_write, event_t, timer_create, timer_delete, &
+   use polydem_posix, only: c_strlen, c_write
+   use polydem_posix_processes, only: c_exit_now, c_free, c_strdup, event_t, timer_create, timer_delete, &
       timer_settime, times_t
    use polydem_strings, only: to_text
    implicit none
