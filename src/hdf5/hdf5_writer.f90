@@ -14,7 +14,7 @@ module polydem_hdf5_writer
    use polydem_hdf5_dataset, only: append_rows_to, byte_type, double_type, integer_type, long_type, write_dataset
    use polydem_hdf5_handle, only: hdf5_handle_t
    use polydem_hdf5_hyperslab, only: part_t, slab_of
-   use polydem_hdf5_location, only: place_t
+   use polydem_hdf5_location, only: dataset_location_t
    use polydem_hdf5_strings, only: write_attribute_value, write_text_attribute, write_texts
    use polydem_kinds, only: bp, dp, ip, lp
    implicit none
@@ -55,20 +55,20 @@ contains
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
       integer, intent(in), optional :: rows
-      type(place_t) :: place
+      type(dataset_location_t) :: location
       integer(hsize_t), allocatable :: extent(:)
       logical :: is_new
 
       if (allocated(error)) return
-      place = self%place_of(name)
+      location = self%location_of(name)
       extent = int(shape, hsize_t)
       is_new = .true.
       if (present(rows)) then
          is_new = .not. self%has(name)
          if (rows == one_row) extent = [extent, 1_hsize_t]
-         call append_rows_to(place, type, slab_of(place, extent, address, max(1, size(shape)), part), error)
+         call append_rows_to(location, type, slab_of(location, extent, address, max(1, size(shape)), part), error)
       else
-         call write_dataset(place, type, slab_of(place, extent, address, size(shape), part), error)
+         call write_dataset(location, type, slab_of(location, extent, address, size(shape), part), error)
       end if
       if (is_new) call self%describe(name, error, unit, meaning)
    end subroutine put
@@ -84,9 +84,9 @@ contains
       character(len=*), intent(in), optional :: unit, meaning
 
       if (allocated(error)) return
-      if (present(unit)) call write_text_attribute(self%place_of(name), 'unit', unit, error)
+      if (present(unit)) call write_text_attribute(self%location_of(name), 'unit', unit, error)
       if (allocated(error)) return
-      if (present(meaning)) call write_text_attribute(self%place_of(name), 'meaning', meaning, error)
+      if (present(meaning)) call write_text_attribute(self%location_of(name), 'meaning', meaning, error)
    end subroutine describe
 
    !> Write a number. The other forms of `write` differ only in kind and shape.
@@ -228,7 +228,7 @@ contains
       character(len=*), intent(in), optional :: unit, meaning
 
       if (allocated(error)) return
-      call write_texts(self%place_of(name), [integer(hsize_t) ::], [values], error)
+      call write_texts(self%location_of(name), [integer(hsize_t) ::], [values], error)
       call self%describe(name, error, unit, meaning)
    end subroutine write_text
 
@@ -240,7 +240,7 @@ contains
       character(len=*), intent(in), optional :: unit, meaning
 
       if (allocated(error)) return
-      call write_texts(self%place_of(name), [size(values, kind=hsize_t)], values, error)
+      call write_texts(self%location_of(name), [size(values, kind=hsize_t)], values, error)
       call self%describe(name, error, unit, meaning)
    end subroutine write_text_list
 
@@ -253,7 +253,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call write_text_attribute(self%place_of(object), name, value, error)
+      call write_text_attribute(self%location_of(object), name, value, error)
    end subroutine attach_text
 
    subroutine attach_integer(self, object, name, value, error)
@@ -263,7 +263,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call write_attribute_value(self%place_of(object), name, integer_type(), c_loc(value), error)
+      call write_attribute_value(self%location_of(object), name, integer_type(), c_loc(value), error)
    end subroutine attach_integer
 
    subroutine attach_real(self, object, name, value, error)
@@ -273,7 +273,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call write_attribute_value(self%place_of(object), name, double_type(), c_loc(value), error)
+      call write_attribute_value(self%location_of(object), name, double_type(), c_loc(value), error)
    end subroutine attach_real
 
 end module polydem_hdf5_writer

@@ -51,11 +51,11 @@ contains
       else
          call manifest%continue_writing()
          do k = 1, size(names)
-            call manifest%own(trim(names(k)), error)
+            call manifest%add_file(trim(names(k)), error)
          end do
          do k = 1, merge(0, manifest%n, is_restart)
             if (manifest%entry(k)%name /= lock .and. .not. allocated(error)) &
-               call manifest%empty(trim(manifest%entry(k)%name), error)
+               call manifest%remove_file(trim(manifest%entry(k)%name), error)
          end do
       end if
    end subroutine claim_folder

@@ -2,7 +2,7 @@
 module polydem_prepare
    use polydem_checked_files, only: check_manifest
    use polydem_claim_folder, only: claim_folder
-   use polydem_dangers, only: warn_of_risks
+   use polydem_initial_warnings, only: warn_of_risks
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: make_folder

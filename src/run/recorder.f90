@@ -78,7 +78,7 @@ contains
             if (allocated(error)) return
             call self%steps%open(folder//'/'//steps_name, stage_names, phase_names, count_names, provenance, error)
             allocate (self%row%stage(n_stages), self%row%phase(n_phases), self%row%count(n_counts))
-            call self%meter%look(simulation%neighbours%finder, self%row%phase, self%row%count)
+            call self%meter%read_all(simulation%neighbours%finder, self%row%phase, self%row%count)
          end if
       end associate
       if (.not. allocated(error)) call record_boxes(self, simulation, manifest, error)
@@ -124,7 +124,7 @@ contains
          row%step = simulation%step
          row%stage = simulation%timers%total - self%stage_seconds
          self%stage_seconds = simulation%timers%total
-         call self%meter%look(simulation%neighbours%finder, row%phase, row%count)
+         call self%meter%read_all(simulation%neighbours%finder, row%phase, row%count)
          row%pairs = simulation%neighbours%pairs%n
          row%contacts = simulation%contacts%n
       end associate

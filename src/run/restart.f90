@@ -265,13 +265,13 @@ contains
       integer(ip) :: number
       integer :: k
 
-      call manifest%empty(folder//'/'//profile_name, error)
+      call manifest%remove_file(folder//'/'//profile_name, error)
       do k = 1, manifest%n
-         if (.not. allocated(error)) call manifest%empty(trim(manifest%entry(k)%name), error, stays=.true.)
+         if (.not. allocated(error)) call manifest%remove_file(trim(manifest%entry(k)%name), error, stays=.true.)
       end do
       do number = earlier%segments + earlier%surplus, earlier%segments + 1_ip, -1_ip
-         call manifest%empty(segment_path(folder, number), error)
-         call manifest%forget(segment_path(folder, number), error)
+         call manifest%remove_file(segment_path(folder, number), error)
+         call manifest%remove_entry(segment_path(folder, number), error)
       end do
       if (earlier%unlisted(1) > 0_lp .and. earlier%surplus == 0_ip) &
          call manifest%close_file(segment_path(folder, earlier%segments), error, earlier%unlisted)

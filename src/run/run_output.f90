@@ -11,7 +11,7 @@ module polydem_run_output
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_counters, write_hash, write_ranks, write_timings
-   use polydem_monitor, only: look, write_warning_counts, report_pending_warnings
+   use polydem_monitor, only: check_step, write_warning_counts, report_pending_warnings
    use polydem_profile_file, only: write_profile
    use polydem_result_files, only: profile_name
    use polydem_run, only: run_t
@@ -41,7 +41,7 @@ contains
       associate (s => run%simulation)
          frame_due = s%step == s%n_steps .or. is_due(s%step, run%frame_steps)
          line_due = s%step == s%n_steps .or. is_due(s%step, run%log_steps)
-         call look(run%monitor, s, line_due, run%log, error)
+         call check_step(run%monitor, s, line_due, run%log, error)
          if (allocated(error)) return
          if (frame_due .or. line_due) call update_balance(run)
          if (line_due) then

@@ -16,7 +16,7 @@ from .former_names import COUNTERS, STAGES, balance_of, present
 from .manifest import MANIFEST, ManifestError, check_bytes, check_hashes, read_manifest
 
 #: Newest layout of files that this reader knows
-SCHEMA_VERSION = 2
+SCHEMA_VERSION = 3
 
 #: Name of a segment: trajectory_0001.h5, or trajectory_0001.h5.open while it is written
 SEGMENT_NAME = re.compile(r"trajectory_(\d{4,})\.h5(\.open)?")
@@ -472,7 +472,7 @@ def _read_segment(path: Path) -> _Segment:
         segment = _Segment(path, file["frames/step"][:n], file["frames/time"][:n])
         _insist(path, "frames", {"step": segment.steps, "time": segment.times}, {"step": (n,), "time": (n,)})
         if segment.steps.dtype.kind not in "iu":
-            raise ResultError(f"{path}: frames/step does not hold whole numbers")
+            raise ResultError(f"{path}: frames/step does not hold integers")
         return segment
 
 
