@@ -35,8 +35,8 @@ program count_exchange
    if (comm%is_root()) then
       call get_word(1, word)
       open (newunit=unit, file=word, status='replace', action='write')
-      write (unit, '(a)') 'shape,grains,ranks,partition,margin,grains_most,ghosts,ghosts_most,messages,messages_most,'// &
-         'bytes,bytes_most,rectangles,imbalance,ghosts_per_grain,neighbours'
+      write (unit, '(a)') 'shape,grains,ranks,partition,margin,grains_most,ghosts,ghosts_most,messages,'// &
+         'messages_most,bytes,bytes_most,rectangles,imbalance,ghosts_per_grain,neighbours'
    end if
    do a = 2, command_argument_count()
       call get_word(a, word)
