@@ -173,15 +173,14 @@ contains
       !> Whether to compute the effective area
       logical, intent(in) :: by_shape
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: vertex(usual_corners, 2, 2), depth(usual_corners), level(usual_corners)
+      real(wp) :: vertex(usual_corners, 2, 2), depths(usual_corners, 2)
       logical :: on_clipper(usual_corners, 2)
       integer(ip) :: corners
 
       ! Each edge of the clipper adds at most one vertex.
       corners = size(subject, 2, kind=ip) + size(clipper, 2, kind=ip)
       if (corners <= usual_corners) then
-         call clip_in(subject, clipper, offset, scale, by_shape, usual_corners, vertex, on_clipper, depth, &
-                      level, overlap)
+         call clip_in(subject, clipper, offset, scale, by_shape, usual_corners, vertex, on_clipper, depths, overlap)
       else
          call clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
       end if
@@ -196,15 +195,14 @@ contains
       logical, intent(in) :: by_shape
       integer(ip), intent(in) :: corners
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: vertex(corners, 2, 2), depth(corners), level(corners)
+      real(wp) :: vertex(corners, 2, 2), depths(corners, 2)
       logical :: on_clipper(corners, 2)
 
-      call clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, depth, level, overlap)
+      call clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, depths, overlap)
    end subroutine clip_many
 
    !> As `clip`, in given work arrays; their last index selects the loop before or after a cut
-   pure subroutine clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, depth, &
-                           level, overlap)
+   pure subroutine clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, depths, overlap)
       real(wp), intent(in), contiguous :: subject(:, :)
       real(wp), intent(in), contiguous :: clipper(:, :)
       real(wp), intent(in) :: offset(2)
@@ -216,10 +214,9 @@ contains
       real(wp), intent(inout) :: vertex(corners, 2, 2)
       !> Whether the edge that starts at a vertex lies on the clipper's outline
       logical, intent(inout) :: on_clipper(corners, 2)
-      !> Depth of each vertex below the clip line, times the length of the edge
-      real(wp), intent(inout) :: depth(corners)
-      !> Depth of the subject's centre below each clip line, times the length of the edge
-      real(wp), intent(inout) :: level(corners)
+      !> Depth of each vertex below the clip line, and of the subject's centre below each clip line, each times the
+      !> length of the edge
+      real(wp), intent(inout) :: depths(corners, 2)
       type(overlap_t), intent(inout) :: overlap
       integer(ip) :: i, k, m, n, now
       real(wp) :: edge(2), lowest, highest
@@ -232,18 +229,18 @@ contains
          on_clipper(i, 1) = .false.
       end do
       now = 1_ip
-      call find_levels(clipper, offset, scale, level, k)
+      call find_levels(clipper, offset, scale, depths(:, 2), k)
       do i = 1_ip, m
          edge = clipper(:, merge(1_ip, k + 1_ip, k == m)) - clipper(:, k)
-         if (level(k) <= 1.01_wp*scale*max(abs(edge(1)), abs(edge(2)))) then
-            call measure(n, corners, vertex(:, :, now), edge, level(k), scale, depth, lowest, highest)
+         if (depths(k, 2) <= 1.01_wp*scale*max(abs(edge(1)), abs(edge(2)))) then
+            call measure(n, corners, vertex(:, :, now), edge, depths(k, 2), scale, depths(:, 1), lowest, highest)
             if (.not. highest > 0.0_wp) return
             if (lowest < 0.0_wp) then
-               call cut(n, corners, vertex(:, :, now), on_clipper(:, now), depth, &
+               call cut(n, corners, vertex(:, :, now), on_clipper(:, now), depths(:, 1), &
                         vertex(:, :, 3_ip - now), on_clipper(:, 3_ip - now))
                now = 3_ip - now
             else if (.not. lowest > 0.0_wp) then
-               call mark_edges_on_line(n, depth, on_clipper(:, now))
+               call mark_edges_on_line(n, depths(:, 1), on_clipper(:, now))
             end if
          end if
          k = merge(1_ip, k + 1_ip, k == m)
