@@ -306,7 +306,7 @@ contains
       if (read_number > 0) then
          number = read_number
       else
-         call raise(error, input_error, name//' '//text//': a whole number from 1 to 999999 was expected')
+         call raise(error, input_error, name//' '//text//': an integer from 1 to 999999 was expected')
       end if
    end subroutine read_count
 

@@ -30,7 +30,7 @@ contains
       type(error_t), allocatable :: ignored
 
       if (message == '') return
-      call screen%open_errors()
+      call screen%open_screen(errors=.true.)
       call screen%put_line('polydem: '//printable(message, keeps_lines=.true.))
       call screen%close(ignored)
    end subroutine warn

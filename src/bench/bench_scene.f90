@@ -5,7 +5,7 @@ module polydem_bench_scene
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_read_settings, only: read_settings
    use polydem_replaced_result, only: holds_result
-   use polydem_result_files, only: profile_path, trace_path
+   use polydem_result_files, only: profile_name, trace_name
    use polydem_run, only: result_folder
    use polydem_run_simulation, only: run_simulation
    use polydem_settings, only: settings_t
@@ -74,7 +74,7 @@ contains
          error%message = place//': '//quoted(text)//': '//error%message
          return
       end if
-      if (present(folder)) scene%path = trace_path(folder)
+      if (present(folder)) scene%path = folder//'/'//trace_name
       if (present(name) .and. scene%settings%output%trace_steps == 0) call raise(error, input_error, place//': '// &
          quoted(text)//' records no boxes; set trace_steps in &output, or add output.trace_steps=N after the file name')
    end subroutine read_scene
@@ -88,9 +88,9 @@ contains
       character(len=:), allocatable :: folder
 
       folder = result_folder(settings)
-      if (.not. exists(profile_path(folder))) call run_simulation(settings, holds_result(folder), error)
-      if (.not. allocated(error)) call check_origin(profile_path(folder), settings, error)
-      if (.not. allocated(error)) call check_end(profile_path(folder), error)
+      if (.not. exists(folder//'/'//profile_name)) call run_simulation(settings, holds_result(folder), error)
+      if (.not. allocated(error)) call check_origin(folder//'/'//profile_name, settings, error)
+      if (.not. allocated(error)) call check_end(folder//'/'//profile_name, error)
    end subroutine provide_result
 
    !> Record the trace of a scene, unless it exists.
@@ -143,12 +143,11 @@ contains
       character(len=:), allocatable, intent(out) :: text
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      type(error_t), allocatable :: ignored
 
       call file%open(path, error)
       if (allocated(error)) return
       call file%read(name, text, error)
-      call file%close(ignored)
+      call file%close(error)
    end subroutine read_one_text
 
    !> Split a text at blanks; commas belong to words. A blank text gives one empty word.

@@ -78,7 +78,6 @@ contains
       real(dp), intent(out) :: time, first_time
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      type(error_t), allocatable :: ignored
       real(dp), allocatable :: seconds(:)
 
       time = 0.0_dp
@@ -87,7 +86,7 @@ contains
       if (allocated(error)) return
       if (one_thread) call file%read('/steps/processor', seconds, error)
       if (.not. one_thread) call file%read('/steps/elapsed', seconds, error)
-      call file%close(ignored)
+      call file%close(error)
       if (allocated(error)) return
       time = ns_per_box(seconds, n_boxes)
       first_time = ns_per_box(seconds(:1), n_boxes)

@@ -23,7 +23,6 @@ contains
       !> Allocated if they differ; names the entry
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      type(error_t), allocatable :: ignored
 
       call file%open(path, error)
       if (allocated(error)) return
@@ -43,7 +42,7 @@ contains
       call compare('/provenance/instruction_set', provenance%instruction_set)
       call compare('/provenance/binding', provenance%binding)
       call compare('/provenance/wait_policy', provenance%wait_policy)
-      call file%close(ignored)
+      call file%close(error)
 
    contains
 

@@ -59,8 +59,8 @@ contains
       simulation%neighbours%finder%work%thorough = checked
       call reserve_sample(sample%case%steps, checked, sample)
       allocate (sample%stage(n_stages, sample%case%steps))
-      call meter%look_at_seconds(simulation%neighbours%finder, sample%phase(:, 1))
-      if (checked) call meter%look(simulation%neighbours%finder, sample%phase(:, 1), sample%count(:, 1))
+      call meter%read_seconds(simulation%neighbours%finder, sample%phase(:, 1))
+      if (checked) call meter%read_all(simulation%neighbours%finder, sample%phase(:, 1), sample%count(:, 1))
       call clock%calibrate()
       sample%clock_cost = clock%processor_cost
       do s = 1_ip, sample%case%steps
@@ -71,10 +71,10 @@ contains
          end if
          associate (neighbours => simulation%neighbours)
             if (checked) then
-               call meter%look(neighbours%finder, sample%phase(:, s), sample%count(:, s))
+               call meter%read_all(neighbours%finder, sample%phase(:, s), sample%count(:, s))
                call check_list(reference, s, sample%case%finder, neighbours%pairs, error, sample%hash(s))
             else
-               call meter%look_at_seconds(neighbours%finder, sample%phase(:, s))
+               call meter%read_seconds(neighbours%finder, sample%phase(:, s))
                call check_number(reference, s, sample%case%finder, neighbours%pairs, error)
             end if
          end associate

@@ -5,7 +5,7 @@ module polydem_reference_file
    use polydem_hash, only: hexadecimal
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: bp, ip, lp
-   use polydem_provenance, only: provenance_t, write_provenance, schema_version
+   use polydem_provenance, only: provenance_t, write_provenance
    use polydem_reference, only: new_reference, reference_t
    implicit none
    private
@@ -31,8 +31,7 @@ contains
 
       call begin_file(file, path, error)
       if (allocated(error)) return
-      call file%write_attribute('/', 'content', 'expected lists of pairs by polydem', error)
-      call file%write_attribute('/', 'schema_version', schema_version, error)
+      call write_provenance(file, 'expected lists of pairs by polydem', provenance, error)
       call file%write('/pairs', reference%pairs, error, '1', 'number of pairs of each step')
       call file%write('/pair_hash', reference%hash, error, '1', 'sum modulo 2^64 of the hashes of the pairs')
       call file%write('/by_all_pairs', merge(1_bp, 0_bp, reference%by_oracle), error, '1', &
@@ -40,7 +39,6 @@ contains
       call file%write('/other', reference%other, error, '1', 'source of the lists of the other steps')
       call file%write('/start', hexadecimal(start), error, '1', 'hash of all recorded bounds, or of the initial state')
       call file%write('/finish', hexadecimal(finish), error, '1', 'hash of the last state; 0 if there is none')
-      if (.not. allocated(error)) call write_provenance(provenance, file, error)
       call complete_file(file, path, error)
    end subroutine write_reference
 
@@ -59,14 +57,13 @@ contains
       !> Allocated if the file cannot be read, or belongs to other boxes or steps
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      type(error_t), allocatable :: ignored
 
       finish = 0_lp
       call new_reference(reference, n_steps)
       call file%open(path, error)
       if (allocated(error)) return
       call read_lists(path, file, n_steps, start, reference, finish, error)
-      call file%close(ignored)
+      call file%close(error)
    end subroutine read_reference
 
    !> Read and check the data sets of an open file.

@@ -59,10 +59,10 @@ contains
          call clock%stop(sample%elapsed(s), sample%processor(s))
          sample%pairs(s) = neighbours%pairs%n
          if (checked) then
-            call meter%look(neighbours%finder, sample%phase(:, s), sample%count(:, s))
+            call meter%read_all(neighbours%finder, sample%phase(:, s), sample%count(:, s))
             call check_list(reference, s, sample%case%finder, neighbours%pairs, error, sample%hash(s))
          else
-            call meter%look_at_seconds(neighbours%finder, sample%phase(:, s))
+            call meter%read_seconds(neighbours%finder, sample%phase(:, s))
             call check_number(reference, s, sample%case%finder, neighbours%pairs, error)
          end if
          if (allocated(error)) return

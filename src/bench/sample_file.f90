@@ -9,7 +9,7 @@ module polydem_sample_file
    use polydem_hash, only: hexadecimal
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp
-   use polydem_provenance, only: provenance_t, write_provenance, schema_version
+   use polydem_provenance, only: provenance_t, write_provenance
    use polydem_timers, only: stage_names
    implicit none
    private
@@ -81,11 +81,9 @@ contains
 
       call begin_file(file, path, error)
       if (allocated(error)) return
-      call file%write_attribute('/', 'content', 'sample of a bench by polydem', error)
-      call file%write_attribute('/', 'schema_version', schema_version, error)
+      call write_provenance(file, 'sample of a bench by polydem', provenance, error)
       call write_case(file, sample, error)
       call write_steps(file, sample, phase_names, count_names, error)
-      if (.not. allocated(error)) call write_provenance(provenance, file, error)
       call complete_file(file, path, error)
    end subroutine write_sample
 

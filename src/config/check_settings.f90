@@ -60,7 +60,7 @@ contains
          end if
       end associate
       associate (given => values(first_row('forces', 'restitution')))
-         if (given%in_force .and. settings%forces%restitution < least_restitution) then
+         if (given%is_active .and. settings%forces%restitution < least_restitution) then
             call raise(error, input_error, given%place//': ''restitution'' in &forces must be at least 0.01, '// &
                'because a smaller value needs a very small time step; omit it to use ''damping_coefficient''')
          end if

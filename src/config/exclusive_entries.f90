@@ -28,7 +28,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: use_special
 
-      if (.not. values(special)%in_force) return
+      if (.not. values(special)%is_active) return
       use_special = values(special)%is_given
       if (use_special .and. values(usual)%is_given) then
          if (values(special)%is_override .eqv. values(usual)%is_override) then
@@ -38,8 +38,8 @@ contains
          end if
          use_special = values(special)%is_override
       end if
-      values(special)%in_force = use_special
-      values(usual)%in_force = .not. use_special
+      values(special)%is_active = use_special
+      values(usual)%is_active = .not. use_special
       if (.not. use_special) values(special)%reals = 0.0_wp
    end subroutine choose_entry
 

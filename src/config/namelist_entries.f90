@@ -28,18 +28,12 @@ contains
    pure function groups() result(names)
       character(len=group_length), allocatable :: names(:)
       logical :: is_new(size(entries))
-      integer :: k, n
+      integer :: k
 
       do k = 1, size(entries)
          is_new(k) = all(entries(:k - 1)%group /= entries(k)%group)
       end do
-      allocate (names(count(is_new)))
-      n = 0
-      do k = 1, size(entries)
-         if (.not. is_new(k)) cycle
-         n = n + 1
-         names(n) = entries(k)%group
-      end do
+      names = pack(entries%group, is_new)
    end function groups
 
    !> Keys of the entries of a group in the order of the table, each key once
@@ -48,18 +42,12 @@ contains
       character(len=*), intent(in) :: group
       character(len=key_length), allocatable :: names(:)
       logical :: is_new(size(entries))
-      integer :: k, n
+      integer :: k
 
       do k = 1, size(entries)
          is_new(k) = entries(k)%group == group .and. first_row(group, trim(entries(k)%key)) == k
       end do
-      allocate (names(count(is_new)))
-      n = 0
-      do k = 1, size(entries)
-         if (.not. is_new(k)) cycle
-         n = n + 1
-         names(n) = entries(k)%key
-      end do
+      names = pack(entries%key, is_new)
    end function keys_of
 
    !> Choices of a word entry, such as the names of the finders

@@ -21,7 +21,7 @@ module polydem_namelist_values
       !> Whether the value comes from the command line
       logical :: is_override = .false.
       !> Whether the entry is in use: the chosen scene and options need it
-      logical :: in_force = .false.
+      logical :: is_active = .false.
       !> Values of a real entry, (count)
       real(wp), allocatable :: reals(:)
       !> Values of an integer entry, (count)

@@ -245,13 +245,13 @@ contains
 
       associate (entry => entries(row))
          home = first_row(entry%group, entry%key)
-         values(row)%in_force = (entry%group == bench_group) .eqv. of_bench
-         if (values(row)%in_force) values(row)%in_force = is_needed(entry, values)
-         if (values(row)%in_force .and. allocated(given(home)%values)) then
+         values(row)%is_active = (entry%group == bench_group) .eqv. of_bench
+         if (values(row)%is_active) values(row)%is_active = is_needed(entry, values)
+         if (values(row)%is_active .and. allocated(given(home)%values)) then
             call read_value(entry, given(home), values(row), error)
          else if (entry%default /= required) then
             call read_value(entry, default_statement(source, entry), values(row), error)
-         else if (values(row)%in_force) then
+         else if (values(row)%is_active) then
             call raise(error, input_error, source%name//': '//label(entry)//' is required'// &
                reason(entry, values)//expected(entry))
          else
@@ -270,7 +270,7 @@ contains
       if (is_needed) return
       colon = index(entry%needs, ':')
       row = first_row(entry%group, entry%needs(:colon - 1))
-      if (values(row)%in_force) is_needed = any(split_words(entry%needs(colon + 1:)) == values(row)%text)
+      if (values(row)%is_active) is_needed = any(split_words(entry%needs(colon + 1:)) == values(row)%text)
    end function is_needed
 
    !> Default of a row in the form of a statement
@@ -350,7 +350,7 @@ contains
       needs = ''
       do row = home, size(entries)
          if (entries(row)%group /= given%group .or. entries(row)%key /= given%key) cycle
-         if (values(row)%in_force) return
+         if (values(row)%is_active) return
          needs = needs//entries(row)%needs(index(entries(row)%needs, ':') + 1:)
       end do
       key = entries(home)%needs(:index(entries(home)%needs, ':') - 1)
@@ -372,7 +372,7 @@ contains
       text = ''
       group = ''
       do row = 1, size(entries)
-         if (.not. values(row)%in_force) cycle
+         if (.not. values(row)%is_active) cycle
          if (entries(row)%group /= group) then
             if (text /= '') text = text//'/'//line_end
             group = entries(row)%group

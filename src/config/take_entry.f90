@@ -84,7 +84,7 @@ contains
       dot = index(name, '.')
       first = first_row(name(:dot - 1), name(dot + 1:))
       do row = first, size(entries)
-         if (values(row)%in_force .and. entries(row)%group == name(:dot - 1) &
+         if (values(row)%is_active .and. entries(row)%group == name(:dot - 1) &
             .and. entries(row)%key == name(dot + 1:)) return
       end do
       row = first

@@ -34,7 +34,7 @@ contains
       call counters%set('ranks', int(comm%size, lp))
       call counters%set('redistributions', domain%redistributions)
       call counters%set('partitions of space', domain%divisions)
-      call counters%set('rectangles', int(domain%regions%n_rectangles(), lp))
+      call counters%set('rectangles', int(domain%rank_bounds%n_rectangles(), lp))
       call counters%set('migrations', sums(4))
       call counters%set('migrations at the start', sums(5))
       call counters%set('halo bodies, summed over steps', sums(3))

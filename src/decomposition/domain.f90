@@ -24,7 +24,7 @@ module polydem_domain
       !> Partition of space; not allocated in a run on one rank
       class(partition_t), allocatable :: partition
       !> Bounding rectangles of the bodies of the other ranks
-      type(rank_bounds_t) :: regions
+      type(rank_bounds_t) :: rank_bounds
       !> Halo: copies of bodies of other ranks
       type(halo_t) :: halo
       !> Distance that a box may move before the next redistribution [m]

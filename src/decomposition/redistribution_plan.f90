@@ -155,7 +155,7 @@ contains
       allocate (slots(64), rank(64))
       n = 0_ip
       do k = 1_ip, size(boxes, 2, kind=ip)
-         call domain%regions%needed_by(boxes(:, k), needing, m)
+         call domain%rank_bounds%needed_by(boxes(:, k), needing, m)
          if (n + m > size(slots)) then
             longer = [slots, spread(0_ip, 1, n + m)]
             call move_alloc(longer, slots)

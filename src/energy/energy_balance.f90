@@ -36,7 +36,7 @@ module polydem_energy_balance
 
    !> Running sums of the energy and momentum balance, and its values at the start
    type :: energy_balance_t
-      !> Greatest energy turned over so far (kinetic energy or work of a channel), the scale of the residual [J/m]
+      !> Energy scale of the residual: largest kinetic energy or work of a channel so far [J/m]
       real(wp) :: energy_scale = 0.0_wp
       !> Whether bodies and contacts are those of the last accumulated step. `accumulate_step` sets it. The caller must
       !> clear it when a step begins; the last rates then have full weight, as is right in the middle of a step
@@ -79,8 +79,8 @@ module polydem_energy_balance
       real(wp) :: angular_impulse = 0.0_wp
       !> Unexplained energy [J/m]
       real(wp) :: energy_residual = 0.0_wp
-      !> Unexplained energy over the energy turned over: the greatest kinetic energy or work so far, but at least 1e-9
-      !> of the potential energy, which is the level of rounding errors
+      !> Unexplained energy over the largest kinetic energy or work so far, but at least over 1e-9 of the potential
+      !> energy, which is the level of rounding errors
       real(wp) :: relative_energy_residual = 0.0_wp
       !> Unexplained momentum, over the sum of the absolute momentum at the start and the absolute impulses of gravity
       !> and of all contacts with fixed bodies
@@ -90,7 +90,7 @@ module polydem_energy_balance
       real(wp) :: relative_angular_residual = 0.0_wp
    end type balance_t
 
-   !> Least energy turned over, as a fraction of the potential energy
+   !> Least energy scale, as a fraction of the potential energy
    real(wp), parameter :: least_share = 1.0e-9_wp
    !> Least number of bodies in a partial sum, and the greatest number of partial sums
    integer(ip), parameter :: block = 1024_ip, most_blocks = 32_ip
@@ -197,7 +197,7 @@ contains
                         'energy, momentum and angular momentum at the start')
       call serializer%field('/run/energy_balance_steps', sums%steps, '1', 'number of accumulated steps')
       call serializer%field('/run/elastic_start', sums%elastic_start, 'J/m', 'elastic energy at the start')
-      call serializer%field('/run/energy_scale', sums%energy_scale, 'J/m', 'greatest energy turned over')
+      call serializer%field('/run/energy_scale', sums%energy_scale, 'J/m', 'largest kinetic energy or work so far')
    end subroutine serialize_balance
 
    !> Serialize the channels of the bodies. When reading, the bodies may differ from those before.

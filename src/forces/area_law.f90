@@ -10,7 +10,7 @@ module polydem_area_law
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_elementary, only: hypotenuse
-   use polydem_force_part, only: acts_elastic, force_part_t
+   use polydem_force_part, only: force_part_t, stage_elastic
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -22,7 +22,7 @@ module polydem_area_law
       !> Young's modulus in two dimensions E [N/m2]
       real(wp) :: stiffness = 0.0_wp
    contains
-      procedure :: choose
+      procedure :: configure
       procedure :: add
       procedure :: stiffen
       procedure :: static_depth
@@ -35,20 +35,15 @@ module polydem_area_law
 
 contains
 
-   !> Choose this part if law = 'area' in &forces.
-   subroutine choose(self, settings, chosen)
+   !> Copy the parameters from the settings.
+   subroutine configure(self, settings)
       class(area_law_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether the settings ask for this part
-      logical, intent(out) :: chosen
 
-      chosen = settings%law == 'area'
-      if (.not. chosen) return
-      self%name = 'area law'
-      self%stage = acts_elastic
+      self%stage = stage_elastic
       self%stiffness = settings%stiffness
-   end subroutine choose
+   end subroutine configure
 
    !> Set the characteristic length and add the elastic force. It acts at the centroid of the overlap.
    subroutine add(self, bodies, dt, block, history)

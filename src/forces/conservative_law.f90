@@ -26,7 +26,7 @@ module polydem_conservative_law
    use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: acts_elastic, force_part_t
+   use polydem_force_part, only: force_part_t, stage_elastic
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -40,7 +40,7 @@ module polydem_conservative_law
       !> Reciprocal side 1/s of the square of each body's area, (slot) [1/m]
       real(wp), allocatable :: inverse_size(:)
    contains
-      procedure :: choose
+      procedure :: configure
       procedure :: measure
       procedure :: add
       procedure :: stiffen
@@ -52,22 +52,17 @@ module polydem_conservative_law
 
 contains
 
-   !> Choose this part if law = 'conservative' in &forces.
-   subroutine choose(self, settings, chosen)
+   !> Copy the parameters from the settings.
+   subroutine configure(self, settings)
       class(conservative_law_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether the settings ask for this part
-      logical, intent(out) :: chosen
 
-      chosen = settings%law == 'conservative'
-      if (.not. chosen) return
-      self%name = 'conservative law'
-      self%stage = acts_elastic
+      self%stage = stage_elastic
       self%needs_effective_area = .true.
       self%energy_is_quadratic = .true.
       self%stiffness = settings%stiffness
-   end subroutine choose
+   end subroutine configure
 
    !> Measure the areas of the bodies.
    subroutine measure(self, bodies)

@@ -17,7 +17,7 @@ module polydem_cundall_strack
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: acts_last, force_part_t
+   use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -35,41 +35,36 @@ module polydem_cundall_strack
       !> Whether the spring uses the slip velocity in the middle of the step instead of that at its end
       logical :: midstep = .false.
    contains
-      procedure :: choose
-      procedure :: stored
+      procedure :: configure
+      procedure :: history_kinds
       procedure :: add
       procedure :: stiffen
    end type cundall_strack_t
 
 contains
 
-   !> Choose this part if friction = 'cundall_strack' in &forces.
-   subroutine choose(self, settings, chosen)
+   !> Copy the parameters from the settings.
+   subroutine configure(self, settings)
       class(cundall_strack_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether the settings ask for this part
-      logical, intent(out) :: chosen
 
-      chosen = settings%friction == 'cundall_strack'
-      if (.not. chosen) return
-      self%name = 'Cundall-Strack friction'
-      self%stage = acts_last
+      self%stage = stage_last
       self%coefficient = settings%friction_coefficient
       self%stiffness = settings%tangential_stiffness*settings%stiffness
       self%damping = settings%tangential_damping
       self%midstep = settings%midstep_slip
-   end subroutine choose
+   end subroutine configure
 
    !> Contact history of this part: the spring force
-   function stored(self) result(kinds)
+   function history_kinds(self) result(kinds)
       class(cundall_strack_t), intent(in) :: self
       type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
       kinds = [history_kind_t('tangential', 'N/m', 'force of the tangential spring')]
-   end function stored
+   end function history_kinds
 
    !> Add the tangential force and store the spring force.
    subroutine add(self, bodies, dt, block, history)

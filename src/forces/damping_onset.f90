@@ -10,9 +10,8 @@ module polydem_damping_onset
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: contact_block_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
-   use polydem_force_part, only: acts_on_damping, force_part_t
+   use polydem_force_part, only: force_part_t
    use polydem_kinds, only: ip, wp
-   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: damping_onset_t
@@ -20,36 +19,21 @@ module polydem_damping_onset
    !> Weight of the normal damping in the first step of a contact
    type, extends(force_part_t) :: damping_onset_t
    contains
-      procedure :: choose
-      procedure :: stored
+      procedure :: history_kinds
       procedure :: add
    end type damping_onset_t
 
 contains
 
-   !> Choose this part if damping_from_touch is true in &forces.
-   subroutine choose(self, settings, chosen)
-      class(damping_onset_t), intent(inout) :: self
-      !> Group &forces
-      type(forces_settings_t), intent(in) :: settings
-      !> Whether the settings ask for this part
-      logical, intent(out) :: chosen
-
-      chosen = settings%damping_from_touch
-      if (.not. chosen) return
-      self%name = 'from first touch'
-      self%stage = acts_on_damping
-   end subroutine choose
-
    !> Contact history of this part: the overlap area of the last step
-   function stored(self) result(kinds)
+   function history_kinds(self) result(kinds)
       class(damping_onset_t), intent(in) :: self
       type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
       kinds = [history_kind_t('area', 'm2', 'overlap area at the last step', zero_is_new=.true.)]
-   end function stored
+   end function history_kinds
 
    !> Weight the damping of new contacts, limit the normal force to repulsion, and store the areas.
    subroutine add(self, bodies, dt, block, history)

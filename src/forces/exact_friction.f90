@@ -58,9 +58,9 @@ module polydem_exact_friction
       !> Greatest remaining slip so far, as a share like `tolerance`
       real(wp), private :: greatest_residual = 0.0_wp
    contains
-      procedure :: choose
+      procedure :: configure
       procedure :: check
-      procedure :: stored
+      procedure :: history_kinds
       procedure :: apply
       procedure :: report
    end type exact_friction_t
@@ -70,20 +70,15 @@ module polydem_exact_friction
 
 contains
 
-   !> Choose this part if friction = 'exact' in &forces.
-   subroutine choose(self, settings, chosen)
+   !> Copy the parameters from the settings.
+   subroutine configure(self, settings)
       class(exact_friction_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether the settings ask for this part
-      logical, intent(out) :: chosen
 
-      chosen = settings%friction == 'exact'
-      if (.not. chosen) return
-      self%name = 'exact friction'
       self%coefficient = settings%friction_coefficient
       self%tolerance = settings%friction_tolerance
-   end subroutine choose
+   end subroutine configure
 
    !> Refuse integration schemes without a velocity in the middle of a step, and several ranks.
    subroutine check(self, settings, n_processes, error)
@@ -105,14 +100,14 @@ contains
    end subroutine check
 
    !> Contact history of this part: the force, from which the next search starts
-   function stored(self) result(kinds)
+   function history_kinds(self) result(kinds)
       class(exact_friction_t), intent(in) :: self
       type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
       kinds = [history_kind_t('tangential', 'N/m', 'tangential force of the last step')]
-   end function stored
+   end function history_kinds
 
    !> Compute the friction of all contacts.
    subroutine apply(self, dt, incidence, bodies, contacts, history, error)

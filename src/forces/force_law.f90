@@ -1,8 +1,8 @@
 !> The force law of a run, a list of parts, and its factory, the only code that lists all parts.
 !>
-!> To add a part, write it as a `force_part_t` in a file of its own, and add a `use` and an `offer` here. The order of
-!> the offers does not matter, because the `stage` of a part gives its place. A law may have a constraint on velocities,
-!> which acts when all other forces on the bodies are known.
+!> To add a part, write it as a `force_part_t` in a file of its own, and add a `use` and a line of `choose_parts` here.
+!> The order of the lines does not matter, because the `stage` of a part gives its place. A law may have a constraint on
+!> velocities, which acts when all other forces on the bodies are known.
 module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
@@ -15,7 +15,7 @@ module polydem_force_law
    use polydem_damping_onset, only: damping_onset_t
    use polydem_errors, only: error_t
    use polydem_exact_friction, only: exact_friction_t
-   use polydem_force_part, only: acts_on_damping, force_part_t
+   use polydem_force_part, only: force_part_t, stage_on_damping
    use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
    use polydem_matuttis_chen_damping, only: matuttis_chen_damping_t
@@ -40,7 +40,7 @@ module polydem_force_law
       !> Constraint that acts after all parts; not allocated if there is none
       class(velocity_constraint_t), allocatable :: constraint
       !> First columns of the contact history, in this order; not allocated before `choose_parts`
-      type(history_kind_t), allocatable :: stored(:)
+      type(history_kind_t), allocatable :: history_kinds(:)
       !> Whether the law needs the effective area of overlaps
       logical :: needs_effective_area = .false.
       !> Whether a part adds to the column `cohesion`
@@ -52,10 +52,10 @@ module polydem_force_law
       !> Names of the parts, for `polydem check` and the log
       character(len=:), allocatable :: description
    contains
-      procedure, private :: offer_part
-      procedure, private :: offer_constraint
-      !> Add a part or a constraint if the settings ask for it
-      generic :: offer => offer_part, offer_constraint
+      procedure, private :: add_part
+      procedure, private :: add_constraint
+      !> Add a part or a constraint with the parameters of the settings
+      generic :: add => add_part, add_constraint
       procedure :: collect_needs
       procedure :: measure
       procedure :: apply
@@ -87,36 +87,41 @@ contains
       !> The law
       type(force_law_t), intent(out) :: law
 
-      call law%offer(area_law_t(), settings)
-      call law%offer(conservative_law_t(), settings)
-      call law%offer(rate_damping_t(), settings)
-      call law%offer(restitution_damping_t(), settings)
-      call law%offer(hunt_crossley_t(), settings)
-      call law%offer(matuttis_chen_damping_t(), settings)
-      call law%offer(damping_onset_t(), settings)
-      call law%offer(tilt_damping_t(), settings)
-      call law%offer(cundall_strack_t(), settings)
-      call law%offer(exact_friction_t(), settings)
+      associate (s => settings)
+         if (s%law == 'area') call law%add(area_law_t(name='area law'), s)
+         if (s%law == 'conservative') call law%add(conservative_law_t(name='conservative law'), s)
+         if (s%damping == 'rate') then
+            if (s%restitution > 0.0_wp) then
+               call law%add(restitution_damping_t(name='damping of given restitution'), s)
+            else
+               call law%add(rate_damping_t(name='rate damping'), s)
+            end if
+         end if
+         if (s%damping == 'hunt_crossley') call law%add(hunt_crossley_t(name='Hunt-Crossley damping'), s)
+         if (s%damping == 'matuttis_chen') call law%add(matuttis_chen_damping_t(name='Matuttis-Chen damping'), s)
+         if (s%damping_from_touch) call law%add(damping_onset_t(name='from first touch', stage=stage_on_damping), s)
+         if (s%tilt_damping > 0.0_wp) call law%add(tilt_damping_t(name='damping of tilts'), s)
+         if (s%friction == 'cundall_strack') call law%add(cundall_strack_t(name='Cundall-Strack friction'), s)
+         if (s%friction == 'exact') call law%add(exact_friction_t(name='exact friction'), s)
+      end associate
       call law%collect_needs()
    end subroutine choose_parts
 
-   !> Add a part if the settings ask for it. Parts are sorted by their stages.
-   subroutine offer_part(law, offered, settings)
-      !> The law; `collect_needs` must follow the last offer
+   !> Add a part with the parameters of the settings. Parts are sorted by their stages.
+   subroutine add_part(law, new, settings)
+      !> The law; `collect_needs` must follow the last part
       class(force_law_t), intent(inout) :: law
-      !> A part with default components
-      class(force_part_t), intent(in) :: offered
+      !> The part with its name
+      class(force_part_t), intent(in) :: new
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
       type(part_holder_t), allocatable :: longer(:)
       class(force_part_t), allocatable :: part
-      logical :: chosen
       integer :: k, n, place
 
       if (.not. allocated(law%parts)) allocate (law%parts(0))
-      allocate (part, source=offered)
-      call part%choose(settings, chosen)
-      if (.not. chosen) return
+      allocate (part, source=new)
+      call part%configure(settings)
       n = size(law%parts)
       place = 1
       do k = 1, n
@@ -128,23 +133,21 @@ contains
       end do
       call move_alloc(part, longer(place)%part)
       call move_alloc(longer, law%parts)
-   end subroutine offer_part
+   end subroutine add_part
 
-   !> Set the constraint if the settings ask for it. They ask for at most one.
-   subroutine offer_constraint(law, offered, settings)
+   !> Set the constraint, with the parameters of the settings. A law has at most one.
+   subroutine add_constraint(law, new, settings)
       !> The law
       class(force_law_t), intent(inout) :: law
-      !> A constraint with default components
-      class(velocity_constraint_t), intent(in) :: offered
+      !> The constraint with its name
+      class(velocity_constraint_t), intent(in) :: new
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      class(velocity_constraint_t), allocatable :: constraint
-      logical :: chosen
 
-      allocate (constraint, source=offered)
-      call constraint%choose(settings, chosen)
-      if (chosen) call move_alloc(constraint, law%constraint)
-   end subroutine offer_constraint
+      if (allocated(law%constraint)) deallocate (law%constraint)
+      allocate (law%constraint, source=new)
+      call law%constraint%configure(settings)
+   end subroutine add_constraint
 
    !> Collect the requirements, the contact history and the names of the parts.
    subroutine collect_needs(law)
@@ -152,8 +155,8 @@ contains
       class(force_law_t), intent(inout) :: law
       integer :: k
 
-      if (allocated(law%stored)) deallocate (law%stored)
-      allocate (law%stored(0))
+      if (allocated(law%history_kinds)) deallocate (law%history_kinds)
+      allocate (law%history_kinds(0))
       law%description = ''
       do k = 1, size(law%parts)
          associate (part => law%parts(k)%part)
@@ -161,15 +164,15 @@ contains
             law%needs_cohesion = law%needs_cohesion .or. part%needs_cohesion
             law%needs_twist = law%needs_twist .or. part%needs_twist
             law%energy_is_quadratic = law%energy_is_quadratic .or. part%energy_is_quadratic
-            part%first_column = size(law%stored) + 1
-            law%stored = [law%stored, part%stored()]
-            if (k > 1 .and. part%stage /= acts_on_damping) law%description = law%description//','
+            part%first_column = size(law%history_kinds) + 1
+            law%history_kinds = [law%history_kinds, part%history_kinds()]
+            if (k > 1 .and. part%stage /= stage_on_damping) law%description = law%description//','
             law%description = law%description//' '//trim(part%name)
          end associate
       end do
       if (allocated(law%constraint)) then
-         law%constraint%first_column = size(law%stored) + 1
-         law%stored = [law%stored, law%constraint%stored()]
+         law%constraint%first_column = size(law%history_kinds) + 1
+         law%history_kinds = [law%history_kinds, law%constraint%history_kinds()]
          law%description = law%description//', '//trim(law%constraint%name)
       end if
       if (law%needs_cohesion) law%energy_is_quadratic = .false.

@@ -9,8 +9,8 @@
 !> * `tangential_force`: work of tangential forces.
 !>
 !> The order in which parts are listed does not matter; they act in the order of their stages. A part is immutable once
-!> it is chosen and has measured the bodies. Its contact history is in columns of `contact_history_t`, with one entry
-!> per pair of the pair list.
+!> it is configured and has measured the bodies. Its contact history is in columns of `contact_history_t`, with one
+!> entry per pair of the pair list.
 module polydem_force_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t
@@ -20,17 +20,17 @@ module polydem_force_part
    use polydem_law_part, only: law_part_t
    implicit none
    private
-   public :: force_part_t, acts_elastic, acts_damping, acts_on_damping, acts_normal, acts_last
+   public :: force_part_t, stage_elastic, stage_damping, stage_on_damping, stage_normal, stage_last
 
    !> Stages in the order in which they act: elastic repulsion, which sets `inverse_length` and `lever`; normal damping,
    !> which uses the repulsion only; changes of the damping; other normal forces, such as cohesion; friction and damping
    !> of tilts, which use the whole normal force
-   integer, parameter :: acts_elastic = 1, acts_damping = 2, acts_on_damping = 3, acts_normal = 4, acts_last = 5
+   integer, parameter :: stage_elastic = 1, stage_damping = 2, stage_on_damping = 3, stage_normal = 4, stage_last = 5
 
-   !> One part of the force between two bodies in contact. `choose` sets all components
+   !> One part of the force between two bodies in contact. The factory or `configure` sets all components
    type, abstract, extends(law_part_t) :: force_part_t
       !> Stage in which it acts, one of the constants above
-      integer :: stage = acts_normal
+      integer :: stage = stage_normal
       !> Whether `area` and the derived columns must be those of the effective area
       logical :: needs_effective_area = .false.
       !> Whether it adds to the column `cohesion`

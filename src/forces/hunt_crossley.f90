@@ -12,7 +12,6 @@ module polydem_hunt_crossley
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
-   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: hunt_crossley_t
@@ -20,26 +19,11 @@ module polydem_hunt_crossley
    !> Damping in proportion to the elastic force
    type, extends(normal_damping_t) :: hunt_crossley_t
    contains
-      procedure :: choose
       procedure :: find_forces
       procedure :: stiffen
    end type hunt_crossley_t
 
 contains
-
-   !> Choose this part if damping = 'hunt_crossley' in &forces.
-   subroutine choose(self, settings, chosen)
-      class(hunt_crossley_t), intent(inout) :: self
-      !> Group &forces
-      type(forces_settings_t), intent(in) :: settings
-      !> Whether the settings ask for this part
-      logical, intent(out) :: chosen
-
-      chosen = settings%damping == 'hunt_crossley'
-      if (.not. chosen) return
-      self%name = 'Hunt-Crossley damping'
-      call self%take_coefficients(settings)
-   end subroutine choose
 
    !> Compute the damping forces of one block of contacts.
    subroutine find_forces(self, dt, block, history, force)

@@ -1,8 +1,9 @@
 !> Base type of the members of a force law: parts of the contact force, and a constraint on velocities.
 !>
-!> A member chooses itself from the settings, refuses settings that exclude it, declares its contact history, and adds
-!> its stiffness to that of a contact. The names of members occur only in their own files and in the factory
-!> (`force_law`), which offers the settings to each member. A member overrides only the defaults that do not fit.
+!> A member copies its parameters from the settings, refuses settings that exclude it, declares its contact history, and
+!> adds its stiffness to that of a contact. The names of members occur only in their own files and in the factory
+!> (`force_law`), which adds the members that the settings ask for. A member overrides only those defaults that do not
+!> fit.
 module polydem_law_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
@@ -17,36 +18,34 @@ module polydem_law_part
 
    !> A member of a force law
    type, abstract :: law_part_t
-      !> Name for `polydem check` and the log; `choose` sets it
+      !> Name for `polydem check` and the log
       character(len=40) :: name = ''
       !> Index of the first column of this member in `contact_history_t`; the law sets it
       integer :: first_column = 1
    contains
       !> Copy its parameters from the settings
-      procedure(choose), deferred :: choose
+      procedure :: configure
       !> Refuse settings that exclude this member
       procedure :: check
       !> Measure the bodies
       procedure :: measure
       !> Columns of its contact history
-      procedure :: stored
+      procedure :: history_kinds
       !> Add its springs and dashpots to those of a contact
       procedure :: stiffen
    end type law_part_t
 
-   abstract interface
-      !> Copy the parameters from the settings, and return whether the settings ask for this member.
-      subroutine choose(self, settings, chosen)
-         import :: forces_settings_t, law_part_t
-         class(law_part_t), intent(inout) :: self
-         !> Group &forces
-         type(forces_settings_t), intent(in) :: settings
-         !> Whether the settings ask for this member
-         logical, intent(out) :: chosen
-      end subroutine choose
-   end interface
-
 contains
+
+   !> Copy the parameters from the settings. Default: there are none.
+   subroutine configure(self, settings)
+      class(law_part_t), intent(inout) :: self
+      !> Group &forces
+      type(forces_settings_t), intent(in) :: settings
+
+      associate (unused_self => self, unused_settings => settings)
+      end associate
+   end subroutine configure
 
    !> Refuse settings that exclude this member. Default: none.
    subroutine check(self, settings, n_processes, error)
@@ -74,14 +73,14 @@ contains
 
    !> Columns of the contact history, in the order column(first_column), column(first_column + 1) ... of
    !> `contact_history_t`. Default: none. Names must differ from those of other members of the same law.
-   function stored(self) result(kinds)
+   function history_kinds(self) result(kinds)
       class(law_part_t), intent(in) :: self
       type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
       allocate (kinds(0))
-   end function stored
+   end function history_kinds
 
    !> Add the springs and dashpots to those of a contact, for the stable step. Default: none. The parts add theirs in
    !> the order of their stages.

@@ -8,7 +8,6 @@ module polydem_matuttis_chen_damping
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
-   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: matuttis_chen_damping_t
@@ -16,8 +15,7 @@ module polydem_matuttis_chen_damping
    !> Damping by the backward difference of the area
    type, extends(normal_damping_t) :: matuttis_chen_damping_t
    contains
-      procedure :: choose
-      procedure :: stored
+      procedure :: history_kinds
       procedure :: find_forces
    end type matuttis_chen_damping_t
 
@@ -26,29 +24,15 @@ module polydem_matuttis_chen_damping
 
 contains
 
-   !> Choose this part if damping = 'matuttis_chen' in &forces.
-   subroutine choose(self, settings, chosen)
-      class(matuttis_chen_damping_t), intent(inout) :: self
-      !> Group &forces
-      type(forces_settings_t), intent(in) :: settings
-      !> Whether the settings ask for this part
-      logical, intent(out) :: chosen
-
-      chosen = settings%damping == 'matuttis_chen'
-      if (.not. chosen) return
-      self%name = 'Matuttis-Chen damping'
-      call self%take_coefficients(settings)
-   end subroutine choose
-
    !> Contact history of this part: the overlap area of the last step
-   function stored(self) result(kinds)
+   function history_kinds(self) result(kinds)
       class(matuttis_chen_damping_t), intent(in) :: self
       type(history_kind_t), allocatable :: kinds(:)
 
       associate (unused_self => self)
       end associate
       kinds = [history_kind_t('area', 'm2', 'overlap area at the last step', zero_is_new=.true.)]
-   end function stored
+   end function history_kinds
 
    !> Compute the damping forces of one block of contacts, and store the areas.
    subroutine find_forces(self, dt, block, history, force)

@@ -8,7 +8,7 @@ module polydem_normal_damping
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: acts_damping, force_part_t
+   use polydem_force_part, only: force_part_t, stage_damping
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -26,7 +26,8 @@ module polydem_normal_damping
       procedure(find_forces), deferred :: find_forces
       procedure :: add
       procedure :: stiffen
-      procedure :: take_coefficients
+      procedure :: configure => take_coefficients
+      procedure, non_overridable :: take_coefficients
    end type normal_damping_t
 
    abstract interface
@@ -91,7 +92,7 @@ contains
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
 
-      self%stage = acts_damping
+      self%stage = stage_damping
       self%stiffness = settings%stiffness
       self%coefficient = settings%damping_coefficient
       self%dissipates = self%coefficient > 0.0_wp

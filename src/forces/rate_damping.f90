@@ -7,7 +7,6 @@ module polydem_rate_damping
    use polydem_contact_history, only: contact_history_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
-   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: rate_damping_t
@@ -15,26 +14,10 @@ module polydem_rate_damping
    !> Damping by the rate of the area
    type, extends(normal_damping_t) :: rate_damping_t
    contains
-      procedure :: choose
       procedure :: find_forces
    end type rate_damping_t
 
 contains
-
-   !> Choose this part if damping = 'rate' and restitution = 0 in &forces.
-   subroutine choose(self, settings, chosen)
-      class(rate_damping_t), intent(inout) :: self
-      !> Group &forces
-      type(forces_settings_t), intent(in) :: settings
-      !> Whether the settings ask for this part
-      logical, intent(out) :: chosen
-
-      chosen = settings%damping == 'rate'
-      if (chosen) chosen = .not. settings%restitution > 0.0_wp
-      if (.not. chosen) return
-      self%name = 'rate damping'
-      call self%take_coefficients(settings)
-   end subroutine choose
 
    !> Compute the damping forces of one block of contacts.
    subroutine find_forces(self, dt, block, history, force)

@@ -31,29 +31,23 @@ module polydem_restitution_damping
       !> Damping ratio zeta
       real(wp) :: ratio = 0.0_wp
    contains
-      procedure :: choose
+      procedure :: configure
       procedure :: find_forces
       procedure :: stiffen
    end type restitution_damping_t
 
 contains
 
-   !> Choose this part if damping = 'rate' and restitution > 0 in &forces.
-   subroutine choose(self, settings, chosen)
+   !> Copy the parameters from the settings.
+   subroutine configure(self, settings)
       class(restitution_damping_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether the settings ask for this part
-      logical, intent(out) :: chosen
 
-      chosen = settings%damping == 'rate'
-      if (chosen) chosen = settings%restitution > 0.0_wp
-      if (.not. chosen) return
-      self%name = 'damping of given restitution'
       call self%take_coefficients(settings)
       self%ratio = damping_ratio_of(settings%restitution)
       self%dissipates = self%ratio > 0.0_wp
-   end subroutine choose
+   end subroutine configure
 
    !> Compute the damping forces of one block of contacts.
    subroutine find_forces(self, dt, block, history, force)

@@ -14,7 +14,7 @@ module polydem_tilt_damping
    use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: acts_last, force_part_t
+   use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -28,29 +28,24 @@ module polydem_tilt_damping
       !> Share s of sqrt(k I_eff)
       real(wp) :: share = 0.0_wp
    contains
-      procedure :: choose
+      procedure :: configure
       procedure :: add
       procedure :: stiffen
    end type tilt_damping_t
 
 contains
 
-   !> Choose this part if tilt_damping > 0 in &forces.
-   subroutine choose(self, settings, chosen)
+   !> Copy the parameters from the settings.
+   subroutine configure(self, settings)
       class(tilt_damping_t), intent(inout) :: self
       !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> Whether the settings ask for this part
-      logical, intent(out) :: chosen
 
-      chosen = settings%tilt_damping > 0.0_wp
-      if (.not. chosen) return
-      self%name = 'damping of tilts'
-      self%stage = acts_last
+      self%stage = stage_last
       self%needs_twist = .true.
       self%stiffness = settings%stiffness
       self%share = settings%tilt_damping
-   end subroutine choose
+   end subroutine configure
 
    !> Add the torque; the normal forces must be complete.
    subroutine add(self, bodies, dt, block, history)

@@ -15,7 +15,7 @@ module polydem_hdf5_dataset
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_hyperslab, only: read_slab, slab_t, write_slab
    use polydem_hdf5_links, only: check_storage, disable_external_links, raise_external, is_external_link
-   use polydem_hdf5_location, only: expect, place_t
+   use polydem_hdf5_location, only: check_status, dataset_location_t
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_strings, only: to_text
    implicit none
@@ -89,27 +89,27 @@ contains
 
    !> Whether a name exists. Every group of the path is tested, as HDF5 requires. A name that leads to another file
    !> exists; an attempt to read it gives an error.
-   logical function has_link(place)
+   logical function has_link(location)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       integer :: k, status
 
       has_link = .false.
-      do k = 2, len(place%name) + 1
-         if (k <= len(place%name)) then
-            if (place%name(k:k) /= '/') cycle
+      do k = 2, len(location%name) + 1
+         if (k <= len(location%name)) then
+            if (location%name(k:k) /= '/') cycle
          end if
-         call h5lexists_f(place%file, place%name(:k - 1), has_link, status)
+         call h5lexists_f(location%file, location%name(:k - 1), has_link, status)
          if (status /= 0) has_link = .false.
          if (.not. has_link) exit
       end do
-      if (.not. has_link) has_link = is_external_link(place)
+      if (.not. has_link) has_link = is_external_link(location)
    end function has_link
 
    !> Write a new data set of fixed shape.
-   subroutine write_dataset(place, kind_in_file, slab, error)
+   subroutine write_dataset(location, kind_in_file, slab, error)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> HDF5 type in memory and in the file
       integer(hid_t), intent(in) :: kind_in_file
       !> Values to write
@@ -120,21 +120,21 @@ contains
       integer :: status
 
       call h5screate_simple_f(size(slab%whole), slab%whole, space, status)
-      call expect(status, 'create the data space of', place, error)
+      call check_status(status, 'create the data space of', location, error)
       if (allocated(error)) return
-      call create_dataset(place, kind_in_file, space, dataset, error)
+      call create_dataset(location, kind_in_file, space, dataset, error)
       if (.not. allocated(error)) then
-         if (product(slab%whole) > 0_hsize_t) call write_slab(dataset, place, kind_in_file, slab, error)
+         if (product(slab%whole) > 0_hsize_t) call write_slab(dataset, location, kind_in_file, slab, error)
          call h5dclose_f(dataset, status)
-         call expect(status, 'finish writing', place, error)
+         call check_status(status, 'finish writing', location, error)
       end if
       call h5sclose_f(space, status)
    end subroutine write_dataset
 
    !> Create a data set and its missing groups. The caller closes the data set.
-   subroutine create_dataset(place, kind_in_file, space, dataset, error, properties)
+   subroutine create_dataset(location, kind_in_file, space, dataset, error, properties)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> HDF5 type in the file
       integer(hid_t), intent(in) :: kind_in_file
       !> HDF5 data space of the data set
@@ -153,20 +153,20 @@ contains
       if (status >= 0) call h5pset_create_inter_group_f(links, 1, status)
       if (status >= 0) then
          if (present(properties)) then
-            call h5dcreate_f(place%file, place%name, kind_in_file, space, dataset, status, &
+            call h5dcreate_f(location%file, location%name, kind_in_file, space, dataset, status, &
                              dcpl_id=properties, lcpl_id=links)
          else
-            call h5dcreate_f(place%file, place%name, kind_in_file, space, dataset, status, lcpl_id=links)
+            call h5dcreate_f(location%file, location%name, kind_in_file, space, dataset, status, lcpl_id=links)
          end if
       end if
-      call expect(status, 'create', place, error)
+      call check_status(status, 'create', location, error)
       call h5pclose_f(links, ignored)
    end subroutine create_dataset
 
    !> Append rows along the slowest dimension, which is unlimited. The first call creates the data set.
-   subroutine append_rows_to(place, kind_in_file, rows, error)
+   subroutine append_rows_to(location, kind_in_file, rows, error)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> HDF5 type in memory and in the file
       integer(hid_t), intent(in) :: kind_in_file
       !> Rows to append; the last dimension counts rows
@@ -176,19 +176,20 @@ contains
       integer(hid_t) :: dataset
       integer :: status
 
-      if (.not. has_link(place)) call create_growing(place, kind_in_file, rows%whole(:size(rows%whole) - 1), error)
+      if (.not. has_link(location)) call create_growing(location, kind_in_file, rows%whole(:size(rows%whole) - 1), &
+                                                        error)
       if (allocated(error)) return
-      call h5dopen_f(place%file, place%name, dataset, status)
-      call expect(status, 'open', place, error)
+      call h5dopen_f(location%file, location%name, dataset, status)
+      call check_status(status, 'open', location, error)
       if (allocated(error)) return
-      call grow(dataset, place, kind_in_file, rows, error)
+      call grow(dataset, location, kind_in_file, rows, error)
       call h5dclose_f(dataset, status)
-      call expect(status, 'finish writing', place, error)
+      call check_status(status, 'finish writing', location, error)
    end subroutine append_rows_to
 
    !> Create an extendible data set without rows.
-   subroutine create_growing(place, kind_in_file, row, error)
-      type(place_t), intent(in) :: place
+   subroutine create_growing(location, kind_in_file, row, error)
+      type(dataset_location_t), intent(in) :: location
       integer(hid_t), intent(in) :: kind_in_file
       integer(hsize_t), intent(in) :: row(:)
       type(error_t), allocatable, intent(inout) :: error
@@ -206,12 +207,12 @@ contains
       call h5screate_simple_f(n, extent, space, status, limit)
       if (status >= 0) call h5pcreate_f(h5p_dataset_create_f, properties, status)
       if (status >= 0) call h5pset_chunk_f(properties, n, chunk, status)
-      if (status >= 0 .and. place%compressed) call compress(properties, status)
+      if (status >= 0 .and. location%compressed) call compress(properties, status)
       ! In parallel, space for rows is allocated long before they are written. Filling it first would cost time.
-      if (status >= 0 .and. place%together) call h5pset_fill_time_f(properties, h5d_fill_time_never_f, status)
-      call expect(status, 'set the properties of', place, error)
+      if (status >= 0 .and. location%together) call h5pset_fill_time_f(properties, h5d_fill_time_never_f, status)
+      call check_status(status, 'set the properties of', location, error)
       if (allocated(error)) return
-      call create_dataset(place, kind_in_file, space, dataset, error, properties)
+      call create_dataset(location, kind_in_file, space, dataset, error, properties)
       if (.not. allocated(error)) call h5dclose_f(dataset, ignored)
       call h5pclose_f(properties, ignored)
       call h5sclose_f(space, ignored)
@@ -230,36 +231,36 @@ contains
    end subroutine compress
 
    !> Extend an open data set by rows and write them.
-   subroutine grow(dataset, place, kind_in_file, rows, error)
+   subroutine grow(dataset, location, kind_in_file, rows, error)
       integer(hid_t), intent(in) :: dataset, kind_in_file
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       type(slab_t), intent(in) :: rows
       type(error_t), allocatable, intent(inout) :: error
       type(slab_t) :: slab
       integer(hsize_t), allocatable :: extent(:)
       integer :: n, status
 
-      call dataset_shape(place, extent, error)
+      call dataset_shape(location, extent, error)
       if (allocated(error)) return
       n = size(extent)
       if (n /= size(rows%whole)) status = -1
       if (n == size(rows%whole)) status = merge(0, -1, all(extent(:n - 1) == rows%whole(:n - 1)))
-      call expect(status, 'add rows of another shape to', place, error)
+      call check_status(status, 'add rows of another shape to', location, error)
       if (allocated(error)) return
       if (rows%whole(n) == 0_hsize_t) return
       slab = rows
       slab%start(n) = slab%start(n) + extent(n)
       extent(n) = extent(n) + rows%whole(n)
       call h5dset_extent_f(dataset, extent, status)
-      call expect(status, 'extend', place, error)
+      call check_status(status, 'extend', location, error)
       if (allocated(error) .or. product(rows%whole) == 0_hsize_t) return
-      call write_slab(dataset, place, kind_in_file, slab, error)
+      call write_slab(dataset, location, kind_in_file, slab, error)
    end subroutine grow
 
    !> Read the shape of a data set, fastest dimension first.
-   subroutine dataset_shape(place, extent, error)
+   subroutine dataset_shape(location, extent, error)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Shape; empty for a scalar
       integer(hsize_t), allocatable, intent(out) :: extent(:)
       !> Allocated if the data set is missing or cannot be read
@@ -268,18 +269,18 @@ contains
       integer(hid_t) :: dataset, space
       integer :: n, status, ignored
 
-      if (.not. has_link(place)) then
-         call raise(error, input_error, place%path//': the data set '//place%name//' is missing')
+      if (.not. has_link(location)) then
+         call raise(error, input_error, location%path//': the data set '//location%name//' is missing')
          return
-      else if (is_external_link(place)) then
-         call raise_external(place, error)
+      else if (is_external_link(location)) then
+         call raise_external(location, error)
          return
       end if
-      call h5dopen_f(place%file, place%name, dataset, status)
-      call expect(status, 'open the data set', place, error)
+      call h5dopen_f(location%file, location%name, dataset, status)
+      call check_status(status, 'open the data set', location, error)
       if (allocated(error)) return
       ! This check precedes the query of the shape, because HDF5 may open other files for it.
-      call check_storage(dataset, place, error)
+      call check_storage(dataset, location, error)
       if (allocated(error)) then
          call h5dclose_f(dataset, ignored)
          return
@@ -290,15 +291,15 @@ contains
          allocate (extent(n), limit(n))
          if (n > 0) call h5sget_simple_extent_dims_f(space, extent, limit, status)
       end if
-      call expect(status, 'read the shape of', place, error)
+      call check_status(status, 'read the shape of', location, error)
       call h5sclose_f(space, ignored)
       call h5dclose_f(dataset, ignored)
    end subroutine dataset_shape
 
    !> Read a slab of a data set into memory.
-   subroutine read_dataset(place, wanted, kind_in_memory, start, extent, address, error)
+   subroutine read_dataset(location, wanted, kind_in_memory, start, extent, address, error)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> holds_reals or holds_integers
       integer, intent(in) :: wanted
       !> HDF5 type in memory; HDF5 converts the values
@@ -315,21 +316,21 @@ contains
       integer :: status
 
       if (product(extent) == 0_hsize_t) return
-      call h5dopen_f(place%file, place%name, dataset, status)
-      call expect(status, 'open', place, error)
+      call h5dopen_f(location%file, location%name, dataset, status)
+      call check_status(status, 'open', location, error)
       if (allocated(error)) return
-      call check_class(dataset, place, wanted, error)
+      call check_class(dataset, location, wanted, error)
       if (.not. allocated(error)) then
-         call read_slab(dataset, place, kind_in_memory, &
+         call read_slab(dataset, location, kind_in_memory, &
                         slab_t(whole=extent, start=start, extent=extent, address=address), error)
       end if
       call h5dclose_f(dataset, status)
    end subroutine read_dataset
 
    !> Check that an open data set has an accepted type.
-   subroutine check_class(dataset, place, wanted, error)
+   subroutine check_class(dataset, location, wanted, error)
       integer(hid_t), intent(in) :: dataset
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       integer, intent(in) :: wanted
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: kind_in_file
@@ -337,15 +338,15 @@ contains
 
       call h5dget_type_f(dataset, kind_in_file, status)
       if (status >= 0) call h5tget_class_f(kind_in_file, class, status)
-      call expect(status, 'read the type of', place, error)
+      call check_status(status, 'read the type of', location, error)
       call h5tclose_f(kind_in_file, ignored)
       if (allocated(error)) return
       if (wanted == holds_reals .and. (class == h5t_float_f .or. class == h5t_integer_f)) return
       if (wanted == holds_integers .and. (class == h5t_integer_f .or. class == h5t_enum_f)) return
       if (wanted == holds_reals) then
-         call raise(error, input_error, place%path//': '//place%name//' does not hold numbers')
+         call raise(error, input_error, location%path//': '//location%name//' does not hold numbers')
       else
-         call raise(error, input_error, place%path//': '//place%name//' does not hold whole numbers')
+         call raise(error, input_error, location%path//': '//location%name//' does not hold integers')
       end if
    end subroutine check_class
 

@@ -8,22 +8,22 @@ module polydem_hdf5_file
    use, intrinsic :: iso_c_binding, only: c_loc
    use hdf5, only: hsize_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_hdf5_appender, only: hdf5_appender_t
    use polydem_hdf5_dataset, only: double_type, holds_integers, holds_reals, library_version, long_type, read_dataset, &
       start_library
    use polydem_hdf5_hyperslab, only: part_t
-   use polydem_hdf5_location, only: place_t
+   use polydem_hdf5_location, only: dataset_location_t
    use polydem_hdf5_shape_check, only: checked_shape, shape_text
    use polydem_hdf5_strings, only: read_attribute_value, read_text
+   use polydem_hdf5_writer, only: hdf5_writer_t, many_rows, one_row
    use polydem_kinds, only: dp, ip, lp
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: hdf5_file_t, part_t, library_version, start_library
+   public :: hdf5_file_t, part_t, one_row, many_rows, library_version, start_library
 
-   !> An HDF5 file: create, join (for parallel writing), open (for reading), flush, close, has, shape_of, write, append,
-   !> append_rows, write_attribute, read
-   type, extends(hdf5_appender_t) :: hdf5_file_t
+   !> An HDF5 file: create, join (for parallel writing), open (for reading), flush, close, has, shape_of, write,
+   !> write_attribute, read
+   type, extends(hdf5_writer_t) :: hdf5_file_t
    contains
       !> Read a data set into an allocatable: read(name, values, error). Integers in the file may have any width, or be
       !> booleans of h5py.
@@ -48,10 +48,10 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(hsize_t), allocatable :: extent(:)
 
-      call expect_rank(self%place_of(name), 1, extent, error)
+      call expect_rank(self%location_of(name), 1, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1)))
-      call read_dataset(self%place_of(name), holds_reals, double_type(), 0*extent, extent, &
+      call read_dataset(self%location_of(name), holds_reals, double_type(), 0*extent, extent, &
                         c_loc(values), error)
    end subroutine read_reals
 
@@ -62,10 +62,10 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(hsize_t), allocatable :: extent(:)
 
-      call expect_rank(self%place_of(name), 2, extent, error)
+      call expect_rank(self%location_of(name), 2, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1), extent(2)))
-      call read_dataset(self%place_of(name), holds_reals, double_type(), 0*extent, extent, &
+      call read_dataset(self%location_of(name), holds_reals, double_type(), 0*extent, extent, &
                         c_loc(values), error)
    end subroutine read_real_table
 
@@ -76,10 +76,10 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(hsize_t), allocatable :: extent(:)
 
-      call expect_rank(self%place_of(name), 3, extent, error)
+      call expect_rank(self%location_of(name), 3, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1), extent(2), extent(3)))
-      call read_dataset(self%place_of(name), holds_reals, double_type(), 0*extent, extent, &
+      call read_dataset(self%location_of(name), holds_reals, double_type(), 0*extent, extent, &
                         c_loc(values), error)
    end subroutine read_real_block
 
@@ -98,11 +98,11 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(hsize_t), allocatable :: extent(:)
 
-      call expect_rank(self%place_of(name), 3, extent, error)
+      call expect_rank(self%location_of(name), 3, extent, error)
       if (allocated(error)) return
       extent(3) = int(n_rows, hsize_t)
       allocate (values(extent(1), extent(2), extent(3)))
-      call read_dataset(self%place_of(name), holds_reals, double_type(), &
+      call read_dataset(self%location_of(name), holds_reals, double_type(), &
                         [0_hsize_t, 0_hsize_t, int(first - 1_ip, hsize_t)], extent, c_loc(values), error)
    end subroutine read_rows
 
@@ -113,10 +113,10 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(hsize_t), allocatable :: extent(:)
 
-      call expect_rank(self%place_of(name), 1, extent, error)
+      call expect_rank(self%location_of(name), 1, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1)))
-      call read_dataset(self%place_of(name), holds_integers, long_type(), 0*extent, extent, &
+      call read_dataset(self%location_of(name), holds_integers, long_type(), 0*extent, extent, &
                         c_loc(values), error)
    end subroutine read_longs
 
@@ -127,13 +127,13 @@ contains
       integer(ip), allocatable, intent(out) :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       integer(lp), allocatable :: wide(:)
-      type(place_t) :: place
+      type(dataset_location_t) :: location
 
-      place = self%place_of(name)
+      location = self%location_of(name)
       call self%read_longs(name, wide, error)
       if (allocated(error)) return
       if (any(wide > huge(1_ip) .or. wide < -huge(1_ip))) then
-         call raise(error, input_error, place%path//': '//name//' holds numbers beyond 32 bits')
+         call raise(error, input_error, location%path//': '//name//' holds numbers beyond 32 bits')
          return
       end if
       values = int(wide, ip)
@@ -145,7 +145,7 @@ contains
       character(len=:), allocatable, intent(out) :: text
       type(error_t), allocatable, intent(inout) :: error
 
-      call read_text(self%place_of(name), text, error)
+      call read_text(self%location_of(name), text, error)
    end subroutine read_one_text
 
    !> Read a real attribute of a group or data set.
@@ -159,13 +159,13 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: there
 
-      call read_attribute_value(self%place_of(object), name, double_type(), c_loc(value), there, error)
+      call read_attribute_value(self%location_of(object), name, double_type(), c_loc(value), there, error)
    end subroutine read_real_attribute
 
    !> Read the shape of a data set and check its number of dimensions.
-   subroutine expect_rank(place, rank, extent, error)
+   subroutine expect_rank(location, rank, extent, error)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Required number of dimensions
       integer, intent(in) :: rank
       !> Shape, fastest dimension first
@@ -174,10 +174,10 @@ contains
       !> hold
       type(error_t), allocatable, intent(inout) :: error
 
-      call checked_shape(place, extent, error)
+      call checked_shape(location, extent, error)
       if (allocated(error)) return
       if (size(extent) == rank) return
-      call raise(error, input_error, place%path//': '//place%name//' has the shape '//shape_text(extent)// &
+      call raise(error, input_error, location%path//': '//location%name//' has the shape '//shape_text(extent)// &
                  ' but must have '//to_text(int(rank, ip))//' dimensions')
    end subroutine expect_rank
 

@@ -7,7 +7,7 @@ module polydem_hdf5_handle
    use polydem_file_system, only: check_access, disk_hint, exists, is_folder
    use polydem_hdf5_access, only: enable_parallel_access, barrier, abort_all
    use polydem_hdf5_dataset, only: has_link, start_library
-   use polydem_hdf5_location, only: place_t
+   use polydem_hdf5_location, only: dataset_location_t
    use polydem_hdf5_shape_check, only: checked_shape
    use polydem_kinds, only: ip, lp
    implicit none
@@ -34,7 +34,7 @@ module polydem_hdf5_handle
       procedure :: abandon
       procedure :: has
       procedure :: shape_of
-      procedure :: place_of
+      procedure :: location_of
       procedure, private :: check
    end type hdf5_handle_t
 
@@ -198,7 +198,7 @@ contains
       !> Name like /frames/position
       character(len=*), intent(in) :: name
 
-      has = has_link(self%place_of(name))
+      has = has_link(self%location_of(name))
    end function has
 
    !> Read the shape of a data set in the order of h5py, with the slowest dimension first.
@@ -212,23 +212,23 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(hsize_t), allocatable :: extent(:)
 
-      call checked_shape(self%place_of(name), extent, error)
+      call checked_shape(self%location_of(name), extent, error)
       if (allocated(error)) return
       shape = int(extent(size(extent):1:-1), lp)
    end subroutine shape_of
 
    !> Location of a data set, for the procedures of `polydem_hdf5_dataset`
-   function place_of(self, name) result(place)
+   function location_of(self, name) result(location)
       class(hdf5_handle_t), intent(in) :: self
       !> Name of the data set
       character(len=*), intent(in) :: name
-      type(place_t) :: place
+      type(dataset_location_t) :: location
 
-      place%file = self%id
-      place%path = self%path
-      place%name = name
-      place%compressed = self%compressed
-      place%together = self%together
-   end function place_of
+      location%file = self%id
+      location%path = self%path
+      location%name = name
+      location%compressed = self%compressed
+      location%together = self%together
+   end function location_of
 
 end module polydem_hdf5_handle

@@ -8,7 +8,7 @@ module polydem_hdf5_hyperslab
       h5s_select_set_f, h5sclose_f, h5screate_simple_f, h5sselect_hyperslab_f, h5sselect_none_f, hid_t, hsize_t
    use polydem_errors, only: error_t
    use polydem_hdf5_access, only: enable_collective_write, writes_replicated
-   use polydem_hdf5_location, only: expect, place_t
+   use polydem_hdf5_location, only: check_status, dataset_location_t
    use polydem_kinds, only: lp
    implicit none
    private
@@ -39,9 +39,9 @@ module polydem_hdf5_hyperslab
 contains
 
    !> Create the slab of an array
-   function slab_of(place, extent, address, dimension, part) result(slab)
+   function slab_of(location, extent, address, dimension, part) result(slab)
       !> File and data set
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Shape of the array; empty for a scalar
       integer(hsize_t), intent(in) :: extent(:)
       !> Address of the first value
@@ -60,17 +60,17 @@ contains
       if (present(part)) then
          slab%whole(dimension) = int(part%total, hsize_t)
          slab%start(dimension) = int(part%first, hsize_t)
-      else if (place%together .and. .not. slab%is_empty) then
+      else if (location%together .and. .not. slab%is_empty) then
          slab%is_empty = .not. writes_replicated()
       end if
    end function slab_of
 
    !> Write a slab into a data set. The call is collective if the file is written in parallel.
-   subroutine write_slab(dataset, place, kind_in_memory, slab, error)
+   subroutine write_slab(dataset, location, kind_in_memory, slab, error)
       !> HDF5 identifiers of the open data set and of the type in memory
       integer(hid_t), intent(in) :: dataset, kind_in_memory
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Values, and their position in the data set
       type(slab_t), intent(in) :: slab
       !> Allocated on failure
@@ -80,21 +80,21 @@ contains
 
       call open_spaces(dataset, slab, memory_space, file_space, status)
       if (status >= 0) call h5pcreate_f(h5p_dataset_xfer_f, properties, status)
-      if (status >= 0 .and. place%together) call enable_collective_write(properties, status)
+      if (status >= 0 .and. location%together) call enable_collective_write(properties, status)
       if (status >= 0) call h5dwrite_f(dataset, kind_in_memory, slab%address, status, memory_space, file_space, &
                                        properties)
-      call expect(status, 'write', place, error)
+      call check_status(status, 'write', location, error)
       call h5pclose_f(properties, ignored)
       call h5sclose_f(file_space, ignored)
       call h5sclose_f(memory_space, ignored)
    end subroutine write_slab
 
    !> Read a slab of a data set.
-   subroutine read_slab(dataset, place, kind_in_memory, slab, error)
+   subroutine read_slab(dataset, location, kind_in_memory, slab, error)
       !> HDF5 identifiers of the open data set and of the type in memory
       integer(hid_t), intent(in) :: dataset, kind_in_memory
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Position in the data set, and the array to fill
       type(slab_t), intent(in) :: slab
       !> Allocated on failure
@@ -106,7 +106,7 @@ contains
       buffer = slab%address
       call open_spaces(dataset, slab, memory_space, file_space, status)
       if (status >= 0) call h5dread_f(dataset, kind_in_memory, buffer, status, memory_space, file_space)
-      call expect(status, 'read', place, error)
+      call check_status(status, 'read', location, error)
       call h5sclose_f(file_space, ignored)
       call h5sclose_f(memory_space, ignored)
    end subroutine read_slab

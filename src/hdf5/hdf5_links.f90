@@ -8,7 +8,7 @@ module polydem_hdf5_links
    use hdf5, only: h5d_virtual_f, h5dget_create_plist_f, h5l_type_external_f, h5l_type_soft_f, h5lget_info_f, &
       h5p_default_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, hid_t, size_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_hdf5_location, only: expect, place_t
+   use polydem_hdf5_location, only: check_status, dataset_location_t
    implicit none
    private
    public :: disable_external_links, is_external_link, check_storage, raise_external
@@ -46,42 +46,42 @@ contains
    end subroutine disable_external_links
 
    !> Whether the path of a name contains an external link
-   recursive logical function is_external_link(place, followed) result(is_external)
+   recursive logical function is_external_link(location, followed) result(is_external)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Number of soft links that were already followed; 0 if absent
       integer, intent(in), optional :: followed
-      type(place_t) :: target_place
+      type(dataset_location_t) :: target_location
       character(len=:), allocatable :: target_name
       integer(size_t) :: length
       integer :: character_set, kind_of_link, k, n, order, status
-      integer(kind(place%file)) :: address
+      integer(kind(location%file)) :: address
       logical :: has_order
 
       is_external = .false.
       n = 0
       if (present(followed)) n = followed
-      do k = 2, len(place%name) + 1
-         if (k <= len(place%name)) then
-            if (place%name(k:k) /= '/') cycle
+      do k = 2, len(location%name) + 1
+         if (k <= len(location%name)) then
+            if (location%name(k:k) /= '/') cycle
          end if
-         call h5lget_info_f(place%file, place%name(:k - 1), character_set, order, has_order, kind_of_link, address, &
-                            length, status)
+         call h5lget_info_f(location%file, location%name(:k - 1), character_set, order, has_order, kind_of_link, &
+                            address, length, status)
          if (status < 0) return
          is_external = kind_of_link == h5l_type_external_f
          if (is_external) return
          if (kind_of_link /= h5l_type_soft_f .or. n >= most_links) cycle
-         call read_target(place, place%name(:k - 1), length, target_name)
-         target_place = place
-         target_place%name = target_name//place%name(k:)
-         is_external = is_external_link(target_place, n + 1)
+         call read_target(location, location%name(:k - 1), length, target_name)
+         target_location = location
+         target_location%name = target_name//location%name(k:)
+         is_external = is_external_link(target_location, n + 1)
          return
       end do
    end function is_external_link
 
    !> Target of a soft link as an absolute name
-   subroutine read_target(place, name, length, target_name)
-      type(place_t), intent(in) :: place
+   subroutine read_target(location, name, length, target_name)
+      type(dataset_location_t), intent(in) :: location
       character(len=*), intent(in) :: name
       integer(size_t), intent(in) :: length
       character(len=:), allocatable, intent(out) :: target_name
@@ -90,7 +90,7 @@ contains
 
       characters = c_null_char
       target_name = ''
-      if (h5lget_val(int(place%file, c_int64_t), name//c_null_char, characters, int(length, c_size_t), &
+      if (h5lget_val(int(location%file, c_int64_t), name//c_null_char, characters, int(length, c_size_t), &
                      int(h5p_default_f, c_int64_t)) < 0_c_int) return
       do k = 1_size_t, length
          if (characters(k) == c_null_char) exit
@@ -100,11 +100,11 @@ contains
    end subroutine read_target
 
    !> Reject an open data set whose values are stored in other files.
-   subroutine check_storage(dataset, place, error)
+   subroutine check_storage(dataset, location, error)
       !> HDF5 identifier of the open data set
       integer(hid_t), intent(in) :: dataset
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Allocated if the values are in other files
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: properties
@@ -118,19 +118,19 @@ contains
          if (status >= 0 .and. n == 0) call h5pget_external_count_f(properties, n, status)
          call h5pclose_f(properties, ignored)
       end if
-      call expect(status, 'find the storage of', place, error)
-      if (n > 0) call raise_external(place, error)
+      call check_status(status, 'find the storage of', location, error)
+      if (n > 0) call raise_external(location, error)
    end subroutine check_storage
 
    !> Report that a data set is in another file.
-   subroutine raise_external(place, error)
+   subroutine raise_external(location, error)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Always allocated afterwards
       type(error_t), allocatable, intent(inout) :: error
 
-      call raise(error, input_error, place%path//': '//place%name//' lies in another file. External links and '// &
-                 'external storage are not followed; copy the data set into this file')
+      call raise(error, input_error, location%path//': '//location%name//' lies in another file. External '// &
+                 'links and external storage are not followed; copy the data set into this file')
    end subroutine raise_external
 
 end module polydem_hdf5_links

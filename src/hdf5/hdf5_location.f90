@@ -5,10 +5,10 @@ module polydem_hdf5_location
    use polydem_hdf5_access, only: abort_all
    implicit none
    private
-   public :: place_t, expect
+   public :: dataset_location_t, check_status
 
    !> Location of a data set, for calls and for messages
-   type :: place_t
+   type :: dataset_location_t
       !> HDF5 identifier of the open file
       integer(hid_t) :: file = -1_hid_t
       !> Path of the file
@@ -19,25 +19,25 @@ module polydem_hdf5_location
       logical :: compressed = .false.
       !> Whether all ranks of the run write the file in parallel
       logical :: together = .false.
-   end type place_t
+   end type dataset_location_t
 
 contains
 
    !> Convert a failed status of HDF5 into an error that names the file and the data set. If the file is written in
    !> parallel, abort all ranks, because the other ranks may wait for this one.
-   subroutine expect(status, action, place, error)
+   subroutine check_status(status, action, location, error)
       !> Status of an HDF5 call, negative on failure
       integer, intent(in) :: status
       !> The failed action, like 'write'; it completes the message 'cannot ...'
       character(len=*), intent(in) :: action
       !> Location of the data set
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Allocated if the call failed
       type(error_t), allocatable, intent(inout) :: error
 
       if (status >= 0) return
-      if (place%together) call abort_all(place%path//': cannot '//action//' '//place%name)
-      call raise(error, io_error, place%path//': cannot '//action//' '//place%name)
-   end subroutine expect
+      if (location%together) call abort_all(location%path//': cannot '//action//' '//location%name)
+      call raise(error, io_error, location%path//': cannot '//action//' '//location%name)
+   end subroutine check_status
 
 end module polydem_hdf5_location

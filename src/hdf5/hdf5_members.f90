@@ -6,7 +6,7 @@ module polydem_hdf5_members
       h5lget_name_by_idx_f, h5oclose_f, h5oopen_f, hid_t, hsize_t, size_t
    use polydem_errors, only: error_t
    use polydem_hdf5_links, only: is_external_link
-   use polydem_hdf5_location, only: expect, place_t
+   use polydem_hdf5_location, only: check_status, dataset_location_t
    implicit none
    private
    public :: count_names, read_name, is_dataset
@@ -14,9 +14,9 @@ module polydem_hdf5_members
 contains
 
    !> Count the names in the root group.
-   subroutine count_names(place, n, error)
+   subroutine count_names(location, n, error)
       !> File; its name is that of the root group, /
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Number of names
       integer, intent(out) :: n
       !> Allocated on failure
@@ -25,19 +25,19 @@ contains
       integer :: kind_of_links, last_order, status, ignored
 
       n = 0
-      call h5gopen_f(place%file, '/', group, status)
-      call expect(status, 'open', place, error)
+      call h5gopen_f(location%file, '/', group, status)
+      call check_status(status, 'open', location, error)
       if (allocated(error)) return
       call h5gget_info_f(group, kind_of_links, n, last_order, status)
-      call expect(status, 'count the names in', place, error)
+      call check_status(status, 'count the names in', location, error)
       call h5gclose_f(group, ignored)
    end subroutine count_names
 
    !> Read one name of the root group, in alphabetical order. One name at a time, because all names may need much
    !> memory.
-   subroutine read_name(place, k, name, error)
+   subroutine read_name(location, k, name, error)
       !> File; its name is that of the root group, /
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Index of the name, from 1
       integer, intent(in) :: k
       !> The name
@@ -52,24 +52,24 @@ contains
       do pass = 1, 2
          if (allocated(name)) deallocate (name)
          allocate (character(len=length) :: name)
-         call h5lget_name_by_idx_f(place%file, '/', h5_index_name_f, h5_iter_inc_f, int(k - 1, hsize_t), name, status, &
-                                   length)
-         call expect(status, 'read the names in', place, error)
+         call h5lget_name_by_idx_f(location%file, '/', h5_index_name_f, h5_iter_inc_f, int(k - 1, hsize_t), name, &
+                                   status, length)
+         call check_status(status, 'read the names in', location, error)
          if (allocated(error)) return
       end do
    end subroutine read_name
 
    !> Whether a name is that of a data set, not of a group, a type or a dangling link. The result is true for a name in
    !> another file; an attempt to read it gives an error
-   logical function is_dataset(place)
+   logical function is_dataset(location)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       integer(hid_t) :: object
       integer :: kind_of_object, status
 
-      is_dataset = is_external_link(place)
+      is_dataset = is_external_link(location)
       if (is_dataset) return
-      call h5oopen_f(place%file, place%name, object, status)
+      call h5oopen_f(location%file, location%name, object, status)
       if (status < 0) return
       call h5iget_type_f(object, kind_of_object, status)
       if (status >= 0) is_dataset = kind_of_object == h5i_dataset_f

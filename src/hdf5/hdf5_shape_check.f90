@@ -4,7 +4,7 @@ module polydem_hdf5_shape_check
       h5tget_size_f, hid_t, hsize_t, size_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_dataset, only: dataset_shape
-   use polydem_hdf5_location, only: expect, place_t
+   use polydem_hdf5_location, only: check_status, dataset_location_t
    use polydem_kinds, only: dp, lp
    use polydem_strings, only: join, to_text
    implicit none
@@ -19,9 +19,9 @@ module polydem_hdf5_shape_check
 contains
 
    !> Read the shape of a data set, fastest dimension first, and check that the stored bytes can contain so many values.
-   subroutine checked_shape(place, extent, error)
+   subroutine checked_shape(location, extent, error)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Shape; empty for a scalar
       integer(hsize_t), allocatable, intent(out) :: extent(:)
       !> Allocated if the data set is missing or claims more data than the file can hold
@@ -32,28 +32,28 @@ contains
       real(dp) :: claimed
       integer :: status, ignored
 
-      call dataset_shape(place, extent, error)
+      call dataset_shape(location, extent, error)
       if (allocated(error)) return
-      call h5dopen_f(place%file, place%name, dataset, status)
-      call expect(status, 'open', place, error)
+      call h5dopen_f(location%file, location%name, dataset, status)
+      call check_status(status, 'open', location, error)
       if (allocated(error)) return
       ! HDF5 1.10 returns a failure if no bytes are stored.
       call h5dget_storage_size_f(dataset, stored, status)
       if (status < 0) stored = 0_hsize_t
       ! The claimed number of stored bytes may be wrong too.
-      call h5fget_filesize_f(place%file, file_size, status)
+      call h5fget_filesize_f(location%file, file_size, status)
       if (status >= 0) stored = min(stored, file_size)
       call h5dget_type_f(dataset, kind_in_file, status)
       if (status >= 0) then
          call h5tget_size_f(kind_in_file, bytes, status)
          call h5tclose_f(kind_in_file, ignored)
       end if
-      call expect(status, 'read the size of', place, error)
+      call check_status(status, 'read the size of', location, error)
       call h5dclose_f(dataset, ignored)
       if (allocated(error)) return
       claimed = real(bytes, dp)*product(real(extent, dp))
       if (claimed <= max(max_unchecked, max_ratio*real(stored, dp)) .and. all(extent >= 0_hsize_t)) return
-      call raise(error, input_error, place%path//': '//place%name//' claims the shape '//shape_text(extent)// &
+      call raise(error, input_error, location%path//': '//location%name//' claims the shape '//shape_text(extent)// &
                  ', but the file holds '//to_text(int(stored, lp))//' bytes of it: it is damaged or was never written')
    end subroutine checked_shape
 

@@ -3,8 +3,7 @@
 !> HDF5 handles such strings as addresses of null-terminated texts. In a file that is written in parallel, it can write
 !> attributes of this type but not data sets.
 module polydem_hdf5_strings
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_loc, c_null_char, c_null_ptr, c_ptr, &
-      c_size_t
+   use, intrinsic :: iso_c_binding, only: c_char, c_loc, c_null_char, c_null_ptr, c_ptr
    use hdf5, only: h5aclose_f, h5acreate_f, h5adelete_f, h5aexists_f, h5aget_space_f, h5aget_type_f, h5aopen_f, &
       h5aread_f, h5awrite_f, h5dclose_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dvlen_reclaim_f, &
       h5oclose_f, h5oopen_f, h5sclose_f, h5screate_f, h5sget_simple_extent_npoints_f, h5tclose_f, h5tcopy_f, &
@@ -14,25 +13,18 @@ module polydem_hdf5_strings
    use polydem_hdf5_dataset, only: dataset_shape, write_dataset
    use polydem_hdf5_hyperslab, only: slab_of
    use polydem_hdf5_links, only: raise_external, is_external_link
-   use polydem_hdf5_location, only: expect, place_t
+   use polydem_hdf5_location, only: check_status, dataset_location_t
+   use polydem_posix, only: text_at
    implicit none
    private
    public :: write_texts, read_text, write_attribute_value, read_attribute_value, write_text_attribute
 
-   interface
-      !> C strlen
-      integer(c_size_t) function c_strlen(text) bind(C, name='strlen')
-         import :: c_ptr, c_size_t
-         type(c_ptr), value :: text
-      end function c_strlen
-   end interface
-
 contains
 
    !> Write a new data set of texts.
-   subroutine write_texts(place, extent, texts, error)
+   subroutine write_texts(location, extent, texts, error)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Shape: empty for a scalar, else the number of texts
       integer(hsize_t), intent(in) :: extent(:)
       !> The texts; trailing blanks of list elements are removed
@@ -45,9 +37,9 @@ contains
       integer :: status
 
       call pack_texts(texts, size(extent) > 0, characters, addresses)
-      call text_type(place, kind_in_file, error)
+      call text_type(location, kind_in_file, error)
       if (allocated(error)) return
-      call write_dataset(place, kind_in_file, slab_of(place, extent, c_loc(addresses), 1), error)
+      call write_dataset(location, kind_in_file, slab_of(location, extent, c_loc(addresses), 1), error)
       call h5tclose_f(kind_in_file, status)
    end subroutine write_texts
 
@@ -75,21 +67,21 @@ contains
    end subroutine pack_texts
 
    !> Create the HDF5 type of variable-length UTF-8 strings.
-   subroutine text_type(place, kind_in_file, error)
-      type(place_t), intent(in) :: place
+   subroutine text_type(location, kind_in_file, error)
+      type(dataset_location_t), intent(in) :: location
       integer(hid_t), intent(out) :: kind_in_file
       type(error_t), allocatable, intent(inout) :: error
       integer :: status
 
       call h5tcopy_f(h5t_string, kind_in_file, status)
       if (status >= 0) call h5tset_cset_f(kind_in_file, h5t_cset_utf8_f, status)
-      call expect(status, 'create the type of', place, error)
+      call check_status(status, 'create the type of', location, error)
    end subroutine text_type
 
    !> Read a data set of one text.
-   subroutine read_text(place, text, error)
+   subroutine read_text(location, text, error)
       !> File and name
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> The text
       character(len=:), allocatable, intent(out) :: text
       !> Allocated on failure, or if the data set is not one text
@@ -101,11 +93,11 @@ contains
       logical :: variable
       integer :: status, ignored
 
-      call dataset_shape(place, extent, error)
+      call dataset_shape(location, extent, error)
       if (allocated(error)) return
-      call h5dopen_f(place%file, place%name, dataset, status)
+      call h5dopen_f(location%file, location%name, dataset, status)
       if (status >= 0) call h5dget_type_f(dataset, kind_in_file, status)
-      call expect(status, 'open', place, error)
+      call check_status(status, 'open', location, error)
       if (allocated(error)) return
       call h5tis_variable_str_f(kind_in_file, variable, status)
       if (status < 0 .or. size(extent) > 0) variable = .false.
@@ -114,43 +106,25 @@ contains
          address = c_null_ptr
          buffer = c_loc(address)
          call h5dread_f(dataset, kind_in_file, buffer, status)
-         call expect(status, 'read', place, error)
+         call check_status(status, 'read', location, error)
          if (.not. allocated(error)) then
-            call copy_text(address, text)
+            text = text_at(address)
             call h5dget_space_f(dataset, space, ignored)
             call h5dvlen_reclaim_f(kind_in_file, space, h5p_default_f, buffer, ignored)
             call h5sclose_f(space, ignored)
          end if
       else
-         call raise(error, input_error, place%path//': '//place%name// &
+         call raise(error, input_error, location%path//': '//location%name// &
                     ' does not hold one text of variable length')
       end if
       call h5tclose_f(kind_in_file, ignored)
       call h5dclose_f(dataset, ignored)
    end subroutine read_text
 
-   !> Copy a null-terminated text.
-   subroutine copy_text(address, text)
-      type(c_ptr), intent(in) :: address
-      character(len=:), allocatable, intent(out) :: text
-      character(kind=c_char), pointer :: characters(:)
-      integer :: k
-
-      if (.not. c_associated(address)) then
-         text = ''
-         return
-      end if
-      call c_f_pointer(address, characters, [c_strlen(address)])
-      allocate (character(len=size(characters)) :: text)
-      do k = 1, size(characters)
-         text(k:k) = characters(k)
-      end do
-   end subroutine copy_text
-
    !> Write a text attribute of a group or data set. An existing attribute of this name is replaced.
-   subroutine write_text_attribute(place, name, text, error)
+   subroutine write_text_attribute(location, name, text, error)
       !> File, and name of the group or data set
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Name of the attribute
       character(len=*), intent(in) :: name
       !> The text
@@ -163,16 +137,16 @@ contains
       integer :: status
 
       call pack_texts([text], .false., characters, addresses)
-      call text_type(place, kind_in_file, error)
+      call text_type(location, kind_in_file, error)
       if (allocated(error)) return
-      call write_attribute_value(place, name, kind_in_file, c_loc(addresses), error)
+      call write_attribute_value(location, name, kind_in_file, c_loc(addresses), error)
       call h5tclose_f(kind_in_file, status)
    end subroutine write_text_attribute
 
    !> Write an attribute of one value to a group or data set. An existing attribute of this name is replaced.
-   subroutine write_attribute_value(place, name, kind_in_file, address, error)
+   subroutine write_attribute_value(location, name, kind_in_file, address, error)
       !> File, and name of the group or data set
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Name of the attribute
       character(len=*), intent(in) :: name
       !> HDF5 type in memory and in the file
@@ -185,24 +159,24 @@ contains
       logical :: there
       integer :: status, ignored
 
-      call h5oopen_f(place%file, place%name, object, status)
-      call expect(status, 'open', place, error)
+      call h5oopen_f(location%file, location%name, object, status)
+      call check_status(status, 'open', location, error)
       if (allocated(error)) return
       call h5aexists_f(object, name, there, status)
       if (status >= 0 .and. there) call h5adelete_f(object, name, status)
       if (status >= 0) call h5screate_f(h5s_scalar_f, space, status)
       if (status >= 0) call h5acreate_f(object, name, kind_in_file, space, attribute, status)
       if (status >= 0) call h5awrite_f(attribute, kind_in_file, address, status)
-      call expect(status, "write the attribute '"//name//"' of", place, error)
+      call check_status(status, "write the attribute '"//name//"' of", location, error)
       call h5aclose_f(attribute, ignored)
       call h5sclose_f(space, ignored)
       call h5oclose_f(object, ignored)
    end subroutine write_attribute_value
 
    !> Read a numeric attribute of a group or data set.
-   subroutine read_attribute_value(place, name, kind_in_memory, address, there, error)
+   subroutine read_attribute_value(location, name, kind_in_memory, address, there, error)
       !> File, and name of the group or data set
-      type(place_t), intent(in) :: place
+      type(dataset_location_t), intent(in) :: location
       !> Name of the attribute
       character(len=*), intent(in) :: name
       !> HDF5 type in memory; HDF5 converts the value
@@ -219,12 +193,12 @@ contains
       integer :: status, ignored
 
       there = .false.
-      if (is_external_link(place)) then
-         call raise_external(place, error)
+      if (is_external_link(location)) then
+         call raise_external(location, error)
          return
       end if
-      call h5oopen_f(place%file, place%name, object, status)
-      call expect(status, 'open', place, error)
+      call h5oopen_f(location%file, location%name, object, status)
+      call check_status(status, 'open', location, error)
       if (allocated(error)) return
       call h5aexists_f(object, name, there, status)
       if (status >= 0 .and. there) then
@@ -234,12 +208,12 @@ contains
             ! The memory at `address` holds only one number.
             is_number = holds_one_number(attribute)
             if (is_number) call h5aread_f(attribute, kind_in_memory, buffer, status)
-            if (.not. is_number) call raise(error, input_error, place%path//": the attribute '"//name//"' of "// &
-                                            place%name//' must be one number')
+            if (.not. is_number) call raise(error, input_error, location%path//": the attribute '"//name//"' of "// &
+                                            location%name//' must be one number')
             call h5aclose_f(attribute, ignored)
          end if
       end if
-      call expect(status, "read the attribute '"//name//"' of", place, error)
+      call check_status(status, "read the attribute '"//name//"' of", location, error)
       call h5oclose_f(object, ignored)
    end subroutine read_attribute_value
 

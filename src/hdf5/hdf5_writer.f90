@@ -1,7 +1,8 @@
-!> HDF5 output: new data sets and attributes.
+!> HDF5 output: new data sets, rows of extendible data sets, and attributes.
 !>
 !> Every procedure takes the name of the data set and the values. On failure it allocates `error`, whose message names
-!> the file and the data set. `unit` and `meaning` become attributes of the data set.
+!> the file and the data set. `unit` and `meaning` become attributes of the data set. With `rows`, values are appended
+!> to an extendible data set, which the first call creates with its attributes.
 !>
 !> All ranks make the same write calls, in the same order, to a file that is written in parallel. The values are equal
 !> on all ranks; with `part`, each rank writes its part of the last dimension. Texts are written before the other ranks
@@ -10,20 +11,26 @@ module polydem_hdf5_writer
    use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr, c_ptr
    use hdf5, only: hid_t, hsize_t
    use polydem_errors, only: error_t
-   use polydem_hdf5_dataset, only: byte_type, double_type, integer_type, long_type, write_dataset
+   use polydem_hdf5_dataset, only: append_rows_to, byte_type, double_type, integer_type, long_type, write_dataset
    use polydem_hdf5_handle, only: hdf5_handle_t
    use polydem_hdf5_hyperslab, only: part_t, slab_of
+   use polydem_hdf5_location, only: dataset_location_t
    use polydem_hdf5_strings, only: write_attribute_value, write_text_attribute, write_texts
    use polydem_kinds, only: bp, dp, ip, lp
    implicit none
    private
-   public :: hdf5_writer_t
+   public :: hdf5_writer_t, one_row, many_rows
+
+   !> The values are one row of an extendible data set
+   integer, parameter :: one_row = 1
+   !> Each index of the last dimension of the values is a row of an extendible data set
+   integer, parameter :: many_rows = 2
 
    !> An HDF5 file for writing
    type, extends(hdf5_handle_t) :: hdf5_writer_t
    contains
-      !> Write a new data set: write(name, values, error, unit, meaning[, part]); `part` is only for lists and tables of
-      !> numbers
+      !> Write a new data set, or append rows to an extendible one: write(name, values, error, unit, meaning, part,
+      !> rows). `part` is for lists and tables of numbers, `rows` for numbers.
       generic :: write => write_real, write_reals, write_real_table, write_integer, write_integers, &
          write_long, write_longs, write_long_table, write_bytes, write_text, write_text_list
       !> Write an attribute of a group or data set: write_attribute(object, name, value, error)
@@ -37,21 +44,33 @@ module polydem_hdf5_writer
 
 contains
 
-   !> Write contiguous values as a new data set with its attributes.
-   subroutine put(self, name, type, extent, address, error, unit, meaning, part)
+   !> Write contiguous values as a new data set or as rows of an extendible one. A new data set gets its attributes.
+   subroutine put(self, name, type, shape, address, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(hid_t), intent(in) :: type
-      integer, intent(in) :: extent(:)
+      integer, intent(in) :: shape(:)
       type(c_ptr), intent(in) :: address
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
+      integer, intent(in), optional :: rows
+      type(dataset_location_t) :: location
+      integer(hsize_t), allocatable :: extent(:)
+      logical :: is_new
 
       if (allocated(error)) return
-      call write_dataset(self%place_of(name), type, slab_of(self%place_of(name), int(extent, hsize_t), address, &
-                                                            size(extent), part), error)
-      call self%describe(name, error, unit, meaning)
+      location = self%location_of(name)
+      extent = int(shape, hsize_t)
+      is_new = .true.
+      if (present(rows)) then
+         is_new = .not. self%has(name)
+         if (rows == one_row) extent = [extent, 1_hsize_t]
+         call append_rows_to(location, type, slab_of(location, extent, address, max(1, size(shape)), part), error)
+      else
+         call write_dataset(location, type, slab_of(location, extent, address, size(shape), part), error)
+      end if
+      if (is_new) call self%describe(name, error, unit, meaning)
    end subroutine put
 
    !> Write the attributes `unit` and `meaning` of a data set.
@@ -65,13 +84,13 @@ contains
       character(len=*), intent(in), optional :: unit, meaning
 
       if (allocated(error)) return
-      if (present(unit)) call write_text_attribute(self%place_of(name), 'unit', unit, error)
+      if (present(unit)) call write_text_attribute(self%location_of(name), 'unit', unit, error)
       if (allocated(error)) return
-      if (present(meaning)) call write_text_attribute(self%place_of(name), 'meaning', meaning, error)
+      if (present(meaning)) call write_text_attribute(self%location_of(name), 'meaning', meaning, error)
    end subroutine describe
 
-   !> Write a new data set. The other forms of `write` differ only in kind and shape.
-   subroutine write_real(self, name, values, error, unit, meaning)
+   !> Write a number. The other forms of `write` differ only in kind and shape.
+   subroutine write_real(self, name, values, error, unit, meaning, rows)
       class(hdf5_writer_t), intent(in) :: self
       !> Name of the data set, like /frames/position
       character(len=*), intent(in) :: name
@@ -79,114 +98,126 @@ contains
       real(dp), intent(in), target :: values
       !> Allocated on failure; nothing happens if it is allocated before
       type(error_t), allocatable, intent(inout) :: error
-      !> Attributes of the data set
+      !> Attributes, written with a new data set
       character(len=*), intent(in), optional :: unit, meaning
+      !> one_row: append a row to an extendible data set; a new data set if absent
+      integer, intent(in), optional :: rows
 
-      call self%put(name, double_type(), [integer ::], c_loc(values), error, unit, meaning)
+      call self%put(name, double_type(), [integer ::], c_loc(values), error, unit, meaning, rows=rows)
    end subroutine write_real
 
-   subroutine write_reals(self, name, values, error, unit, meaning, part)
+   subroutine write_reals(self, name, values, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       real(dp), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      !> Part of the last dimension that this rank has; if absent, the values are equal on all ranks
       type(part_t), intent(in), optional :: part
+      !> one_row or many_rows: append to an extendible data set; a new data set if absent
+      integer, intent(in), optional :: rows
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, double_type(), [size(values)], address, error, unit, meaning, part)
+      call self%put(name, double_type(), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_reals
 
-   subroutine write_real_table(self, name, values, error, unit, meaning, part)
+   subroutine write_real_table(self, name, values, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       real(dp), intent(in), target, contiguous :: values(:, :)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
+      integer, intent(in), optional :: rows
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, double_type(), [size(values, 1), size(values, 2)], address, error, unit, meaning, part)
+      call self%put(name, double_type(), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_real_table
 
-   subroutine write_integer(self, name, values, error, unit, meaning)
+   subroutine write_integer(self, name, values, error, unit, meaning, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(ip), intent(in), target :: values
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      integer, intent(in), optional :: rows
 
-      call self%put(name, integer_type(), [integer ::], c_loc(values), error, unit, meaning)
+      call self%put(name, integer_type(), [integer ::], c_loc(values), error, unit, meaning, rows=rows)
    end subroutine write_integer
 
-   subroutine write_integers(self, name, values, error, unit, meaning, part)
+   subroutine write_integers(self, name, values, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(ip), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
+      integer, intent(in), optional :: rows
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, integer_type(), [size(values)], address, error, unit, meaning, part)
+      call self%put(name, integer_type(), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_integers
 
-   subroutine write_long(self, name, values, error, unit, meaning)
+   subroutine write_long(self, name, values, error, unit, meaning, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(lp), intent(in), target :: values
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
+      integer, intent(in), optional :: rows
 
-      call self%put(name, long_type(), [integer ::], c_loc(values), error, unit, meaning)
+      call self%put(name, long_type(), [integer ::], c_loc(values), error, unit, meaning, rows=rows)
    end subroutine write_long
 
-   subroutine write_longs(self, name, values, error, unit, meaning, part)
+   subroutine write_longs(self, name, values, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(lp), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
+      integer, intent(in), optional :: rows
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, long_type(), [size(values)], address, error, unit, meaning, part)
+      call self%put(name, long_type(), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_longs
 
-   subroutine write_long_table(self, name, values, error, unit, meaning, part)
+   subroutine write_long_table(self, name, values, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(lp), intent(in), target, contiguous :: values(:, :)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
+      integer, intent(in), optional :: rows
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, long_type(), [size(values, 1), size(values, 2)], address, error, unit, meaning, part)
+      call self%put(name, long_type(), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_long_table
 
-   subroutine write_bytes(self, name, values, error, unit, meaning, part)
+   subroutine write_bytes(self, name, values, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(bp), intent(in), target, contiguous :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
+      integer, intent(in), optional :: rows
       type(c_ptr) :: address
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, byte_type(), [size(values)], address, error, unit, meaning, part)
+      call self%put(name, byte_type(), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_bytes
 
    subroutine write_text(self, name, values, error, unit, meaning)
@@ -197,7 +228,7 @@ contains
       character(len=*), intent(in), optional :: unit, meaning
 
       if (allocated(error)) return
-      call write_texts(self%place_of(name), [integer(hsize_t) ::], [values], error)
+      call write_texts(self%location_of(name), [integer(hsize_t) ::], [values], error)
       call self%describe(name, error, unit, meaning)
    end subroutine write_text
 
@@ -209,7 +240,7 @@ contains
       character(len=*), intent(in), optional :: unit, meaning
 
       if (allocated(error)) return
-      call write_texts(self%place_of(name), [size(values, kind=hsize_t)], values, error)
+      call write_texts(self%location_of(name), [size(values, kind=hsize_t)], values, error)
       call self%describe(name, error, unit, meaning)
    end subroutine write_text_list
 
@@ -222,7 +253,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call write_text_attribute(self%place_of(object), name, value, error)
+      call write_text_attribute(self%location_of(object), name, value, error)
    end subroutine attach_text
 
    subroutine attach_integer(self, object, name, value, error)
@@ -232,7 +263,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call write_attribute_value(self%place_of(object), name, integer_type(), c_loc(value), error)
+      call write_attribute_value(self%location_of(object), name, integer_type(), c_loc(value), error)
    end subroutine attach_integer
 
    subroutine attach_real(self, object, name, value, error)
@@ -242,7 +273,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call write_attribute_value(self%place_of(object), name, double_type(), c_loc(value), error)
+      call write_attribute_value(self%location_of(object), name, double_type(), c_loc(value), error)
    end subroutine attach_real
 
 end module polydem_hdf5_writer

@@ -68,7 +68,6 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
       type(table_t) :: table
-      type(error_t), allocatable :: ignored
       integer :: bytes
       logical :: is_present
 
@@ -83,10 +82,6 @@ contains
       if (allocated(error)) return
       call check_names(file, path, error)
       if (.not. allocated(error)) call read_table(file, path, real(density, dp), table, error)
-      if (allocated(error)) then
-         call file%close(ignored)
-         return
-      end if
       call file%close(error)
       if (allocated(error)) return
       call list_table(table, list)
@@ -100,11 +95,11 @@ contains
       character(len=:), allocatable :: name
       integer :: k, n
 
-      call count_names(file%place_of('/'), n, error)
+      call count_names(file%location_of('/'), n, error)
       do k = 1, n
-         call read_name(file%place_of('/'), k, name, error)
+         call read_name(file%location_of('/'), k, name, error)
          if (allocated(error)) return
-         if (any(known_names == name) .eqv. is_dataset(file%place_of(name))) cycle
+         if (any(known_names == name) .eqv. is_dataset(file%location_of(name))) cycle
          if (any(known_names == name)) then
             call raise(error, input_error, path//': '//name//' must be a data set, but is a group or a link')
          else

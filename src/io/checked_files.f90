@@ -158,14 +158,13 @@ contains
       !> Allocated if the file cannot be read, has no frame, or its steps do not ascend
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      type(error_t), allocatable :: ignored
       integer(lp), allocatable :: steps(:)
 
       frames = 0_lp
       call file%open(path, error)
       if (allocated(error)) return
       call file%read('/frames/step', steps, error)
-      call file%close(ignored)
+      call file%close(error)
       if (allocated(error)) return
       if (size(steps) == 0) then
          call raise(error, io_error, path//': the segment contains no frame')

@@ -93,9 +93,7 @@ contains
 
       call begin_file(self%file, self%path, self%error, with_checksum=.true.)
       if (allocated(self%error)) return
-      call self%file%write_attribute('/', 'content', 'checkpoint by polydem', self%error)
-      call self%file%write_attribute('/', 'schema_version', schema_version, self%error)
-      if (.not. allocated(self%error)) call write_provenance(provenance, self%file, self%error)
+      call write_provenance(self%file, 'checkpoint by polydem', provenance, self%error)
    end subroutine write_origin
 
    !> Set the distribution of the rows of a group over ranks. Call it before the columns of the group are written.

@@ -7,7 +7,7 @@ module polydem_log
    use polydem_host, only: is_terminal
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_line_writer, only: line_writer_t
-   use polydem_result_files, only: log_path
+   use polydem_result_files, only: log_name
    use polydem_strings, only: printable
    implicit none
    private
@@ -66,7 +66,7 @@ contains
       if (on_screen) call self%screen%open_screen()
       self%is_interactive = is_terminal() .and. on_screen
       self%has_heading = .false.
-      if (folder /= '') call self%file%open(log_path(folder), error, appended)
+      if (folder /= '') call self%file%open(folder//'/'//log_name, error, appended)
    end subroutine open_log
 
    !> Write one or several lines on the screen and into the file. Control characters are replaced.

@@ -69,11 +69,11 @@ module polydem_manifest
       procedure :: continue_writing
       procedure :: owns
       procedure :: place_of
-      procedure :: own
+      procedure :: add_file
       procedure :: reopen
       procedure :: close_file
-      procedure :: empty
-      procedure :: forget
+      procedure :: remove_file => remove_forms
+      procedure :: remove_entry
    end type manifest_t
 
 contains
@@ -299,7 +299,7 @@ contains
    end function place_of
 
    !> Add a file to the result, before the file is created. A no-op if the result already owns it.
-   subroutine own(self, path, error)
+   subroutine add_file(self, path, error)
       class(manifest_t), intent(inout) :: self
       !> Final name of the file, with or without folder
       character(len=*), intent(in) :: path
@@ -317,7 +317,7 @@ contains
       end do
       if (.not. allocated(error)) call append(self, 'owns '//name_in(path), error)
       if (.not. allocated(error)) call add_entry(self, entry_t(name=name_in(path)))
-   end subroutine own
+   end subroutine add_file
 
    !> Mark a closed file as about to be changed. A no-op if the file is not closed.
    subroutine reopen(self, path, error)
@@ -359,7 +359,7 @@ contains
    end subroutine close_file
 
    !> Remove the temporary forms of a file of the result, and the file itself unless `stays`. The result keeps the name.
-   subroutine empty(self, path, error, stays)
+   subroutine remove_forms(self, path, error, stays)
       class(manifest_t), intent(inout) :: self
       !> Final name of the file, with or without folder
       character(len=*), intent(in) :: path
@@ -379,10 +379,10 @@ contains
          if (allocated(error)) return
          if (link_exists(self%folder//'/'//trim(forms(k)))) call remove_file(self%folder//'/'//trim(forms(k)), error)
       end do
-   end subroutine empty
+   end subroutine remove_forms
 
    !> Remove a name from the result. A file of this name no longer belongs to the result.
-   subroutine forget(self, path, error)
+   subroutine remove_entry(self, path, error)
       class(manifest_t), intent(inout) :: self
       !> Final name of the file, with or without folder
       character(len=*), intent(in) :: path
@@ -394,6 +394,6 @@ contains
       if (k == 0 .or. .not. self%is_active .or. allocated(error)) return
       call append(self, 'removed '//name_in(path), error)
       if (.not. allocated(error)) call drop_entry(self, k)
-   end subroutine forget
+   end subroutine remove_entry
 
 end module polydem_manifest

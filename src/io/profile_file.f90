@@ -7,8 +7,8 @@ module polydem_profile_file
    use polydem_hash, only: hexadecimal
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, lp
-   use polydem_provenance, only: provenance_t, write_provenance, schema_version
-   use polydem_result_files, only: profile_path
+   use polydem_provenance, only: provenance_t, write_provenance
+   use polydem_result_files, only: profile_name
    use polydem_timers, only: stage_names, timers_t
    implicit none
    private
@@ -39,11 +39,11 @@ contains
       type(hdf5_file_t) :: file
       character(len=:), allocatable :: path
 
-      path = profile_path(folder)
+      path = folder//'/'//profile_name
       call begin_file(file, path, error)
+      call write_provenance(file, 'profile of a run by polydem', provenance, error)
       call fill_profile(file, timers, seconds, counters, state_hash, status, error)
       if (present(memory)) call file%write('/profile/memory', memory, error, 'KiB', 'resident after the last step')
-      if (.not. allocated(error)) call write_provenance(provenance, file, error)
       call complete_file(file, path, error)
    end subroutine write_profile
 
@@ -65,7 +65,7 @@ contains
       call file%close(error)
    end subroutine read_final_status
 
-   !> Write the attributes, timings, counters, hash and status.
+   !> Write the timings, counters, hash and status.
    subroutine fill_profile(file, timers, seconds, counters, state_hash, status, error)
       type(hdf5_file_t), intent(inout) :: file
       type(timers_t), intent(in) :: timers
@@ -75,8 +75,6 @@ contains
       character(len=*), intent(in) :: status
       type(error_t), allocatable, intent(inout) :: error
 
-      call file%write_attribute('/', 'content', 'profile of a run by polydem', error)
-      call file%write_attribute('/', 'schema_version', schema_version, error)
       call write_timers(file, timers, seconds, error)
       if (allocated(counters%name)) then
          call file%write('/counters/name', counters%name, error, '1', 'name of each counter')

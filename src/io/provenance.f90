@@ -79,7 +79,7 @@ module polydem_provenance
    end type provenance_t
 
    !> Version of the file layout. It increases when a reader of the previous version would fail.
-   integer(ip), parameter :: schema_version = 2_ip
+   integer(ip), parameter :: schema_version = 3_ip
 
 contains
 
@@ -136,15 +136,20 @@ contains
       threads_are_bound = omp_get_proc_bind() /= omp_proc_bind_false
    end function threads_are_bound
 
-   !> Write the group /provenance. Its entry `written` is the time of this call.
-   subroutine write_provenance(provenance, file, error)
-      !> Origin of the result
-      type(provenance_t), intent(in) :: provenance
+   !> Write what a file contains, the version of its layout, and the group /provenance. Its entry `written` is the time
+   !> of this call.
+   subroutine write_provenance(file, content, provenance, error)
       !> File, open for writing
       type(hdf5_file_t), intent(inout) :: file
+      !> What the file contains
+      character(len=*), intent(in) :: content
+      !> Origin of the result
+      type(provenance_t), intent(in) :: provenance
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
+      call file%write_attribute('/', 'content', content, error)
+      call file%write_attribute('/', 'schema_version', schema_version, error)
       call file%write('/provenance/program', 'polydem', error)
       call file%write('/provenance/version', provenance%version, error)
       call file%write('/provenance/revision', provenance%revision, error)

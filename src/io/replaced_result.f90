@@ -79,7 +79,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 
-      call manifest%own(replaced_name, error)
+      call manifest%add_file(replaced_name, error)
       if (allocated(error)) return
       call make_folder(replaced_path(folder), error)
       do k = 1, manifest%n
@@ -133,7 +133,7 @@ contains
          end if
          do k = 1, manifest%n
             if (is_excluded(manifest%entry(k)%name)) cycle
-            call manifest%empty(trim(manifest%entry(k)%name), error)
+            call manifest%remove_file(trim(manifest%entry(k)%name), error)
          end do
          call move_manifest(replaced_path(folder)//'/'//manifest_name, folder//'/'//manifest_name, folder, error)
          if (allocated(error)) return
@@ -165,7 +165,7 @@ contains
       if (.not. allocated(error)) call sync_file(folder, error)
       if (allocated(error)) return
       call remove_folder(replaced_path(folder))
-      call manifest%forget(replaced_name, error)
+      call manifest%remove_entry(replaced_name, error)
    end subroutine put_back
 
    !> Remove the files of an obsolete result, and finally their manifest.
@@ -193,7 +193,7 @@ contains
       if (allocated(error)) return
       call remove_file(replaced_path(folder)//'/'//obsolete_name, error)
       call remove_folder(replaced_path(folder))
-      call manifest%forget(replaced_name, error)
+      call manifest%remove_entry(replaced_name, error)
    end subroutine clear_obsolete
 
    !> Move a file, in any of its forms, to another folder. The target must not exist.

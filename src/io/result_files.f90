@@ -18,7 +18,7 @@ module polydem_result_files
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: segment_path, profile_path, log_path, trace_path, steps_path, overlaps_path, checkpoint_path
+   public :: segment_path, checkpoint_path, log_name, overlaps_name, profile_name, steps_name, trace_name
    public :: default_folder, n_checkpoints, open_suffix, unfinished, name_in, segment_number, last_segment, &
       manifest_name, forms_of, complete_name, conflict_text
 
@@ -30,8 +30,9 @@ module polydem_result_files
    !> Suffix of the temporary name of the open segment
    character(len=*), parameter :: open_suffix = '.open'
 
-   !> Name of the manifest of a result
-   character(len=*), parameter :: manifest_name = 'manifest.txt'
+   !> Names of single files of a result
+   character(len=*), parameter :: manifest_name = 'manifest.txt', log_name = 'log.txt', profile_name = 'profile.h5', &
+      trace_name = 'trace.h5', steps_name = 'steps.h5', overlaps_name = 'overlaps.csv'
 
 contains
 
@@ -47,51 +48,6 @@ contains
       if (last < first) last = len(input_file)
       folder = 'results/'//input_file(first:last)
    end function default_folder
-
-   !> Path of the profile
-   pure function profile_path(folder) result(path)
-      !> Folder of the result
-      character(len=*), intent(in) :: folder
-      character(len=:), allocatable :: path
-
-      path = folder//'/profile.h5'
-   end function profile_path
-
-   !> Path of the log
-   pure function log_path(folder) result(path)
-      !> Folder of the result
-      character(len=*), intent(in) :: folder
-      character(len=:), allocatable :: path
-
-      path = folder//'/log.txt'
-   end function log_path
-
-   !> Path of the recorded boxes
-   pure function trace_path(folder) result(path)
-      !> Folder of the result
-      character(len=*), intent(in) :: folder
-      character(len=:), allocatable :: path
-
-      path = folder//'/trace.h5'
-   end function trace_path
-
-   !> Path of the timings and counts of every step
-   pure function steps_path(folder) result(path)
-      !> Folder of the result
-      character(len=*), intent(in) :: folder
-      character(len=:), allocatable :: path
-
-      path = folder//'/steps.h5'
-   end function steps_path
-
-   !> Path of the table of deep contacts at the start
-   pure function overlaps_path(folder) result(path)
-      !> Folder of the result
-      character(len=*), intent(in) :: folder
-      character(len=:), allocatable :: path
-
-      path = folder//'/overlaps.csv'
-   end function overlaps_path
 
    !> Path of a checkpoint
    pure function checkpoint_path(folder, number) result(path)

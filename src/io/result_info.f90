@@ -10,7 +10,7 @@ module polydem_result_info
    use polydem_log_tables, only: write_header
    use polydem_oversubscription, only: oversubscription_text
    use polydem_provenance, only: collect_provenance, provenance_t
-   use polydem_result_files, only: open_suffix, profile_path, segment_path
+   use polydem_result_files, only: open_suffix, profile_name, segment_path
    use polydem_strings, only: printable, to_text
    implicit none
    private
@@ -69,8 +69,8 @@ contains
       integer(ip) :: number
       logical :: is_empty
 
-      is_empty = .not. exists(profile_path(path))
-      if (.not. is_empty) call describe_file(profile_path(path), log, error)
+      is_empty = .not. exists(path//'/'//profile_name)
+      if (.not. is_empty) call describe_file(path//'/'//profile_name, log, error)
       number = 1_ip
       do
          if (allocated(error)) return
@@ -91,7 +91,6 @@ contains
       type(log_t), intent(inout) :: log
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      type(error_t), allocatable :: ignored
       logical :: is_profile
 
       call file%open(path, error)
@@ -102,11 +101,7 @@ contains
       if (.not. allocated(error)) call describe_frames(file, log, error)
       if (.not. allocated(error)) call describe_checkpoint(path, file, log, error)
       if (.not. allocated(error) .and. is_profile) call describe_end(file, log, error)
-      if (allocated(error)) then
-         call file%close(ignored)
-      else
-         call file%close(error)
-      end if
+      call file%close(error)
    end subroutine describe_file
 
    !> Print the provenance.

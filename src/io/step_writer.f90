@@ -10,9 +10,9 @@
 module polydem_step_writer
    use polydem_atomic_file, only: begin_file, complete_file
    use polydem_errors, only: error_t
-   use polydem_hdf5_file, only: hdf5_file_t
+   use polydem_hdf5_file, only: hdf5_file_t, many_rows
    use polydem_kinds, only: dp, ip, lp
-   use polydem_provenance, only: provenance_t, write_provenance, schema_version
+   use polydem_provenance, only: provenance_t, write_provenance
    implicit none
    private
    public :: step_writer_t, step_row_t
@@ -81,13 +81,11 @@ contains
       if (allocated(error)) return
       self%is_open = .true.
       associate (file => self%file)
-         call file%write_attribute('/', 'content', 'steps of a run by polydem', error)
-         call file%write_attribute('/', 'schema_version', schema_version, error)
+         call write_provenance(file, 'steps of a run by polydem', provenance, error)
          call file%write('/steps/stage_name', stage_names, error, '1', 'stages of the time step')
          call file%write('/steps/phase_name', phase_names, error, '1', 'phases of the neighbour finder')
          call file%write('/steps/count_name', count_names, error, '1', 'statistics of the neighbour finder')
       end associate
-      if (.not. allocated(error)) call write_provenance(provenance, self%file, error)
       if (allocated(error)) call close_steps(self, error)
    end subroutine open_steps
 
@@ -128,13 +126,15 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       associate (file => self%file, n => self%n)
-         call file%append_rows('/steps/step', self%step(:n), error, '1', 'number of the time step')
-         call file%append_rows('/steps/stage', self%stage(:, :n), error, 's', 'time of each stage')
-         call file%append_rows('/steps/phase', self%phase(:, :n), error, 's', 'time of each phase of the finder')
-         call file%append_rows('/steps/count', self%count(:, :n), error, '1', &
-                               'statistics of the finder in the step, or its state after it')
-         call file%append_rows('/steps/pairs', self%pairs(:n), error, '1', 'pairs of bodies whose boxes overlap')
-         call file%append_rows('/steps/contacts', self%contacts(:n), error, '1', 'contacts')
+         call file%write('/steps/step', self%step(:n), error, '1', 'number of the time step', rows=many_rows)
+         call file%write('/steps/stage', self%stage(:, :n), error, 's', 'time of each stage', rows=many_rows)
+         call file%write('/steps/phase', self%phase(:, :n), error, 's', 'time of each phase of the finder', &
+                         rows=many_rows)
+         call file%write('/steps/count', self%count(:, :n), error, '1', &
+                         'statistics of the finder in the step, or its state after it', rows=many_rows)
+         call file%write('/steps/pairs', self%pairs(:n), error, '1', 'pairs of bodies whose boxes overlap', &
+                         rows=many_rows)
+         call file%write('/steps/contacts', self%contacts(:n), error, '1', 'contacts', rows=many_rows)
       end associate
       self%n = 0_ip
    end subroutine write_block

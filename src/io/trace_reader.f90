@@ -61,7 +61,6 @@ contains
       !> Maximum number of steps to read; 0 or absent: all steps
       integer(ip), intent(in), optional :: most_steps
       type(hdf5_file_t) :: file
-      type(error_t), allocatable :: ignored
 
       call file%open(path, error)
       if (allocated(error)) return
@@ -78,11 +77,7 @@ contains
       end if
       if (.not. ieee_is_finite(trace%dt) .or. trace%dt < 0.0_dp) call raise(error, input_error, path// &
          ': the attribute dt must be finite and not negative')
-      if (allocated(error)) then
-         call file%close(ignored)
-      else
-         call file%close(error)
-      end if
+      call file%close(error)
    end subroutine read_trace
 
    !> Read the bounds of all boxes and the flags of fixed ones. The reach is set to the greatest recorded half side.

@@ -12,9 +12,9 @@
 module polydem_trace_writer
    use polydem_atomic_file, only: begin_file, complete_file, discard_file
    use polydem_errors, only: error_t
-   use polydem_hdf5_file, only: hdf5_file_t
+   use polydem_hdf5_file, only: hdf5_file_t, one_row
    use polydem_kinds, only: bp, dp, ip, lp, wp
-   use polydem_provenance, only: provenance_t, write_provenance, schema_version
+   use polydem_provenance, only: provenance_t, write_provenance
    implicit none
    private
    public :: trace_writer_t
@@ -61,8 +61,7 @@ contains
       if (allocated(error)) return
       self%is_open = .true.
       associate (file => self%file)
-         call file%write_attribute('/', 'content', 'trace of boxes by polydem', error)
-         call file%write_attribute('/', 'schema_version', schema_version, error)
+         call write_provenance(file, 'trace of boxes by polydem', provenance, error)
          call file%write_attribute('/', 'dt', real(dt, dp), error)
          call file%write('/is_wall', merge(1_bp, 0_bp, fixed), error, '1', '1: the body of the box is fixed')
          call file%write('/reach', real(reach, dp), error, 'm', 'greatest half side of the box at any angle')
@@ -70,7 +69,6 @@ contains
             call file%write('/body', body, error, '1', 'body of each box, counted from 1')
          end if
       end associate
-      if (.not. allocated(error)) call write_provenance(provenance, self%file, error)
       if (allocated(error)) call close_trace(self, error)
    end subroutine open_trace
 
@@ -88,10 +86,10 @@ contains
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
-      call self%file%append('/aabb', real(bounds, dp), error, 'm', 'xmin, ymin, xmax, ymax of each box')
-      call self%file%append('/step', step, error, '1', 'number of the time step')
-      call self%file%append('/npairs', n_pairs, error, '1', 'pairs of bodies whose boxes overlap')
-      call self%file%append('/pair_hash', hash, error, '1', 'sum modulo 2^64 of the hashes of these pairs')
+      call self%file%write('/aabb', real(bounds, dp), error, 'm', 'xmin, ymin, xmax, ymax of each box', rows=one_row)
+      call self%file%write('/step', step, error, '1', 'number of the time step', rows=one_row)
+      call self%file%write('/npairs', n_pairs, error, '1', 'pairs of bodies whose boxes overlap', rows=one_row)
+      call self%file%write('/pair_hash', hash, error, '1', 'sum modulo 2^64 of the hashes of these pairs', rows=one_row)
       self%n_steps = self%n_steps + 1_ip
       if (allocated(error)) call close_trace(self, error)
    end subroutine add

@@ -26,7 +26,6 @@ contains
       character(len=:), allocatable :: file_path
       type(hdf5_file_t) :: file
       type(body_list_t) :: list
-      type(error_t), allocatable :: ignored
       logical :: is_segment
 
       file_path = path
@@ -40,7 +39,7 @@ contains
       if (allocated(error)) return
       is_segment = file%has('frames')
       if (is_segment) call list_last_frame(file, list, error)
-      call file%close(ignored)
+      call file%close(error)
       if (.not. is_segment) call read_bodies_file(file_path, 1.0_wp, list, error)
       if (.not. allocated(error)) call new_bodies(list, bodies, error)
    end subroutine read_packing

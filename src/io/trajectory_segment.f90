@@ -19,11 +19,11 @@ module polydem_trajectory_segment
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_global_order, only: component, global_order_t, vector
-   use polydem_hdf5_file, only: hdf5_file_t, part_t
+   use polydem_hdf5_file, only: hdf5_file_t, many_rows, one_row, part_t
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_named_values, only: named_values_t
    use polydem_ownership, only: order_bodies, order_pairs, order_parts
-   use polydem_provenance, only: provenance_t, write_provenance, schema_version
+   use polydem_provenance, only: provenance_t, write_provenance
    implicit none
    private
    public :: start_segment, write_bodies, add_frame, add_walls, add_contacts, add_balance
@@ -39,9 +39,7 @@ contains
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
-      call file%write_attribute('/', 'content', 'segment of a trajectory by polydem', error)
-      call file%write_attribute('/', 'schema_version', schema_version, error)
-      call write_provenance(provenance, file, error)
+      call write_provenance(file, 'segment of a trajectory by polydem', provenance, error)
    end subroutine start_segment
 
    !> Write the constant properties of the bodies: identifier, fixed flag, mass, inertia and shape.
@@ -146,14 +144,15 @@ contains
       call order_bodies(comm, bodies, blocks)
       call blocks%to_blocks(comm, state, block)
       part = part_t(blocks%first, blocks%total)
-      call file%append('/frames/step', step, error, '1', 'number of the time step')
-      call file%append('/frames/time', time, error, 's', 'simulated time')
-      call file%append('/frames/position', vector(block, 1), error, 'm', 'centres of mass', part)
-      call file%append('/frames/angle', component(block, 3), error, 'rad', 'angles since the start, anticlockwise', &
-                       part)
-      call file%append('/frames/velocity', vector(block, 4), error, 'm/s', 'velocities of the centres of mass', part)
-      call file%append('/frames/angular_velocity', component(block, 6), error, 'rad/s', &
-                       'angular velocities, anticlockwise', part)
+      call file%write('/frames/step', step, error, '1', 'number of the time step', rows=one_row)
+      call file%write('/frames/time', time, error, 's', 'simulated time', rows=one_row)
+      call file%write('/frames/position', vector(block, 1), error, 'm', 'centres of mass', part, rows=one_row)
+      call file%write('/frames/angle', component(block, 3), error, 'rad', 'angles since the start, anticlockwise', &
+                      part, rows=one_row)
+      call file%write('/frames/velocity', vector(block, 4), error, 'm/s', 'velocities of the centres of mass', part, &
+                      rows=one_row)
+      call file%write('/frames/angular_velocity', component(block, 6), error, 'rad/s', &
+                      'angular velocities, anticlockwise', part, rows=one_row)
    end subroutine add_frame
 
    !> Add the forces and torques on the fixed bodies, if there are any.
@@ -177,8 +176,9 @@ contains
          force(:, w) = real(bodies%force(:, s), dp)
          torque(w) = real(bodies%torque(s), dp)
       end do
-      call file%append('/walls/force', force, error, 'N/m', 'forces of the other bodies on each fixed body')
-      call file%append('/walls/torque', torque, error, 'N', 'torques about its centre of mass')
+      call file%write('/walls/force', force, error, 'N/m', 'forces of the other bodies on each fixed body', &
+                      rows=one_row)
+      call file%write('/walls/torque', torque, error, 'N', 'torques about its centre of mass', rows=one_row)
    end subroutine add_walls
 
    !> Add the contacts of a frame.
@@ -217,22 +217,24 @@ contains
       call blocks%to_blocks(comm, values, block)
       part = part_t(blocks%first, blocks%total)
       if (.not. file%has('/contacts/start')) then
-         call file%append('/contacts/start', 0_lp, error, '1', 'frame k owns the rows start[k] to start[k + 1] - 1')
+         call file%write('/contacts/start', 0_lp, error, '1', 'frame k owns the rows start[k] to start[k + 1] - 1', &
+                         rows=one_row)
       end if
       n_before = n_before + blocks%total
-      call file%append('/contacts/start', n_before, error)
-      call file%append_rows('/contacts/first', int(pairs(1, :), ip), error, '1', &
-                            'identifier of the first body, the lower one', part)
-      call file%append_rows('/contacts/second', int(pairs(2, :), ip), error, '1', 'identifier of the second body', part)
-      call file%append_rows('/contacts/area', component(block, 1), error, 'm2', &
-                            'area of the overlap; with the conservative law its effective area', part)
-      call file%append_rows('/contacts/point', vector(block, 2), error, 'm', 'centroid of the overlap in the world', &
-                            part)
-      call file%append_rows('/contacts/normal', vector(block, 4), error, 'm', &
-                            'integral of the outward normal over the outline of first inside second, '// &
-                            'the gradient of that area', part)
-      call file%append_rows('/contacts/force', vector(block, 6), error, 'N/m', &
-                            'force on the first body; the second feels the opposite', part)
+      call file%write('/contacts/start', n_before, error, rows=one_row)
+      call file%write('/contacts/first', int(pairs(1, :), ip), error, '1', &
+                      'identifier of the first body, the lower one', part, rows=many_rows)
+      call file%write('/contacts/second', int(pairs(2, :), ip), error, '1', 'identifier of the second body', part, &
+                      rows=many_rows)
+      call file%write('/contacts/area', component(block, 1), error, 'm2', &
+                      'area of the overlap; with the conservative law its effective area', part, rows=many_rows)
+      call file%write('/contacts/point', vector(block, 2), error, 'm', 'centroid of the overlap in the world', &
+                      part, rows=many_rows)
+      call file%write('/contacts/normal', vector(block, 4), error, 'm', &
+                      'integral of the outward normal over the outline of first inside second, '// &
+                      'the gradient of that area', part, rows=many_rows)
+      call file%write('/contacts/force', vector(block, 6), error, 'N/m', &
+                      'force on the first body; the second feels the opposite', part, rows=many_rows)
    end subroutine add_contacts
 
    !> Add a row of the energy balance.
@@ -247,8 +249,8 @@ contains
 
       if (.not. allocated(row%name)) return
       do k = 1, size(row%name)
-         call file%append('/energy_balance/'//trim(row%name(k)), row%value(k), error, trim(row%unit(k)), &
-                          trim(row%meaning(k)))
+         call file%write('/energy_balance/'//trim(row%name(k)), row%value(k), error, trim(row%unit(k)), &
+                         trim(row%meaning(k)), rows=one_row)
       end do
    end subroutine add_balance
 

@@ -189,7 +189,7 @@ contains
       self%n_frames = 0_ip
       self%n_contacts = 0_lp
       if (self%comm%is_root()) then
-         if (present(manifest)) call manifest%own(segment_path(self%folder, self%number), error)
+         if (present(manifest)) call manifest%add_file(segment_path(self%folder, self%number), error)
          if (.not. allocated(error)) call self%file%create(path, error)
          if (.not. allocated(error)) call start_segment(self%file, self%provenance, error)
       end if

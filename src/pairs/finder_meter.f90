@@ -15,14 +15,14 @@ module polydem_finder_meter
       !> Seconds, in the order of `phase_names`
       real(dp) :: seconds(n_phases) = 0.0_dp
    contains
-      procedure :: look
-      procedure :: look_at_seconds
+      procedure :: read_all
+      procedure :: read_seconds
    end type finder_meter_t
 
 contains
 
    !> Read the seconds since the last reading, but no counts.
-   pure subroutine look_at_seconds(self, finder, phase)
+   pure subroutine read_seconds(self, finder, phase)
       class(finder_meter_t), intent(inout) :: self
       !> Finder
       class(finder_t), intent(in) :: finder
@@ -31,10 +31,10 @@ contains
 
       phase = finder%work%seconds - self%seconds
       self%seconds = finder%work%seconds
-   end subroutine look_at_seconds
+   end subroutine read_seconds
 
    !> Read seconds and counts since the last reading, and the counts of the present state.
-   subroutine look(self, finder, phase, count)
+   subroutine read_all(self, finder, phase, count)
       class(finder_meter_t), intent(inout) :: self
       !> Finder; its `survey` is called
       class(finder_t), intent(inout) :: finder
@@ -43,11 +43,11 @@ contains
       !> Increments of the counts that are sums, and values of those that describe the present state, (counts)
       integer(lp), intent(out) :: count(:)
 
-      call self%look_at_seconds(finder, phase)
+      call self%read_seconds(finder, phase)
       call finder%survey()
       count = finder%work%value
       count(:n_sums) = count(:n_sums) - self%value(:n_sums)
       self%value = finder%work%value
-   end subroutine look
+   end subroutine read_all
 
 end module polydem_finder_meter

@@ -10,8 +10,8 @@ module polydem_check_result
    use polydem_manifest, only: manifest_t
    use polydem_manifest_lines, only: entry_t
    use polydem_replaced_result, only: replaced_name
-   use polydem_result_files, only: complete_name, forms_of, manifest_name, checkpoint_path, n_checkpoints, name_in, &
-      overlaps_path, profile_path, segment_number, steps_path, trace_path
+   use polydem_result_files, only: checkpoint_path, complete_name, forms_of, manifest_name, n_checkpoints, name_in, &
+      overlaps_name, profile_name, segment_number, steps_name, trace_name
    use polydem_strings, only: to_text
    implicit none
    private
@@ -150,7 +150,7 @@ contains
       problem = 'has the name of a result file, but is not listed in '//manifest_name
       do k = 1, size(found)
          name = complete_name(trim(found(k)))
-         if (segment_number(name) == 0_ip .and. name /= name_in(profile_path(''))) cycle
+         if (segment_number(name) == 0_ip .and. name /= profile_name) cycle
          if (.not. manifest%owns(name)) call report_file(findings, trim(found(k)), problem, '')
       end do
    end subroutine check_others
@@ -159,9 +159,8 @@ contains
    logical function gets_closed(name)
       character(len=*), intent(in) :: name
 
-      gets_closed = segment_number(name) > 0_ip .or. name == name_in(profile_path('')) .or. &
-                    name == name_in(trace_path('')) .or. name == name_in(steps_path('')) .or. &
-                    name == name_in(overlaps_path(''))
+      gets_closed = segment_number(name) > 0_ip .or. name == profile_name .or. name == trace_name .or. &
+                    name == steps_name .or. name == overlaps_name
    end function gets_closed
 
    !> Count a file and write its line.

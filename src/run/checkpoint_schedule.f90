@@ -43,11 +43,11 @@ module polydem_checkpoint_schedule
       real(dp), private :: last_time = 0.0_dp
       !> Time at which the attempt should end [s]
       real(dp), private :: deadline = huge(1.0_dp)
-      !> Time of the last call of `look`, and of the next poll for signals [s]
+      !> Time of the last call of `decide`, and of the next poll for signals [s]
       real(dp), private :: last_check = 0.0_dp, next_poll = 0.0_dp
    contains
       procedure :: open => open_checkpoints
-      procedure :: look
+      procedure :: decide
       procedure :: write => write_checkpoint
       procedure :: close => close_checkpoints
    end type checkpoints_t
@@ -81,7 +81,7 @@ contains
    end subroutine open_checkpoints
 
    !> Decide at the end of a step whether a checkpoint is due, and whether the run must end after it.
-   subroutine look(self, step, is_due, reason)
+   subroutine decide(self, step, is_due, reason)
       class(checkpoints_t), intent(inout) :: self
       !> Number of completed steps
       integer(lp), intent(in) :: step
@@ -107,7 +107,7 @@ contains
       if (now + (now - self%last_check) + self%longest >= self%deadline) reason = '--walltime'
       self%last_check = now
       is_due = (is_due .or. allocated(reason)) .and. step /= self%last_step
-   end subroutine look
+   end subroutine decide
 
    !> Write a checkpoint over the older of the last two; collective.
    subroutine write_checkpoint(self, folder, provenance, comm, simulation, attempts, monitor, error)

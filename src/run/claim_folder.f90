@@ -7,8 +7,8 @@ module polydem_claim_folder
    use polydem_kinds, only: ip
    use polydem_manifest, only: manifest_t
    use polydem_replaced_result, only: check_inputs, move_to_replaced, replaced_name
-   use polydem_result_files, only: checkpoint_path, log_path, n_checkpoints, name_in, overlaps_path, profile_path, &
-      steps_path, trace_path
+   use polydem_result_files, only: checkpoint_path, log_name, n_checkpoints, name_in, overlaps_name, profile_name, &
+      steps_name, trace_name
    use polydem_simulation, only: simulation_t
    implicit none
    private
@@ -51,11 +51,11 @@ contains
       else
          call manifest%continue_writing()
          do k = 1, size(names)
-            call manifest%own(trim(names(k)), error)
+            call manifest%add_file(trim(names(k)), error)
          end do
          do k = 1, merge(0, manifest%n, is_restart)
             if (manifest%entry(k)%name /= lock .and. .not. allocated(error)) &
-               call manifest%empty(trim(manifest%entry(k)%name), error)
+               call manifest%remove_file(trim(manifest%entry(k)%name), error)
          end do
       end if
    end subroutine claim_folder
@@ -80,15 +80,15 @@ contains
       integer(ip) :: k
 
       allocate (names(2))
-      names = [character(len=longest) :: name_in(log_path('')), name_in(profile_path(''))]
+      names = [character(len=longest) :: log_name, profile_name]
       do k = 1_ip, n_checkpoints
          names = [character(len=longest) :: names, name_in(checkpoint_path('', k))]
       end do
       associate (output => simulation%settings%output)
-         if (output%trace_steps > 0_ip) names = [character(len=longest) :: names, name_in(trace_path(''))]
-         if (output%step_profile) names = [character(len=longest) :: names, name_in(steps_path(''))]
+         if (output%trace_steps > 0_ip) names = [character(len=longest) :: names, trace_name]
+         if (output%step_profile) names = [character(len=longest) :: names, steps_name]
       end associate
-      if (has_deep_contacts(simulation)) names = [character(len=longest) :: names, name_in(overlaps_path(''))]
+      if (has_deep_contacts(simulation)) names = [character(len=longest) :: names, overlaps_name]
    end subroutine list_output_names
 
 end module polydem_claim_folder

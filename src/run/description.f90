@@ -6,11 +6,11 @@ module polydem_description
    use polydem_kinds, only: ip, wp
    use polydem_log, only: log_t
    use polydem_overlap_table, only: write_overlap_table
-   use polydem_result_files, only: overlaps_path
+   use polydem_result_files, only: overlaps_name
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers, stable_step_of_contacts
    use polydem_strings, only: to_text
-   use polydem_survey, only: survey_scene, survey_t
+   use polydem_scene_measures, only: measure_scene, scene_measures_t
    implicit none
    private
    public :: describe, has_deep_contacts, list_overlaps
@@ -23,14 +23,14 @@ contains
       type(simulation_t), intent(in) :: simulation
       !> Log
       type(log_t), intent(inout) :: log
-      type(survey_t) :: survey
+      type(scene_measures_t) :: measures
 
-      call survey_scene(simulation, survey)
+      call measure_scene(simulation, measures)
       associate (s => simulation)
          call log%write_line('bodies     '//to_text(size(s%bodies%free, kind=ip))//' free, '// &
                              to_text(s%bodies%n - size(s%bodies%free, kind=ip))//' fixed, '// &
-                             to_text(survey%corners)//' vertices')
-         call write_measures(s, survey, log)
+                             to_text(measures%corners)//' vertices')
+         call write_measures(s, measures, log)
          call log%write_line('boxes      '//to_text(s%boxes%n)//', including '// &
                              to_text(count(s%boxes%fixed, kind=ip))//' of fixed bodies')
          call log%write_line('parts      '//s%settings%neighbours%finder//', '//s%law%description//gravity_text(s)// &
@@ -43,9 +43,9 @@ contains
                              ' steps'//rounding_text(real(s%n_steps, wp)*s%dt, s%settings%integrate%duration))
          if (s%contacts%n > 0_ip) then
             call log%write_line('at start   '//to_text(s%contacts%n)//' contacts, the deepest '//deepest_text(s))
-            call log%write_line('           elastic energy '//to_text(survey%stored, 3)//' J/m, kinetic energy '// &
-                                to_text(survey%kinetic, 3)//' J/m, weight times extent '// &
-                                to_text(survey%potential, 3)//' J/m')
+            call log%write_line('           elastic energy '//to_text(measures%stored, 3)//' J/m, kinetic energy '// &
+                                to_text(measures%kinetic, 3)//' J/m, weight times extent '// &
+                                to_text(measures%potential, 3)//' J/m')
          end if
          if (s%relaxation%sweeps > 0_ip) then
             call log%write_line('relaxed    '//to_text(s%relaxation%sweeps)//' sweeps reduced the deepest contact '// &
@@ -65,29 +65,29 @@ contains
    end function has_deep_contacts
 
    !> Write sizes, masses, densities and speeds of the bodies.
-   subroutine write_measures(simulation, survey, log)
+   subroutine write_measures(simulation, measures, log)
       type(simulation_t), intent(in) :: simulation
-      type(survey_t), intent(in) :: survey
+      type(scene_measures_t), intent(in) :: measures
       type(log_t), intent(inout) :: log
       logical :: any_free
 
       any_free = size(simulation%bodies%free) > 0
-      call log%write_line('extent     '//extent_text(survey%extent))
+      call log%write_line('extent     '//extent_text(measures%extent))
       if (any_free) then
-         call log%write_line('           free bodies '//extent_text(survey%free_extent))
-         call log%write_line('sizes      diameters of free bodies '//range_text(survey%diameter([1, 3]))// &
-                             ' m, median '//to_text(survey%diameter(2), 3)//' m')
+         call log%write_line('           free bodies '//extent_text(measures%free_extent))
+         call log%write_line('sizes      diameters of free bodies '//range_text(measures%diameter([1, 3]))// &
+                             ' m, median '//to_text(measures%diameter(2), 3)//' m')
       end if
-      call log%write_line('thinnest   body '//to_text(simulation%bodies%id(survey%thinnest))//', '// &
-                          to_text(survey%thickness, 3)//' m')
+      call log%write_line('thinnest   body '//to_text(simulation%bodies%id(measures%thinnest))//', '// &
+                          to_text(measures%thickness, 3)//' m')
       if (any_free) then
-         call log%write_line('masses     of free bodies '//range_text(survey%mass(1:2))//' kg/m, '// &
-                             to_text(survey%mass(3), 3)//' kg/m in total, densities '// &
-                             range_text(survey%density)//' kg/m3')
+         call log%write_line('masses     of free bodies '//range_text(measures%mass(1:2))//' kg/m, '// &
+                             to_text(measures%mass(3), 3)//' kg/m in total, densities '// &
+                             range_text(measures%density)//' kg/m3')
       end if
-      call log%write_line('speeds     of free bodies up to '//to_text(survey%speed, 3)// &
-                          ' m/s at the start, of walls up to '//to_text(survey%wall_speed, 3)// &
-                          ' m/s, after a fall through the extent '//to_text(survey%fall_speed, 3)//' m/s')
+      call log%write_line('speeds     of free bodies up to '//to_text(measures%speed, 3)// &
+                          ' m/s at the start, of walls up to '//to_text(measures%wall_speed, 3)// &
+                          ' m/s, after a fall through the extent '//to_text(measures%fall_speed, 3)//' m/s')
    end subroutine write_measures
 
    !> An extent as text: least and greatest x and y
@@ -144,20 +144,20 @@ contains
          if (folder == '') then
             call log%write_line('           (a run lists them in overlaps.csv)')
          else
-            call write_overlap_table(overlaps_path(folder), s%bodies, s%contacts, thickness, limit, error)
-            call log%write_line('           full list: '//overlaps_path(folder))
+            call write_overlap_table(folder//'/'//overlaps_name, s%bodies, s%contacts, thickness, limit, error)
+            call log%write_line('           full list: '//folder//'/'//overlaps_name)
          end if
       end associate
    end subroutine list_overlaps
 
-   !> Remark if the requested duration is not a whole number of steps; else empty
+   !> Remark if the requested duration is not an integer of steps; else empty
    function rounding_text(duration, wanted) result(text)
       real(wp), intent(in) :: duration, wanted
       character(len=:), allocatable :: text
 
       text = ''
       if (abs(duration - wanted) > 1.0e-6_wp*wanted) text = ' (requested: '//to_text(wanted)// &
-                                                            ' s, not a whole number of steps)'
+                                                            ' s, not an integer of steps)'
    end function rounding_text
 
    !> ', gravity' if there is gravity; else empty

@@ -34,7 +34,7 @@ contains
       real(wp), intent(in) :: share
       character(len=:), allocatable :: text
 
-      text = to_text(share, 2)//' of the energy turned over'
+      text = to_text(share, 2)//' of the largest kinetic energy or work so far'
    end function percent
 
 end module polydem_energy_report

@@ -6,7 +6,7 @@ module polydem_finished_result
    use polydem_log_tables, only: write_hash
    use polydem_replaced_result, only: replaced_name
    use polydem_restart, only: find_finished
-   use polydem_result_files, only: name_in, profile_path
+   use polydem_result_files, only: profile_name
    use polydem_run, only: run_t
    use polydem_settings, only: settings_t
    use polydem_start, only: build_start
@@ -29,7 +29,7 @@ contains
       integer :: k
 
       call run%manifest%read(run%folder)
-      k = run%manifest%place_of(name_in(profile_path(run%folder)))
+      k = run%manifest%place_of(profile_name)
       if (k == 0 .or. allocated(run%manifest%problem) .or. run%manifest%owns(replaced_name)) return
       if (.not. run%manifest%entry(k)%is_closed) return
       call build_start(settings, run, error)

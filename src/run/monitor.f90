@@ -17,7 +17,8 @@ module polydem_monitor
    use polydem_warning, only: warning_t
    implicit none
    private
-   public :: monitor_t, new_monitor, look, checks_contacts, report_pending_warnings, write_warning_counts, serialize_monitor, &
+   public :: monitor_t, new_monitor, check_step, checks_contacts, report_pending_warnings, write_warning_counts, &
+      serialize_monitor, &
       warning_counts, set_warning_counts
 
    !> Guards and their findings
@@ -65,7 +66,7 @@ contains
       call serializer%field('/run/deep_steps', monitor%overlap%count, '1', 'steps with a contact that was too deep')
       call serializer%field('/run/passing_steps', monitor%passing%count, '1', 'steps in which a body was passing '// &
                         'through another')
-      call serializer%field('/run/energy_looks', monitor%energy%warning%count, '1', &
+      call serializer%field('/run/energy_warnings', monitor%energy%warning%count, '1', &
                         'checks that found an unexplained energy gain')
       call serializer%field('/run/large_steps', monitor%large_steps, '1', 'checks with dt above half the stable dt')
       call serializer%field('/run/warned_share', monitor%warned, '1', 'greatest dt / stable dt of a warning')
@@ -73,7 +74,7 @@ contains
    end subroutine serialize_monitor
 
    !> Check a step with the guards, and write new warnings. Collective; all ranks get the error.
-   subroutine look(monitor, simulation, is_last, log, error)
+   subroutine check_step(monitor, simulation, is_last, log, error)
       !> The monitor
       type(monitor_t), intent(inout) :: monitor
       !> The simulation at the end of a step
@@ -96,7 +97,7 @@ contains
       end associate
       if (check_all .or. simulation%comm%size == 1_ip) call report_pending_warnings(monitor, simulation, log)
       call write_pending(monitor%energy%warning, log)
-   end subroutine look
+   end subroutine check_step
 
    !> Whether the monitor checks all that it can after a step
    pure logical function is_checked(step)

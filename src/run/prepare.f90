@@ -2,7 +2,7 @@
 module polydem_prepare
    use polydem_checked_files, only: check_manifest
    use polydem_claim_folder, only: claim_folder
-   use polydem_dangers, only: warn_of_risks
+   use polydem_initial_warnings, only: warn_of_risks
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: make_folder
@@ -15,7 +15,7 @@ module polydem_prepare
    use polydem_replaced_result, only: recover, replaced_name
    use polydem_replacement, only: say
    use polydem_restart, only: remove_surplus_files, find_restart
-   use polydem_result_files, only: overlaps_path
+   use polydem_result_files, only: overlaps_name
    use polydem_run, only: run_t
    use polydem_run_output, only: choose_intervals
    use polydem_settings, only: settings_t
@@ -112,9 +112,9 @@ contains
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
 
-      call run%manifest%reopen(overlaps_path(run%folder), error)
+      call run%manifest%reopen(run%folder//'/'//overlaps_name, error)
       if (.not. allocated(error)) call list_overlaps(run%simulation, run%folder, run%log, error)
-      call run%manifest%close_file(overlaps_path(run%folder), error)
+      call run%manifest%close_file(run%folder//'/'//overlaps_name, error)
    end subroutine write_overlaps
 
 end module polydem_prepare

@@ -12,7 +12,7 @@ module polydem_recorder
    use polydem_manifest, only: manifest_t
    use polydem_pair_list_hash, only: list_hash
    use polydem_provenance, only: provenance_t
-   use polydem_result_files, only: steps_path, trace_path
+   use polydem_result_files, only: steps_name, trace_name
    use polydem_simulation, only: simulation_t
    use polydem_step_writer, only: step_writer_t, step_row_t
    use polydem_strings, only: to_text
@@ -68,17 +68,17 @@ contains
          if (self%trace_steps > 0_ip .and. simulation%step <= self%first_step) then
             if (self%first_step + int(self%trace_steps, lp) - 1_lp > simulation%n_steps) call log%write_line( &
                'warning: the run ends before the trace is complete')
-            call manifest%reopen(trace_path(folder), error)
+            call manifest%reopen(folder//'/'//trace_name, error)
             if (.not. allocated(error)) &
-               call self%trace%open(trace_path(folder), boxes%body(:boxes%n), boxes%fixed(:boxes%n), &
+               call self%trace%open(folder//'/'//trace_name, boxes%body(:boxes%n), boxes%fixed(:boxes%n), &
                                  boxes%reach(:boxes%n), simulation%dt, provenance, error)
          end if
          if (output%step_profile) then
-            call manifest%reopen(steps_path(folder), error)
+            call manifest%reopen(folder//'/'//steps_name, error)
             if (allocated(error)) return
-            call self%steps%open(steps_path(folder), stage_names, phase_names, count_names, provenance, error)
+            call self%steps%open(folder//'/'//steps_name, stage_names, phase_names, count_names, provenance, error)
             allocate (self%row%stage(n_stages), self%row%phase(n_phases), self%row%count(n_counts))
-            call self%meter%look(simulation%neighbours%finder, self%row%phase, self%row%count)
+            call self%meter%read_all(simulation%neighbours%finder, self%row%phase, self%row%count)
          end if
       end associate
       if (.not. allocated(error)) call record_boxes(self, simulation, manifest, error)
@@ -102,7 +102,7 @@ contains
          first = first_trace_step(output%trace_start, simulation%dt)
          if (output%trace_steps == 0_ip .or. first > step) return
          is_whole = first + int(output%trace_steps, lp) - 1_lp <= step
-         if (is_whole) is_whole = exists(trace_path(folder))
+         if (is_whole) is_whole = exists(folder//'/'//trace_name)
          if (.not. is_whole) call raise(error, input_error, 'the run was interrupted while it recorded a trace '// &
             '(trace_steps in &output), and a trace cannot resume; start again with --force instead of --continue')
       end associate
@@ -124,7 +124,7 @@ contains
          row%step = simulation%step
          row%stage = simulation%timers%total - self%stage_seconds
          self%stage_seconds = simulation%timers%total
-         call self%meter%look(simulation%neighbours%finder, row%phase, row%count)
+         call self%meter%read_all(simulation%neighbours%finder, row%phase, row%count)
          row%pairs = simulation%neighbours%pairs%n
          row%contacts = simulation%n_contacts
       end associate
@@ -147,8 +147,8 @@ contains
          to_text(self%trace%n_steps)//' of '//to_text(self%trace_steps)//' steps')
       call self%trace%close(error)
       call self%steps%close(error)
-      if (was_open(1)) call manifest%close_file(trace_path(''), error)
-      if (was_open(2)) call manifest%close_file(steps_path(''), error)
+      if (was_open(1)) call manifest%close_file(trace_name, error)
+      if (was_open(2)) call manifest%close_file(steps_name, error)
    end subroutine close_recorder
 
    !> First step at or after a time
@@ -176,7 +176,7 @@ contains
       end associate
       if (self%trace%n_steps < self%trace_steps) return
       call self%trace%close(error)
-      call manifest%close_file(trace_path(''), error)
+      call manifest%close_file(trace_name, error)
    end subroutine record_boxes
 
 end module polydem_recorder

@@ -12,7 +12,7 @@ module polydem_restart
    use polydem_monitor, only: monitor_t
    use polydem_profile_file, only: read_final_status
    use polydem_provenance, only: origin_of
-   use polydem_result_files, only: checkpoint_path, n_checkpoints, name_in, profile_path, segment_path, trace_path
+   use polydem_result_files, only: checkpoint_path, n_checkpoints, name_in, profile_name, segment_path, trace_name
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
@@ -64,7 +64,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path, status, text
 
-      path = profile_path(folder)
+      path = folder//'/'//profile_name
       call check_closed(manifest, folder, error, only=name_in(path))
       if (.not. allocated(error)) call read_final_status(path, status, text, error)
       if (allocated(error)) return
@@ -125,7 +125,7 @@ contains
 
       earlier%remark = 'there is no checkpoint in '//folder//': the run starts at step 0'
       path = segment_path(folder, 1_ip)
-      if (.not. exists(path)) path = profile_path(folder)
+      if (.not. exists(path)) path = folder//'/'//profile_name
       if (.not. exists(path)) return
       changes = changed_entries(origin_of(path, 'resolved_input'), settings%resolved)
       former = origin_of(path, 'scene')
@@ -265,19 +265,19 @@ contains
       integer(ip) :: number
       integer :: k
 
-      call manifest%empty(profile_path(folder), error)
+      call manifest%remove_file(folder//'/'//profile_name, error)
       do k = 1, manifest%n
-         if (.not. allocated(error)) call manifest%empty(trim(manifest%entry(k)%name), error, stays=.true.)
+         if (.not. allocated(error)) call manifest%remove_file(trim(manifest%entry(k)%name), error, stays=.true.)
       end do
       do number = earlier%segments + earlier%surplus, earlier%segments + 1_ip, -1_ip
-         call manifest%empty(segment_path(folder, number), error)
-         call manifest%forget(segment_path(folder, number), error)
+         call manifest%remove_file(segment_path(folder, number), error)
+         call manifest%remove_entry(segment_path(folder, number), error)
       end do
       if (earlier%unlisted(1) > 0_lp .and. earlier%surplus == 0_ip) &
          call manifest%close_file(segment_path(folder, earlier%segments), error, earlier%unlisted)
-      k = manifest%place_of(name_in(trace_path(folder)))
+      k = manifest%place_of(trace_name)
       if (k == 0) return
-      if (.not. manifest%entry(k)%is_closed) call manifest%close_file(trace_path(folder), error)
+      if (.not. manifest%entry(k)%is_closed) call manifest%close_file(folder//'/'//trace_name, error)
    end subroutine remove_surplus_files
 
    !> Restore the simulation from the checkpoint.

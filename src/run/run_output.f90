@@ -11,9 +11,9 @@ module polydem_run_output
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_counters, write_hash, write_ranks, write_timings
-   use polydem_monitor, only: checks_contacts, look, write_warning_counts, report_pending_warnings
+   use polydem_monitor, only: check_step, checks_contacts, report_pending_warnings, write_warning_counts
    use polydem_profile_file, only: write_profile
-   use polydem_result_files, only: profile_path
+   use polydem_result_files, only: profile_name
    use polydem_run, only: run_t
    use polydem_simulation, only: simulation_t, time_of, compute_balance
    use polydem_simulation_counters, only: count_contacts, report_counters
@@ -41,7 +41,7 @@ contains
       associate (s => run%simulation)
          frame_due = s%step == s%n_steps .or. is_due(s%step, run%frame_steps)
          line_due = is_line_due(run, s%step)
-         call look(run%monitor, s, line_due, run%log, error)
+         call check_step(run%monitor, s, line_due, run%log, error)
          if (allocated(error)) return
          if (frame_due .or. line_due) call update_balance(run)
          if (line_due) then
@@ -155,7 +155,7 @@ contains
          call run%checkpoints%close(run%log)
          if (run%comm%is_root()) call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, &
                                                   status, write_error, memory)
-         call run%manifest%close_file(profile_path(run%folder), write_error)
+         call run%manifest%close_file(run%folder//'/'//profile_name, write_error)
          call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n_all)
          call write_rank_times(run, run%log)
          call write_counters(run%log, counters)

@@ -7,7 +7,7 @@ module polydem_run_simulation
    use polydem_errors, only: error_t, raise, stopped_early
    use polydem_finished_result, only: find_finished_result, is_finished
    use polydem_kinds, only: ip, lp
-   use polydem_monitor, only: look, set_warning_counts, report_pending_warnings, warning_counts
+   use polydem_monitor, only: check_step, set_warning_counts, report_pending_warnings, warning_counts
    use polydem_oversubscription, only: oversubscription
    use polydem_prepare, only: begin
    use polydem_replacement, only: remove_replaced, restore_replaced
@@ -98,7 +98,7 @@ contains
 
       is_due = .false.
       if (run%comm%is_root()) then
-         call run%checkpoints%look(run%simulation%step, is_due, run%reason)
+         call run%checkpoints%decide(run%simulation%step, is_due, run%reason)
          call run%lock%check(run%has_lost_folder, error)
       end if
       must_stop = allocated(run%reason)

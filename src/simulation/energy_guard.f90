@@ -73,7 +73,7 @@ contains
          call find_fastest(simulation%comm, simulation%bodies, id, position)
          call guard%warning%respond(settings%energy, 'step '//to_text(simulation%step)//': unexplained energy '// &
                                     'gain of '//to_text(growth, 3)//' J/m, '//to_text(growth/scale, 3)// &
-                                    ' of the energy turned over; fastest body '//to_text(id)// &
+                                    ' of the largest kinetic energy or work so far; fastest body '//to_text(id)// &
                                     ' at ('//to_text(real(position(1), wp))//', '//to_text(real(position(2), wp))// &
                                     ') m. Reduce dt, or check for deep overlaps', error)
       end associate

@@ -98,8 +98,8 @@ contains
 
       self%history = contact_history_t()
       allocate (self%history%memory(0))
-      do k = 1, size(self%law%stored)
-         call add_column(self%history, self%law%stored(k), 0_ip)
+      do k = 1, size(self%law%history_kinds)
+         call add_column(self%history, self%law%history_kinds(k), 0_ip)
       end do
       if (self%settings%guards%passing /= 'off') call add_column(self%history, former_direction, 0_ip)
    end subroutine allocate_history

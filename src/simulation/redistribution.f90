@@ -180,7 +180,7 @@ contains
 
       n = self%bodies%n
       boxes = padded_boxes(self%bodies, self%domain%margin + self%settings%boxes%margin)
-      call self%domain%regions%publish(self%comm, boxes)
+      call self%domain%rank_bounds%publish(self%comm, boxes)
       call list_needed(self%domain, self%comm, self%bodies, boxes, sent, counts)
       call pack_bodies(self%bodies, sent, packed_halo)
       call all_to_all_bodies(self%comm, counts, packed_halo, counts_received)

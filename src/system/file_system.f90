@@ -1,9 +1,11 @@
 !> Operations on files and folders (POSIX): create, rename, remove, reserve disk space, flush to disk.
 module polydem_file_system
-   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_int, c_int64_t, c_loc, c_null_char, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_null_char
    use polydem_errors, only: error_t, io_error, raise
    use polydem_kinds, only: lp
-   use polydem_posix, only: c_close, c_open, c_strlen, c_write, error_number
+   use polydem_posix, only: c_access, c_close, c_fallocate, c_fsync, c_lseek, c_mkdir, c_open, c_rename, c_strerror, &
+      c_unlink, error_number, is_written, text_at
+   use polydem_posix_processes, only: c_umask, c_user
    implicit none
    private
    public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_space, sync_file, overwrite_start
@@ -34,72 +36,6 @@ module polydem_file_system
    integer(c_int), parameter :: of_owner = int(o'700', c_int)
    !> User identifier of root, who may read and write everything
    integer(c_int), parameter :: superuser = 0_c_int
-
-   interface
-      !> POSIX access(2)
-      integer(c_int) function c_access(path, mode) bind(C, name='access')
-         import :: c_char, c_int
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int), value :: mode
-      end function c_access
-
-      !> POSIX mkdir(2)
-      integer(c_int) function c_mkdir(path, mode) bind(C, name='mkdir')
-         import :: c_char, c_int
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int), value :: mode
-      end function c_mkdir
-
-      !> POSIX umask(2)
-      integer(c_int) function c_umask(mask) bind(C, name='umask')
-         import :: c_int
-         integer(c_int), value :: mask
-      end function c_umask
-
-      !> POSIX geteuid(2)
-      integer(c_int) function c_user() bind(C, name='geteuid')
-         import :: c_int
-      end function c_user
-
-      !> POSIX rename(2)
-      integer(c_int) function c_rename(from, to) bind(C, name='rename')
-         import :: c_char, c_int
-         character(kind=c_char), intent(in) :: from(*), to(*)
-      end function c_rename
-
-      !> POSIX unlink(2)
-      integer(c_int) function c_unlink(path) bind(C, name='unlink')
-         import :: c_char, c_int
-         character(kind=c_char), intent(in) :: path(*)
-      end function c_unlink
-
-      !> POSIX fsync(2)
-      integer(c_int) function c_fsync(descriptor) bind(C, name='fsync')
-         import :: c_int
-         integer(c_int), value :: descriptor
-      end function c_fsync
-
-      !> POSIX lseek(2) with 64-bit offsets (GNU C library)
-      integer(c_int64_t) function c_lseek(descriptor, offset, from) bind(C, name='lseek64')
-         import :: c_int, c_int64_t
-         integer(c_int), value :: descriptor
-         integer(c_int64_t), value :: offset
-         integer(c_int), value :: from
-      end function c_lseek
-
-      !> Linux fallocate(2) with 64-bit offsets
-      integer(c_int) function c_fallocate(descriptor, mode, offset, length) bind(C, name='fallocate64')
-         import :: c_int, c_int64_t
-         integer(c_int), value :: descriptor, mode
-         integer(c_int64_t), value :: offset, length
-      end function c_fallocate
-
-      !> POSIX strerror(3)
-      type(c_ptr) function c_strerror(number) bind(C, name='strerror')
-         import :: c_int, c_ptr
-         integer(c_int), value :: number
-      end function c_strerror
-   end interface
 
 contains
 
@@ -249,23 +185,15 @@ contains
       character(len=*), intent(in) :: text
       !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
-      character(kind=c_char), target :: bytes(len(text))
       character(len=:), allocatable :: reason
       integer(c_int) :: descriptor
-      integer(c_size_t) :: written
-      integer :: k, n
 
-      do k = 1, len(text)
-         bytes(k) = text(k:k)
-      end do
       descriptor = c_open(path//c_null_char, write_only, 0_c_int)
-      if (descriptor < 0_c_int) reason = last_failure()
-      n = 0
-      do while (n < len(text) .and. .not. allocated(reason))
-         written = c_write(descriptor, c_loc(bytes(n + 1)), int(len(text) - n, c_size_t))
-         if (written <= 0_c_size_t) reason = last_failure()
-         n = n + int(written)
-      end do
+      if (descriptor < 0_c_int) then
+         reason = last_failure()
+      else if (.not. is_written(descriptor, text)) then
+         reason = last_failure()
+      end if
       if (.not. allocated(reason)) then
          if (c_fsync(descriptor) /= 0_c_int) reason = last_failure()
       end if
@@ -307,16 +235,8 @@ contains
       !> Value of errno
       integer(c_int), intent(in) :: number
       character(len=:), allocatable :: reason
-      character(kind=c_char), pointer :: letters(:)
-      type(c_ptr) :: text
-      integer :: k
 
-      text = c_strerror(number)
-      call c_f_pointer(text, letters, [c_strlen(text)])
-      allocate (character(len=size(letters)) :: reason)
-      do k = 1, size(letters)
-         reason(k:k) = letters(k)
-      end do
+      reason = text_at(c_strerror(number))
    end function errno_message
 
 end module polydem_file_system

@@ -76,10 +76,10 @@ module polydem_folder_lock
    type :: observation_t
       !> Time constants
       type(lock_times_t) :: times
-      !> Owner at the last look
+      !> Owner at the last check
       type(owner_t) :: owner
-      !> Times of the first and the last look at this owner [s]
-      real(dp) :: since = 0.0_dp, last_look = -huge(0.0_dp)
+      !> Times of the first and the last check of this owner [s]
+      real(dp) :: since = 0.0_dp, last_check = -huge(0.0_dp)
       !> Whether the owner ran or runs under the kernel of this process
       logical :: is_same_kernel = .false.
       !> Whether the heartbeat of the owner was seen since `since`
@@ -94,10 +94,10 @@ module polydem_folder_lock
       procedure :: record
       procedure :: decide_if_free
       procedure :: decide_if_busy
-      procedure :: wait => wait_for_next_look
+      procedure :: wait => wait_for_next_check
    end type observation_t
 
-   !> Decisions after a look: wait and look again, take the lock, or refuse to run
+   !> Decisions after a check: wait and check again, take the lock, or refuse to run
    integer, parameter :: wait_longer = 0, take = 1, refuse = 2
 
 contains
@@ -265,13 +265,13 @@ contains
       now = wall_seconds()
       is_same = owner%key == self%owner%key .and. owner%process == self%owner%process .and. &
                 owner%host == self%owner%host .and. (owner%link_exists .eqv. self%owner%link_exists) .and. &
-                (owner%is_empty .eqv. self%owner%is_empty) .and. now - self%last_look < 0.5_dp*self%times%watch
+                (owner%is_empty .eqv. self%owner%is_empty) .and. now - self%last_check < 0.5_dp*self%times%watch
       self%has_renewed = is_same .and. (self%has_renewed .or. owner%renewed /= self%owner%renewed)
       if (.not. is_same) self%since = now
       self%is_creator = owner%is_empty .and. (is_new .or. (self%is_creator .and. is_same))
       self%owner = owner
       self%is_same_kernel = owner%is_under_this_kernel()
-      self%last_look = now
+      self%last_check = now
    end subroutine record
 
    !> Decision about a file that no kernel lock denies to this process: wait_longer, take or refuse
@@ -282,7 +282,7 @@ contains
       logical :: is_finished
       real(dp) :: waited
 
-      waited = self%last_look - self%since
+      waited = self%last_check - self%since
       self%is_watched = .false.
       decide_if_free = wait_longer
       if (.not. self%owner%link_exists) return
@@ -313,7 +313,7 @@ contains
       ! A file server releases the locks of a dead machine only after some time.
       if (self%is_watched) limit = 2.0_dp*self%times%watch
       decide_if_busy = wait_longer
-      if (self%last_look - self%since >= limit .or. (self%is_watched .and. self%has_renewed)) decide_if_busy = refuse
+      if (self%last_check - self%since >= limit .or. (self%is_watched .and. self%has_renewed)) decide_if_busy = refuse
    end function decide_if_busy
 
    !> Whether the process of a lock without a key may be a living run of an older version. A process with the identifier
@@ -326,8 +326,8 @@ contains
       if (runs_older_version) runs_older_version = runs_same_program(process)
    end function runs_older_version
 
-   !> Wait until the next look. The first long wait is announced on the screen.
-   subroutine wait_for_next_look(self, folder)
+   !> Wait until the next check. The first long wait is announced on the screen.
+   subroutine wait_for_next_check(self, folder)
       class(observation_t), intent(inout) :: self
       !> Result folder
       character(len=*), intent(in) :: folder
@@ -344,7 +344,7 @@ contains
       end if
       self%is_announced = .true.
       call wait_for(min(0.25_dp, 0.05_dp*self%times%watch))
-   end subroutine wait_for_next_look
+   end subroutine wait_for_next_check
 
    !> Message that another run writes to the folder
    function refusal(folder, observed, answer) result(message)

@@ -1,10 +1,12 @@
 !> Contents of folders (POSIX, GNU C library on Linux): lists of names, links, canonical paths, and the bytes of small
 !> files.
 module polydem_folders
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_null_char, c_null_ptr, c_ptr
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_loc, c_null_char, c_null_ptr, &
+      c_ptr
    use polydem_errors, only: error_t, io_error, raise
    use polydem_file_system, only: last_failure
-   use polydem_posix, only: c_free, c_strlen
+   use polydem_posix, only: c_closedir, c_faccessat, c_opendir, c_readdir, c_realpath, c_rmdir, text_at
+   use polydem_posix_processes, only: c_free
    implicit none
    private
    public :: link_exists, list_names, read_bytes, remove_folder, canonical_path
@@ -19,47 +21,6 @@ module polydem_folders
    integer, parameter :: name_offset = 19
    !> Maximum length of a file name (NAME_MAX of Linux)
    integer, parameter :: max_name_length = 255
-
-   interface
-      !> POSIX faccessat(2)
-      integer(c_int) function c_faccessat(folder, path, mode, flags) bind(C, name='faccessat')
-         import :: c_char, c_int
-         integer(c_int), value :: folder
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int), value :: mode, flags
-      end function c_faccessat
-
-      !> POSIX opendir(3)
-      type(c_ptr) function c_opendir(path) bind(C, name='opendir')
-         import :: c_char, c_ptr
-         character(kind=c_char), intent(in) :: path(*)
-      end function c_opendir
-
-      !> POSIX readdir(3)
-      type(c_ptr) function c_readdir(stream) bind(C, name='readdir')
-         import :: c_ptr
-         type(c_ptr), value :: stream
-      end function c_readdir
-
-      !> POSIX closedir(3)
-      integer(c_int) function c_closedir(stream) bind(C, name='closedir')
-         import :: c_int, c_ptr
-         type(c_ptr), value :: stream
-      end function c_closedir
-
-      !> POSIX rmdir(2)
-      integer(c_int) function c_rmdir(path) bind(C, name='rmdir')
-         import :: c_char, c_int
-         character(kind=c_char), intent(in) :: path(*)
-      end function c_rmdir
-
-      !> POSIX realpath(3), which allocates its result if `resolved` is null
-      type(c_ptr) function c_realpath(path, resolved) bind(C, name='realpath')
-         import :: c_char, c_ptr
-         character(kind=c_char), intent(in) :: path(*)
-         type(c_ptr), value :: resolved
-      end function c_realpath
-   end interface
 
 contains
 
@@ -104,14 +65,9 @@ contains
       type(c_ptr), intent(in) :: entry
       character(len=max_name_length) :: name
       character(kind=c_char), pointer :: letters(:)
-      integer :: k
 
-      call c_f_pointer(entry, letters, [name_offset + max_name_length + 1])
-      name = ''
-      do k = 1, max_name_length
-         if (letters(name_offset + k) == c_null_char) exit
-         name(k:k) = letters(name_offset + k)
-      end do
+      call c_f_pointer(entry, letters, [name_offset + 1])
+      name = text_at(c_loc(letters(name_offset + 1)))
    end function name_of
 
    !> Read all bytes of a small file.
@@ -152,19 +108,10 @@ contains
       !> Any path of the file or folder
       character(len=*), intent(in) :: path
       character(len=:), allocatable :: resolved
-      character(kind=c_char), pointer :: letters(:)
       type(c_ptr) :: text
-      integer :: k
 
-      resolved = ''
       text = c_realpath(path//c_null_char, c_null_ptr)
-      if (.not. c_associated(text)) return
-      call c_f_pointer(text, letters, [c_strlen(text)])
-      deallocate (resolved)
-      allocate (character(len=size(letters)) :: resolved)
-      do k = 1, size(letters)
-         resolved(k:k) = letters(k)
-      end do
+      resolved = text_at(text)
       call c_free(text)
    end function canonical_path
 

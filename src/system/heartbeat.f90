@@ -5,12 +5,13 @@
 !> process is stopped or the file system does not respond. It writes the counter first and then reads the key; the
 !> counter never overwrites the key of another process. If no thread can be created, `has_lost` gives the beats.
 module polydem_heartbeat
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_funloc, c_funptr, c_int, &
-      c_intptr_t, c_null_char, c_null_ptr, c_ptr, c_short, c_size_t, c_sizeof
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_double, c_f_pointer, c_funloc, c_int, c_intptr_t, &
+      c_loc, c_null_char, c_null_ptr, c_ptr, c_short, c_size_t, c_sizeof
    use polydem_clock, only: wall_seconds
    use polydem_kinds, only: dp
    use polydem_lock_file, only: lock_file_t, read_record, record_length
-   use polydem_posix, only: c_close, c_free
+   use polydem_posix, only: c_close
+   use polydem_posix_processes, only: c_free, c_malloc, c_pipe2, c_poll, pthread_create, pthread_join
    implicit none
    private
    public :: heartbeat_t, n_digits
@@ -71,45 +72,6 @@ module polydem_heartbeat
    integer(c_int), parameter :: close_on_exec = int(o'2000000', c_int)
    !> POLLIN of poll(2)
    integer(c_short), parameter :: readable = 1_c_short
-
-   interface
-      !> pthread_create(3); pthread_t is as wide as an address on Linux
-      integer(c_int) function pthread_create(thread, attributes, routine, argument) bind(C, name='pthread_create')
-         import :: c_funptr, c_int, c_intptr_t, c_ptr
-         integer(c_intptr_t), intent(out) :: thread
-         type(c_ptr), value :: attributes
-         type(c_funptr), value :: routine
-         type(c_ptr), value :: argument
-      end function pthread_create
-
-      !> pthread_join(3)
-      integer(c_int) function pthread_join(thread, result_of_it) bind(C, name='pthread_join')
-         import :: c_int, c_intptr_t, c_ptr
-         integer(c_intptr_t), value :: thread
-         type(c_ptr), value :: result_of_it
-      end function pthread_join
-
-      !> pipe2(2)
-      integer(c_int) function c_pipe2(ends, flags) bind(C, name='pipe2')
-         import :: c_int
-         integer(c_int), intent(out) :: ends(2)
-         integer(c_int), value :: flags
-      end function c_pipe2
-
-      !> poll(2); nfds_t is as wide as size_t on Linux
-      integer(c_int) function c_poll(files, n, milliseconds) bind(C, name='poll')
-         import :: c_int, c_size_t, pollfd_t
-         type(pollfd_t), intent(inout) :: files
-         integer(c_size_t), value :: n
-         integer(c_int), value :: milliseconds
-      end function c_poll
-
-      !> C malloc
-      type(c_ptr) function c_malloc(size) bind(C, name='malloc')
-         import :: c_ptr, c_size_t
-         integer(c_size_t), value :: size
-      end function c_malloc
-   end interface
 
 contains
 
@@ -191,13 +153,13 @@ contains
       type(c_ptr), value :: argument
       type(c_ptr) :: nothing
       type(pulse_t), pointer, volatile :: pulse
-      type(pollfd_t) :: event
+      type(pollfd_t), target :: event
 
       nothing = c_null_ptr
       call c_f_pointer(argument, pulse)
       do while (pulse%is_lost == 0_c_int)
          event = pollfd_t(pulse%wake_read_end, readable, 0_c_short)
-         if (c_poll(event, 1_c_size_t, pulse%interval) > 0_c_int) exit
+         if (c_poll(c_loc(event), 1_c_size_t, pulse%interval) > 0_c_int) exit
          call give_beat(pulse)
       end do
    end function beat

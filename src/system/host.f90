@@ -1,54 +1,13 @@
 !> Facts about the machine of a run (Linux): name, processor, memory, load, environment, date, terminal.
 module polydem_host
-   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_long, c_null_char, c_null_ptr, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_null_ptr, c_size_t
    use polydem_kinds, only: dp, ip, lp
+   use polydem_posix_processes, only: c_time, gethostname, gmtime, isatty, strftime, sysconf
    implicit none
    private
    public :: host_name, processor_name, processor_clock, processor_has, cache_sizes, memory_size, frequency_governor
    public :: kernel_release, boot_identity, cores_online
    public :: load_average, environment, utc_now, is_terminal, resident_memory
-
-   interface
-      !> POSIX gethostname(2)
-      integer(c_int) function gethostname(name, length) bind(C, name='gethostname')
-         import :: c_char, c_int, c_size_t
-         character(kind=c_char), intent(out) :: name(*)
-         integer(c_size_t), value :: length
-      end function gethostname
-
-      !> POSIX isatty(3)
-      integer(c_int) function isatty(descriptor) bind(C, name='isatty')
-         import :: c_int
-         integer(c_int), value :: descriptor
-      end function isatty
-
-      !> POSIX sysconf(3)
-      integer(c_long) function sysconf(name) bind(C, name='sysconf')
-         import :: c_int, c_long
-         integer(c_int), value :: name
-      end function sysconf
-
-      !> C time
-      integer(c_long) function c_time(place) bind(C, name='time')
-         import :: c_long, c_ptr
-         type(c_ptr), value :: place
-      end function c_time
-
-      !> C gmtime
-      type(c_ptr) function gmtime(seconds) bind(C, name='gmtime')
-         import :: c_long, c_ptr
-         integer(c_long), intent(in) :: seconds
-      end function gmtime
-
-      !> C strftime
-      integer(c_size_t) function strftime(text, length, form, broken_down) bind(C, name='strftime')
-         import :: c_char, c_ptr, c_size_t
-         character(kind=c_char), intent(out) :: text(*)
-         integer(c_size_t), value :: length
-         character(kind=c_char), intent(in) :: form(*)
-         type(c_ptr), value :: broken_down
-      end function strftime
-   end interface
 
    !> Text for facts that the system does not report
    character(len=*), parameter :: unknown = 'unknown'

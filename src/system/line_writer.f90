@@ -3,11 +3,11 @@
 !> Every written line survives a crash of the program, and every failure is detected. The Fortran `flush` statement does
 !> not report a full disk.
 module polydem_line_writer
-   use, intrinsic :: iso_c_binding, only: c_char, c_int, c_loc, c_new_line, c_null_char, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_int, c_new_line, c_null_char
    use, intrinsic :: iso_fortran_env, only: output_unit
    use polydem_errors, only: error_t, io_error, raise
    use polydem_file_system, only: exists, last_failure
-   use polydem_posix, only: c_close, c_open, c_write, error_number
+   use polydem_posix, only: c_close, c_creat, c_open, error_number, is_written
    implicit none
    private
    public :: line_writer_t
@@ -25,7 +25,6 @@ module polydem_line_writer
    contains
       procedure :: open => open_writer
       procedure :: open_screen
-      procedure :: open_errors
       procedure :: put
       procedure :: put_line
       procedure :: check
@@ -43,15 +42,6 @@ module polydem_line_writer
    integer(c_int), parameter :: read_and_write = int(o'666', c_int)
    !> O_WRONLY and O_APPEND of Linux
    integer(c_int), parameter :: write_and_append = int(o'2001', c_int)
-
-   interface
-      !> POSIX creat(2)
-      integer(c_int) function c_creat(path, mode) bind(C, name='creat')
-         import :: c_char, c_int
-         character(kind=c_char), intent(in) :: path(*)
-         integer(c_int), value :: mode
-      end function c_creat
-   end interface
 
 contains
 
@@ -77,52 +67,35 @@ contains
    end subroutine open_writer
 
    !> Open standard output. Its previous Fortran output is flushed before each write.
-   subroutine open_screen(self)
+   subroutine open_screen(self, errors)
       class(line_writer_t), intent(inout) :: self
+      !> Whether to open standard error instead; false if absent
+      logical, intent(in), optional :: errors
 
       self%name = 'standard output'
-      if (allocated(self%failure)) deallocate (self%failure)
       self%descriptor = standard_output
-   end subroutine open_screen
-
-   !> Open standard error.
-   subroutine open_errors(self)
-      class(line_writer_t), intent(inout) :: self
-
-      self%name = 'standard error'
       if (allocated(self%failure)) deallocate (self%failure)
+      if (.not. present(errors)) return
+      if (.not. errors) return
+      self%name = 'standard error'
       self%descriptor = standard_error
-   end subroutine open_errors
+   end subroutine open_screen
 
    !> Write a text unchanged. A failure is stored and reported by `check` and `close`.
    subroutine put(self, text)
       class(line_writer_t), intent(inout) :: self
       !> The text
       character(len=*), intent(in) :: text
-      character(kind=c_char), target :: bytes(len(text))
-      integer(c_int) :: number
-      integer(c_size_t) :: written
-      integer :: k, n, ignored
+      integer :: ignored
 
       if (self%descriptor < 0_c_int .or. allocated(self%failure)) return
       if (self%descriptor == standard_output) flush (output_unit, iostat=ignored)
-      do k = 1, len(text)
-         bytes(k) = text(k:k)
-      end do
-      n = 0
-      do while (n < len(text))
-         written = c_write(self%descriptor, c_loc(bytes(n + 1)), int(len(text) - n, c_size_t))
-         if (written <= 0_c_size_t) then
-            number = error_number()
-            if (self%is_screen() .and. number == broken_pipe) then
-               self%descriptor = -1_c_int
-            else
-               self%failure = last_failure()
-            end if
-            return
-         end if
-         n = n + int(written)
-      end do
+      if (is_written(self%descriptor, text)) return
+      if (error_number() == broken_pipe .and. self%is_screen()) then
+         self%descriptor = -1_c_int
+      else
+         self%failure = last_failure()
+      end if
    end subroutine put
 
    !> Write a text and a line feed.

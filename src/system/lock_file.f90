@@ -7,7 +7,7 @@
 module polydem_lock_file
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char, c_size_t
    use polydem_file_system, only: last_failure
-   use polydem_posix, only: c_close, c_open, error_number
+   use polydem_posix, only: c_close, c_flock, c_open, c_pread, c_pwrite, error_number
    implicit none
    private
    public :: lock_file_t, read_record, record_length
@@ -40,32 +40,6 @@ module polydem_lock_file
    !> ENOENT, EINTR, EWOULDBLOCK, EEXIST, ENOTDIR and ESTALE of errno on Linux
    integer(c_int), parameter :: no_entry = 2_c_int, interrupted = 4_c_int, would_block = 11_c_int, &
       exists_already = 17_c_int, no_folder = 20_c_int, stale = 116_c_int
-
-   interface
-      !> flock(2)
-      integer(c_int) function c_flock(descriptor, operation) bind(C, name='flock')
-         import :: c_int
-         integer(c_int), value :: descriptor, operation
-      end function c_flock
-
-      !> POSIX pread(2); ssize_t is as wide as size_t
-      integer(c_size_t) function c_pread(descriptor, bytes, length, offset) bind(C, name='pread64')
-         import :: c_char, c_int, c_int64_t, c_size_t
-         integer(c_int), value :: descriptor
-         character(kind=c_char), intent(inout) :: bytes(*)
-         integer(c_size_t), value :: length
-         integer(c_int64_t), value :: offset
-      end function c_pread
-
-      !> POSIX pwrite(2)
-      integer(c_size_t) function c_pwrite(descriptor, bytes, length, offset) bind(C, name='pwrite64')
-         import :: c_char, c_int, c_int64_t, c_size_t
-         integer(c_int), value :: descriptor
-         character(kind=c_char), intent(in) :: bytes(*)
-         integer(c_size_t), value :: length
-         integer(c_int64_t), value :: offset
-      end function c_pwrite
-   end interface
 
 contains
 

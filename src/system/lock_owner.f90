@@ -16,6 +16,7 @@ module polydem_lock_owner
    use polydem_host, only: boot_identity, host_name, utc_now
    use polydem_kinds, only: ip, lp
    use polydem_lock_file, only: read_record, record_length
+   use polydem_posix_processes, only: c_getrandom
    use polydem_processes, only: own_process
    use polydem_strings, only: to_text
    implicit none
@@ -54,16 +55,6 @@ module polydem_lock_owner
       procedure :: is_under_this_kernel
       procedure :: name => name_of
    end type owner_t
-
-   interface
-      !> getrandom(2)
-      integer(c_size_t) function c_getrandom(word, length, flags) bind(C, name='getrandom')
-         import :: c_int, c_int64_t, c_size_t
-         integer(c_int64_t), intent(inout) :: word
-         integer(c_size_t), value :: length
-         integer(c_int), value :: flags
-      end function c_getrandom
-   end interface
 
 contains
 

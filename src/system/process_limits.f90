@@ -3,13 +3,15 @@
 !> A process that exceeds a limit is ended by a signal or by the OpenMP library in the middle of its work. Therefore the
 !> limits are checked before anything is written.
 module polydem_process_limits
-   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_funptr, c_int, c_int64_t, c_loc, c_long, &
+   use, intrinsic :: iso_c_binding, only: c_char, c_f_pointer, c_funloc, c_int, c_int64_t, c_loc, c_long, &
       c_null_ptr, c_ptr, c_size_t
    use omp_lib, only: omp_get_num_procs, omp_get_thread_limit
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: errno_message, last_failure
    use polydem_kinds, only: ip, lp
    use polydem_posix, only: c_close
+   use polydem_posix_processes, only: c_attributes_init, c_attributes_stack, c_getaffinity, c_getrlimit, c_pipe, &
+      c_read, limit_t, pthread_create, pthread_join
    use polydem_strings, only: to_text
    implicit none
    private
@@ -29,72 +31,6 @@ module polydem_process_limits
    integer, parameter :: attribute_words = 16
    !> RLIMIT_STACK of getrlimit(2) on Linux
    integer(c_int), parameter :: stack_limit = 3_c_int
-
-   !> struct rlimit. Its numbers are unsigned in C: a negative value here means unlimited
-   type, bind(C) :: limit_t
-      !> Current limit, and maximum to which it may be raised [B]
-      integer(c_int64_t) :: soft, hard
-   end type limit_t
-
-   interface
-      !> POSIX getrlimit(2) with 64-bit limits
-      integer(c_int) function c_getrlimit(resource, limit) bind(C, name='getrlimit64')
-         import :: c_int, limit_t
-         integer(c_int), value :: resource
-         type(limit_t), intent(out) :: limit
-      end function c_getrlimit
-
-      !> Linux sched_getaffinity(2)
-      integer(c_int) function c_getaffinity(process, length, mask) bind(C, name='sched_getaffinity')
-         import :: c_int, c_long, c_size_t
-         integer(c_int), value :: process
-         integer(c_size_t), value :: length
-         integer(c_long), intent(out) :: mask(*)
-      end function c_getaffinity
-
-      !> POSIX pthread_create(3)
-      integer(c_int) function c_thread_create(thread, attributes, routine, argument) bind(C, name='pthread_create')
-         import :: c_funptr, c_int, c_long, c_ptr
-         integer(c_long), intent(out) :: thread
-         type(c_ptr), value :: attributes
-         type(c_funptr), value :: routine
-         type(c_ptr), value :: argument
-      end function c_thread_create
-
-      !> POSIX pthread_join(3)
-      integer(c_int) function c_thread_join(thread, value) bind(C, name='pthread_join')
-         import :: c_int, c_long, c_ptr
-         integer(c_long), value :: thread
-         type(c_ptr), value :: value
-      end function c_thread_join
-
-      !> POSIX pthread_attr_init(3)
-      integer(c_int) function c_attributes_init(attributes) bind(C, name='pthread_attr_init')
-         import :: c_int, c_long
-         integer(c_long), intent(inout) :: attributes(*)
-      end function c_attributes_init
-
-      !> POSIX pthread_attr_setstacksize(3)
-      integer(c_int) function c_attributes_stack(attributes, bytes) bind(C, name='pthread_attr_setstacksize')
-         import :: c_int, c_long, c_size_t
-         integer(c_long), intent(inout) :: attributes(*)
-         integer(c_size_t), value :: bytes
-      end function c_attributes_stack
-
-      !> POSIX pipe(2)
-      integer(c_int) function c_pipe(ends) bind(C, name='pipe')
-         import :: c_int
-         integer(c_int), intent(out) :: ends(2)
-      end function c_pipe
-
-      !> POSIX read(2); ssize_t is as wide as size_t
-      integer(c_size_t) function c_read(descriptor, bytes, length) bind(C, name='read')
-         import :: c_char, c_int, c_size_t
-         integer(c_int), value :: descriptor
-         character(kind=c_char), intent(out) :: bytes(*)
-         integer(c_size_t), value :: length
-      end function c_read
-   end interface
 
 contains
 
@@ -165,13 +101,13 @@ contains
       if (stack > 0_lp) status = c_attributes_stack(attributes, int(stack, c_size_t))
       n = 1_ip
       do while (status == 0_c_int .and. n < threads)
-         status = c_thread_create(names(n), c_loc(attributes), c_funloc(await_end), c_loc(ends))
+         status = pthread_create(names(n), c_loc(attributes), c_funloc(await_end), c_loc(ends))
          if (status == 0_c_int) n = n + 1_ip
       end do
       ! Closing this end of the pipe ends the threads.
       ignored = c_close(ends(2))
       do k = 1_ip, n - 1_ip
-         ignored = c_thread_join(names(k), c_null_ptr)
+         ignored = pthread_join(names(k), c_null_ptr)
       end do
       ignored = c_close(ends(1))
       if (status /= 0_c_int) call raise(error, input_error, 'only '//to_text(n)//' of '//to_text(threads)// &

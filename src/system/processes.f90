@@ -1,8 +1,9 @@
 !> Processes of this machine (POSIX): identifier of this process, state of another process, and waiting.
 module polydem_processes
-   use, intrinsic :: iso_c_binding, only: c_int, c_null_ptr, c_ptr, c_size_t
+   use, intrinsic :: iso_c_binding, only: c_int, c_null_ptr, c_size_t
    use polydem_kinds, only: dp, ip
    use polydem_posix, only: error_number
+   use polydem_posix_processes, only: c_getpid, c_kill, c_poll
    use polydem_strings, only: to_text
    implicit none
    private
@@ -14,27 +15,6 @@ module polydem_processes
    integer(c_int), parameter :: no_signal = 0_c_int
    !> Length that holds the start of a line of proc(5)
    integer, parameter :: line_length = 512
-
-   interface
-      !> POSIX getpid(2)
-      integer(c_int) function c_getpid() bind(C, name='getpid')
-         import :: c_int
-      end function c_getpid
-
-      !> POSIX kill(2)
-      integer(c_int) function c_kill(process, signal) bind(C, name='kill')
-         import :: c_int
-         integer(c_int), value :: process, signal
-      end function c_kill
-
-      !> POSIX poll(2), here without files; nfds_t is as wide as size_t on Linux
-      integer(c_int) function c_poll(files, n, milliseconds) bind(C, name='poll')
-         import :: c_int, c_ptr, c_size_t
-         type(c_ptr), value :: files
-         integer(c_size_t), value :: n
-         integer(c_int), value :: milliseconds
-      end function c_poll
-   end interface
 
 contains
 

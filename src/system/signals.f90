@@ -6,7 +6,8 @@
 !> ignored.
 module polydem_signals
    use, intrinsic :: iso_c_binding, only: c_associated, c_funloc, c_funptr, c_int, c_intptr_t, c_loc, c_long, &
-      c_null_funptr, c_null_ptr, c_ptr
+      c_null_funptr, c_null_ptr
+   use polydem_posix_processes, only: c_sigaction
    implicit none
    private
    public :: await_signals, caught_signal, release_signals, ignore_write_signals
@@ -33,15 +34,6 @@ module polydem_signals
       !> Reserved for the library
       type(c_funptr) :: restorer
    end type sigaction_t
-
-   interface
-      !> POSIX sigaction(2)
-      integer(c_int) function c_sigaction(signal, new, old) bind(C, name='sigaction')
-         import :: c_int, c_ptr
-         integer(c_int), value :: signal
-         type(c_ptr), value :: new, old
-      end function c_sigaction
-   end interface
 
 contains
 

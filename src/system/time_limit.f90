@@ -5,11 +5,13 @@
 !> this. The operating system runs the timer. When it expires, a thread prints a message and ends this process; MPI then
 !> ends the other ranks.
 module polydem_time_limit
-   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_funloc, c_funptr, c_int, c_long, c_new_line, &
+   use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_int, c_long, c_new_line, &
       c_null_char, c_null_ptr, c_ptr, c_size_t
    use polydem_errors, only: io_error
    use polydem_kinds, only: dp, ip, lp
-   use polydem_posix, only: c_free, c_strlen, c_write
+   use polydem_posix, only: c_strlen, c_write
+   use polydem_posix_processes, only: c_exit_now, c_free, c_strdup, event_t, timer_create, timer_delete, &
+      timer_settime, times_t
    use polydem_strings, only: to_text
    implicit none
    private
@@ -35,67 +37,6 @@ module polydem_time_limit
       procedure :: set
       procedure :: lift
    end type time_limit_t
-
-   !> struct sigevent of the GNU C library, 64 bytes
-   type, bind(C) :: event_t
-      !> Argument of the procedure
-      type(c_ptr) :: value
-      !> Number of a signal; not used
-      integer(c_int) :: signal
-      !> Kind of the notification, here a thread
-      integer(c_int) :: notify
-      !> Procedure that is called when the timer expires
-      type(c_funptr) :: procedure
-      !> Attributes of the thread
-      type(c_ptr) :: attributes
-      !> Reserved for the library
-      integer(c_int) :: rest(8)
-   end type event_t
-
-   !> POSIX struct itimerspec
-   type, bind(C) :: times_t
-      !> Period of a repeated timer [s, ns]; zero here
-      integer(c_long) :: period(2)
-      !> Time until the timer expires [s, ns]
-      integer(c_long) :: first(2)
-   end type times_t
-
-   interface
-      !> POSIX timer_create(2)
-      integer(c_int) function timer_create(clock, event, timer) bind(C, name='timer_create')
-         import :: c_int, c_ptr, event_t
-         integer(c_int), value :: clock
-         type(event_t), intent(in) :: event
-         type(c_ptr), intent(out) :: timer
-      end function timer_create
-
-      !> POSIX timer_settime(2)
-      integer(c_int) function timer_settime(timer, flags, new, old) bind(C, name='timer_settime')
-         import :: c_int, c_ptr, times_t
-         type(c_ptr), value :: timer
-         integer(c_int), value :: flags
-         type(times_t), intent(in) :: new
-         type(c_ptr), value :: old
-      end function timer_settime
-
-      !> POSIX timer_delete(2)
-      integer(c_int) function timer_delete(timer) bind(C, name='timer_delete')
-         import :: c_int, c_ptr
-         type(c_ptr), value :: timer
-      end function timer_delete
-
-      !> POSIX strdup(3)
-      type(c_ptr) function c_strdup(text) bind(C, name='strdup')
-         import :: c_char, c_ptr
-         character(kind=c_char), intent(in) :: text(*)
-      end function c_strdup
-
-      !> POSIX _exit(2)
-      subroutine c_exit_now(code) bind(C, name='_exit')
-         import :: c_int
-         integer(c_int), value :: code
-      end subroutine c_exit_now
-   end interface
 
 contains
 
@@ -148,9 +89,11 @@ contains
    !> Print the message and end this process.
    subroutine end_process(message) bind(C)
       type(c_ptr), value :: message
+      character(kind=c_char), pointer :: letters(:)
       integer(c_size_t) :: written
 
-      written = c_write(standard_error, message, c_strlen(message))
+      call c_f_pointer(message, letters, [c_strlen(message)])
+      written = c_write(standard_error, letters, size(letters, kind=c_size_t))
       call c_exit_now(int(io_error, c_int))
    end subroutine end_process
 

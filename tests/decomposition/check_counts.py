@@ -17,7 +17,8 @@ def count(program: str, launch: list, ranks: int) -> list:
     subprocess.run([*launch, str(ranks), program, path, str(GRAINS)], check=True)
     with open(path, newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
-    return [{name: word if name in ("shape", "cut") else float(word) for name, word in row.items()} for row in rows]
+    words = ("shape", "partition")
+    return [{name: word if name in words else float(word) for name, word in row.items()} for row in rows]
 
 
 def complaints(row: dict) -> list:
@@ -33,7 +34,7 @@ def complaints(row: dict) -> list:
     if row["ranks"] == 1:
         return found + (["a single rank has halo bodies"] if row["ghosts"] or row["messages"] else [])
     strip = (1.0 + 2.0 * row["margin"]) * math.sqrt(own)
-    if not 0.5 * strip < row["ghosts_most"] < (4.0 if row["cut"] == "bisection" else 8.0) * strip:
+    if not 0.5 * strip < row["ghosts_most"] < (4.0 if row["partition"] == "bisection" else 8.0) * strip:
         found.append("halo bodies are not in a strip")
     if not 2 * row["ranks"] - 2 <= row["messages"] <= row["ranks"] * (row["ranks"] - 1):
         found.append("messages do not connect the ranks")

@@ -35,8 +35,8 @@ program count_exchange
    if (comm%is_root()) then
       call get_word(1, word)
       open (newunit=unit, file=word, status='replace', action='write')
-      write (unit, '(a)') 'shape,grains,ranks,cut,margin,grains_most,ghosts,ghosts_most,messages,messages_most,'// &
-         'bytes,bytes_most,rectangles,imbalance,ghosts_per_grain,neighbours'
+      write (unit, '(a)') 'shape,grains,ranks,partition,margin,grains_most,ghosts,ghosts_most,messages,'// &
+         'messages_most,bytes,bytes_most,rectangles,imbalance,ghosts_per_grain,neighbours'
    end if
    do a = 2, command_argument_count()
       call get_word(a, word)
@@ -102,7 +102,7 @@ contains
       character(len=*), intent(in) :: shape, cut
       real(wp), intent(in) :: margin
       real(wp), intent(in) :: grains(:, :)
-      type(rank_bounds_t) :: regions
+      type(rank_bounds_t) :: rank_bounds
       real(wp), allocatable :: rectangles(:, :)
       real(wp) :: boxes(4, size(grains, 2))
       integer(ip) :: ranks(comm%size), n_ranks, k
@@ -110,10 +110,10 @@ contains
 
       boxes(1:2, :) = grains(1:2, :) - grains(3:4, :) - margin
       boxes(3:4, :) = grains(1:2, :) + grains(3:4, :) + margin
-      call regions%publish(comm, boxes)
+      call rank_bounds%publish(comm, boxes)
       sent = 0_lp
       do k = 1_ip, size(boxes, 2, kind=ip)
-         call regions%needed_by(boxes(:, k), ranks, n_ranks)
+         call rank_bounds%needed_by(boxes(:, k), ranks, n_ranks)
          sent(ranks(1:n_ranks)) = sent(ranks(1:n_ranks)) + 1_lp
       end do
       received = sent

@@ -11,7 +11,7 @@ program divide_checks
    use polydem_random, only: new_random, random_t
    use polydem_rank_bounds, only: rank_bounds_t
    use polydem_communicator, only: communicator_t
-   use posed_team, only: divided, owners_of, shares, strew
+   use posed_communicator, only: divided, owners_of, shares, strew
    implicit none
    class(communicator_t), allocatable :: comm
    type(error_t), allocatable :: error
@@ -94,16 +94,16 @@ contains
       character(len=*), intent(in) :: name
       real(wp), intent(in) :: boxes(:, :)
       integer(ip), intent(in) :: owner(:)
-      type(rank_bounds_t) :: regions
+      type(rank_bounds_t) :: rank_bounds
       integer(ip) :: ranks(comm%size), n
       logical :: needed(0:comm%size - 1_ip)
       integer, allocatable :: mine(:)
       integer :: j, k
 
       mine = pack([(j, j=1, size(owner))], owner == comm%rank)
-      call regions%publish(comm, boxes(:, mine))
+      call rank_bounds%publish(comm, boxes(:, mine))
       do j = 1, size(mine)
-         call regions%needed_by(boxes(:, mine(j)), ranks, n)
+         call rank_bounds%needed_by(boxes(:, mine(j)), ranks, n)
          needed = .false.
          needed(ranks(1:n)) = .true.
          call demand(count(needed, kind=ip) == n .and. .not. needed(comm%rank), name//': list of ranks')

@@ -3,7 +3,7 @@ module pulls
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: contact_block_t
    use polydem_contact_history, only: contact_history_t
-   use polydem_force_part, only: acts_normal, force_part_t
+   use polydem_force_part, only: force_part_t, stage_normal
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -15,7 +15,7 @@ module pulls
       !> Attraction [N/m]
       real(wp) :: pull = 0.0_wp
    contains
-      procedure :: choose => choose_cohesion
+      procedure :: configure => configure_cohesion
       procedure :: add => add_cohesion
    end type cohesion_t
 
@@ -24,25 +24,23 @@ module pulls
       !> Attraction [N/m]
       real(wp) :: pull = 0.0_wp
    contains
-      procedure :: choose => choose_drag
+      procedure :: configure => configure_drag
       procedure :: add => add_drag
    end type drag_t
 
 contains
 
-   !> Choose this part always.
-   subroutine choose_cohesion(self, settings, chosen)
+   !> Set name and stage.
+   subroutine configure_cohesion(self, settings)
       class(cohesion_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
-      logical, intent(out) :: chosen
 
       associate (unused => settings)
       end associate
-      chosen = .true.
       self%name = 'cohesion'
-      self%stage = acts_normal
+      self%stage = stage_normal
       self%needs_cohesion = .true.
-   end subroutine choose_cohesion
+   end subroutine configure_cohesion
 
    !> Add the attraction.
    subroutine add_cohesion(self, bodies, dt, block, history)
@@ -61,18 +59,16 @@ contains
       end do
    end subroutine add_cohesion
 
-   !> Choose this part always.
-   subroutine choose_drag(self, settings, chosen)
+   !> Set name and stage.
+   subroutine configure_drag(self, settings)
       class(drag_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
-      logical, intent(out) :: chosen
 
       associate (unused => settings)
       end associate
-      chosen = .true.
       self%name = 'drag'
-      self%stage = acts_normal
-   end subroutine choose_drag
+      self%stage = stage_normal
+   end subroutine configure_drag
 
    !> Add the attraction.
    subroutine add_drag(self, bodies, dt, block, history)

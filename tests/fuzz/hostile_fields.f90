@@ -21,7 +21,7 @@ module hostile_fields
       integer(hsize_t), allocatable :: extent(:)
       !> Values in order
       real(dp), allocatable :: value(:)
-      !> Whether they are whole numbers
+      !> Whether they are integers
       logical :: whole = .false.
       !> A text in their place; empty: none
       character(len=:), allocatable :: text
@@ -39,7 +39,7 @@ contains
       integer, intent(in) :: extent(:)
       !> As many values
       real(dp), intent(in) :: value(:)
-      !> Whether they are whole numbers
+      !> Whether they are integers
       logical, intent(in) :: whole
       type(field_t) :: field
 

@@ -129,7 +129,7 @@ contains
       if (width > 1) self%fields = [self%fields, new_field(name, [width, size(values)/width], values, .false.)]
    end subroutine transfer_reals
 
-   !> Take a column of whole numbers as a field.
+   !> Take a column of integers as a field.
    subroutine transfer_longs(self, name, values, unit, meaning)
       class(field_serializer_t), intent(inout) :: self
       character(len=*), intent(in) :: name

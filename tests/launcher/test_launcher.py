@@ -290,7 +290,7 @@ class Ranks(Toy):
         for words in (["0"], ["-1"], ["two"], ["1000000"], ["2.5"], [""], []):
             code, _, messages = self.call("run", "x.nml", "--ranks", *words)
             self.assertEqual(code, 2)
-            self.assertIn("a whole number from 1 to 999999 was expected", messages)
+            self.assertIn("an integer from 1 to 999999 was expected", messages)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
 
     def test_under_mpirun_every_rank_becomes_the_program_with_mpi(self):

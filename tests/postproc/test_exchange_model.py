@@ -52,7 +52,8 @@ def test_one_rank_costs_its_bodies_and_nothing_else(law):
 
 
 def test_every_part_of_the_time_is_what_it_was_made_of(law):
-    machine = replace(MACHINE, ghost=0.25, imbalance=1.2, sums=3, interval=10.0, settlement=0.5, settled_bytes=100.0)
+    machine = replace(MACHINE, ghost=0.25, imbalance=1.2, sums=3, interval=10.0, redistribution=0.5,
+                      redistributed_bytes=100.0)
     step = predict(law, machine, 1e6, 64)
     ghosts = law.ghosts(1e6 / 64)
     assert step.bodies == pytest.approx(1.2 * 1e6 / 64 * 1e-6)
@@ -60,8 +61,9 @@ def test_every_part_of_the_time_is_what_it_was_made_of(law):
     assert step.neighbours == pytest.approx(8e-6 + ghosts * 48 / 1e9)
     assert step.everyone == pytest.approx(3 * 6e-6)
     waits = (13 * 6 + 9 * 8) * 1e-6
-    assert step.settling == pytest.approx((waits + (64 * 2 * 32 + 100 * ghosts) / 1e9 + 0.5e-6 * 1e6 / 64) / 10.0)
-    assert step.total == pytest.approx(step.bodies + step.ghosts + step.neighbours + step.everyone + step.settling)
+    assert step.redistributing == pytest.approx((waits + (64 * 2 * 32 + 100 * ghosts) / 1e9 + 0.5e-6 * 1e6 / 64) / 10.0)
+    parts = (step.bodies, step.ghosts, step.neighbours, step.everyone, step.redistributing)
+    assert step.total == pytest.approx(sum(parts))
     assert predict(law, machine, 1e6, 2).neighbours == pytest.approx(1e-6 + law.ghosts(5e5) * 48 / 1e9)
 
 
@@ -82,7 +84,7 @@ def test_few_ranks_make_no_row_of_strips():
 
 
 def test_files_are_read_and_joined(tmp_path):
-    counts = [counted(16), counted(64, cut="morton", margin=1.0)]
+    counts = [counted(16), counted(64, partition="morton", margin=1.0)]
     paths = [write(tmp_path / f"{k}.csv", [count]) for k, count in enumerate(counts)]
     assert read_counts(paths) == counts
     assert [row[:3] for row in strip_table(counts).rows] == [("drum", "bisection", "0.2"), ("drum", "morton", "1")]

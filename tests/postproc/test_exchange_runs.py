@@ -55,40 +55,41 @@ def test_all_counters_of_a_run_are_read(shared):
     assert {name: getattr(run, field) for field, name in COUNTERS.items()} == VALUES
     result = Trajectory(shared)
     assert run.bodies == int((~result.frame(0).fixed).sum()) > 0
-    assert (run.ranks, run.steps, run.cut, run.pairs, run.state_hash) == (16, 101, "morton", 130, result.state_hash)
+    assert (run.ranks, run.steps, run.partition, run.pairs) == (16, 101, "morton", 130)
+    assert run.state_hash == result.state_hash
 
 
 def test_cut_and_margin_are_those_of_the_group_decomposition(make_result):
     counters = {"steps": 1, "pairs": 1}
     assert read_run(make_result("a", counters)).margin == 0.0
     run = read_run(make_result("b", counters, "margin = 9.5E-003\n   partition = 'bisection'"))
-    assert (run.cut, run.margin, run.as_count().margin) == ("bisection", 0.0095, 0.0095)
+    assert (run.partition, run.margin, run.as_count().margin) == ("bisection", 0.0095, 0.0095)
 
 
 def test_counts_are_means_of_a_step_and_ghosts_do_not_follow_in_the_first(shared):
     run = replace(read_run(shared), bodies=40)
     count = run.as_count()
-    assert (count.shape, count.margin, count.cut, count.grains, count.ranks) == (SHAPE, MARGIN, "morton", 40, 16)
+    assert (count.shape, count.margin, count.partition, count.grains, count.ranks) == (SHAPE, MARGIN, "morton", 40, 16)
     assert (count.ghosts, count.ghosts_most, count.messages, count.bytes) == (100, 10, 60, 4800)
     assert (count.messages_most, count.bytes_most, count.rectangles, count.grains_most) == (5, 480, 70, 3)
 
 
-def test_the_tables_tell_steps_from_settlements_and_these_from_the_first(shared, alone):
+def test_the_tables_tell_steps_from_redistributions_and_these_from_the_first(shared, alone):
     runs = [replace(read_run(folder), bodies=40) for folder in (shared, alone)]
-    steps, settling = runs_tables(runs)
+    steps, redistributing = runs_tables(runs)
     rows = [dict(zip(steps.heading, row)) for row in steps.rows]
     assert [row["ranks"] for row in rows] == ["1", "16"]
     row = next(row for row in rows if row["ranks"] == "16")
     assert (row["ghosts per body"], row["most ghosts"], row["pairs per ghost"]) == ("2.50", "10", "0.500")
     assert (row["bodies, most/mean"], row["pairs, most/mean"]) == ("1.200", "2.462")
     expected = ("101", "3", "1", "100", "250", "50000", "500", "900", "500", "900000")
-    assert [row[4:] for row in settling.rows] == [expected]
+    assert [row[4:] for row in redistributing.rows] == [expected]
 
 
 def test_a_run_on_one_rank_has_its_bodies_and_tells_nothing(alone):
     run = read_run(alone)
     assert (run.ranks, run.most_bodies, run.most_pairs, run.ghosts, run.messages) == (1, run.bodies, 80, 0, 0)
-    assert run.later_settlements == 0
+    assert run.later_redistributions == 0
 
 
 def test_tables_of_runs_name_the_revision_that_counted(shared, alone, tmp_path):
@@ -106,6 +107,10 @@ def test_what_is_saved_is_read_again_and_nothing_else_is(shared, alone, tmp_path
     runs = [read_run(shared), read_run(alone)]
     write_runs(runs, tmp_path / "runs.csv")
     assert read_runs(tmp_path / "runs.csv") == runs
+    former = (tmp_path / "runs.csv").read_text(encoding="utf-8")
+    former = former.replace(",partition,", ",cut,", 1).replace(",redistributions,", ",settlements,", 1)
+    (tmp_path / "former.csv").write_text(former, encoding="utf-8")
+    assert ",cut," in former and ",settlements," in former and read_runs(tmp_path / "former.csv") == runs
     (tmp_path / "other.csv").write_text("shape,grains\nbox,1\n", encoding="utf-8")
     assert read_runs(tmp_path / "other.csv") == []
     damaged = (tmp_path / "runs.csv").read_text(encoding="utf-8").replace(",morton,", ",morton,x", 1)
@@ -129,9 +134,12 @@ def test_the_command_takes_folders_and_saved_files(shared, alone, tmp_path, caps
     assert main(["scale", str(shared), str(alone), "--save", saved]) == 0
     printed = capsys.readouterr().out
     assert "### Exact counts of runs, means of a step" in printed and "reckoned" not in printed
-    assert main(["scale", saved, "--body", "1e-6", "--bodies", "1e5,1e6", "--cut", "morton"]) == 0
+    assert main(["scale", saved, "--body", "1e-6", "--bodies", "1e5,1e6", "--partition", "morton"]) == 0
     again = capsys.readouterr().out
     assert again.startswith(printed) and again.count("| 4096 |") == 2
     assert "### Time of a step of 100000 bodies" in again and "| run | morton | 0 | 1 |" in again
+    former = ["--cut", "morton", "--settlement", "4", "--settled-bytes", "300"]
+    assert main(["scale", saved, "--body", "1e-6", "--bodies", "1e5,1e6", *former]) == 0
+    assert capsys.readouterr().out == again
     assert main(["scale", saved, "--body", "1e-6"]) == 2
     assert "nothing was counted for run bisection 0" in capsys.readouterr().err

@@ -1,10 +1,10 @@
 """The environment of the program: threads, stacks, file size limits, pipes, closed streams, umasks, new folders.
 
-usage: check_outside.py PROGRAM TRACE WATCHED_SYSTEM
+usage: check_outside.py PROGRAM TRACE FAILING_WRITES
 
-WATCHED_SYSTEM is the library of watched_system.c. The program must never end by a signal or with a message of a
-library: it reports each problem in one line of its own, and a reported success is one. tests/faults.md lists all
-faults.
+FAILING_WRITES is the library of failing_writes.c, which here only logs calls. The program must never end by a signal or
+with a message of a library: it reports each problem in one line of its own, and a reported success is one.
+tests/faults.md lists all faults.
 """
 
 import os
@@ -319,8 +319,9 @@ def a_umask_that_takes_ones_own_rights_is_refused(case):
 
 
 def the_parents_of_new_folders_are_brought_to_disk(case, library):
-    environment = {"LD_PRELOAD": library, "POLYDEM_WATCHED": os.path.abspath("watched")}
     here = os.path.realpath(".")
+    environment = {"LD_PRELOAD": library, "POLYDEM_FAIL_FOLDER": here,
+                   "POLYDEM_FAIL_LOG": os.path.join(here, "watched")}
     os.makedirs("above", exist_ok=True)
     for folder in "above/one/two", "alone", os.path.join(here, "above/three"):
         if os.path.exists("watched"):
@@ -328,11 +329,12 @@ def the_parents_of_new_folders_are_brought_to_disk(case, library):
         code, _, message = case.call(*case.run_words(folder), env=environment)
         assert code == GOOD, message
         with open("watched", encoding="utf-8") as file:
-            lines = file.read().splitlines()
+            lines = [line.split(" ", 1)[1] for line in file.read().splitlines()]
+        lines = [line for line in lines if line.startswith(("mkdir ", "fsync "))]
         made = [k for k, line in enumerate(lines) if line.startswith("mkdir ")]
         assert len(made) == (2 if folder == "above/one/two" else 1), lines
         for k in made:
-            parent = os.path.dirname(os.path.join(here, lines[k].split(" ", 1)[1]))
+            parent = os.path.dirname(lines[k].split(" ", 1)[1])
             assert lines[k + 1] == f"fsync {parent}", (folder, lines[k:k + 2])
 
 

@@ -7,31 +7,7 @@
  * POLYDEM_KILL_AT=n kills the process before its n-th call to a file or folder whose path contains POLYDEM_KILL_IN. With
  * n = 0 the process ends with a line on standard error that gives the number of these calls.
  */
-#define _GNU_SOURCE
-#include <dlfcn.h>
-#include <errno.h>
-#include <fcntl.h>
-#include <limits.h>
-#include <signal.h>
-#include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/file.h>
-#include <sys/stat.h>
-#include <sys/time.h>
-#include <time.h>
-#include <unistd.h>
-
-/* The hidden function of this name */
-#define REAL(type, name, ...) ((type (*)(__VA_ARGS__))dlsym(RTLD_NEXT, name))
-
-static int does(const char *what)
-{
-   const char *all = getenv("POLYDEM_HOSTILE");
-
-   return all != NULL && strstr(all, what) != NULL;
-}
+#include "system_calls.h"
 
 int clock_gettime(clockid_t clock, struct timespec *now)
 {
@@ -73,10 +49,10 @@ static void ask(const char *path)
 
 static void ask_open(int file)
 {
-   char link[40], path[PATH_MAX] = "";
+   char path[PATH_MAX];
 
-   snprintf(link, sizeof link, "/proc/self/fd/%d", file);
-   if (readlink(link, path, sizeof path - 1) > 0) ask(path);
+   path_of(file, path);
+   if (*path != '\0') ask(path);
 }
 
 int flock(int file, int operation)
@@ -87,33 +63,18 @@ int flock(int file, int operation)
    return -1;
 }
 
-static int open_really(const char *name, const char *path, int flags, mode_t mode)
-{
-   ask(path);
-   return REAL(int, name, const char *, int, ...)(path, flags, mode);
-}
-
-int open(const char *path, int flags, ...)
-{
-   va_list more;
-   mode_t mode;
-
-   va_start(more, flags);
-   mode = flags & O_CREAT ? va_arg(more, mode_t) : 0;
-   va_end(more);
-   return open_really("open", path, flags, mode);
-}
-
-int open64(const char *path, int flags, ...)
-{
-   va_list more;
-   mode_t mode;
-
-   va_start(more, flags);
-   mode = flags & O_CREAT ? va_arg(more, mode_t) : 0;
-   va_end(more);
-   return open_really("open64", path, flags, mode);
-}
+#define OPEN(name)                                             \
+   int name(const char *path, int flags, ...)                  \
+   {                                                           \
+      SYSTEM(int, real, const char *, int, ...);               \
+      mode_t mode;                                             \
+                                                               \
+      TAKE_MODE(mode, flags);                                  \
+      ask(path);                                               \
+      return real(path, flags, mode);                          \
+   }
+OPEN(open)
+OPEN(open64)
 
 int creat(const char *path, mode_t mode)
 {

@@ -10,21 +10,7 @@
  *
  * A failing call does nothing, except close, which still closes the file.
  */
-#define _GNU_SOURCE
-#include <dlfcn.h>
-#include <errno.h>
-#include <fcntl.h>
-#include <limits.h>
-#include <stdarg.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
-#include <sys/types.h>
-#include <sys/uio.h>
-#include <unistd.h>
-
-/* The system function that a function of this file hides */
-#define SYSTEM(type, name, ...) type (*name)(__VA_ARGS__) = (type (*)(__VA_ARGS__))dlsym(RTLD_NEXT, __func__)
+#include "system_calls.h"
 
 static const char *setting(const char *name, const char *otherwise)
 {
@@ -55,9 +41,9 @@ static int judge(const char *call, const char *path)
    if (*log != '\0') {
       char line[PATH_MAX + 64];
       int length = snprintf(line, sizeof line, "%d %s %s\n", number, call, path);
-      int (*open_log)(const char *, int, ...) = (int (*)(const char *, int, ...))dlsym(RTLD_NEXT, "open");
-      ssize_t (*put)(int, const void *, size_t) = (ssize_t (*)(int, const void *, size_t))dlsym(RTLD_NEXT, "write");
-      int (*close_log)(int) = (int (*)(int))dlsym(RTLD_NEXT, "close");
+      int (*open_log)(const char *, int, ...) = REAL(int, "open", const char *, int, ...);
+      ssize_t (*put)(int, const void *, size_t) = REAL(ssize_t, "write", int, const void *, size_t);
+      int (*close_log)(int) = REAL(int, "close", int);
       int file = open_log(log, O_WRONLY | O_CREAT | O_APPEND, 0666);
 
       if (file < 0 || put(file, line, (size_t)length) != length || close_log(file) != 0) abort();
@@ -71,16 +57,10 @@ static int judge(const char *call, const char *path)
 
 static int judge_file(const char *call, int file)
 {
-   char link[64], path[PATH_MAX];
-   int before = errno;
-   ssize_t length;
+   char path[PATH_MAX];
 
-   snprintf(link, sizeof link, "/proc/self/fd/%d", file);
-   length = readlink(link, path, sizeof path - 1);
-   errno = before;
-   if (length <= 0) return 0;
-   path[length] = '\0';
-   return judge(call, path);
+   path_of(file, path);
+   return *path == '\0' ? 0 : judge(call, path);
 }
 
 static int judge_path(const char *call, const char *path)
@@ -103,11 +83,8 @@ static int may_write(int flags)
    int name(const char *path, int flags, ...)                                 \
    {                                                                          \
       SYSTEM(int, real, const char *, int, ...);                              \
-      va_list rest;                                                           \
       mode_t mode;                                                            \
-      va_start(rest, flags);                                                  \
-      mode = (flags & (O_CREAT | O_TMPFILE)) ? va_arg(rest, mode_t) : 0;      \
-      va_end(rest);                                                           \
+      TAKE_MODE(mode, flags);                                                 \
       if (may_write(flags) && judge_path("open", path) > 0) return -1;        \
       return real(path, flags, mode);                                         \
    }
@@ -118,11 +95,8 @@ OPEN(open64)
    int name(int folder, const char *path, int flags, ...)                     \
    {                                                                          \
       SYSTEM(int, real, int, const char *, int, ...);                         \
-      va_list rest;                                                           \
       mode_t mode;                                                            \
-      va_start(rest, flags);                                                  \
-      mode = (flags & (O_CREAT | O_TMPFILE)) ? va_arg(rest, mode_t) : 0;      \
-      va_end(rest);                                                           \
+      TAKE_MODE(mode, flags);                                                 \
       if (may_write(flags) && judge_path("open", path) > 0) return -1;        \
       return real(folder, path, flags, mode);                                 \
    }

@@ -88,8 +88,8 @@ def of_any(statement, room):
     if not code.startswith("!$omp"):
         for literal in REAL_LITERAL.findall(code):
             yield f"the real number {literal} has no kind"
-    if re.search(r"%(law|damping|friction)\s*(==|/=)", code) and statement.scopes[-1].name != "choose":
-        yield "only `choose` of a force part knows its word in the namelist"
+    if re.search(r"%(law|damping|friction)\s*(==|/=)", code) and statement.scopes[-1].name != "choose_parts":
+        yield "only `choose_parts` of the factory knows the words of force parts in the namelist"
 
 
 def of_declaration(statement):

@@ -96,7 +96,7 @@ BAD = [
     ("      !> Length [m]\n", "      ! Length [m]\n", 14, "no comment !> above length"),
     ("real(wp) :: length = 1.0_wp", "real(wp), pointer :: length(:)", 14, "no pointers"),
     ("1.0_wp", "1.0", 14, "the real number 1.0 has no kind"),
-    ("half = x\n", "if (s%law == 'area') half = x\n", 43, "only `choose` of a force part"),
+    ("half = x\n", "if (s%law == 'area') half = x\n", 43, "only `choose_parts` of the factory"),
     ("1.0_wp", "1e3", 14, "the real number 1e3 has no kind"),
     ("1.0_wp", "1.0d0", 14, "the real number 1.0d0 has no kind"),
     ("   !> Make it longer.\n", "\n", 28, "no comment !> above grow"),

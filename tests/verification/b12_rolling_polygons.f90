@@ -94,7 +94,7 @@ contains
             call steps(simulation, 1, error)
             if (allocated(error)) return
             greatest = max(greatest, -simulation%bodies%angular_velocity(1))
-            ! The greatest rate is the rate before an impact; impacts are a whole number of faces from the start.
+            ! The greatest rate is the rate before an impact; impacts are an integer of faces from the start.
             if (-simulation%bodies%angle(1) > 2.0_wp*pi*(real(face, wp) + 0.5_wp)/real(n, wp)) exit
          end do
          before = before + greatest/real(last - first + 1, wp)

@@ -186,12 +186,14 @@ def _add_scale(verbs) -> None:
     scale.add_argument("--save", type=Path, metavar="FILE.csv")
     scale.add_argument("--bodies", type=_positives, default=[1e6], metavar="N,...")
     scale.add_argument("--body", type=_positive, metavar="S")
-    for name, default in (("latency", 2e-6), ("bandwidth", 1e9), ("ghost", 0.5), ("imbalance", 1.1),
-                          ("interval", 40.0), ("settlement", 4.0), ("settled-bytes", 300.0)):
-        scale.add_argument(f"--{name}", type=_positive, default=default, metavar="X")
+    for default, *names in ((2e-6, "latency"), (1e9, "bandwidth"), (0.5, "ghost"), (1.1, "imbalance"),
+                            (40.0, "interval"), (4.0, "settlement", "redistribution"),
+                            (300.0, "settled-bytes", "redistributed-bytes")):
+        scale.add_argument(*(f"--{name}" for name in names), type=_positive, default=default, metavar="X",
+                           dest=names[-1].replace("-", "_"))
     scale.add_argument("--sums", type=_count, default=2, metavar="K")
     scale.add_argument("--shape")
-    scale.add_argument("--cut", default="bisection")
+    scale.add_argument("--cut", "--partition", dest="partition", default="bisection")
     scale.add_argument("--margin", type=_positive)
 
 
@@ -211,7 +213,7 @@ def _positive(text: str) -> float:
 
 def _count(text: str) -> int:
     if not text.isdigit() or not 0 < int(text) < 1000000:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 on")
+        raise argparse.ArgumentTypeError(f"'{text}' is not an integer from 1 on")
     return int(text)
 
 
@@ -219,7 +221,7 @@ def _numbers(text: str) -> list[int]:
     try:
         return [int(word) for word in text.split(",")]
     except ValueError as error:
-        raise argparse.ArgumentTypeError(f"'{text}' is not a list of whole numbers like 0,10,-1") from error
+        raise argparse.ArgumentTypeError(f"'{text}' is not a list of integers like 0,10,-1") from error
 
 
 def _words(text: str) -> list[str]:
@@ -349,7 +351,7 @@ def _scale(options: argparse.Namespace) -> None:
     if options.body:
         machine = Machine(**{field.name: getattr(options, field.name) for field in fields(Machine)})
         shape = options.shape or (SHAPE if runs else "drum")
-        law = fit_law(counts, shape, options.cut, options.margin or (MARGIN if shape == SHAPE else 0.2))
+        law = fit_law(counts, shape, options.partition, options.margin or (MARGIN if shape == SHAPE else 0.2))
         tables += [scale_table(law, machine, bodies) for bodies in options.bodies]
     print("\n".join(table.document("markdown") for table in tables), end="")
 

@@ -13,12 +13,12 @@ from .figure_style import (
     SETTINGS,
     Drawing,
     draw_estimates,
-    look,
     over_size,
     panels,
     panels_with_legend,
     readable_decades,
     shared_legend,
+    style_of,
 )
 from .statistics import typical
 
@@ -53,7 +53,7 @@ def all_finders(bench: Bench) -> Drawing | None:
             [case.boxes for case in cases],
             [typical(case.time()) for case in cases],
             label=finder + slope,
-            **look(finder),
+            **style_of(finder),
         )
     if not axis.has_data():
         return None
@@ -80,7 +80,7 @@ def threads(bench: Bench) -> Drawing | None:
         if not one or len(cases) < 2:
             continue
         gains = [series.ratio(one[0], case, series.elapsed_time) for case in cases]
-        draw_estimates(axis, [case.threads for case in cases], gains, label=name, **look(finder))
+        draw_estimates(axis, [case.threads for case in cases], gains, label=name, **style_of(finder))
         most = max(most, *(case.threads for case in cases))
     counts = np.arange(1, most + 1)
     axis.plot(counts, counts, color="0.75", linewidth=0.8, zorder=0, label="as many as threads")
@@ -125,7 +125,7 @@ def misses(bench: Bench) -> Drawing | None:
                 [getattr(r, level) for r in found],
                 linewidth=1.1,
                 label=finder,
-                **look(finder),
+                **style_of(finder),
             )
     for axis, label in zip(axes, ("first-level misses", "last-level misses")):
         over_size(axis, f"{label} per box and step", logarithmic=False)
@@ -148,7 +148,7 @@ def work(bench: Bench) -> Drawing | None:
         visits = [(c.boxes, visits_per_search(c)) for c in cases if visits_per_search(c) > 0.0]
         for axis, points in ((left, candidates), (right, visits)):
             if points and finder != "all_pairs":
-                axis.plot(*np.array(points).T, linewidth=1.1, label=finder, **look(finder))
+                axis.plot(*np.array(points).T, linewidth=1.1, label=finder, **style_of(finder))
     if not left.has_data() and not right.has_data():
         return None
     for axis, label in ((left, "candidates per box"), (right, "nodes or cells per search")):

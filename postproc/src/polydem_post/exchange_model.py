@@ -31,7 +31,7 @@ RANKS = tuple(2**k for k in range(13))
 RECTANGLE = 32
 
 #: What handing bodies out anew takes: calls in which all ranks take part, and rounds of messages to neighbours
-SETTLING_CALLS, SETTLING_ROUNDS = 13, 9
+REDISTRIBUTION_CALLS, REDISTRIBUTION_ROUNDS = 13, 9
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Count:
     grains: int
     #: Number of ranks
     ranks: int
-    #: How space is cut: bisection or morton
-    cut: str
+    #: Partition of space: bisection or morton
+    partition: str
     #: How far grains may move until regions are found anew, in long axes; of runs in m, 0 if they choose it
     margin: float
     #: Grains of the rank that has most
@@ -86,19 +86,19 @@ class Machine:
     ghost: float = 0.5
     #: Greatest work of a rank over the mean
     imbalance: float = 1.1
-    #: Sums over all ranks in a step: to settle or fail together, and to know of signals
+    #: Sums over all ranks in a step: to redistribute or fail together, and to know of signals
     sums: int = 2
-    #: Steps between two settlements, in which bodies are handed out anew; the program aims at 40 or more
+    #: Steps between two redistributions of bodies; the program aims at 40 or more
     interval: float = 40.0
-    #: What a settlement costs per own body, in steps
-    settlement: float = 4.0
+    #: What a redistribution costs per own body, in steps
+    redistribution: float = 4.0
     #: Bytes that it tells of a ghost: its shape and state
-    settled_bytes: float = 300.0
+    redistributed_bytes: float = 300.0
 
 
 @dataclass(frozen=True)
 class Law:
-    """What grows with the number of ranks, for one packing, cut and margin."""
+    """What grows with the number of ranks, for one packing, partition and margin."""
 
     #: Width of the strip of ghosts, in mean distances of grains
     strip: float
@@ -130,13 +130,13 @@ class Step:
     neighbours: float
     #: Sums over all ranks
     everyone: float
-    #: The share of a step in a settlement
-    settling: float
+    #: The share of a step in a redistribution
+    redistributing: float
 
     @property
     def total(self) -> float:
         """Time of the step [s]."""
-        return self.bodies + self.ghosts + self.neighbours + self.everyone + self.settling
+        return self.bodies + self.ghosts + self.neighbours + self.everyone + self.redistributing
 
 
 def read_counts(paths) -> list[Count]:
@@ -155,17 +155,17 @@ def read_counts(paths) -> list[Count]:
     return counts
 
 
-def fit_law(counts: list[Count], shape: str, cut: str, margin: float) -> Law:
-    """The law of one packing, cut and margin, from counts of at least SURROUNDED ranks."""
-    mine = [count for count in counts if (count.shape, count.cut, count.margin) == (shape, cut, margin)]
+def fit_law(counts: list[Count], shape: str, partition: str, margin: float) -> Law:
+    """The law of one packing, partition and margin, from counts of at least SURROUNDED ranks."""
+    mine = [count for count in counts if (count.shape, count.partition, count.margin) == (shape, partition, margin)]
     if not counts:
         raise ResultError("the time on many ranks is reckoned from runs of several ranks, of which there are none")
     if not mine:
-        known = sorted({f"{count.shape} {count.cut} {count.margin:g}" for count in counts})
-        raise ResultError(f"nothing was counted for {shape} {cut} {margin:g}; there are {', '.join(known)}")
+        known = sorted({f"{count.shape} {count.partition} {count.margin:g}" for count in counts})
+        raise ResultError(f"nothing was counted for {shape} {partition} {margin:g}; there are {', '.join(known)}")
     mine = [count for count in mine if count.ranks >= SURROUNDED and count.ghosts > 0]
     if not mine:
-        raise ResultError(f"{shape} {cut} {margin:g}: counts of at least {SURROUNDED} ranks are needed")
+        raise ResultError(f"{shape} {partition} {margin:g}: counts of at least {SURROUNDED} ranks are needed")
     strips = [count.strip for count in mine]
     return Law(
         strip=math.exp(sum(map(math.log, strips)) / len(strips)),
@@ -185,27 +185,27 @@ def predict(law: Law, machine: Machine, bodies: float, ranks: int) -> Step:
     ghosts = law.ghosts(own)
     messages = min(law.messages, ranks - 1)
     stages = math.ceil(math.log2(ranks))
-    waits = SETTLING_CALLS * stages + SETTLING_ROUNDS * messages
-    told = ranks * law.rectangles * RECTANGLE + ghosts * machine.settled_bytes
-    settlement = waits * machine.latency + told / machine.bandwidth + machine.settlement * machine.body * own
+    waits = REDISTRIBUTION_CALLS * stages + REDISTRIBUTION_ROUNDS * messages
+    told = ranks * law.rectangles * RECTANGLE + ghosts * machine.redistributed_bytes
+    redistribution = waits * machine.latency + told / machine.bandwidth + machine.redistribution * machine.body * own
     return Step(
         bodies=machine.imbalance * own * machine.body,
         ghosts=ghosts * machine.ghost * machine.body,
         neighbours=messages * machine.latency + ghosts * law.ghost_bytes / machine.bandwidth,
         everyone=machine.sums * stages * machine.latency,
-        settling=settlement / machine.interval,
+        redistributing=redistribution / machine.interval,
     )
 
 
 def strip_table(counts: list[Count]) -> Table:
     """How wide the strip of ghosts is, for everything that was counted."""
-    heading = ("packing", "cut", "margin", "counts", "strip", "least", "most", "messages", "rectangles per rank")
+    heading = ("packing", "partition", "margin", "counts", "strip", "least", "most", "messages", "rectangles per rank")
     table = Table("strips", "Width of the strip of ghosts, in mean distances of grains", heading, texts=2)
     enough = [count for count in counts if count.ranks >= SURROUNDED and count.ghosts > 0]
-    for shape, cut, margin in sorted({(count.shape, count.cut, count.margin) for count in enough}):
-        law = fit_law(enough, shape, cut, margin)
+    for shape, partition, margin in sorted({(count.shape, count.partition, count.margin) for count in enough}):
+        law = fit_law(enough, shape, partition, margin)
         widths = [f"{width:.2f}" for width in (law.strip, *law.spread)]
-        table.add(shape, cut, f"{margin:g}", law.counts, *widths, law.messages, f"{law.rectangles:.1f}")
+        table.add(shape, partition, f"{margin:g}", law.counts, *widths, law.messages, f"{law.rectangles:.1f}")
     table.note = (
         "Ghosts per body are 4 w sqrt(P/N) + 4 w^2 P/N for N bodies on P ranks and a strip of width w; the rank with "
         f"most ghosts counts, and only runs and packings on {SURROUNDED} ranks or more. Messages: those of the busiest "
@@ -217,14 +217,14 @@ def strip_table(counts: list[Count]) -> Table:
 def scale_table(law: Law, machine: Machine, bodies: float, ranks=RANKS) -> Table:
     """Time of a step against the number of ranks, with all that is assumed."""
     heading = ("ranks", "bodies per rank", "ghosts per body", "bodies [us]", "ghosts [us]", "neighbours [us]",
-               "everyone [us]", "settling [us]", "step [us]", "speed-up", "efficiency [%]")
+               "everyone [us]", "redistributing [us]", "step [us]", "speed-up", "efficiency [%]")
     table = Table("scale", f"Time of a step of {bodies:g} bodies, reckoned", heading, texts=0)
     alone = predict(law, machine, bodies, 1).total
     for size in ranks:
         step = predict(law, machine, bodies, size)
         own = bodies / size
         gain = alone / step.total
-        times = (step.bodies, step.ghosts, step.neighbours, step.everyone, step.settling, step.total)
+        times = (step.bodies, step.ghosts, step.neighbours, step.everyone, step.redistributing, step.total)
         table.add(size, number(own, 4), number(law.ghosts(own) / own if size > 1 else 0.0),
                   *(number(1e6 * time) for time in times), number(gain), f"{100.0 * gain / size:.0f}")
     table.note = _assumptions(law, machine)
@@ -240,11 +240,12 @@ def _assumptions(law: Law, machine: Machine) -> str:
         f"{law.rectangles:.1f} rectangles per rank.",
         f"Given: {1e6 * machine.body:g} us per body and step, latency {1e6 * machine.latency:g} us, bandwidth "
         f"{1e-9 * machine.bandwidth:g} GB/s per rank. Assumed: a ghost costs {machine.ghost:g} of a body; the busiest "
-        f"rank works {machine.imbalance:g} times the mean; {machine.sums} sums over all ranks in a step; a settlement "
-        f"every {machine.interval:g} steps that costs {machine.settlement:g} steps of the own bodies, "
-        f"{SETTLING_CALLS} calls of all ranks, {SETTLING_ROUNDS} rounds of messages to neighbours and "
-        f"{machine.settled_bytes:g} bytes per ghost, and tells all ranks all rectangles. Sums and calls take a latency "
-        "for each doubling of the ranks.",
+        f"rank works {machine.imbalance:g} times the mean; {machine.sums} sums over all ranks in a step; a "
+        f"redistribution every {machine.interval:g} steps that costs {machine.redistribution:g} steps of the own "
+        "bodies, "
+        f"{REDISTRIBUTION_CALLS} calls of all ranks, {REDISTRIBUTION_ROUNDS} rounds of messages to neighbours and "
+        f"{machine.redistributed_bytes:g} bytes per ghost, and tells all ranks all rectangles. Sums and calls take "
+        "a latency for each doubling of the ranks.",
         "Messages follow one another and hide behind no work; every rank has neighbours on all sides, which is too "
         f"much below {SURROUNDED} ranks. Left out: contention in the network, that ranks of one machine share memory "
         "and caches, output, and that space is divided anew.",

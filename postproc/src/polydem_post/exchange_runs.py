@@ -23,7 +23,7 @@ SHAPE, MARGIN = "run", 0.0
 
 #: Counters of a run of several processes, and what they are called here
 COUNTERS = {
-    "settlements": "redistributions",
+    "redistributions": "redistributions",
     "divisions": "partitions of space",
     "rectangles": "rectangles",
     "migrations": "migrations",
@@ -55,12 +55,12 @@ class RunCount:
     bodies: int
     ranks: int
     steps: int
-    #: How space is cut: bisection or morton
-    cut: str
+    #: Partition of space: bisection or morton
+    partition: str
     #: How far bodies may move until they are handed out anew [m]; 0: the run chose it
     margin: float
     #: How often bodies were handed out, the first time included; how often space was divided
-    settlements: int
+    redistributions: int
     divisions: int
     #: Rectangles that cover the bodies of all ranks
     rectangles: int
@@ -95,15 +95,15 @@ class RunCount:
         return max(self.steps - 1, 1)
 
     @property
-    def later_settlements(self) -> int:
+    def later_redistributions(self) -> int:
         """Times that bodies were handed out after the first."""
-        return max(self.settlements - 1, 0)
+        return max(self.redistributions - 1, 0)
 
     def as_count(self) -> Count:
         """The means of a step, as count_exchange counts them in a packing."""
         steps, told = self.steps, self.told_steps
         return Count(
-            shape=SHAPE, grains=self.bodies, ranks=self.ranks, cut=self.cut, margin=self.margin,
+            shape=SHAPE, grains=self.bodies, ranks=self.ranks, partition=self.partition, margin=self.margin,
             grains_most=self.most_bodies,
             ghosts=round(self.ghosts / steps), ghosts_most=round(self.most_ghosts / steps),
             messages=round(self.messages / told), messages_most=math.ceil(self.most_messages / told),
@@ -131,8 +131,8 @@ def read_run(folder) -> RunCount:
         margin = float(entries.get("margin", MARGIN))
     except ValueError as error:
         raise ResultError(f"{folder}: its margin of decomposition is no number: {entries['margin'][:40]!r}") from error
-    cut = entries.get("partition", entries.get("cut", "bisection"))
-    run = RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], cut=cut, margin=margin,
+    partition = entries.get("partition", entries.get("cut", "bisection"))
+    run = RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], partition=partition, margin=margin,
                    pairs=counters["pairs"], state_hash=result.state_hash,
                    revision=str(result.provenance.get("revision", NOT_RECORDED)), **counts)
     _insist_on_counts(folder, run)
@@ -170,41 +170,44 @@ def _insist_on_counts(place, run: RunCount) -> None:
 
 def runs_tables(runs: list[RunCount]) -> list[Table]:
     """What steps tell, and what handing bodies out tells."""
-    heading = ("cut", "margin", "bodies", "ranks", "ghosts per body", "most ghosts", "pairs per ghost", "messages",
+    heading = ("partition", "margin", "bodies", "ranks", "ghosts per body", "most ghosts", "pairs per ghost",
+               "messages",
                "of one rank", "bytes", "of one rank", "bodies, most/mean", "pairs, most/mean", "steps", "hash")
     steps = Table("runs", "Exact counts of runs, means of a step", heading, texts=1)
-    heading = ("cut", "margin", "bodies", "ranks", "steps", "settlements", "divisions", "migrations", "messages",
+    heading = ("partition", "margin", "bodies", "ranks", "steps", "redistributions", "divisions", "migrations",
+               "messages",
                "bytes", "bytes per ghost", "at the start", "messages", "bytes")
-    settling = Table("settling", "Exact counts of handing bodies out anew", heading, texts=1)
-    order = sorted(runs, key=lambda run: (run.bodies, run.margin, run.cut, run.ranks))
+    redistributing = Table("redistributing", "Exact counts of handing bodies out anew", heading, texts=1)
+    order = sorted(runs, key=lambda run: (run.bodies, run.margin, run.partition, run.ranks))
     alone = {(run.bodies, run.steps): run.pairs for run in order if run.ranks == 1}
     for run in order:
         count = run.as_count()
         extra = run.pairs - alone.get((run.bodies, run.steps), run.pairs)
-        steps.add(run.cut, f"{run.margin:g}", run.bodies, run.ranks, number(run.ghosts / run.steps / run.bodies),
+        steps.add(run.partition, f"{run.margin:g}", run.bodies, run.ranks, number(run.ghosts / run.steps / run.bodies),
                   count.ghosts_most, number(extra / count.ghosts) if extra and count.ghosts else "-", count.messages,
                   count.messages_most, count.bytes, count.bytes_most,
                   number(run.most_bodies * run.ranks / run.bodies, 4),
                   number(run.most_pairs * run.ranks / run.pairs, 4) if run.pairs else "-", run.steps, run.state_hash)
         if run.ranks > 1:
-            settling.add(run.cut, f"{run.margin:g}", run.bodies, run.ranks, run.steps, run.settlements, run.divisions,
-                         *_later(run), run.first_migrations, run.first_messages, run.first_bytes)
+            redistributing.add(run.partition, f"{run.margin:g}", run.bodies, run.ranks, run.steps,
+                               run.redistributions, run.divisions, *_later(run), run.first_migrations,
+                               run.first_messages, run.first_bytes)
     steps.note = ("Messages and bytes are those that let ghosts follow; margin in m, 0: chosen by the run. Pairs per "
                   "ghost: how many pairs more than one process all have together at the end. Runs of the same scene "
                   "and steps have the same hash on any number of ranks.")
-    settling.note = ("Settlements: how often bodies were handed out, the first time included. Migrations (of the whole "
-                     "run), messages and bytes (of one time) are those after the first, when rank 0 gives out all "
-                     "bodies; that is on the right.")
-    for table in (steps, settling):
+    redistributing.note = ("Redistributions: how often bodies were handed out, the first time included. Migrations (of "
+                           "the whole run), messages and bytes (of one time) are those after the first, when rank 0 "
+                           "gives out all bodies; that is on the right.")
+    for table in (steps, redistributing):
         table.origin = f"Counted by polydem, revision {', '.join(dict.fromkeys(run.revision for run in runs))}."
-    return [steps, settling]
+    return [steps, redistributing]
 
 
 def _later(run: RunCount) -> tuple:
-    """Migrations; messages, bytes, and bytes per ghost of a settlement after the first."""
-    if run.later_settlements == 0:
+    """Migrations; messages, bytes, and bytes per ghost of a redistribution after the first."""
+    if run.later_redistributions == 0:
         return 0, "-", "-", "-"
-    told = (run.all_bytes - run.bytes - run.first_bytes) / run.later_settlements
-    messages = (run.all_messages - run.messages - run.first_messages) / run.later_settlements
+    told = (run.all_bytes - run.bytes - run.first_bytes) / run.later_redistributions
+    messages = (run.all_messages - run.messages - run.first_messages) / run.later_redistributions
     return (run.migrations - run.first_migrations, round(messages), round(told),
             number(told * run.steps / run.ghosts) if run.ghosts else "-")

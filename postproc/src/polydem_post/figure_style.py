@@ -83,7 +83,7 @@ def shared_legend(below, axes, columns: int) -> None:
     below.legend(entries.values(), entries.keys(), ncol=columns, loc="center", fontsize=8, borderpad=0.0)
 
 
-def look(finder: str) -> dict:
+def style_of(finder: str) -> dict:
     """Colour and marker of a finder."""
     colour, marker = LOOKS.get(finder, ("0.3", "h"))
     return {"color": colour, "marker": marker, "markersize": 4.5}

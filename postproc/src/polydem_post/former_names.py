@@ -36,6 +36,9 @@ ENTRIES = {
     "scene.movers": "scene.moving_grains",
 }
 
+#: Columns of tables of counts
+COLUMNS = {"cut": "partition", "settlements": "redistributions"}
+
 #: Data sets of the energy balance lie in the first of these groups that a file has
 BALANCE_GROUPS = ("energy_balance", "ledger")
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from . import paper, series
 from .bench import Bench
-from .figure_style import PAPER, SETTINGS, Drawing, draw_estimates, draw_law, look, mark_caches, over_size, panels
+from .figure_style import PAPER, SETTINGS, Drawing, draw_estimates, draw_law, mark_caches, over_size, panels, style_of
 from .series import SWEEP, TREE
 from .statistics import median, of_one_bench, typical
 
@@ -30,7 +30,7 @@ def idle_swaps(bench: Bench) -> Drawing | None:
     if not cases or not np.any(np.isfinite(shares)):
         return None
     figure, (axis,) = panels()
-    axis.plot([case.boxes for case in cases], shares, linewidth=1.1, **look(SWEEP))
+    axis.plot([case.boxes for case in cases], shares, linewidth=1.1, **style_of(SWEEP))
     axis.axhline(50.0, **PAPER)
     axis.annotate(
         "most: more than half (paper, no number)", (0.02, 51.0), xycoords=("axes fraction", "data"), fontsize=8
@@ -118,10 +118,11 @@ def _two_finders(bench: Bench, quantity, name: str, what: str, slopes: dict, rat
         law = series.law(found, quantity)
         label = finder if law is None else f"{finder}: slope {law.exponent.text()}; paper {slopes[finder]:g}"
         draw_estimates(
-            left, [c.boxes for c in found], _per_step(found, quantity), label=label, **look(finder), linestyle="none"
+            left, [c.boxes for c in found], _per_step(found, quantity), label=label, linestyle="none",
+            **style_of(finder),
         )
         if law is not None:
-            draw_law(left, law, color=look(finder)["color"])
+            draw_law(left, law, color=style_of(finder)["color"])
             slope = slopes[finder]
             middle = np.exp(np.mean(np.log(law.sizes)))
             left.plot(law.sizes, law.at(middle) * (law.sizes / middle) ** slope, zorder=0, **PAPER)
@@ -167,7 +168,7 @@ def inlining(bench: Bench) -> Drawing | None:
             [c.boxes for c in found],
             [typical(c.time()) for c in found],
             label=name + slope,
-            **look(finder),
+            **style_of(finder),
         )
     both = series.pairs_of(cases[TREE], cases["quadtree_called"])
     draw_estimates(
@@ -229,7 +230,7 @@ def interpreted(bench: Bench) -> Drawing | None:
         linewidth=1.1,
         label="MATLAB example of the authors in GNU Octave",
     )
-    draw_estimates(axis, [case.boxes for case in cases], _per_step(cases), label="polydem, quadtree", **look(TREE))
+    draw_estimates(axis, [case.boxes for case in cases], _per_step(cases), label="polydem, quadtree", **style_of(TREE))
     middle = np.array([case.boxes for case in cases], dtype=float)
     ours = np.array([estimate.value for estimate in _per_step(cases)])
     axis.fill_between(

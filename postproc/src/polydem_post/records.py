@@ -7,6 +7,7 @@ import math
 from dataclasses import MISSING, fields
 from pathlib import Path
 
+from .former_names import COLUMNS, present
 from .trajectory import ResultError
 
 _KINDS = {"str": str, "int": int, "float": float}
@@ -26,6 +27,7 @@ def _read(path: Path) -> tuple:
     try:
         with Path(path).open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
+            reader.fieldnames = [present(COLUMNS, name) for name in reader.fieldnames or []]
             rows = list(reader)
             return list(reader.fieldnames or []), rows
     except FileNotFoundError as error:

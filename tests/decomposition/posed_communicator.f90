@@ -1,5 +1,5 @@
 !> Communicator for tests in one process, which acts as one rank after the other.
-module posed_team
+module posed_communicator
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_serial_communicator, only: serial_communicator_t
    use polydem_partition, only: partition_t
@@ -112,4 +112,4 @@ contains
       end do
    end subroutine strew
 
-end module posed_team
+end module posed_communicator

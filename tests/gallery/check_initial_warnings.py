@@ -1,6 +1,6 @@
 """What `check` and `run` say about danger: nothing about scenes of inputs, and all about scenes that are dangerous.
 
-usage: check_dangers.py PROGRAM INPUTS
+usage: check_initial_warnings.py PROGRAM INPUTS
 
 Each dangerous scene is one of inputs with a mistake in it. `check` ends with code 0 unless a run would stop at once,
 and a run that goes on ends with the number of its warnings.

@@ -2,7 +2,7 @@
 !>
 !> Each warning names a probable mistake of the input. The warnings cost no time in a step; the guards that a run
 !> evaluates during its steps are in `monitor`.
-module polydem_dangers
+module polydem_initial_warnings
    use polydem_body_sizes, only: thickness_of_bodies
    use polydem_contact_depth, only: count_deeper, deepest_contact, depth_share, depth_text
    use polydem_elementary, only: hypotenuse
@@ -11,7 +11,7 @@ module polydem_dangers
    use polydem_log, only: log_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
-   use polydem_survey, only: survey_scene, survey_t
+   use polydem_scene_measures, only: measure_scene, scene_measures_t
    implicit none
    private
    public :: warn_of_risks
@@ -49,26 +49,26 @@ contains
       !> Number of warnings
       integer(lp), intent(out) :: n
       type(warning_writer_t) :: writer
-      type(survey_t) :: survey
+      type(scene_measures_t) :: measures
 
-      call survey_scene(simulation, survey)
-      if (size(simulation%bodies%free) > 0) call warn_of_units(simulation, survey, writer, log)
+      call measure_scene(simulation, measures)
+      if (size(simulation%bodies%free) > 0) call warn_of_units(simulation, measures, writer, log)
       call warn_of_step(simulation, writer, log)
-      call warn_of_overlaps(simulation, survey, writer, log)
-      call warn_of_speeds(simulation, survey, writer, log)
+      call warn_of_overlaps(simulation, measures, writer, log)
+      call warn_of_speeds(simulation, measures, writer, log)
       call warn_of_law(simulation, writer, log)
       n = writer%n
    end subroutine warn_of_risks
 
    !> Warn of lengths, densities and gravity that are implausible in SI units.
-   subroutine warn_of_units(simulation, survey, writer, log)
+   subroutine warn_of_units(simulation, measures, writer, log)
       type(simulation_t), intent(in) :: simulation
-      type(survey_t), intent(in) :: survey
+      type(scene_measures_t), intent(in) :: measures
       type(warning_writer_t), intent(inout) :: writer
       type(log_t), intent(inout) :: log
       real(wp) :: gravity
 
-      associate (median => survey%diameter(2), density => survey%density)
+      associate (median => measures%diameter(2), density => measures%density)
          if (median > diameters(2) .or. median < diameters(1)) call writer%warn(log, &
             'lengths are in metres: the median diameter of the free bodies is '//to_text(median, 3)// &
             ' m; convert lengths that are given in other units')
@@ -82,8 +82,8 @@ contains
       if (gravity > strongest_gravity) call writer%warn(log, &
          'gravity is in m/s2: '//to_text(gravity, 3)//' m/s2 is '//to_text(gravity/9.81_wp, 3)// &
          ' times that of the Earth; check the units')
-      if (survey%softness > softest) call writer%warn(log, &
-         'the pressure under the full height of the free bodies is '//to_text(survey%softness, 3)// &
+      if (measures%softness > softest) call writer%warn(log, &
+         'the pressure under the full height of the free bodies is '//to_text(measures%softness, 3)// &
          ' of the stiffness: the lowest bodies overlap deeply. Increase stiffness in &forces, and check that '// &
          'lengths are in metres')
    end subroutine warn_of_units
@@ -103,9 +103,9 @@ contains
    end subroutine warn_of_step
 
    !> Warn of initial overlaps whose elastic energy is large.
-   subroutine warn_of_overlaps(simulation, survey, writer, log)
+   subroutine warn_of_overlaps(simulation, measures, writer, log)
       type(simulation_t), intent(in) :: simulation
-      type(survey_t), intent(in) :: survey
+      type(scene_measures_t), intent(in) :: measures
       type(warning_writer_t), intent(inout) :: writer
       type(log_t), intent(inout) :: log
       real(wp), allocatable :: thickness(:)
@@ -118,21 +118,22 @@ contains
          c = deepest_contact(s%contacts, thickness)
          if (c == 0_ip) return
          share = depth_share(s%contacts, thickness, c)
-         is_energetic = survey%stored > survey%kinetic + survey%potential .and. share > s%settings%guards%listed_depth
+         is_energetic = measures%stored > measures%kinetic + measures%potential .and. &
+            share > s%settings%guards%listed_depth
          if (share <= deep_fraction .and. .not. is_energetic) return
          call writer%warn(log, to_text(count_deeper(s%contacts, thickness, s%settings%guards%listed_depth))// &
                           ' contacts are deep at the start: '//depth_text(s%bodies, s%contacts, thickness, c)// &
-                          '. All contacts store '//to_text(survey%stored, 3)//' J/m, which can accelerate all '// &
+                          '. All contacts store '//to_text(measures%stored, 3)//' J/m, which can accelerate all '// &
                           'free bodies to '// &
-                          to_text(sqrt(2.0_wp*survey%stored/max(survey%mass(3), tiny(1.0_wp))), 3)// &
+                          to_text(sqrt(2.0_wp*measures%stored/max(measures%mass(3), tiny(1.0_wp))), 3)// &
                           ' m/s. Separate the bodies: set relaxed_depth in &guards')
       end associate
    end subroutine warn_of_overlaps
 
    !> Warn of bodies that can pass through others: by moving too far in one step, or by their momentum.
-   subroutine warn_of_speeds(simulation, survey, writer, log)
+   subroutine warn_of_speeds(simulation, measures, writer, log)
       type(simulation_t), intent(in) :: simulation
-      type(survey_t), intent(in) :: survey
+      type(scene_measures_t), intent(in) :: measures
       type(warning_writer_t), intent(inout) :: writer
       type(log_t), intent(inout) :: log
       character(len=:), allocatable :: thinnest
@@ -140,21 +141,20 @@ contains
       integer(ip) :: slot
 
       associate (s => simulation)
-         thinnest = ' times the thickness of the thinnest body ('//to_text(survey%thickness, 3)//' m, body '// &
-            to_text(s%bodies%id(survey%thinnest))//')'
+         thinnest = ' times the thickness of the thinnest body ('//to_text(measures%thickness, 3)//' m, body '// &
+            to_text(s%bodies%id(measures%thinnest))//')'
          call greatest_displacement(s%guard, s%bodies, s%dt, move, slot)
-         if (move > fast_fraction*survey%thickness) call writer%warn(log, 'body '// &
-            to_text(s%bodies%id(slot))//' moves '//to_text(move/survey%thickness, 3)//thinnest// &
+         if (move > fast_fraction*measures%thickness) call writer%warn(log, 'body '// &
+            to_text(s%bodies%id(slot))//' moves '//to_text(move/measures%thickness, 3)//thinnest// &
             ' in one step: it may pass through other bodies undetected. Reduce dt')
-         fastest = max(survey%wall_speed, merge(survey%fall_speed, 0.0_wp, size(s%bodies%free) > 0))
-         if (move <= fast_fraction*survey%thickness .and. fastest*s%dt > fast_fraction*survey%thickness) &
-            call writer%warn(log, 'walls reach '//to_text(survey%wall_speed, 3)//' m/s, a fall through the extent '// &
-            to_text(survey%fall_speed, 3)//' m/s: the faster of them moves '//to_text(fastest*s%dt/survey%thickness, &
-               3)//thinnest// &
-            ' in one step. Reduce dt')
-         if (survey%impact > fast_fraction*survey%thickness) call writer%warn(log, 'body '// &
-            to_text(s%bodies%id(survey%fastest))//' is so fast that stopping it takes an overlap of '// &
-            'about '//to_text(survey%impact, 3)//' m, '//to_text(survey%impact/survey%thickness, 3)//thinnest// &
+         fastest = max(measures%wall_speed, merge(measures%fall_speed, 0.0_wp, size(s%bodies%free) > 0))
+         if (move <= fast_fraction*measures%thickness .and. fastest*s%dt > fast_fraction*measures%thickness) &
+            call writer%warn(log, 'walls reach '//to_text(measures%wall_speed, 3)//' m/s, a fall through the '// &
+            'extent '//to_text(measures%fall_speed, 3)//' m/s: the faster of them moves '// &
+            to_text(fastest*s%dt/measures%thickness, 3)//thinnest//' in one step. Reduce dt')
+         if (measures%impact > fast_fraction*measures%thickness) call writer%warn(log, 'body '// &
+            to_text(s%bodies%id(measures%fastest))//' is so fast that stopping it takes an overlap of '// &
+            'about '//to_text(measures%impact, 3)//' m, '//to_text(measures%impact/measures%thickness, 3)//thinnest// &
             ': it may pass through other bodies. Increase stiffness in &forces, or use thicker bodies')
       end associate
    end subroutine warn_of_speeds
@@ -182,4 +182,4 @@ contains
       call log%write_line('warning: '//text)
    end subroutine warn
 
-end module polydem_dangers
+end module polydem_initial_warnings

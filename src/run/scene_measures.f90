@@ -1,5 +1,5 @@
 !> Measures of an initial scene: sizes, masses and speeds of its bodies, and the elastic energy of its contacts.
-module polydem_survey
+module polydem_scene_measures
    use polydem_bodies, only: bodies_t
    use polydem_body_sizes, only: measure_body
    use polydem_elementary, only: hypotenuse
@@ -10,10 +10,10 @@ module polydem_survey
    use polydem_simulation, only: simulation_t
    implicit none
    private
-   public :: survey_t, survey_scene
+   public :: scene_measures_t, measure_scene
 
    !> Measures of a scene at time 0; those of free bodies are 0 if there are none
-   type :: survey_t
+   type :: scene_measures_t
       !> Bounding box of all vertices: (x and y, least and greatest) [m]
       real(wp) :: extent(2, 2) = 0.0_wp
       !> Bounding box of the vertices of free bodies, as `extent` [m]
@@ -46,35 +46,35 @@ module polydem_survey
       real(wp) :: kinetic = 0.0_wp, potential = 0.0_wp
       !> Elastic energy of the contacts [J/m]
       real(wp) :: stored = 0.0_wp
-   end type survey_t
+   end type scene_measures_t
 
 contains
 
    !> Compute the measures of a scene.
-   subroutine survey_scene(simulation, survey)
+   subroutine measure_scene(simulation, measures)
       !> A simulation at time 0
       type(simulation_t), intent(in) :: simulation
       !> Measures of the scene
-      type(survey_t), intent(out) :: survey
+      type(scene_measures_t), intent(out) :: measures
       real(wp) :: gravity, down(2)
       integer :: k
 
       associate (s => simulation, bodies => simulation%bodies)
-         survey%corners = bodies%vertex_start(bodies%n + 1_ip) - 1_ip
-         call survey_bodies(bodies, survey)
-         if (size(bodies%free) > 0) survey%diameter(2) = s%maker%median_diameter
-         call survey_free_bodies(bodies, s%settings%forces%stiffness, survey)
+         measures%corners = bodies%vertex_start(bodies%n + 1_ip) - 1_ip
+         call survey_bodies(bodies, measures)
+         if (size(bodies%free) > 0) measures%diameter(2) = s%maker%median_diameter
+         call survey_free_bodies(bodies, s%settings%forces%stiffness, measures)
          do k = 1, size(s%motions)
-            survey%wall_speed = max(survey%wall_speed, greatest_speed(s%motions(k), s%guard%radius))
+            measures%wall_speed = max(measures%wall_speed, greatest_speed(s%motions(k), s%guard%radius))
          end do
          gravity = hypotenuse(s%settings%forces%gravity(1), s%settings%forces%gravity(2))
          if (gravity > 0.0_wp) then
             down = abs(s%settings%forces%gravity)/gravity
-            survey%potential = gravity*survey%mass(3)*along(survey%extent)
-            survey%fall_speed = sqrt(2.0_wp*gravity*along(survey%extent))
-            survey%softness = survey%density(2)*gravity*along(survey%free_extent)/s%settings%forces%stiffness
+            measures%potential = gravity*measures%mass(3)*along(measures%extent)
+            measures%fall_speed = sqrt(2.0_wp*gravity*along(measures%extent))
+            measures%softness = measures%density(2)*gravity*along(measures%free_extent)/s%settings%forces%stiffness
          end if
-         survey%stored = stored_energy(s%contacts)
+         measures%stored = stored_energy(s%contacts)
       end associate
 
    contains
@@ -86,27 +86,27 @@ contains
          along = down(1)*(extent(1, 2) - extent(1, 1)) + down(2)*(extent(2, 2) - extent(2, 1))
       end function along
 
-   end subroutine survey_scene
+   end subroutine measure_scene
 
    !> Find the extents and the thinnest body.
-   pure subroutine survey_bodies(bodies, survey)
+   pure subroutine survey_bodies(bodies, measures)
       type(bodies_t), intent(in) :: bodies
-      type(survey_t), intent(inout) :: survey
+      type(scene_measures_t), intent(inout) :: measures
       real(wp) :: thickness, radius
       integer(ip) :: s
 
-      survey%thickness = huge(1.0_wp)
-      survey%extent = reshape([1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp], [2, 2])*huge(1.0_wp)
-      survey%free_extent = survey%extent
+      measures%thickness = huge(1.0_wp)
+      measures%extent = reshape([1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp], [2, 2])*huge(1.0_wp)
+      measures%free_extent = measures%extent
       do s = 1_ip, bodies%n
-         call extend_extent(survey%extent, bodies, s)
-         if (.not. bodies%fixed(s)) call extend_extent(survey%free_extent, bodies, s)
+         call extend_extent(measures%extent, bodies, s)
+         if (.not. bodies%fixed(s)) call extend_extent(measures%free_extent, bodies, s)
          call measure_body(bodies, s, thickness, radius)
-         if (thickness >= survey%thickness) cycle
-         survey%thickness = thickness
-         survey%thinnest = s
+         if (thickness >= measures%thickness) cycle
+         measures%thickness = thickness
+         measures%thinnest = s
       end do
-      if (size(bodies%free) == 0) survey%free_extent = 0.0_wp
+      if (size(bodies%free) == 0) measures%free_extent = 0.0_wp
    end subroutine survey_bodies
 
    !> Extend a bounding box to the vertices of a body.
@@ -126,17 +126,17 @@ contains
    !>
    !> A body of mass m and speed v causes an overlap of at most v sqrt(m/E) in a contact of stiffness E, if the contact
    !> is as long as the length in the force law and the other body is at rest.
-   pure subroutine survey_free_bodies(bodies, stiffness, survey)
+   pure subroutine survey_free_bodies(bodies, stiffness, measures)
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: stiffness
-      type(survey_t), intent(inout) :: survey
+      type(scene_measures_t), intent(inout) :: measures
       real(wp) :: length, density, speed, impact
       integer(ip) :: k, s
 
       if (size(bodies%free) == 0) return
-      survey%diameter(1) = huge(1.0_wp)
-      survey%mass(1) = huge(1.0_wp)
-      survey%density(1) = huge(1.0_wp)
+      measures%diameter(1) = huge(1.0_wp)
+      measures%mass(1) = huge(1.0_wp)
+      measures%density(1) = huge(1.0_wp)
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
          associate (shape => bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))
@@ -144,17 +144,17 @@ contains
             density = bodies%mass(s)/area_of(shape)
          end associate
          speed = hypotenuse(bodies%velocity(1, s), bodies%velocity(2, s))
-         survey%diameter([1, 3]) = [min(survey%diameter(1), length), max(survey%diameter(3), length)]
-         survey%mass = [min(survey%mass(1), bodies%mass(s)), max(survey%mass(2), bodies%mass(s)), &
-                        survey%mass(3) + bodies%mass(s)]
-         survey%density = [min(survey%density(1), density), max(survey%density(2), density)]
-         survey%speed = max(survey%speed, speed)
-         survey%kinetic = survey%kinetic + 0.5_wp*bodies%mass(s)*speed**2 &
+         measures%diameter([1, 3]) = [min(measures%diameter(1), length), max(measures%diameter(3), length)]
+         measures%mass = [min(measures%mass(1), bodies%mass(s)), max(measures%mass(2), bodies%mass(s)), &
+                        measures%mass(3) + bodies%mass(s)]
+         measures%density = [min(measures%density(1), density), max(measures%density(2), density)]
+         measures%speed = max(measures%speed, speed)
+         measures%kinetic = measures%kinetic + 0.5_wp*bodies%mass(s)*speed**2 &
             + 0.5_wp*bodies%inertia(s)*bodies%angular_velocity(s)**2
          impact = speed*sqrt(bodies%mass(s)/stiffness)
-         if (impact <= survey%impact) cycle
-         survey%impact = impact
-         survey%fastest = s
+         if (impact <= measures%impact) cycle
+         measures%impact = impact
+         measures%fastest = s
       end do
    end subroutine survey_free_bodies
 
@@ -192,4 +192,4 @@ contains
       end select
    end function greatest_speed
 
-end module polydem_survey
+end module polydem_scene_measures

@@ -2,7 +2,7 @@
 !>
 !> In the first round each rank records the values that it contributes. In the second round they are the values of the
 !> other rank.
-module paired_team
+module paired_communicator
    use polydem_kinds, only: lp
    use polydem_serial_communicator, only: serial_communicator_t
    implicit none
@@ -40,4 +40,4 @@ contains
       if (allocated(self%received(self%n_calls)%word)) values = values + self%received(self%n_calls)%word
    end subroutine all_reduce_sum
 
-end module paired_team
+end module paired_communicator

@@ -1,0 +1,135 @@
+"""HDF5 files of results: opening them, and what is wrong with them told in sentences."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+#: Newest layout of files that this reader knows
+SCHEMA_VERSION = 3
+
+#: End of the name of a segment that is being written
+OPEN_SUFFIX = ".open"
+
+#: What h5py and numpy raise for files that are incomplete or not what they should be
+UNREADABLE = (
+    OSError,
+    KeyError,
+    RuntimeError,
+    ValueError,
+    TypeError,
+    IndexError,
+    AttributeError,
+    OverflowError,
+    MemoryError,
+)
+
+#: Bytes that one byte of a file can stand for at most: deflate makes a thousand zeros one byte
+MOST_COMPRESSED = 1100
+
+#: Deepest nesting of groups, and most objects, of a file of polydem
+DEEPEST, MOST_OBJECTS = 8, 10000
+
+
+class ResultError(Exception):
+    """A result that is not there, not complete or not a result; the message says which and what to do."""
+
+
+def open_file(path: Path) -> h5py.File:
+    """Open a file, also one that a run is still writing or has just closed and renamed."""
+    try:
+        try:
+            file = _open_hdf5(path)
+        except OSError:
+            if present_path(path) == path:
+                raise
+            file = _open_hdf5(present_path(path))
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be read ({error})") from error
+    try:
+        version = int(file.attrs.get("schema_version", 0))
+        if not 1 <= version <= SCHEMA_VERSION:
+            raise ResultError(f"{path}: is not a file of polydem, or of a newer version than this reader")
+        insist_on_own_data(path, file)
+    except UNREADABLE as error:
+        file.close()
+        raise ResultError(f"{path}: cannot be read ({error})") from error
+    except ResultError:
+        file.close()
+        raise
+    return file
+
+
+@contextmanager
+def reading(path: Path):
+    """A file to read; whatever is wrong with what it holds is told in a sentence."""
+    with open_file(path) as file:
+        try:
+            yield file
+        except UNREADABLE as error:
+            raise ResultError(f"{path}: cannot be read ({_reason(error)})") from error
+
+
+def insist_on_own_data(path: Path, file: h5py.File) -> None:
+    """Refuse a file whose data lie in other files: what it shows would depend on what is there, or belong to others."""
+    waiting, seen = [(file, "", 0)], 0
+    most_bytes = MOST_COMPRESSED * Path(file.filename).stat().st_size + 2**20
+    while waiting:
+        group, place, depth = waiting.pop()
+        for name in group:
+            seen += 1
+            if depth >= DEEPEST or seen > MOST_OBJECTS:
+                raise ResultError(f"{path}: has groups in groups as no file of polydem has")
+            link = group.get(name, getlink=True)
+            if not isinstance(link, h5py.HardLink):
+                raise ResultError(f"{path}: {place}/{name} is a link, perhaps to another file; polydem writes none")
+            entry = group[name]
+            if isinstance(entry, h5py.Group):
+                waiting.append((entry, f"{place}/{name}", depth + 1))
+            elif isinstance(entry, h5py.Dataset) and entry.nbytes > most_bytes:
+                raise ResultError(f"{path}: {place}/{name} claims {entry.nbytes} bytes, more than the file can hold; "
+                                  "it is damaged")
+            elif isinstance(entry, h5py.Dataset) and (entry.is_virtual or entry.external):
+                raise ResultError(f"{path}: the data of {place}/{name} lie in other files; polydem writes no such "
+                                  "files")
+
+
+def insist(path: Path, group: str, arrays: dict, shapes: dict, finite: bool = True) -> None:
+    """Insist on numbers of these shapes, which must be finite unless that is left open."""
+    for name, values in arrays.items():
+        values = np.asarray(values)
+        if values.dtype.kind not in "iufb":
+            raise ResultError(f"{path}: {group}/{name} does not hold numbers")
+        if values.shape != shapes[name]:
+            raise ResultError(f"{path}: {group}/{name} has the shape {values.shape}, not {shapes[name]}")
+        if finite and values.dtype.kind == "f" and not np.isfinite(values).all():
+            raise ResultError(f"{path}: {group}/{name} holds what is no number (NaN or infinite)")
+
+
+def plain(entry: h5py.Dataset):
+    """A stored text or number as Python's own."""
+    value = entry[()]
+    return value.decode("utf-8", errors="replace") if isinstance(value, bytes) else value.item()
+
+
+def present_path(path: Path) -> Path:
+    """The path, or that of the closed segment if a run has closed the segment since it was found."""
+    if path.name.endswith(OPEN_SUFFIX) and not path.exists():
+        return path.with_suffix("")
+    return path
+
+
+def _open_hdf5(path: Path) -> h5py.File:
+    try:
+        return h5py.File(path, "r", locking=False)
+    except (TypeError, ValueError):
+        return h5py.File(path, "r")
+
+
+def _reason(error: Exception) -> str:
+    """What an exception says, in one line."""
+    words = " ".join(str(error).split()).strip("'\"")
+    return words or type(error).__name__
