@@ -46,7 +46,8 @@ contains
       integer(ip), intent(in) :: s
       real(wp) :: power(n_channels)
 
-      associate (v => bodies%velocity(:, s), w => bodies%angular_velocity(s), e => term(sum_elastic + 1:sum_elastic + 3), &
+      associate (v => bodies%velocity(:, s), w => bodies%angular_velocity(s), &
+                 e => term(sum_elastic + 1:sum_elastic + 3), &
                  n => term(sum_normal + 1:sum_normal + 3), t => term(sum_tangential + 1:sum_tangential + 3))
          power(1) = (e(1)*v(1) + e(2)*v(2)) + e(3)*w
          power(2) = ((n(1) - e(1))*v(1) + (n(2) - e(2))*v(2)) + (n(3) - e(3))*w

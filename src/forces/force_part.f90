@@ -1,6 +1,7 @@
 !> Base type of a part of the contact force.
 !>
-!> A part adds to columns of a block of contacts in one loop over the block. It never overwrites values of other parts. The columns decide the channel of the energy balance:
+!> A part adds to columns of a block of contacts in one loop over the block. It never overwrites values of other
+!> parts. The columns decide the channel of the energy balance:
 !>
 !> * `elastic` and `normal_force`: repulsion of the overlap, work of elastic forces;
 !> * `cohesion` and `normal_force`: another force with a potential, which may attract, also work of elastic forces;

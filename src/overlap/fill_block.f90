@@ -2,8 +2,8 @@
 !> contact point and direction.
 !>
 !> Most pairs are like those of the last step: an edge still separates the polygons, or their outlines cross at the same
-!> edges. The contact history remembers either. Contacts of the second kind are evaluated together, as a batch. All other
-!> pairs are searched one by one. The result is the same, whatever is remembered.
+!> edges. The contact history remembers either. Contacts of the second kind are evaluated together, as a batch. All
+!> other pairs are searched one by one. The result is the same, whatever is remembered.
 !>
 !> A contact is *degenerate* if it has no direction: |N| is negligible against the square root of the area, because one
 !> body is inside the other, or bars cross. A degenerate contact gets the direction of the line of centres (or of the x
@@ -40,8 +40,8 @@ contains
       integer(ip), intent(in) :: low
       !> First pair to examine, at least `low`; afterwards the next one, less than `low` if there is none
       integer(ip), intent(inout) :: next
-      !> Contact history of the pairs: `memory` is updated, and the other columns are cleared for pairs whose polygons do
-      !> not overlap; any column may be absent
+      !> Contact history of the pairs: `memory` is updated, and the other columns are cleared for pairs whose polygons
+      !> do not overlap; any column may be absent
       type(contact_history_t), intent(inout) :: history
       !> Contacts; the columns that the force law fills are not changed
       type(contact_block_t), intent(inout) :: block
@@ -104,8 +104,8 @@ contains
             in_batch(n) = .false.
             if (.not. remembers) cycle
             call add_lane(batch, n, history%memory(p), &
-                          [start(i), start(i + 1_ip) - 1_ip, start(j), start(j + 1_ip) - 1_ip], offset_of(bodies, i, j), &
-                          radius(i), radius(j), in_batch(n))
+                          [start(i), start(i + 1_ip) - 1_ip, start(j), start(j + 1_ip) - 1_ip], &
+                          offset_of(bodies, i, j), radius(i), radius(j), in_batch(n))
          end do
       end associate
       next = p

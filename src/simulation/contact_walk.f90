@@ -1,8 +1,8 @@
 !> From pairs to forces on bodies in one walk over blocks of contacts: overlaps, force law, guards, sums per body.
 !>
-!> A block of contacts stays in the first-level cache from its overlaps to the sums of its forces; a table of contacts is
-!> written only for those who ask for it. Each thread walks over one range of pairs. Sums of forces are in the same order
-!> for any number of threads (see `polydem_force_sums`).
+!> A block of contacts stays in the first-level cache from its overlaps to the sums of its forces; a table of contacts
+!> is written only for those who ask for it. Each thread walks over one range of pairs. Sums of forces are in the same
+!> order for any number of threads (see `polydem_force_sums`).
 module polydem_contact_walk
    use omp_lib, only: omp_get_max_threads
    use polydem_clock, only: wall_seconds

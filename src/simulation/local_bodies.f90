@@ -45,7 +45,8 @@ contains
       if (allocated(error)) return
       call rebuild_neighbours(self, error)
       call allocate_history(self)
-      call new_contact_guard(self%contact_guard, self%settings%guards, self%bodies, column_of(self%history, 'direction'))
+      call new_contact_guard(self%contact_guard, self%settings%guards, self%bodies, &
+                             column_of(self%history, 'direction'))
       self%generation = self%generation + 1_ip
    end subroutine fit_to_bodies
 

@@ -21,7 +21,8 @@ module polydem_passing
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: contact_guard_t, new_contact_guard, test_block, passing_text, packed_direction, is_reversed, centre_inside, least_depth
+   public :: contact_guard_t, new_contact_guard, test_block, passing_text, packed_direction, is_reversed, &
+      centre_inside, least_depth
 
    !> Minimum depth of the tested contacts, as a fraction of the thickness of the thinner body
    real(wp), parameter :: least_depth = 0.0625_wp
@@ -30,7 +31,8 @@ module polydem_passing
    type :: contact_guard_t
       !> Thickness of each body, (slot) [m]; not allocated if the guards are off
       real(wp), allocatable :: thickness(:)
-      !> Contacts deeper than this fraction of the thickness of the thinner body are suspects; huge: only degenerate ones
+      !> Contacts deeper than this fraction of the thickness of the thinner body are suspects; huge: only degenerate
+      !> ones
       real(wp) :: least_depth = huge(1.0_wp)
       !> Column of the contact history with the directions of the last step; 0 if there is none
       integer :: column = 0

@@ -16,7 +16,8 @@ module polydem_force_sums
    implicit none
    private
    public :: force_sums_t, contact_terms_t, late_terms_t, n_terms, sum_elastic, sum_normal, sum_tangential, sum_energy
-   public :: start_sums, terms_of_block, term_of, add_terms, add_late_terms, assemble_forces, select_walls, total_forces, set_force
+   public :: start_sums, terms_of_block, term_of, add_terms, add_late_terms, assemble_forces, select_walls
+   public :: total_forces, set_force
 
    !> Rows of a term: force along x and y and torque of the elastic forces with cohesion, of all normal forces with the
    !> twist, and of the tangential forces [N/m, N/m, N]; elastic energy [J/m]
