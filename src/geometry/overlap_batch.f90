@@ -6,7 +6,7 @@
 module polydem_overlap_batch
    use polydem_kinds, only: ip, wp
    use polydem_overlap_tolerances, only: far
-   use polydem_pair_memory, only: unpack_lens
+   use polydem_pair_memory, only: lens_bits
    implicit none
    private
    public :: lanes, column_length, overlap_batch_t, add_lane
@@ -85,7 +85,8 @@ contains
 
       usable = .false.
       if (memory <= 0_ip) return
-      call unpack_lens(memory, edge)
+      edge(1:2) = [ibits(memory, 0, lens_bits), ibits(memory, lens_bits, lens_bits)]
+      edge(3:4) = [ibits(memory, 2*lens_bits, lens_bits), ibits(memory, 3*lens_bits, lens_bits)]
       corners_p = vertices(2) - vertices(1) + 1_ip
       corners_q = vertices(4) - vertices(3) + 1_ip
       if (max(edge(1), edge(2)) >= corners_p .or. max(edge(3), edge(4)) >= corners_q) return
@@ -113,8 +114,7 @@ contains
       batch%radius(lane, 1) = radius_p
       batch%radius(lane, 2) = radius_q
       equal = merge(0.0_wp, 1.0_wp, radius_p < radius_q)
-      batch%on_entering(lane, 1) = 1.0_wp
-      batch%on_entering(lane, 2) = equal
+      batch%on_entering(lane, :) = [1.0_wp, equal]
       batch%scale(lane, 1) = radius_p
       batch%scale(lane, 2) = (1.0_wp - 0.5_wp*equal)*far*radius_p
       batch%centre(lane, 1) = -0.5_wp*equal*offset(1)
