@@ -6,7 +6,7 @@
 module polydem_overlap_batch
    use polydem_kinds, only: ip, wp
    use polydem_overlap_tolerances, only: far
-   use polydem_pair_memory, only: unpack_lens
+   use polydem_pair_memory, only: lens_bits, most_lens_corners
    implicit none
    private
    public :: lanes, column_length, overlap_batch_t, add_lane, copy_lane
@@ -85,9 +85,12 @@ contains
 
       usable = .false.
       if (memory <= 0_ip) return
-      call unpack_lens(memory, edge)
+      edge(1:2) = [ibits(memory, 0, lens_bits), ibits(memory, lens_bits, lens_bits)]
+      edge(3:4) = [ibits(memory, 2*lens_bits, lens_bits), ibits(memory, 3*lens_bits, lens_bits)]
       corners_p = vertices(2) - vertices(1) + 1_ip
       corners_q = vertices(4) - vertices(3) + 1_ip
+      ! The search without memory leaves larger polygons to clipping.
+      if (max(corners_p, corners_q) > most_lens_corners) return
       if (max(edge(1), edge(2)) >= corners_p .or. max(edge(3), edge(4)) >= corners_q) return
       inside_p = edge(2) - edge(1)
       if (inside_p < 0_ip) inside_p = inside_p + corners_p
@@ -110,13 +113,10 @@ contains
       batch%some(lane, 2) = real(min(1_ip, inside_q), wp)
       batch%two(lane, 1) = real(ishft(inside_p, -1), wp)
       batch%two(lane, 2) = real(ishft(inside_q, -1), wp)
-      batch%radius(lane, 1) = radius_p
-      batch%radius(lane, 2) = radius_q
+      batch%radius(lane, :) = [radius_p, radius_q]
       equal = merge(0.0_wp, 1.0_wp, radius_p < radius_q)
-      batch%on_entering(lane, 1) = 1.0_wp
-      batch%on_entering(lane, 2) = equal
-      batch%scale(lane, 1) = radius_p
-      batch%scale(lane, 2) = (1.0_wp - 0.5_wp*equal)*far*radius_p
+      batch%on_entering(lane, :) = [1.0_wp, equal]
+      batch%scale(lane, :) = [radius_p, (1.0_wp - 0.5_wp*equal)*far*radius_p]
       batch%centre(lane, 1) = -0.5_wp*equal*offset(1)
       batch%centre(lane, 2) = -0.5_wp*equal*offset(2)
       batch%centre(lane, 3) = offset(1) + batch%centre(lane, 1)

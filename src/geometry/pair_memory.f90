@@ -9,7 +9,7 @@ module polydem_pair_memory
    use polydem_kinds, only: ip
    implicit none
    private
-   public :: most_lens_corners, packed_lens, unpack_lens, packed_edge, unpack_edge
+   public :: lens_bits, most_lens_corners, packed_lens, packed_edge, unpack_edge
 
    !> Bits of the number of an edge of a lens, and of the number of a separating edge
    integer, parameter :: lens_bits = 7, edge_bits = 15
@@ -20,25 +20,13 @@ contains
 
    !> Memory of a lens
    pure integer(ip) function packed_lens(edges)
-      !> Edge of P that enters Q, edge of P that leaves it, edge of Q that enters P, edge of Q that leaves it
+      !> Edge of P that enters Q, edge of P that leaves it, edge of Q that enters P, edge of Q that leaves it, from the
+      !> lowest bits upwards
       integer(ip), intent(in) :: edges(4)
 
       packed_lens = ior(ior(edges(1), ishft(edges(2), lens_bits)), &
                         ior(ishft(edges(3), 2*lens_bits), ishft(edges(4), 3*lens_bits)))
    end function packed_lens
-
-   !> The edges of a lens.
-   pure subroutine unpack_lens(memory, edges)
-      !> A positive number
-      integer(ip), intent(in) :: memory
-      !> As in `packed_lens`
-      integer(ip), intent(out) :: edges(4)
-
-      edges(1) = ibits(memory, 0, lens_bits)
-      edges(2) = ibits(memory, lens_bits, lens_bits)
-      edges(3) = ibits(memory, 2*lens_bits, lens_bits)
-      edges(4) = ibits(memory, 3*lens_bits, lens_bits)
-   end subroutine unpack_lens
 
    !> Memory of a separating edge, 0 if its number or that of the corner is too large
    pure integer(ip) function packed_edge(of_q, edge, corner)
