@@ -74,7 +74,7 @@ contains
       type(overlap_batch_t), intent(inout) :: batch
       !> Whether the pair has a lane in the batch
       logical, intent(inout) :: in_batch(block_size)
-      integer(ip) :: i, j, n, p
+      integer(ip) :: exchange, i, j, n, p
       logical :: apart, remembers
 
       remembers = allocated(history%memory)
@@ -84,11 +84,10 @@ contains
             if (n == block_size) exit
             i = first(p)
             j = second(p)
-            ! As `is_exchanged`; a call costs 2 % of a step here.
-            if (radius(j) < radius(i)) then
-               i = second(p)
-               j = first(p)
-            end if
+            ! The roles of `is_exchanged`, without a branch: which radius is greater, a processor cannot predict.
+            exchange = iand(ieor(i, j), -merge(1_ip, 0_ip, radius(j) < radius(i)))
+            i = ieor(i, exchange)
+            j = ieor(j, exchange)
             if (remembers) then
                if (history%memory(p) < 0_ip) then
                   call test_separation(turned(:, start(i):start(i + 1_ip) - 1_ip), &
