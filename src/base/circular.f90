@@ -48,17 +48,17 @@ contains
       real(dp) :: r, rest, sines(1), cosines(1)
       integer(lp) :: quadrant, sign
 
-      if (abs(angle) <= greatest_angle) then
+      if (.not. ieee_is_finite(angle)) then
+         sine = ieee_value(sine, ieee_quiet_nan)
+         cosine = sine
+      else if (abs(angle) <= greatest_angle) then
          call sine_lanes(1, [angle], sines, cosines)
          sine = sines(1)
          cosine = cosines(1)
-      else if (ieee_is_finite(angle)) then
+      else
          call reduce_angle(abs(angle), quadrant, r, rest)
          sign = ieor(transfer(abs(angle), sign), transfer(angle, sign))
          call turned_sine(quadrant, sign, r, rest, sine, cosine)
-      else
-         sine = ieee_value(sine, ieee_quiet_nan)
-         cosine = sine
       end if
    end subroutine sine_and_cosine
 
