@@ -52,7 +52,8 @@ contains
       real(dp) :: minus, of_minus, plus, of_plus, square, of_square, root, of_root, product, error
 
       arc_cosine = ieee_value(x, ieee_quiet_nan)
-      if (.not. abs(x) <= 1.0_dp) return
+      if (ieee_is_nan(x)) return
+      if (abs(x) > 1.0_dp) return
       ! The sine is the root of (1 - x)(1 + x), with its rounding error.
       call add(1.0_dp, -x, minus, of_minus)
       call add(1.0_dp, x, plus, of_plus)
@@ -141,12 +142,15 @@ contains
       real(dp) :: scaled(2), square(2), error(2), sum, of_sum, product, of_product
       integer :: power
 
-      hypotenuse = max(abs(x), abs(y))
       if (.not. (ieee_is_finite(x) .and. ieee_is_finite(y))) then
-         if (ieee_is_nan(x) .or. ieee_is_nan(y)) hypotenuse = ieee_value(x, ieee_quiet_nan)
-         if (abs(x) > huge(x) .or. abs(y) > huge(y)) hypotenuse = ieee_value(x, ieee_positive_inf)
+         ! An infinite component counts even beside one that is not a number.
+         hypotenuse = ieee_value(x, ieee_positive_inf)
+         if (ieee_is_finite(x) .or. ieee_is_finite(y) .or. (ieee_is_nan(x) .and. ieee_is_nan(y))) then
+            if (ieee_is_nan(x) .or. ieee_is_nan(y)) hypotenuse = ieee_value(x, ieee_quiet_nan)
+         end if
          return
       end if
+      hypotenuse = max(abs(x), abs(y))
       if (.not. hypotenuse > 0.0_dp) return
       power = exponent(hypotenuse)
       scaled = scale([x, y], -power)

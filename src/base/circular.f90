@@ -9,13 +9,11 @@ module polydem_circular
    use polydem_instruction_set, only: isa_avx2
    use polydem_kinds, only: dp, lp
    use polydem_sine_lanes_avx2, only: sine_lanes_avx2 => sine_lanes
-   use polydem_sine_lanes_base, only: cosine_series, sine_lanes, sine_series, turned_sine
+   use polydem_sine_lanes_base, only: cosine_series, greatest_angle, sine_lanes, sine_series, turned_sine
    implicit none
    private
    public :: sines_and_cosines, sine_and_cosine, sine, cosine, tangent
 
-   !> Greatest magnitude of an angle that `sine_lanes` takes [rad]
-   real(dp), parameter :: greatest = 2.0_dp**20
    !> Angles up to pi/4 need no reduction [rad]
    real(dp), parameter :: half_right_angle = 0.7853981633974483_dp
 
@@ -37,7 +35,7 @@ contains
          call sine_lanes(size(angle), angle, sine, cosine)
       end if
       do k = 1, size(angle)
-         if (.not. abs(angle(k)) <= greatest) call sine_and_cosine(angle(k), sine(k), cosine(k))
+         if (.not. abs(angle(k)) <= greatest_angle) call sine_and_cosine(angle(k), sine(k), cosine(k))
       end do
    end subroutine sines_and_cosines
 
@@ -50,17 +48,17 @@ contains
       real(dp) :: r, rest, sines(1), cosines(1)
       integer(lp) :: quadrant, sign
 
-      if (abs(angle) <= greatest) then
+      if (.not. ieee_is_finite(angle)) then
+         sine = ieee_value(sine, ieee_quiet_nan)
+         cosine = sine
+      else if (abs(angle) <= greatest_angle) then
          call sine_lanes(1, [angle], sines, cosines)
          sine = sines(1)
          cosine = cosines(1)
-      else if (ieee_is_finite(angle)) then
+      else
          call reduce_angle(abs(angle), quadrant, r, rest)
          sign = ieor(transfer(abs(angle), sign), transfer(angle, sign))
          call turned_sine(quadrant, sign, r, rest, sine, cosine)
-      else
-         sine = ieee_value(sine, ieee_quiet_nan)
-         cosine = sine
       end if
    end subroutine sine_and_cosine
 

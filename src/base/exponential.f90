@@ -55,7 +55,8 @@ contains
       integer :: k
 
       logarithm = x
-      if (.not. x <= huge(x)) return
+      if (ieee_is_nan(x)) return
+      if (x > huge(x)) return
       if (x <= 0.0_dp) then
          logarithm = ieee_value(x, ieee_quiet_nan)
          if (.not. x < 0.0_dp) logarithm = ieee_value(x, ieee_negative_inf)

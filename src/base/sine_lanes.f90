@@ -12,8 +12,10 @@ module polydem_sine_lanes
    use polydem_kinds, only: dp, lp
    implicit none
    private
-   public :: sine_lanes, turned_sine, sine_series, cosine_series
+   public :: greatest_angle, sine_lanes, turned_sine, sine_series, cosine_series
 
+   !> Greatest magnitude of an angle that a kernel takes [rad]
+   real(dp), parameter :: greatest_angle = 2.0_dp**20
    !> 2/pi
    real(dp), parameter :: quadrants_per_radian = 0.6366197723675814_dp
    !> Parts of pi/2
@@ -30,7 +32,7 @@ module polydem_sine_lanes
 
 contains
 
-   !> Compute the sines and cosines of angles of magnitude up to 2^20.
+   !> Compute the sines and cosines of angles of magnitude up to `greatest_angle`. Those of others have no meaning.
    pure subroutine sine_lanes(n, angle, sine, cosine)
       !> Number of angles
       integer, intent(in) :: n
@@ -45,8 +47,8 @@ contains
       integer :: l
 
       do l = 1, n
-         x = abs(angle(l))
-         sign = ieor(transfer(x, sign), transfer(angle(l), sign))
+         x = min(abs(angle(l)), greatest_angle)
+         sign = ieor(transfer(abs(angle(l)), sign), transfer(angle(l), sign))
          whole = x*quadrants_per_radian + rounder
          k = whole - rounder
          first = x - k*part(1)

@@ -8,20 +8,12 @@ add_library(polydem::flags ALIAS polydem_flags)
 # GCC takes the descriptors of allocatables that are allocated by assignment for uninitialised (GCC bug 77504), so
 # these two warnings are off; run-time checks of the Debug build find the real cases.
 #
-# GCC before 12.3 vectorises rotations with fused multiply-add even if contraction is off (GCC bug 107647). So there a build
-# for this machine leaves out the instruction sets that have it.
-set(polydem_native -march=native)
-if(CMAKE_Fortran_COMPILER_VERSION VERSION_LESS 12.3 AND CMAKE_SYSTEM_PROCESSOR STREQUAL "x86_64")
-  list(APPEND polydem_native -mno-fma -mno-avx512f)
-endif()
-
 target_compile_options(polydem_flags INTERFACE
   -std=f2008 -fimplicit-none -ffp-contract=off
   -Wall -Wextra -Wimplicit-interface -Werror=implicit-interface -Wtrampolines -Werror=trampolines
   -Wno-uninitialized -Wno-maybe-uninitialized
   $<$<CONFIG:Debug>:-Og -g -fcheck=all -fbacktrace -ffpe-trap=invalid,zero,overflow -finit-real=snan>
-  $<$<CONFIG:Sanitize>:-O1 -g -fcheck=bounds -fsanitize=address,undefined -fno-omit-frame-pointer>
-  $<$<BOOL:${POLYDEM_NATIVE}>:${polydem_native}>)
+  $<$<CONFIG:Sanitize>:-O1 -g -fcheck=bounds -fsanitize=address,undefined -fno-omit-frame-pointer>)
 target_link_options(polydem_flags INTERFACE
   $<$<CONFIG:Sanitize>:-fsanitize=address,undefined>)
 target_link_libraries(polydem_flags INTERFACE OpenMP::OpenMP_Fortran)

@@ -19,7 +19,7 @@ SOURCES = FOLDER = pathlib.Path()
 CMAKE = ""
 
 #: Entries of a preset that decide on flags alone
-FLAGS = {"CMAKE_BUILD_TYPE", "POLYDEM_NATIVE"}
+FLAGS = {"CMAKE_BUILD_TYPE"}
 #: No code, so nothing to put into libraries and programs
 ONLY_CHECK = ["-DCMAKE_BUILD_TYPE=Release", "-DCMAKE_Fortran_FLAGS_RELEASE=-fsyntax-only", "-DPOLYDEM_TESTS=OFF",
               "-DCMAKE_Fortran_ARCHIVE_CREATE=<CMAKE_COMMAND> -E touch <TARGET>", "-DCMAKE_Fortran_ARCHIVE_FINISH=",

@@ -67,7 +67,7 @@ class Revision(Scene):
         room = SOURCES / "src/system"
         code, _, message = call(CMAKE, "-D", f"TEMPLATE={room / 'build_info.f90.in'}", "-D", f"RESULT={result}",
                                 "-D", f"SOURCE_DIR={self.clone}", "-D", "VERSION=1", "-D", "BUILD_TYPE=Release",
-                                "-D", "NATIVE=OFF", "-P", room / "build_info.cmake")
+                                "-P", room / "build_info.cmake")
         self.assertEqual(code, 0, message)
         return result.read_text(encoding="utf-8").split("git_revision = '")[1].split("'")[0]
 
