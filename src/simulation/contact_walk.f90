@@ -188,7 +188,6 @@ contains
       integer(ip), intent(in) :: n
       integer(ip) :: c, r, n_degenerate
 
-      self%has_contacts = self%keeps_contacts
       self%contacts%n = 0_ip
       n_degenerate = 0_ip
       self%n_contacts = 0_ip
