@@ -5,8 +5,8 @@
 !> decides whether values are saved or restored.
 !>
 !> Names have the form /group/column. The group determines the rows of a column. A column of /run is one value or list
-!> for the whole run. A column of /bodies, /boxes or /pairs has one row per body, box or pair, in ascending order of
-!> identifiers (not of slots). A parallel serializer therefore derives from the name how to gather and distribute rows.
+!> for the whole run. A column of /bodies or /pairs has one row per body or pair, in ascending order of identifiers (not
+!> of slots). A parallel serializer therefore derives from the name how to gather and distribute rows.
 !>
 !> Every bit is preserved in any working precision. Restored data are untrusted: integers must not exceed 2^62 in
 !> magnitude. The first failure stays in `error`, and all later calls do nothing.
@@ -33,6 +33,9 @@ module polydem_serializer
       !> Save a column, or check that it equals the saved one: match(name, values, unit, meaning)
       generic :: match => match_longs, match_real
       procedure :: seconds_field
+      procedure :: has_failed
+      procedure :: count_rows
+      procedure :: choose_rows
       !> Save or restore real numbers
       procedure(transfer_reals), deferred :: transfer_reals
       !> Save or restore integers
@@ -70,6 +73,38 @@ module polydem_serializer
    end interface
 
 contains
+
+   !> Whether an earlier call failed. Serializers of several ranks make sure that the answer is the same on all ranks.
+   logical function has_failed(self)
+      class(serializer_t), intent(inout) :: self
+
+      has_failed = allocated(self%error)
+   end function has_failed
+
+   !> Number of saved rows of a column, for a column whose length is unknown before it is restored; 0 when saving
+   subroutine count_rows(self, name, n)
+      class(serializer_t), intent(inout) :: self
+      !> Name of the column
+      character(len=*), intent(in) :: name
+      !> Number of rows
+      integer(lp), intent(out) :: n
+
+      associate (unused_self => self, unused => name)
+      end associate
+      n = 0_lp
+   end subroutine count_rows
+
+   !> Choose the rows of a group that are restored next. By default all rows are.
+   subroutine choose_rows(self, group, rows)
+      class(serializer_t), intent(inout) :: self
+      !> Name of the group, such as /pairs/
+      character(len=*), intent(in) :: group
+      !> Number of rows before the rows to restore, and number of rows to restore
+      integer(lp), intent(in) :: rows(2)
+
+      associate (unused_self => self, unused => group, unused_rows => rows)
+      end associate
+   end subroutine choose_rows
 
    !> Save or restore real numbers. The other forms of `field` differ only in kind and shape.
    subroutine field_reals(self, name, values, unit, meaning)
@@ -124,7 +159,7 @@ contains
       real(dp), allocatable :: doubles(:)
       integer(lp), allocatable :: words(:)
 
-      if (allocated(self%error)) return
+      if (self%has_failed()) return
       if (storage_size(values) > storage_size(1.0_dp)) then
          words = transfer(values, [0_lp])
          call self%transfer_longs(name, words, unit, meaning//'; bits of the working precision')
@@ -142,7 +177,7 @@ contains
       integer(lp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
 
-      if (allocated(self%error)) return
+      if (self%has_failed()) return
       call self%transfer_longs(name, values, unit, meaning)
       if (.not. self%is_reading .or. allocated(self%error)) return
       if (any(values > max_magnitude .or. values < -max_magnitude)) call raise(self%error, input_error, name//' ('// &
@@ -188,7 +223,7 @@ contains
       !> Meaning, which is stored with the column
       character(len=*), intent(in) :: meaning
 
-      if (allocated(self%error)) return
+      if (self%has_failed()) return
       call self%transfer_reals(name, 1, values, 's', meaning)
    end subroutine seconds_field
 
@@ -203,7 +238,7 @@ contains
       character(len=*), intent(in) :: unit, meaning
       integer(lp), allocatable :: saved_values(:)
 
-      if (allocated(self%error)) return
+      if (self%has_failed()) return
       allocate (saved_values, source=values)
       call self%transfer_longs(name, saved_values, unit, meaning)
       if (allocated(self%error)) return

@@ -21,7 +21,7 @@ module polydem_box_maker
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: box_maker_t, new_box_maker, update_boxes
+   public :: box_maker_t, new_box_maker, update_boxes, diameters_of
 
    !> Allowance for rounding, in units of epsilon times the diameter of a body
    real(wp), parameter :: roundings = 64.0_wp
@@ -228,17 +228,28 @@ contains
       type(bodies_t), intent(in) :: bodies
       real(wp), allocatable :: length(:)
       integer(ip), allocatable :: ranked(:)
-      integer(ip) :: k, n
+      integer(ip) :: n
 
       n = size(bodies%free, kind=ip)
       median_of_diameters = huge(1.0_wp)
       if (n == 0_ip) return
-      allocate (length(n), ranked(n))
-      do k = 1_ip, n
-         length(k) = diameter(body_shape(bodies, bodies%free(k)))
-      end do
+      allocate (ranked(n))
+      length = diameters_of(bodies)
       call sort_reals(length, ranked)
       median_of_diameters = length(ranked((n + 1_ip)/2_ip))
    end function median_of_diameters
+
+   !> Diameters of the free bodies, (body) [m]
+   pure function diameters_of(bodies) result(length)
+      !> Bodies
+      type(bodies_t), intent(in) :: bodies
+      real(wp), allocatable :: length(:)
+      integer(ip) :: k
+
+      allocate (length(size(bodies%free)))
+      do k = 1_ip, size(bodies%free, kind=ip)
+         length(k) = diameter(body_shape(bodies, bodies%free(k)))
+      end do
+   end function diameters_of
 
 end module polydem_box_maker

@@ -26,6 +26,8 @@ module polydem_global_order
       integer(ip), allocatable, private :: slot(:)
       !> Number of rows to send to each rank, (0:size - 1)
       integer(ip), allocatable, private :: counts(:)
+      !> Number of rows received from each rank, (0:size - 1)
+      integer(ip), allocatable, private :: counts_received(:)
       !> Index of the received row for each row of the block, (n)
       integer(ip), allocatable, private :: source(:)
       !> Whether there is only one rank and the rows are already in order
@@ -34,6 +36,7 @@ module polydem_global_order
       procedure :: lay_out
       !> Bring a column into blocks: to_blocks(comm, values, block)
       generic :: to_blocks => longs_to_blocks, doubles_to_blocks
+      procedure :: from_blocks
       procedure, private :: longs_to_blocks, doubles_to_blocks
    end type global_order_t
 
@@ -74,7 +77,7 @@ contains
          sent(1, k) = key(self%slot(k))
       end do
       self%slot = slot(self%slot)
-      call comm%all_to_all(sent, self%counts, received, counts)
+      call comm%all_to_all(sent, self%counts, received, self%counts_received)
       self%n = size(received, 2, kind=ip)
       call rank_keys(received(1, :), self%source)
       self%is_in_order = comm%size == 1_ip .and. all(self%source(2:) > self%source(:self%n - 1_ip))
@@ -110,6 +113,29 @@ contains
          block(:, k) = received(:, self%source(k))
       end do
    end subroutine longs_to_blocks
+
+   !> Bring the blocks of a column back to the ranks that own the rows: the inverse of `to_blocks`. Collective.
+   subroutine from_blocks(self, comm, block, values)
+      class(global_order_t), intent(in) :: self
+      !> The communicator, as in `lay_out`
+      class(communicator_t), intent(inout) :: comm
+      !> The block of this rank, (width, n)
+      integer(lp), intent(in) :: block(:, :)
+      !> The local column, (width, n_known); rows that other ranks own are unchanged
+      integer(lp), intent(inout) :: values(:, :)
+      integer(lp), allocatable :: sent(:, :), received(:, :)
+      integer(ip), allocatable :: counts(:)
+      integer(ip) :: k
+
+      allocate (sent(size(block, 1), self%n))
+      do k = 1_ip, self%n
+         sent(:, self%source(k)) = block(:, k)
+      end do
+      call comm%all_to_all(sent, self%counts_received, received, counts)
+      do k = 1_ip, size(self%slot, kind=ip)
+         values(:, self%slot(k)) = received(:, k)
+      end do
+   end subroutine from_blocks
 
    !> Bring a column of real numbers into blocks without changing a bit; collective.
    subroutine doubles_to_blocks(self, comm, values, block)

@@ -1,14 +1,14 @@
-!> Hash of the state of all bodies of a run, independent of the number of ranks.
+!> Hashes of all bodies of a run, independent of the number of ranks.
 module polydem_global_hash
    use polydem_bodies, only: bodies_t, state_words
    use polydem_communicator, only: communicator_t
    use polydem_global_order, only: global_order_t
    use polydem_hash, only: mix_word
-   use polydem_kinds, only: ip, lp
-   use polydem_ownership, only: order_bodies
+   use polydem_kinds, only: dp, ip, lp
+   use polydem_ownership, only: order_bodies, order_parts
    implicit none
    private
-   public :: hash_all_bodies
+   public :: hash_all_bodies, hash_scene
 
 contains
 
@@ -22,9 +22,7 @@ contains
       integer(lp), intent(out) :: hash
       type(global_order_t) :: blocks
       integer(lp), allocatable :: words(:, :), block(:, :)
-      integer(lp) :: relay(1)
       integer(ip) :: k
-      integer :: i
 
       allocate (words(7, bodies%n))
       do k = 1_ip, bodies%n
@@ -32,10 +30,66 @@ contains
       end do
       call order_bodies(comm, bodies, blocks)
       call blocks%to_blocks(comm, words, block)
-      ! Each rank continues the hash of the ranks below it.
-      relay = int(bodies%n_all, lp)
-      call comm%receive_from_previous(relay)
+      hash = int(bodies%n_all, lp)
+      call mix_blocks(comm, block, hash)
+   end subroutine hash_all_bodies
+
+   !> Compute the hash of the initial bodies: their state, and their constant properties (fixed or free, mass, inertia,
+   !> shape). Collective.
+   subroutine hash_scene(comm, bodies, hash)
+      !> Ranks
+      class(communicator_t), intent(inout) :: comm
+      !> Bodies of this rank at time 0
+      type(bodies_t), intent(in) :: bodies
+      !> The hash, equal on all ranks
+      integer(lp), intent(out) :: hash
+      type(global_order_t) :: blocks
+      integer(lp), allocatable :: words(:, :), block(:, :), counts_of_ranks(:)
+      integer(ip), allocatable :: body(:), counts(:)
+      integer(ip) :: k
+
+      call hash_all_bodies(comm, bodies, hash)
+      allocate (words(4, bodies%n))
+      words(1, :) = merge(1_lp, 0_lp, bodies%fixed)
+      do k = 1_ip, bodies%n
+         words(2:3, k) = transfer(real([bodies%mass(k), bodies%inertia(k)], dp), 0_lp, 2)
+      end do
+      words(4, :) = int(bodies%vertex_start(2:) - bodies%vertex_start(:bodies%n), lp)
+      call order_bodies(comm, bodies, blocks)
+      call blocks%to_blocks(comm, words, block)
+      ! The start of the vertices of the next body takes the place of the number of vertices.
+      call comm%gather([sum(block(4, :))], counts_of_ranks, counts)
       do k = 1_ip, blocks%n
+         if (k == 1_ip) block(4, 1) = block(4, 1) + 1_lp + sum(counts_of_ranks(:comm%rank))
+         if (k > 1_ip) block(4, k) = block(4, k) + block(4, k - 1_ip)
+      end do
+      call mix_blocks(comm, block, hash)
+      deallocate (words)
+      allocate (words(2, size(bodies%shape, 2)), body(size(bodies%shape, 2)))
+      do k = 1_ip, bodies%n
+         body(bodies%vertex_start(k):bodies%vertex_start(k + 1_ip) - 1_ip) = k
+      end do
+      do k = 1_ip, size(body, kind=ip)
+         words(:, k) = transfer(real(bodies%shape(:, k), dp), 0_lp, 2)
+      end do
+      call order_parts(comm, bodies, body, blocks)
+      call blocks%to_blocks(comm, words, block)
+      call mix_blocks(comm, block, hash)
+   end subroutine hash_scene
+
+   !> Continue a hash with the rows of all blocks. Each rank continues the hash of the ranks below it. Collective.
+   subroutine mix_blocks(comm, block, hash)
+      class(communicator_t), intent(inout) :: comm
+      !> The block of this rank, (word, row)
+      integer(lp), intent(in) :: block(:, :)
+      !> The hash, equal on all ranks
+      integer(lp), intent(inout) :: hash
+      integer(lp) :: relay(1)
+      integer :: i, k
+
+      relay = hash
+      call comm%receive_from_previous(relay)
+      do k = 1, size(block, 2)
          do i = 1, size(block, 1)
             relay = mix_word(relay(1), block(i, k))
          end do
@@ -44,6 +98,6 @@ contains
       if (comm%rank < comm%size - 1_ip) relay = 0_lp
       call comm%all_reduce_sum(relay)
       hash = relay(1)
-   end subroutine hash_all_bodies
+   end subroutine mix_blocks
 
 end module polydem_global_hash

@@ -1,4 +1,5 @@
-!> Transfer of the contact history of pairs to the ranks that have these pairs after a redistribution.
+!> Contact history of pairs without their bodies: its transfer to the ranks that have these pairs after a
+!> redistribution, and its way from a checkpoint to the pairs of the first search.
 module polydem_packed_history
    use polydem_communicator, only: communicator_t
    use polydem_contact_history, only: contact_history_t
@@ -7,53 +8,96 @@ module polydem_packed_history
    use polydem_sort, only: sort_keys
    implicit none
    private
-   public :: packed_history_t, send_pairs, receive_pairs
+   public :: packed_history_t, pack_pairs, send_pairs, receive_pairs, slots_of_pair
 
-   !> Contact history of some pairs, in ascending order
+   !> Contact history of some pairs
    type :: packed_history_t
-      !> Global indices of both bodies in one word, the lower one in the upper half, (pair)
+      !> Identifiers of both bodies in one word, the lower one in the upper half, ascending, (pair)
       integer(lp), allocatable :: key(:)
       !> Edge that separated the pair last, (pair)
       integer(ip), allocatable :: edge(:)
       !> Columns of the contact history, or one of zeros if there is none, (column, pair)
       real(wp), allocatable :: value(:, :)
+   contains
+      procedure :: append
    end type packed_history_t
 
 contains
 
-   !> Send the history of each pair to the ranks that will move one of its bodies. Collective.
-   !>
-   !> The sender is the rank that owned the leading body: the first body, or the second one if the first is fixed.
-   subroutine send_pairs(comm, n, first, second, row, lead_is_mine, owner, history, packed)
-      !> Ranks
-      class(communicator_t), intent(inout) :: comm
+   !> Append some pairs of another part of the same list.
+   subroutine append(self, other, chosen)
+      class(packed_history_t), intent(inout) :: self
+      !> Pairs behind those of this list
+      type(packed_history_t), intent(in) :: other
+      !> Indices of the pairs to append, ascending
+      integer(ip), intent(in) :: chosen(:)
+      integer :: n
+
+      n = size(self%value, 2) + size(chosen)
+      self%key = [self%key, other%key(chosen)]
+      self%edge = [self%edge, other%edge(chosen)]
+      self%value = reshape([self%value, other%value(:, chosen)], [size(self%value, 1), n])
+   end subroutine append
+
+   !> Pack the history of all pairs of a list.
+   subroutine pack_pairs(n, first, second, id, history, packed)
       !> Number of pairs
       integer(ip), intent(in) :: n
-      !> Slots of both bodies of each pair
+      !> Slots of both bodies of each pair, in ascending order
       integer(ip), intent(in) :: first(:), second(:)
-      !> Global index of each body, (slot)
-      integer(ip), intent(in) :: row(:)
-      !> Whether this rank owns the leading body of each pair, (pair)
-      logical, intent(in) :: lead_is_mine(:)
-      !> Rank that will move each body, negative for fixed bodies, (slot)
-      integer(ip), intent(in) :: owner(:)
+      !> Identifier of each body, (slot)
+      integer(ip), intent(in) :: id(:)
       !> Contact history of the pairs
       type(contact_history_t), intent(in) :: history
-      !> Received history: pairs of which this rank will move a body, in ascending order
+      !> The same, packed
       type(packed_history_t), intent(out) :: packed
-      integer(lp), allocatable :: sent(:, :), received(:, :)
-      real(wp), allocatable :: value_sent(:, :), value_received(:, :)
-      integer(ip), allocatable :: pair(:), rank(:), counts(:), counts_received(:), order(:)
-      integer(ip) :: p, k, m, to(2)
       integer :: j, n_columns
 
       n_columns = 0
       if (allocated(history%column)) n_columns = size(history%column)
+      packed%key = pair_key(id(first(:n)), id(second(:n)))
+      packed%edge = history%separating_edge(:n)
+      allocate (packed%value(max(1, n_columns), n), source=0.0_wp)
+      do j = 1, n_columns
+         packed%value(j, :) = history%column(j)%value(:n)
+      end do
+   end subroutine pack_pairs
+
+   !> Identifiers of both bodies of a pair in one word, the lower one in the upper half
+   elemental integer(lp) function pair_key(first, second)
+      !> Identifiers, the lower one first
+      integer(ip), intent(in) :: first, second
+
+      pair_key = ior(shiftl(int(first, lp), 32), int(second, lp))
+   end function pair_key
+
+   !> Send the history of each pair to the ranks that will move one of its bodies. Collective.
+   !>
+   !> Both ranks that move a body of the pair have its history. Each sends it to the next owner of its own body.
+   subroutine send_pairs(comm, id, owner, packed)
+      !> Ranks
+      class(communicator_t), intent(inout) :: comm
+      !> Identifier of each body, ascending, (slot)
+      integer(ip), intent(in) :: id(:)
+      !> Rank that will move each body; negative for bodies that this rank does not move, (slot)
+      integer(ip), intent(in) :: owner(:)
+      !> On entry the history of pairs with a body of this rank; on return that of pairs with a future body of it
+      type(packed_history_t), intent(inout) :: packed
+      integer(lp), allocatable :: sent(:, :), received(:, :)
+      real(wp), allocatable :: value_received(:, :)
+      integer(ip), allocatable :: pair(:), rank(:), counts(:), counts_received(:), order(:)
+      integer(ip) :: p, k, m, n, slots(2), to(2)
+
+      n = size(packed%key, kind=ip)
       allocate (pair(2_ip*n), rank(2_ip*n))
       m = 0_ip
       do p = 1_ip, n
-         if (.not. lead_is_mine(p)) cycle
-         to = destinations(owner(first(p)), owner(second(p)))
+         slots = slots_of_pair(id, packed%key(p))
+         to = -1_ip
+         do k = 1_ip, 2_ip
+            if (slots(k) > 0_ip) to(k) = owner(slots(k))
+         end do
+         if (to(1) == to(2)) to(2) = -1_ip
          do k = 1_ip, 2_ip
             if (to(k) < 0_ip) cycle
             m = m + 1_ip
@@ -62,67 +106,89 @@ contains
          end do
       end do
       call sort_by_rank(rank(:m), comm%size, counts, order)
-      allocate (sent(2, m), value_sent(max(1, n_columns), m))
-      value_sent = 0.0_wp
-      do k = 1_ip, m
-         p = pair(order(k))
-         sent(1, k) = key_of(row, first(p), second(p))
-         sent(2, k) = int(history%separating_edge(p), lp)
-         do j = 1, n_columns
-            value_sent(j, k) = history%column(j)%value(p)
-         end do
-      end do
+      order = pair(order)
+      allocate (sent(2, m))
+      sent(1, :) = packed%key(order)
+      sent(2, :) = int(packed%edge(order), lp)
       call comm%all_to_all(sent, counts, received, counts_received)
-      call comm%all_to_all(value_sent, counts, value_received, counts_received)
+      call comm%all_to_all(packed%value(:, order), counts, value_received, counts_received)
       call sort_pairs(received, value_received, packed)
    end subroutine send_pairs
 
-   !> Global indices of both bodies of a pair in one word, the lower one in the upper half
-   pure integer(lp) function key_of(row, first, second)
-      integer(ip), intent(in) :: row(:), first, second
+   !> Slots of the bodies of a pair; 0 for bodies that the rank does not have
+   pure function slots_of_pair(id, key) result(slots)
+      !> Identifier of each body, ascending, (slot)
+      integer(ip), intent(in) :: id(:)
+      !> Key of the pair
+      integer(lp), intent(in) :: key
+      integer(ip) :: slots(2)
 
-      key_of = ior(shiftl(int(row(first), lp), 32), int(row(second), lp))
-   end function key_of
+      slots = [slot_of(id, int(shiftr(key, 32), ip)), slot_of(id, int(iand(key, int(huge(1_ip), lp)), ip))]
+   end function slots_of_pair
 
-   !> The one or two ranks that will have a pair; negative: none
-   pure function destinations(owner_1, owner_2) result(to)
-      integer(ip), intent(in) :: owner_1, owner_2
-      integer(ip) :: to(2)
+   !> Slot of a body given by its identifier; 0 if there is none
+   pure integer(ip) function slot_of(id, wanted)
+      !> Identifier of each body, ascending, (slot)
+      integer(ip), intent(in) :: id(:)
+      !> Identifier to find
+      integer(ip), intent(in) :: wanted
+      integer(ip) :: low, high, middle
 
-      to = [owner_1, owner_2]
-      if (owner_1 == owner_2) to(2) = -1_ip
-   end function destinations
+      low = 1_ip
+      high = size(id, kind=ip)
+      slot_of = 0_ip
+      do while (low <= high)
+         middle = low + (high - low)/2_ip
+         if (id(middle) == wanted) slot_of = middle
+         if (id(middle) < wanted) then
+            low = middle + 1_ip
+         else
+            high = middle - 1_ip
+         end if
+      end do
+   end function slot_of
 
-   !> Sort received pairs by their keys.
+   !> Sort received pairs by their keys. A pair that two ranks sent is kept once.
    subroutine sort_pairs(received, value_received, packed)
       integer(lp), intent(in) :: received(:, :)
       real(wp), intent(in) :: value_received(:, :)
       type(packed_history_t), intent(out) :: packed
-      integer(lp), allocatable :: spare_key(:)
+      integer(lp), allocatable :: key(:), spare_key(:)
       integer(ip), allocatable :: order(:), spare(:)
       integer(ip) :: k, n
 
       n = size(received, 2, kind=ip)
-      allocate (order(n), spare(n), spare_key(n))
-      packed%key = received(1, :)
-      do k = 1_ip, n
-         order(k) = k
-      end do
-      call sort_keys(n, packed%key, order, spare_key, spare)
+      allocate (spare(n), spare_key(n))
+      key = received(1, :)
+      order = [(k, k=1_ip, n)]
+      call sort_keys(n, key, order, spare_key, spare)
+      order = pack(order, [(is_new(k), k=1_ip, n)])
+      packed%key = received(1, order)
       packed%edge = int(received(2, order), ip)
       packed%value = value_received(:, order)
+
+   contains
+
+      !> Whether a key differs from the one before it
+      pure logical function is_new(at)
+         integer(ip), intent(in) :: at
+
+         is_new = .true.
+         if (at > 1_ip) is_new = key(at) /= key(at - 1_ip)
+      end function is_new
+
    end subroutine sort_pairs
 
    !> Restore the history of the pairs of a new list.
-   subroutine receive_pairs(packed, n, first, second, row, history, n_known)
-      !> Received history, in ascending order
+   subroutine receive_pairs(packed, n, first, second, id, history, n_known)
+      !> Received history
       type(packed_history_t), intent(in) :: packed
       !> Number of pairs in the list
       integer(ip), intent(in) :: n
       !> Slots of both bodies of each pair, in ascending order
       integer(ip), intent(in) :: first(:), second(:)
-      !> Global index of each body, (slot)
-      integer(ip), intent(in) :: row(:)
+      !> Identifier of each body, (slot)
+      integer(ip), intent(in) :: id(:)
       !> Contact history of the list, zero on entry; received values are set
       type(contact_history_t), intent(inout) :: history
       !> Number of pairs of the list with received history
@@ -136,7 +202,7 @@ contains
       n_known = 0_ip
       k = 1_ip
       do p = 1_ip, n
-         key = key_of(row, first(p), second(p))
+         key = pair_key(id(first(p)), id(second(p)))
          do while (k <= size(packed%key))
             if (packed%key(k) >= key) exit
             k = k + 1_ip

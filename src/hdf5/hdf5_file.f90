@@ -26,7 +26,7 @@ module polydem_hdf5_file
    type, extends(hdf5_writer_t) :: hdf5_file_t
    contains
       !> Read a data set into an allocatable: read(name, values, error). Integers in the file may have any width, or be
-      !> booleans of h5py.
+      !> booleans of h5py. With `rows` only some rows along the slowest dimension are read.
       generic :: read => read_reals, read_real_table, read_real_block, read_integers, read_longs, &
          read_one_text
       procedure :: read_rows
@@ -38,7 +38,7 @@ module polydem_hdf5_file
 contains
 
    !> Read real numbers. The other forms of `read` differ only in kind and shape.
-   subroutine read_reals(self, name, values, error)
+   subroutine read_reals(self, name, values, error, rows)
       class(hdf5_file_t), intent(in) :: self
       !> Name of the data set
       character(len=*), intent(in) :: name
@@ -46,26 +46,29 @@ contains
       real(dp), allocatable, target, intent(out) :: values(:)
       !> Allocated on failure, or if the data set has another number of dimensions
       type(error_t), allocatable, intent(inout) :: error
-      integer(hsize_t), allocatable :: extent(:)
+      !> Number of rows before the rows to read, and number of rows to read; default: all rows
+      integer(lp), intent(in), optional :: rows(2)
+      integer(hsize_t), allocatable :: start(:), extent(:)
 
-      call expect_rank(self%location_of(name), 1, extent, error)
+      call choose_rows(self%location_of(name), 1, rows, start, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1)))
-      call read_dataset(self%location_of(name), holds_reals, double_type(), 0*extent, extent, &
+      call read_dataset(self%location_of(name), holds_reals, double_type(), start, extent, &
                         c_loc(values), error)
    end subroutine read_reals
 
-   subroutine read_real_table(self, name, values, error)
+   subroutine read_real_table(self, name, values, error, rows)
       class(hdf5_file_t), intent(in) :: self
       character(len=*), intent(in) :: name
       real(dp), allocatable, target, intent(out) :: values(:, :)
       type(error_t), allocatable, intent(inout) :: error
-      integer(hsize_t), allocatable :: extent(:)
+      integer(lp), intent(in), optional :: rows(2)
+      integer(hsize_t), allocatable :: start(:), extent(:)
 
-      call expect_rank(self%location_of(name), 2, extent, error)
+      call choose_rows(self%location_of(name), 2, rows, start, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1), extent(2)))
-      call read_dataset(self%location_of(name), holds_reals, double_type(), 0*extent, extent, &
+      call read_dataset(self%location_of(name), holds_reals, double_type(), start, extent, &
                         c_loc(values), error)
    end subroutine read_real_table
 
@@ -106,17 +109,18 @@ contains
                         [0_hsize_t, 0_hsize_t, int(first - 1_ip, hsize_t)], extent, c_loc(values), error)
    end subroutine read_rows
 
-   subroutine read_longs(self, name, values, error)
+   subroutine read_longs(self, name, values, error, rows)
       class(hdf5_file_t), intent(in) :: self
       character(len=*), intent(in) :: name
       integer(lp), allocatable, target, intent(out) :: values(:)
       type(error_t), allocatable, intent(inout) :: error
-      integer(hsize_t), allocatable :: extent(:)
+      integer(lp), intent(in), optional :: rows(2)
+      integer(hsize_t), allocatable :: start(:), extent(:)
 
-      call expect_rank(self%location_of(name), 1, extent, error)
+      call choose_rows(self%location_of(name), 1, rows, start, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1)))
-      call read_dataset(self%location_of(name), holds_integers, long_type(), 0*extent, extent, &
+      call read_dataset(self%location_of(name), holds_integers, long_type(), start, extent, &
                         c_loc(values), error)
    end subroutine read_longs
 
@@ -161,6 +165,30 @@ contains
 
       call read_attribute_value(self%location_of(object), name, double_type(), c_loc(value), there, error)
    end subroutine read_real_attribute
+
+   !> Choose the part of a data set to read, and check that it exists.
+   subroutine choose_rows(location, rank, rows, start, extent, error)
+      type(dataset_location_t), intent(in) :: location
+      !> Required number of dimensions
+      integer, intent(in) :: rank
+      !> Number of rows before the rows to read, and number of rows to read; absent: all rows
+      integer(lp), intent(in), optional :: rows(2)
+      !> Start and shape of the part, fastest dimension first
+      integer(hsize_t), allocatable, intent(out) :: start(:), extent(:)
+      type(error_t), allocatable, intent(inout) :: error
+
+      call expect_rank(location, rank, extent, error)
+      if (allocated(error)) return
+      start = 0*extent
+      if (.not. present(rows)) return
+      if (rows(1) + rows(2) > extent(rank)) then
+         call raise(error, input_error, location%path//': '//location%name//' has only '// &
+                    to_text(int(extent(rank), lp))//' rows')
+         return
+      end if
+      start(rank) = rows(1)
+      extent(rank) = rows(2)
+   end subroutine choose_rows
 
    !> Read the shape of a data set and check its number of dimensions.
    subroutine expect_rank(location, rank, extent, error)

@@ -2,16 +2,16 @@
 !>
 !>     /run         step, time step, energy balance, clocks and counters of the whole run
 !>     /bodies      id and variable state: one row per body, in ascending order of identifiers
-!>     /boxes       bounds at the last pair search
-!>     /pairs       first, second (identifiers) and contact history of each pair
+!>     /pairs       first, second (identifiers) and contact history of each pair of the last search
 !>     /provenance  origin of the file
 !>
 !> Constant data (shapes, masses) follow from the namelist; hashes detect a difference. The caller defines the
 !> contents of the groups with `field` and `match`. The file ends with a checksum and is opened only if the checksum
 !> is correct.
 !>
-!> All ranks write a checkpoint collectively. The root rank writes /run. In the other groups each rank writes the rows
-!> that `set_rows` assigns to it. The root rank reads a checkpoint alone.
+!> All ranks write and read a checkpoint collectively. The root rank writes /run, all ranks read it. In the other
+!> groups each rank writes the rows that `set_rows` assigns to it. When reading, each rank reads one block of the rows
+!> and sends them to the ranks that own them, or it reads the rows that `choose_rows` names.
 module polydem_checkpoint_file
    use polydem_atomic_file, only: begin_file, complete_file, open_on_all_ranks
    use polydem_communicator, only: communicator_t
@@ -30,7 +30,7 @@ module polydem_checkpoint_file
    public :: checkpoint_file_t
 
    !> Groups with distributed rows
-   character(len=*), parameter :: groups(3) = [character(len=8) :: '/bodies/', '/boxes/', '/pairs/']
+   character(len=*), parameter :: groups(2) = [character(len=8) :: '/bodies/', '/pairs/']
 
    !> A checkpoint that is being written or read
    type, extends(serializer_t) :: checkpoint_file_t
@@ -45,6 +45,8 @@ module polydem_checkpoint_file
       type(global_order_t) :: rows(size(groups))
       !> Whether the rows of each group are distributed; otherwise each column is complete on one rank
       logical :: is_spread(size(groups)) = .false.
+      !> Rows of each group to read: number of rows before them, and their number; negative: all rows
+      integer(lp) :: part(2, size(groups)) = -1_lp
    contains
       procedure :: create
       procedure :: set_rows
@@ -52,6 +54,9 @@ module polydem_checkpoint_file
       procedure :: open => open_checkpoint
       procedure :: close => close_checkpoint
       procedure :: read_origin
+      procedure :: has_failed
+      procedure :: count_rows
+      procedure :: choose_rows
       procedure :: transfer_reals
       procedure :: transfer_longs
    end type checkpoint_file_t
@@ -96,20 +101,19 @@ contains
       call write_provenance(self%file, 'checkpoint by polydem', provenance, self%error)
    end subroutine write_origin
 
-   !> Set the distribution of the rows of a group over ranks. Call it before the columns of the group are written.
+   !> Set the distribution of the rows of a group over ranks. Call it before the columns of the group are written or
+   !> read.
    subroutine set_rows(self, group, rows)
       class(checkpoint_file_t), intent(inout) :: self
-      !> /bodies/, /boxes/ or /pairs/
+      !> /bodies/ or /pairs/
       character(len=*), intent(in) :: group
       !> Global order of the rows
       type(global_order_t), intent(in) :: rows
       integer :: k
 
-      do k = 1, size(groups)
-         if (groups(k) /= group) cycle
-         self%rows(k) = rows
-         self%is_spread(k) = .true.
-      end do
+      k = place_of(group)
+      self%rows(k) = rows
+      self%is_spread(k) = .true.
    end subroutine set_rows
 
    !> Append the checksum, flush the file to disk and rename it to its final path. After a write error the file is
@@ -123,25 +127,60 @@ contains
       if (allocated(self%error) .and. .not. allocated(error)) call move_alloc(self%error, error)
    end subroutine complete
 
-   !> Open a checkpoint for reading.
-   subroutine open_checkpoint(self, path, error)
+   !> Open a checkpoint for reading. Collective; all ranks get the same error.
+   subroutine open_checkpoint(self, path, error, comm)
       class(checkpoint_file_t), intent(inout) :: self
       !> Path of the file
       character(len=*), intent(in) :: path
       !> Describes the damage if the checksum is wrong
       type(error_t), allocatable, intent(inout) :: error
+      !> Communicator of the ranks that read it; absent: this rank reads alone
+      class(communicator_t), intent(in), optional :: comm
       character(len=:), allocatable :: problem
 
       self%path = path
       self%is_reading = .true.
-      call verify_checksum(path, problem)
-      if (allocated(problem)) then
-         call raise(error, io_error, path//': is damaged: '//problem)
-      else
+      if (present(comm)) allocate (self%comm, source=comm)
+      if (.not. allocated(self%comm)) allocate (serial_communicator_t :: self%comm)
+      if (self%comm%is_root()) call verify_checksum(path, problem)
+      if (allocated(problem)) call raise(error, io_error, path//': is damaged: '//problem)
+      call self%comm%all_reduce_error(error)
+      if (.not. allocated(error)) then
          call self%file%open(path, error)
          if (.not. allocated(error)) call refuse_other_versions(self, error)
       end if
+      call self%comm%all_reduce_error(error)
    end subroutine open_checkpoint
+
+   !> Whether an earlier call failed on any rank; collective while reading.
+   logical function has_failed(self)
+      class(checkpoint_file_t), intent(inout) :: self
+
+      if (self%is_reading) call self%comm%all_reduce_error(self%error)
+      has_failed = allocated(self%error)
+   end function has_failed
+
+   !> Number of rows of a column in the file
+   subroutine count_rows(self, name, n)
+      class(checkpoint_file_t), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      integer(lp), intent(out) :: n
+      integer(lp), allocatable :: extent(:)
+
+      n = 0_lp
+      if (self%has_failed()) return
+      call self%file%shape_of(name, extent, self%error)
+      if (.not. allocated(self%error)) n = product(extent(:min(1, size(extent))))
+   end subroutine count_rows
+
+   !> Choose the rows of a group that are read next, without a distribution over ranks.
+   subroutine choose_rows(self, group, rows)
+      class(checkpoint_file_t), intent(inout) :: self
+      character(len=*), intent(in) :: group
+      integer(lp), intent(in) :: rows(2)
+
+      self%part(:, place_of(group)) = rows
+   end subroutine choose_rows
 
    !> Refuse a checkpoint of another version of the file layout. Close it in this case.
    subroutine refuse_other_versions(self, error)
@@ -160,7 +199,7 @@ contains
          '; finish the run with the version that began it')
    end subroutine refuse_other_versions
 
-   !> Close a checkpoint after reading.
+   !> Close a checkpoint after reading. Collective; all ranks get the same error.
    subroutine close_checkpoint(self, error)
       class(checkpoint_file_t), intent(inout) :: self
       !> First read error, if any
@@ -168,6 +207,7 @@ contains
 
       call self%file%close(self%error)
       if (allocated(self%error) .and. .not. allocated(error)) call move_alloc(self%error, error)
+      call self%comm%all_reduce_error(error)
    end subroutine close_checkpoint
 
    !> Read the revision of the program that wrote an open checkpoint, and its settings.
@@ -192,18 +232,52 @@ contains
       real(dp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
       real(dp), allocatable :: table(:, :), list(:)
+      integer(lp), allocatable :: words(:, :)
+      integer(lp) :: rows(2)
 
       if (.not. self%is_reading) then
          call write_reals(self, name, reshape(values, [width, size(values)/width]), unit, meaning)
       else
-         if (width == 1) call self%file%read(name, list, self%error)
-         if (width > 1) call self%file%read(name, table, self%error)
+         call find_rows(self, name, 1_lp, rows)
+         if (self%has_failed()) return
+         if (width == 1) call self%file%read(name, list, self%error, rows)
+         if (width > 1) call self%file%read(name, table, self%error, rows)
          if (width > 1 .and. .not. allocated(self%error)) list = reshape(table, [size(table)])
+         if (group_of(self, name) > 0) then
+            if (allocated(self%error)) list = spread(0.0_dp, 1, width*int(rows(2)))
+            words = reshape(transfer(values, 0_lp, size(values)), [width, size(values)/width])
+            call self%rows(place_of(name))%from_blocks( &
+               self%comm, reshape(transfer(list, 0_lp, size(list)), [width, size(list)/width]), words)
+            list = transfer(words, 0.0_dp, size(words))
+         end if
          if (allocated(self%error)) return
          call expect_size(self, name, size(list), size(values))
          if (.not. allocated(self%error)) values = list
       end if
    end subroutine transfer_reals
+
+   !> Find the rows of a column that this rank reads.
+   subroutine find_rows(self, name, entries, rows)
+      class(checkpoint_file_t), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      !> Number of entries of the data set along its slowest dimension that make a row of the group
+      integer(lp), intent(in) :: entries
+      !> Number of rows before them, and their number
+      integer(lp), intent(out) :: rows(2)
+      integer :: k
+
+      rows = 0_lp
+      call self%count_rows(name, rows(2))
+      if (allocated(self%error)) return
+      k = place_of(name)
+      if (k == 0) return
+      if (self%part(1, k) >= 0_lp) then
+         rows = entries*self%part(:, k)
+      else if (self%is_spread(k)) then
+         call expect_size(self, name, int(rows(2)), int(entries*self%rows(k)%total))
+         rows = entries*[self%rows(k)%first, int(self%rows(k)%n, lp)]
+      end if
+   end subroutine find_rows
 
    !> Write rows of real numbers.
    subroutine write_reals(self, name, values, unit, meaning)
@@ -255,13 +329,21 @@ contains
    pure integer function group_of(self, name)
       class(checkpoint_file_t), intent(in) :: self
       character(len=*), intent(in) :: name
+
+      group_of = place_of(name)
+      if (group_of > 0) group_of = merge(group_of, 0, self%is_spread(group_of) .and. self%part(1, group_of) < 0_lp)
+   end function group_of
+
+   !> Index of the group of a column in `groups`; 0: none of them
+   pure integer function place_of(name)
+      character(len=*), intent(in) :: name
       integer :: k
 
-      group_of = 0
+      place_of = 0
       do k = 1, size(groups)
-         if (index(name, trim(groups(k))) == 1 .and. self%is_spread(k)) group_of = k
+         if (index(name, trim(groups(k))) == 1) place_of = k
       end do
-   end function group_of
+   end function place_of
 
    !> Write or read integers.
    subroutine transfer_longs(self, name, values, unit, meaning)
@@ -269,12 +351,29 @@ contains
       character(len=*), intent(in) :: name
       integer(lp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
-      integer(lp), allocatable :: list(:)
+      integer(lp), allocatable :: list(:), mine(:, :)
+      integer(lp) :: rows(2), width(1)
 
       if (.not. self%is_reading) then
          call write_longs(self, name, values, unit, meaning)
       else
-         call self%file%read(name, list, self%error)
+         width = 1_lp
+         if (group_of(self, name) > 0) then
+            width = size(values, kind=lp)/int(max(1_ip, self%rows(place_of(name))%n_known), lp)
+            call self%comm%all_reduce_max(width)
+         else if (place_of(name) > 0) then
+            width = max(1_lp, size(values, kind=lp)/max(1_lp, self%part(2, place_of(name))))
+         end if
+         call find_rows(self, name, width(1), rows)
+         if (self%has_failed()) return
+         call self%file%read(name, list, self%error, rows)
+         if (group_of(self, name) > 0) then
+            if (allocated(self%error)) list = spread(0_lp, 1, int(rows(2)))
+            mine = reshape(values, [int(width(1)), size(values)/int(width(1))])
+            call self%rows(place_of(name))%from_blocks( &
+               self%comm, reshape(list, [int(width(1)), size(list)/int(width(1))]), mine)
+            list = reshape(mine, [size(mine)])
+         end if
          if (allocated(self%error)) return
          call expect_size(self, name, size(list), size(values))
          if (.not. allocated(self%error)) values = list

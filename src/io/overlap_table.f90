@@ -1,11 +1,14 @@
 !> Table of deep contacts at the start, as comma-separated values (overlaps.csv).
 module polydem_overlap_table
    use polydem_bodies, only: bodies_t
+   use polydem_communicator, only: communicator_t
    use polydem_contact_depth, only: depth_share
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
-   use polydem_kinds, only: ip, wp
+   use polydem_global_order, only: global_order_t
+   use polydem_kinds, only: dp, ip, wp
    use polydem_line_writer, only: line_writer_t
+   use polydem_ownership, only: order_pairs
    use polydem_strings, only: to_text
    implicit none
    private
@@ -13,8 +16,8 @@ module polydem_overlap_table
 
 contains
 
-   !> Write a table of all contacts whose relative depth exceeds a limit.
-   subroutine write_overlap_table(path, bodies, contacts, thickness, limit, error)
+   !> Write a table of all contacts whose relative depth exceeds a limit. The root rank writes it. Collective.
+   subroutine write_overlap_table(path, bodies, contacts, thickness, limit, error, comm)
       !> Path of the file
       character(len=*), intent(in) :: path
       !> Bodies
@@ -25,27 +28,57 @@ contains
       real(wp), intent(in) :: thickness(:)
       !> Limit of the depth as a fraction of the thickness of the thinner body
       real(wp), intent(in) :: limit
-      !> Allocated on failure
+      !> Allocated on failure; the same on all ranks
       type(error_t), allocatable, intent(inout) :: error
+      !> Ranks that share the bodies
+      class(communicator_t), intent(inout) :: comm
       type(line_writer_t) :: file
-      real(wp) :: share
-      integer(ip) :: c
+      type(global_order_t) :: rows
+      real(dp), allocatable :: values(:, :), block(:, :), of_rank(:)
+      integer(ip), allocatable :: deep(:), counts(:)
+      integer(ip) :: c, k, rank
 
-      call file%open(path, error)
-      if (allocated(error)) return
-      call file%put_line('first,second,x [m],y [m],area [m2],depth [m],depth/thinner body')
-      do c = 1_ip, contacts%n
-         share = depth_share(contacts, thickness, c)
-         if (share <= limit) cycle
+      deep = pack([(c, c=1_ip, contacts%n)], [(depth_share(contacts, thickness, c) > limit, c=1_ip, contacts%n)])
+      allocate (values(7, size(deep)))
+      do k = 1_ip, size(deep, kind=ip)
+         c = deep(k)
          associate (i => contacts%first(c), j => contacts%second(c))
-            call file%put_line(to_text(bodies%id(i))//','//to_text(bodies%id(j))//','// &
-                               to_text(bodies%position(1, i) + contacts%arm_first(1, c), 9)//','// &
-                               to_text(bodies%position(2, i) + contacts%arm_first(2, c), 9)//','// &
-                               to_text(contacts%area(c))//','//to_text(contacts%area(c)/contacts%length(c))//','// &
-                               to_text(share))
+            values(:, k) = real([real(bodies%id(i), wp), real(bodies%id(j), wp), &
+                                 bodies%position(:, i) + contacts%arm_first(:, c), contacts%area(c), &
+                                 contacts%area(c)/contacts%length(c), depth_share(contacts, thickness, c)], dp)
          end associate
       end do
-      call file%close(error)
+      call order_pairs(comm, bodies, contacts%first(deep), contacts%second(deep), rows)
+      call rows%to_blocks(comm, values, block)
+      if (comm%is_root()) call file%open(path, error)
+      call comm%all_reduce_error(error)
+      if (allocated(error)) return
+      if (comm%is_root()) &
+         call file%put_line('first,second,x [m],y [m],area [m2],depth [m],depth/thinner body')
+      ! One block at a time, as no rank has memory for all of them.
+      do rank = 0_ip, comm%size - 1_ip
+         call comm%gather(reshape(block(:, :merge(rows%n, 0_ip, rank == comm%rank)), &
+                                  [7*merge(rows%n, 0_ip, rank == comm%rank)]), of_rank, counts)
+         if (comm%is_root()) call put_rows(file, reshape(of_rank, [7, size(of_rank)/7]))
+      end do
+      if (comm%is_root()) call file%close(error)
+      call comm%all_reduce_error(error)
    end subroutine write_overlap_table
+
+   !> Write the rows of a block.
+   subroutine put_rows(file, block)
+      type(line_writer_t), intent(inout) :: file
+      !> Identifiers, position, area, depth, and depth over thickness, (7, row)
+      real(dp), intent(in) :: block(:, :)
+      integer :: k
+
+      do k = 1, size(block, 2)
+         associate (row => real(block(:, k), wp))
+            call file%put_line(to_text(nint(block(1, k), ip))//','//to_text(nint(block(2, k), ip))//','// &
+                               to_text(row(3), 9)//','//to_text(row(4), 9)//','//to_text(row(5))//','// &
+                               to_text(row(6))//','//to_text(row(7)))
+         end associate
+      end do
+   end subroutine put_rows
 
 end module polydem_overlap_table

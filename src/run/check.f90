@@ -13,6 +13,7 @@ module polydem_check
    use polydem_simulation, only: simulation_t
    use polydem_start, only: new_simulation
    use polydem_strings, only: to_text
+   use polydem_scene_measures, only: measure_scene, scene_measures_t
    implicit none
    private
    public :: check_simulation
@@ -29,6 +30,7 @@ contains
       !> Warning if the ranks have more threads than there are processors; none if absent or empty
       character(len=*), intent(in), optional :: oversubscription
       type(simulation_t) :: simulation
+      type(scene_measures_t) :: measures
       type(log_t) :: log
       integer(lp) :: before, after, frames
 
@@ -39,8 +41,9 @@ contains
       call log%open('', error)
       if (allocated(error)) return
       call write_lines(log, settings%resolved)
-      call describe(simulation, log)
-      call list_overlaps(simulation, '', log, error)
+      call measure_scene(simulation, measures)
+      call describe(simulation, measures, log)
+      call list_overlaps(simulation, measures, '', log, error)
       if (present(oversubscription)) then
          if (oversubscription /= '') call log%write_line(oversubscription)
       end if
@@ -50,19 +53,20 @@ contains
       call log%write_line('frames     '//to_text(frames)//' of '//to_text(frame_size(simulation)/1024_lp + 1_lp)// &
                           ' KiB each, '// &
                           to_text(real(frames, wp)*real(frame_size(simulation), wp)/1048576.0_wp, 3)//' MiB in total')
-      call warn_at_start(simulation, log, error)
+      call warn_at_start(simulation, measures, log, error)
       call log%close(error)
    end subroutine check_simulation
 
    !> Write the warnings about the initial state, then apply the guards of a run at step 0.
-   subroutine warn_at_start(simulation, log, error)
+   subroutine warn_at_start(simulation, measures, log, error)
       type(simulation_t), intent(inout) :: simulation
+      type(scene_measures_t), intent(in) :: measures
       type(log_t), intent(inout) :: log
       type(error_t), allocatable, intent(inout) :: error
       type(monitor_t) :: monitor
 
       call new_monitor(monitor, simulation)
-      call warn_of_risks(simulation, log, monitor%at_start)
+      call warn_of_risks(simulation, measures, log, monitor%at_start)
       call check_step(monitor, simulation, .true., log, error)
       if (allocated(error)) return
       ! A body that is too fast at the start moves too far in the first step.

@@ -1,26 +1,29 @@
 !> The list of fields of a checkpoint: all state that outlives a time step and does not follow from the namelist.
 !>
 !> A checkpoint does not hold shapes and masses (the scene is built again; a hash detects a difference), motions
-!> (functions of time), contacts (computed by the next step) or the state of neighbour finders. A restart rebuilds the
-!> finder and its pairs from the boxes of the last search, which the checkpoint holds. These boxes can differ from those
-!> of the bodies at the end of the step, since Gear's scheme moves bodies once more; the contact history belongs to the
-!> pairs of these boxes.
+!> (functions of time), contacts (computed by the next step) or the state of neighbour finders. After a restart the
+!> first search starts without pairs. The pairs that it finds again get their contact history.
 module polydem_checkpoint_fields
    use polydem_bodies, only: bodies_t, state_hash, turn_bodies
    use polydem_body_fields, only: serialize_bodies
    use polydem_contact_history, only: contact_history_t
    use polydem_energy_balance, only: serialize_contributions, serialize_balance
-   use polydem_errors, only: input_error, raise
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_global_hash, only: hash_scene
    use polydem_hash, only: mix_word
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_local_bodies, only: rebuild_pairs
+   use polydem_local_bodies, only: fit_to_bodies
    use polydem_monitor, only: serialize_monitor, monitor_t
+   use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: attempts_t, serialize_run, serialize_global, serialize_progress, scene_hash
+   public :: attempts_t, serialize_run, serialize_progress, hash_scene_of, scene_hash
+
+   !> Number of pairs that are read at a time
+   integer(lp), parameter :: most_rows = 65536_lp
 
    !> Hash of the initial scene, and counts of all attempts of a run
    type :: attempts_t
@@ -53,12 +56,15 @@ contains
          call serialize_bodies(serializer, s%bodies)
          call s%integrator%serialize(serializer)
          if (s%settings%output%energy_balance) call serialize_contributions(s%energy_balance, s%bodies%n, serializer)
-         call serializer%field('/boxes/bounds', s%boxes%bounds(:, :s%boxes%n), 'm', &
-                           'xmin, ymin, xmax, ymax at the last search for pairs')
-         call serialize_pairs(serializer, s)
+         associate (work => s%neighbours%finder%work)
+            call serializer%field('/run/finder_counts', work%value, '1', 'statistics of the finder so far')
+            call serializer%seconds_field('/run/finder_seconds', work%seconds, 'time of each phase of the finder')
+         end associate
+         if (.not. serializer%is_reading) call save_pairs(serializer, s)
+         if (serializer%is_reading) call read_pairs(serializer, s)
          if (.not. serializer%is_reading .or. allocated(serializer%error)) return
          call turn_bodies(s%bodies, s%moving)
-         s%contacts%n = 0_ip
+         call fit_to_bodies(s, serializer%error, s%domain%median_diameter)
          s%contacts%n_degenerate = 0_ip
       end associate
    end subroutine serialize_run
@@ -110,80 +116,154 @@ contains
       attempts%seconds = seconds(1)
    end subroutine serialize_progress
 
-   !> Serialize the pairs and their contact history. A restart rebuilds the pairs and compares them to the file.
-   subroutine serialize_pairs(serializer, s)
+   !> Save the pairs and their contact history.
+   subroutine save_pairs(serializer, s)
       class(serializer_t), intent(inout) :: serializer
       type(simulation_t), intent(inout) :: s
-      integer(ip) :: n
+      type(packed_history_t) :: packed
 
-      if (serializer%is_reading .and. .not. allocated(serializer%error)) then
-         call rebuild_pairs(s, serializer%error)
-         if (allocated(serializer%error)) return
-      end if
-      associate (pairs => s%neighbours%pairs, work => s%neighbours%finder%work)
-         n = pairs%n
-         call serializer%match('/pairs/first', int(s%bodies%id(pairs%first(:n)), lp), '1', &
-            'lower identifier of each pair')
-         call serializer%match('/pairs/second', int(s%bodies%id(pairs%second(:n)), lp), '1', &
-            'higher identifier of each pair')
-         call serialize_history(serializer, n, s%history)
-         call expect_edges(serializer, s)
-         call serializer%field('/run/finder_counts', work%value, '1', 'statistics of the finder so far')
-         call serializer%seconds_field('/run/finder_seconds', work%seconds, 'time of each phase of the finder')
+      associate (pairs => s%neighbours%pairs)
+         call pack_pairs(pairs%n, pairs%first, pairs%second, s%bodies%id, s%history, packed)
       end associate
-   end subroutine serialize_pairs
+      call serialize_pairs(serializer, s%history, packed)
+   end subroutine save_pairs
 
-   !> Serialize the columns of the contact history that the force models of the scene use.
-   subroutine serialize_history(serializer, n, history)
+   !> Read the contact history of the pairs that have a body of this rank. All pairs are read, some at a time.
+   subroutine read_pairs(serializer, s)
       class(serializer_t), intent(inout) :: serializer
-      !> Number of pairs
-      integer(ip), intent(in) :: n
-      type(contact_history_t), intent(inout) :: history
+      type(simulation_t), intent(inout) :: s
+      type(packed_history_t) :: part
+      integer(ip), allocatable :: owned(:)
+      integer(lp) :: first, n
+      integer(ip) :: k
+
+      call serializer%count_rows('/pairs/first', n)
+      if (allocated(s%received_history)) deallocate (s%received_history)
+      allocate (s%received_history)
+      call resize(part, s%history, 0_ip)
+      s%received_history = part
+      do first = 0_lp, max(0_lp, n - 1_lp), most_rows
+         if (serializer%has_failed()) return
+         call resize(part, s%history, int(min(most_rows, n - first), ip))
+         call serializer%choose_rows('/pairs/', [first, size(part%key, kind=lp)])
+         call serialize_pairs(serializer, s%history, part)
+         if (allocated(serializer%error)) cycle
+         call check_pairs(s, part, serializer%error)
+         owned = pack([(k, k=1_ip, size(part%key, kind=ip))], &
+                      [(has_body(part%key(k)), k=1_ip, size(part%key, kind=ip))])
+         call s%received_history%append(part, owned)
+      end do
+
+   contains
+
+      !> Whether this rank moves a body of a pair
+      pure logical function has_body(key)
+         integer(lp), intent(in) :: key
+         integer(ip) :: slots(2)
+
+         slots = slots_of_pair(s%bodies%id, key)
+         has_body = any(slots > 0_ip)
+         if (slots(1) > 0_ip) has_body = .not. s%bodies%in_halo(slots(1)) .and. .not. s%bodies%fixed(slots(1))
+         if (.not. has_body .and. slots(2) > 0_ip) &
+            has_body = .not. s%bodies%in_halo(slots(2)) .and. .not. s%bodies%fixed(slots(2))
+      end function has_body
+
+   end subroutine read_pairs
+
+   !> Serialize pairs and their contact history.
+   subroutine serialize_pairs(serializer, history, packed)
+      class(serializer_t), intent(inout) :: serializer
+      !> Columns of the history
+      type(contact_history_t), intent(in) :: history
+      !> Pairs; when reading, their number is given
+      type(packed_history_t), intent(inout) :: packed
+      integer(lp), allocatable :: ids(:)
+      real(wp), allocatable :: column(:)
       integer :: k
 
-      if (serializer%is_reading) history%separating_edge = spread(0_ip, 1, n)
-      call serializer%field('/pairs/separating_edge', history%separating_edge(:n), '1', &
+      ids = shiftr(packed%key, 32)
+      call serializer%field('/pairs/first', ids, '1', 'lower identifier of each pair')
+      if (serializer%is_reading) packed%key = shiftl(ids, 32)
+      ids = iand(packed%key, int(huge(1_ip), lp))
+      call serializer%field('/pairs/second', ids, '1', 'higher identifier of each pair')
+      if (serializer%is_reading) packed%key = ior(packed%key, iand(ids, int(huge(1_ip), lp)))
+      call serializer%field('/pairs/separating_edge', packed%edge, '1', &
                         'last edge that separated the pair: +k of the first body, -k of the second, 0 unknown')
       if (.not. allocated(history%column)) return
       do k = 1, size(history%column)
          associate (kind => history%column(k)%kind)
-            call serialize_column(serializer, '/pairs/'//trim(kind%name), n, history%column(k)%value, trim(kind%unit), &
-                             trim(kind%meaning))
+            column = packed%value(k, :)
+            call serializer%field('/pairs/'//trim(kind%name), column, trim(kind%unit), trim(kind%meaning))
+            packed%value(k, :) = column
          end associate
       end do
-   end subroutine serialize_history
+   end subroutine serialize_pairs
 
-   !> Check that the bodies of each pair have the stored separating edge.
-   subroutine expect_edges(serializer, s)
-      class(serializer_t), intent(inout) :: serializer
-      type(simulation_t), intent(in) :: s
-      integer(ip) :: edge, k
-
-      if (.not. serializer%is_reading .or. allocated(serializer%error)) return
-      associate (pairs => s%neighbours%pairs, start => s%bodies%vertex_start)
-         do k = 1_ip, pairs%n
-            edge = s%history%separating_edge(k)
-            if (edge <= start(pairs%first(k) + 1_ip) - start(pairs%first(k)) .and. &
-                -edge <= start(pairs%second(k) + 1_ip) - start(pairs%second(k))) cycle
-            call raise(serializer%error, input_error, '/pairs/separating_edge of the bodies '// &
-                       to_text(int(s%bodies%id(pairs%first(k)), lp))//' and '// &
-                       to_text(int(s%bodies%id(pairs%second(k)), lp))//' is '//to_text(edge)// &
-                       ', but they have no such edge')
-            return
-         end do
-      end associate
-   end subroutine expect_edges
-
-   !> Serialize a column over pairs.
-   subroutine serialize_column(serializer, name, n, column, unit, meaning)
-      class(serializer_t), intent(inout) :: serializer
-      character(len=*), intent(in) :: name, unit, meaning
+   !> Allocate a number of pairs without history.
+   subroutine resize(packed, history, n)
+      type(packed_history_t), intent(out) :: packed
+      type(contact_history_t), intent(in) :: history
       integer(ip), intent(in) :: n
-      real(wp), allocatable, intent(inout) :: column(:)
+      integer :: n_columns
 
-      if (serializer%is_reading) column = spread(0.0_wp, 1, n)
-      call serializer%field(name, column(:n), unit, meaning)
-   end subroutine serialize_column
+      n_columns = 0
+      if (allocated(history%column)) n_columns = size(history%column)
+      allocate (packed%key(n), source=0_lp)
+      allocate (packed%edge(n), source=0_ip)
+      allocate (packed%value(max(1, n_columns), n), source=0.0_wp)
+   end subroutine resize
+
+   !> Check that pairs are in ascending order, and that those bodies of a pair that this rank has have the stored
+   !> separating edge. A serial run has all bodies.
+   subroutine check_pairs(s, packed, error)
+      type(simulation_t), intent(in) :: s
+      type(packed_history_t), intent(in) :: packed
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: edge, k, slots(2)
+      logical :: is_known
+
+      do k = 1_ip, size(packed%key, kind=ip)
+         slots = slots_of_pair(s%bodies%id, packed%key(k))
+         is_known = all(slots > 0_ip) .or. s%bodies%n < s%bodies%n_all
+         if (k > 1_ip) is_known = is_known .and. packed%key(k) > packed%key(k - 1_ip)
+         if (.not. is_known) then
+            call raise(error, input_error, '/pairs/first or /pairs/second differs from the saved state')
+            return
+         end if
+         edge = packed%edge(k)
+         if (has_edge(slots(1), edge) .and. has_edge(slots(2), -edge)) cycle
+         call raise(error, input_error, '/pairs/separating_edge of the bodies '// &
+                    to_text(shiftr(packed%key(k), 32))//' and '// &
+                    to_text(iand(packed%key(k), int(huge(1_ip), lp)))//' is '//to_text(edge)// &
+                    ', but they have no such edge')
+         return
+      end do
+
+   contains
+
+      !> Whether a body has an edge; true for unknown bodies
+      pure logical function has_edge(slot, number)
+         integer(ip), intent(in) :: slot, number
+
+         has_edge = .true.
+         if (slot > 0_ip) has_edge = number <= s%bodies%vertex_start(slot + 1_ip) - s%bodies%vertex_start(slot)
+      end function has_edge
+
+   end subroutine check_pairs
+
+   !> Compute the hash of the initial bodies of all ranks. Collective; all ranks get the same hash.
+   subroutine hash_scene_of(simulation, hash)
+      !> A simulation at time 0
+      type(simulation_t), intent(inout) :: simulation
+      !> The value of `scene_hash` on a rank that had all bodies
+      integer(lp), intent(out) :: hash
+
+      if (simulation%comm%size > 1_ip) then
+         call hash_scene(simulation%comm, simulation%bodies, hash)
+      else
+         hash = scene_hash(simulation%bodies)
+      end if
+   end subroutine hash_scene_of
 
    !> Hash of the initial bodies: their state, and their constant properties (fixed or free, mass, inertia, shape)
    pure integer(lp) function scene_hash(bodies)

@@ -11,7 +11,7 @@ module polydem_checkpoint_schedule
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_monitor, only: monitor_t
-   use polydem_ownership, only: order_bodies, order_pairs, order_parts
+   use polydem_ownership, only: order_bodies, order_pairs
    use polydem_provenance, only: provenance_t
    use polydem_result_files, only: checkpoint_path, n_checkpoints
    use polydem_settings, only: checkpoint_settings_t
@@ -150,7 +150,7 @@ contains
    end subroutine write_checkpoint
 
    !> Upper bound of the size of a checkpoint [B]. A body takes 200 bytes and each of its three or four pairs 40 bytes;
-   !> the bound also covers the arrays of Gear's scheme and walls of many boxes.
+   !> the bound also covers the arrays of Gear's scheme.
    pure integer(lp) function room_for(simulation)
       type(simulation_t), intent(in) :: simulation
 
@@ -164,11 +164,9 @@ contains
       type(checkpoint_file_t), intent(inout) :: file
       type(global_order_t) :: rows
 
-      associate (bodies => simulation%bodies, boxes => simulation%boxes, pairs => simulation%neighbours%pairs)
+      associate (bodies => simulation%bodies, pairs => simulation%neighbours%pairs)
          call order_bodies(comm, bodies, rows)
          call file%set_rows('/bodies/', rows)
-         call order_parts(comm, bodies, boxes%body(:boxes%n), rows)
-         call file%set_rows('/boxes/', rows)
          call order_pairs(comm, bodies, pairs%first(:pairs%n), pairs%second(:pairs%n), rows)
          call file%set_rows('/pairs/', rows)
       end associate

@@ -1,7 +1,6 @@
 !> Claiming a result folder: the manifest lists the files of a run before the run writes any of them.
 module polydem_claim_folder
    use polydem_checked_files, only: check_free
-   use polydem_description, only: has_deep_contacts
    use polydem_errors, only: error_t
    use polydem_folder_lock, only: lock_path
    use polydem_kinds, only: ip
@@ -9,7 +8,7 @@ module polydem_claim_folder
    use polydem_replaced_result, only: check_inputs, move_to_replaced, replaced_name
    use polydem_result_files, only: checkpoint_path, log_name, n_checkpoints, name_in, overlaps_name, profile_name, &
       steps_name, trace_name
-   use polydem_simulation, only: simulation_t
+   use polydem_settings, only: output_settings_t, settings_t
    implicit none
    private
    public :: claim_folder
@@ -20,9 +19,11 @@ module polydem_claim_folder
 contains
 
    !> Begin the manifest of a run, or continue that of earlier attempts. A result to be replaced is moved aside.
-   subroutine claim_folder(simulation, folder, force, is_restart, manifest, error)
-      !> Simulation at time 0
-      type(simulation_t), intent(in) :: simulation
+   subroutine claim_folder(settings, has_deep_contacts, folder, force, is_restart, manifest, error)
+      !> Settings of the run
+      type(settings_t), intent(in) :: settings
+      !> Whether the run writes a table of deep contacts
+      logical, intent(in) :: has_deep_contacts
       !> Result folder; this run holds its lock
       character(len=*), intent(in) :: folder
       !> Whether the run replaces an existing result
@@ -37,13 +38,13 @@ contains
       character(len=longest) :: lock
       integer :: k
 
-      call list_output_names(simulation, names)
+      call list_output_names(settings%output, has_deep_contacts, names)
       call check_free(manifest, folder, names, error)
       lock = name_in(lock_path(''))
       if (.not. manifest%is_found) then
          if (.not. allocated(error)) call manifest%begin(folder, [lock, names], error)
       else if (force) then
-         call check_inputs(manifest, folder, input_paths(simulation), error)
+         call check_inputs(manifest, folder, input_paths(settings), error)
          call manifest%continue_writing()
          if (.not. allocated(error)) call move_to_replaced(manifest, folder, error)
          names = [character(len=longest) :: lock, names, replaced_name]
@@ -61,11 +62,11 @@ contains
    end subroutine claim_folder
 
    !> Paths of the input files of a run: namelist, bodies file, packing; empty where the scene reads no such file
-   function input_paths(simulation) result(inputs)
-      type(simulation_t), intent(in) :: simulation
+   function input_paths(settings) result(inputs)
+      type(settings_t), intent(in) :: settings
       character(len=:), allocatable :: inputs(:)
 
-      associate (file => simulation%settings%file, scene => simulation%settings%scene)
+      associate (file => settings%file, scene => settings%scene)
          allocate (character(len=max(len(file), len(scene%bodies_file), len(scene%packing))) :: inputs(3))
          inputs(1) = file
          inputs(2) = scene%bodies_file
@@ -74,8 +75,9 @@ contains
    end function input_paths
 
    !> Names of the files that a run can write, without segments
-   subroutine list_output_names(simulation, names)
-      type(simulation_t), intent(in) :: simulation
+   subroutine list_output_names(output, has_deep_contacts, names)
+      type(output_settings_t), intent(in) :: output
+      logical, intent(in) :: has_deep_contacts
       character(len=longest), allocatable, intent(out) :: names(:)
       integer(ip) :: k
 
@@ -84,11 +86,9 @@ contains
       do k = 1_ip, n_checkpoints
          names = [character(len=longest) :: names, name_in(checkpoint_path('', k))]
       end do
-      associate (output => simulation%settings%output)
-         if (output%trace_steps > 0_ip) names = [character(len=longest) :: names, trace_name]
-         if (output%step_profile) names = [character(len=longest) :: names, steps_name]
-      end associate
-      if (has_deep_contacts(simulation)) names = [character(len=longest) :: names, overlaps_name]
+      if (output%trace_steps > 0_ip) names = [character(len=longest) :: names, trace_name]
+      if (output%step_profile) names = [character(len=longest) :: names, steps_name]
+      if (has_deep_contacts) names = [character(len=longest) :: names, overlaps_name]
    end subroutine list_output_names
 
 end module polydem_claim_folder

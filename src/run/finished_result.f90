@@ -16,7 +16,26 @@ module polydem_finished_result
 
 contains
 
-   !> Check on the root rank whether the folder holds the finished result of this run. No file changes.
+   !> Whether the folder may hold a finished result, as the root rank sees it; collective.
+   logical function may_be_finished(run)
+      !> The run; its manifest is read on the root rank
+      type(run_t), intent(inout) :: run
+      integer(lp) :: found(1)
+      integer :: k
+
+      found = 0_lp
+      if (run%comm%is_root() .and. run%attempt%continues) then
+         call run%manifest%read(run%folder)
+         k = run%manifest%place_of(profile_name)
+         if (k > 0 .and. .not. allocated(run%manifest%problem) .and. .not. run%manifest%owns(replaced_name)) &
+            found = merge(1_lp, 0_lp, run%manifest%entry(max(1, k))%is_closed)
+      end if
+      call run%comm%broadcast(found)
+      may_be_finished = found(1) == 1_lp
+   end function may_be_finished
+
+   !> Check on the root rank whether the folder holds the finished result of this run. No file changes. Collective; all
+   !> ranks get the same error.
    subroutine find_finished_result(settings, run, last_state, error)
       !> Settings of the run
       type(settings_t), intent(in) :: settings
@@ -26,15 +45,13 @@ contains
       character(len=:), allocatable, intent(out) :: last_state
       !> Allocated if the finished result is damaged or the scene cannot be built
       type(error_t), allocatable, intent(inout) :: error
-      integer :: k
 
-      call run%manifest%read(run%folder)
-      k = run%manifest%place_of(profile_name)
-      if (k == 0 .or. allocated(run%manifest%problem) .or. run%manifest%owns(replaced_name)) return
-      if (.not. run%manifest%entry(k)%is_closed) return
+      if (.not. may_be_finished(run)) return
       call build_start(settings, run, error)
-      if (.not. allocated(error)) call find_finished(run%folder, settings, run%provenance%scene, run%manifest, &
-                                                     last_state, error)
+      if (allocated(error)) return
+      if (run%comm%is_root()) call find_finished(run%folder, settings, run%provenance%scene, run%manifest, &
+                                                 last_state, error)
+      call run%comm%all_reduce_error(error)
    end subroutine find_finished_result
 
    !> Whether the root rank found a finished result, which it then reports; collective.

@@ -3,14 +3,11 @@
 !> Each warning names a probable mistake of the input. The warnings cost no time in a step; the guards that a run
 !> evaluates during its steps are in `monitor`.
 module polydem_initial_warnings
-   use polydem_body_sizes, only: thickness_of_bodies
-   use polydem_contact_depth, only: count_deeper, deepest_contact, depth_share, depth_text
-   use polydem_guards, only: greatest_displacement
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: lp, wp
    use polydem_log, only: log_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
-   use polydem_scene_measures, only: measure_scene, scene_measures_t
+   use polydem_scene_measures, only: scene_measures_t
    implicit none
    private
    public :: warn_of_risks
@@ -40,18 +37,18 @@ module polydem_initial_warnings
 contains
 
    !> Write a warning about each risk of the initial state.
-   subroutine warn_of_risks(simulation, log, n)
+   subroutine warn_of_risks(simulation, measures, log, n)
       !> A simulation at time 0
       type(simulation_t), intent(in) :: simulation
+      !> Its measures
+      type(scene_measures_t), intent(in) :: measures
       !> Log
       type(log_t), intent(inout) :: log
       !> Number of warnings
       integer(lp), intent(out) :: n
       type(warning_writer_t) :: writer
-      type(scene_measures_t) :: measures
 
-      call measure_scene(simulation, measures)
-      if (size(simulation%bodies%free) > 0) call warn_of_units(simulation, measures, writer, log)
+      if (measures%free > 0_lp) call warn_of_units(simulation, measures, writer, log)
       call warn_of_step(simulation, writer, log)
       call warn_of_overlaps(simulation, measures, writer, log)
       call warn_of_speeds(simulation, measures, writer, log)
@@ -107,26 +104,17 @@ contains
       type(scene_measures_t), intent(in) :: measures
       type(warning_writer_t), intent(inout) :: writer
       type(log_t), intent(inout) :: log
-      real(wp), allocatable :: thickness(:)
-      real(wp) :: share
-      integer(ip) :: c
       logical :: is_energetic
 
-      associate (s => simulation)
-         thickness = thickness_of_bodies(s%bodies)
-         c = deepest_contact(s%contacts, thickness)
-         if (c == 0_ip) return
-         share = depth_share(s%contacts, thickness, c)
-         is_energetic = measures%stored > measures%kinetic + measures%potential .and. &
-            share > s%settings%guards%listed_depth
-         if (share <= deep_fraction .and. .not. is_energetic) return
-         call writer%warn(log, to_text(count_deeper(s%contacts, thickness, s%settings%guards%listed_depth))// &
-                          ' contacts are deep at the start: '//depth_text(s%bodies, s%contacts, thickness, c)// &
-                          '. All contacts store '//to_text(measures%stored, 3)//' J/m, which can accelerate all '// &
-                          'free bodies to '// &
-                          to_text(sqrt(2.0_wp*measures%stored/max(measures%mass(3), tiny(1.0_wp))), 3)// &
-                          ' m/s. Separate the bodies: set relaxed_depth in &guards')
-      end associate
+      if (measures%contacts == 0_lp) return
+      is_energetic = measures%stored > measures%kinetic + measures%potential .and. &
+         measures%depth_share > simulation%settings%guards%listed_depth
+      if (measures%depth_share <= deep_fraction .and. .not. is_energetic) return
+      call writer%warn(log, to_text(measures%deep)//' contacts are deep at the start: '//measures%deepest// &
+                       '. All contacts store '//to_text(measures%stored, 3)//' J/m, which can accelerate all '// &
+                       'free bodies to '// &
+                       to_text(sqrt(2.0_wp*measures%stored/max(measures%mass(3), tiny(1.0_wp))), 3)// &
+                       ' m/s. Separate the bodies: set relaxed_depth in &guards')
    end subroutine warn_of_overlaps
 
    !> Warn of bodies that can pass through others: by moving too far in one step, or by their momentum.
@@ -136,23 +124,21 @@ contains
       type(warning_writer_t), intent(inout) :: writer
       type(log_t), intent(inout) :: log
       character(len=:), allocatable :: thinnest
-      real(wp) :: move, fastest
-      integer(ip) :: slot
+      real(wp) :: fastest
 
       associate (s => simulation)
          thinnest = ' times the thickness of the thinnest body ('//to_text(measures%thickness, 3)//' m, body '// &
-            to_text(s%bodies%id(measures%thinnest))//')'
-         call greatest_displacement(s%guard, s%bodies, s%dt, move, slot)
-         if (move > fast_fraction*measures%thickness) call writer%warn(log, 'body '// &
-            to_text(s%bodies%id(slot))//' moves '//to_text(move/measures%thickness, 3)//thinnest// &
+            to_text(measures%thinnest)//')'
+         if (measures%move > fast_fraction*measures%thickness) call writer%warn(log, 'body '// &
+            to_text(measures%farthest)//' moves '//to_text(measures%move/measures%thickness, 3)//thinnest// &
             ' in one step: it may pass through other bodies undetected. Reduce dt')
-         fastest = max(measures%wall_speed, merge(measures%fall_speed, 0.0_wp, size(s%bodies%free) > 0))
-         if (move <= fast_fraction*measures%thickness .and. fastest*s%dt > fast_fraction*measures%thickness) &
+         fastest = max(measures%wall_speed, merge(measures%fall_speed, 0.0_wp, measures%free > 0_lp))
+         if (measures%move <= fast_fraction*measures%thickness .and. fastest*s%dt > fast_fraction*measures%thickness) &
             call writer%warn(log, 'walls reach '//to_text(measures%wall_speed, 3)//' m/s, a fall through the '// &
             'extent '//to_text(measures%fall_speed, 3)//' m/s: the faster of them moves '// &
             to_text(fastest*s%dt/measures%thickness, 3)//thinnest//' in one step. Reduce dt')
          if (measures%impact > fast_fraction*measures%thickness) call writer%warn(log, 'body '// &
-            to_text(s%bodies%id(measures%fastest))//' is so fast that stopping it takes an overlap of '// &
+            to_text(measures%fastest)//' is so fast that stopping it takes an overlap of '// &
             'about '//to_text(measures%impact, 3)//' m, '//to_text(measures%impact/measures%thickness, 3)//thinnest// &
             ': it may pass through other bodies. Increase stiffness in &forces, or use thicker bodies')
       end associate

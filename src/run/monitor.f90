@@ -49,17 +49,17 @@ module polydem_monitor
 
 contains
 
-   !> Prepare the guards that are switched on.
+   !> Prepare the guards that are switched on. Collective.
    subroutine new_monitor(monitor, simulation)
       !> The monitor
       type(monitor_t), intent(out) :: monitor
       !> A simulation at time 0
-      type(simulation_t), intent(in) :: simulation
+      type(simulation_t), intent(inout) :: simulation
 
       associate (settings => simulation%settings%guards)
          if (settings%overlap /= 'off' .or. settings%passing /= 'off') &
             monitor%thickness = thickness_of_bodies(simulation%bodies)
-         if (settings%energy /= 'off') call open_energy_guard(monitor%energy, simulation%contacts)
+         if (settings%energy /= 'off') call open_energy_guard(monitor%energy, simulation)
       end associate
    end subroutine new_monitor
 

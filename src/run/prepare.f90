@@ -1,4 +1,5 @@
-!> Preparation of a run by the root rank: the scene, the result folder, and the state of earlier attempts.
+!> Preparation of a run: the scene, which all ranks build alike, the result folder, which the root rank manages, and the
+!> state of earlier attempts.
 module polydem_prepare
    use polydem_checked_files, only: check_manifest
    use polydem_claim_folder, only: claim_folder
@@ -7,7 +8,7 @@ module polydem_prepare
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: make_folder
    use polydem_finished_result, only: find_finished_result
-   use polydem_kinds, only: ip
+   use polydem_kinds, only: ip, lp
    use polydem_log_tables, only: write_header
    use polydem_monitor, only: new_monitor
    use polydem_provenance, only: collect_provenance
@@ -22,36 +23,79 @@ module polydem_prepare
    use polydem_start, only: build_start, recall
    implicit none
    private
-   public :: begin
+   public :: build_and_lock, prepare
 
 contains
 
-   !> Prepare a run on the root rank: build the scene, lock the folder, and restore the state of earlier attempts.
-   subroutine begin(settings, force, run, last_state, error)
+   !> Build the scene, lock the folder, and find out whether its result is finished already. Collective; all ranks get
+   !> the same error.
+   subroutine build_and_lock(settings, force, run, last_state, error)
       !> Checked settings
       type(settings_t), intent(in) :: settings
       !> Whether to replace an existing result
       logical, intent(in) :: force
       !> The run
       type(run_t), intent(inout) :: run
-      !> Hash of the last state; allocated if the run is finished
+      !> Hash of the last state; allocated on the root rank if the run is finished
       character(len=:), allocatable, intent(inout) :: last_state
       !> Allocated if the run cannot start
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: lock_note, recovery_note
+      character(len=:), allocatable :: recovery_note
+      integer(lp) :: is_recovered(1)
 
-      call check_overwrite(run, force, error)
+      if (run%comm%is_root()) call check_overwrite(run, force, error)
+      call run%comm%all_reduce_error(error)
       if (.not. allocated(error)) call build_start(settings, run, error)
-      if (.not. allocated(error)) call make_folder(run%folder, error)
-      if (.not. allocated(error)) call run%lock%acquire(run%folder, lock_note, error, run%comm%size > 1_ip)
-      if (.not. allocated(error)) call recover(run%folder, recovery_note, error)
       if (allocated(error)) return
-      if (allocated(recovery_note)) call say(recovery_note)
-      if (allocated(recovery_note) .and. run%attempt%continues) call find_finished_result(settings, run, last_state, &
-         error)
-      if (.not. allocated(last_state) .and. .not. allocated(error)) &
-         call open_and_restore(settings, force, lock_note, run, error)
-   end subroutine begin
+      if (run%comm%is_root()) call lock_folder(run, recovery_note, error)
+      call run%comm%all_reduce_error(error)
+      if (allocated(error)) return
+      is_recovered = merge(1_lp, 0_lp, allocated(recovery_note))
+      call run%comm%broadcast(is_recovered)
+      if (is_recovered(1) == 1_lp .and. run%attempt%continues) &
+         call find_finished_result(settings, run, last_state, error)
+   end subroutine build_and_lock
+
+   !> Lock the result folder, and restore a result that an interrupted --force moved aside.
+   subroutine lock_folder(run, recovery_note, error)
+      type(run_t), intent(inout) :: run
+      !> Allocated if a result was restored
+      character(len=:), allocatable, intent(out) :: recovery_note
+      type(error_t), allocatable, intent(inout) :: error
+
+      call make_folder(run%folder, error)
+      if (.not. allocated(error)) call run%lock%acquire(run%folder, run%lock_note, error, run%comm%size > 1_ip)
+      if (.not. allocated(error)) call recover(run%folder, recovery_note, error)
+      if (allocated(recovery_note) .and. .not. allocated(error)) call say(recovery_note)
+   end subroutine lock_folder
+
+   !> Open the log, describe the run, and restore the state of earlier attempts, in a folder that this run has locked.
+   !> Collective; all ranks get the same error.
+   subroutine prepare(settings, force, run, error)
+      !> Checked settings
+      type(settings_t), intent(in) :: settings
+      !> Whether to replace an existing result
+      logical, intent(in) :: force
+      !> The run, after `build_and_lock`
+      type(run_t), intent(inout) :: run
+      !> Allocated if the run cannot start
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (run%comm%is_root()) then
+         call open_log(settings, force, run, error)
+      else
+         call run%lock%join(run%folder)
+      end if
+      call run%comm%all_reduce_error(error)
+      if (allocated(error)) return
+      call write_overlaps(run, error)
+      call new_monitor(run%monitor, run%simulation)
+      if (run%comm%is_root()) call warn_of_risks(run%simulation, run%measures, run%log, run%monitor%at_start)
+      call choose_intervals(run)
+      if (.not. allocated(error)) call recall(run, error)
+      if (.not. allocated(error) .and. run%comm%is_root()) call finish_restart(run, error)
+      call run%comm%all_reduce_error(error)
+   end subroutine prepare
 
    !> Refuse to overwrite a result without --force, and to use a folder whose manifest is damaged.
    subroutine check_overwrite(run, force, error)
@@ -68,16 +112,13 @@ contains
                  'to resume it or --force to overwrite it, or choose another folder with --set output.folder=NAME')
    end subroutine check_overwrite
 
-   !> Open the log, describe the run, and restore the state of earlier attempts, in a folder that this run has locked.
-   subroutine open_and_restore(settings, force, lock_note, run, error)
+   !> Find the state of earlier attempts, claim the folder, open the log and describe the run.
+   subroutine open_log(settings, force, run, error)
       type(settings_t), intent(in) :: settings
       logical, intent(in) :: force
-      !> Remark on how the folder was locked; unallocated if there is none
-      character(len=:), allocatable, intent(in) :: lock_note
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: scene
-      logical :: is_restart
 
       ! Repeat the check: now no other run can write to the folder.
       call check_overwrite(run, force, error)
@@ -89,32 +130,42 @@ contains
       if (run%manifest%is_found .and. run%attempt%continues) &
          call find_restart(run%folder, run%manifest, settings, scene, run%attempt%may_change, run%earlier, error)
       if (allocated(error)) return
-      is_restart = run%earlier%checkpoint > 0_ip .or. run%earlier%segments > 0_ip
-      call claim_folder(run%simulation, run%folder, force, is_restart, run%manifest, error)
-      if (.not. allocated(error)) call run%log%open(run%folder, error, appended=is_restart)
+      call claim_folder(settings, run%measures%deep > 0_lp, run%folder, force, is_restart(run), run%manifest, error)
+      if (.not. allocated(error)) call run%log%open(run%folder, error, appended=is_restart(run))
       if (allocated(error)) return
       call write_header(run%log, run%provenance, run%folder)
       if (run%oversubscription /= '') call run%log%write_line(run%oversubscription)
-      if (allocated(lock_note)) call run%log%write_line(lock_note)
-      call describe(run%simulation, run%log)
-      call write_overlaps(run, error)
-      call new_monitor(run%monitor, run%simulation)
-      call warn_of_risks(run%simulation, run%log, run%monitor%at_start)
-      call choose_intervals(run)
-      if (.not. allocated(error)) call recall(run, error)
-      if (.not. allocated(error)) call check_recording(run%simulation, run%folder, error)
-      if (is_restart .and. .not. allocated(error)) call remove_surplus_files(run%folder, run%manifest, run%earlier, &
-         error)
-   end subroutine open_and_restore
+      if (allocated(run%lock_note)) call run%log%write_line(run%lock_note)
+      call describe(run%simulation, run%measures, run%log)
+   end subroutine open_log
 
-   !> Write the deep initial contacts to the log and to a table.
+   !> Whether the run keeps files of earlier attempts
+   pure logical function is_restart(run)
+      type(run_t), intent(in) :: run
+
+      is_restart = run%earlier%checkpoint > 0_ip .or. run%earlier%segments > 0_ip
+   end function is_restart
+
+   !> Check the recording, and remove the files of earlier attempts that the run does not keep.
+   subroutine finish_restart(run, error)
+      type(run_t), intent(inout) :: run
+      type(error_t), allocatable, intent(inout) :: error
+
+      call check_recording(run%simulation, run%folder, error)
+      if (is_restart(run) .and. .not. allocated(error)) &
+         call remove_surplus_files(run%folder, run%manifest, run%earlier, error)
+   end subroutine finish_restart
+
+   !> Write the deep initial contacts to the log and to a table. Collective; all ranks get the same error.
    subroutine write_overlaps(run, error)
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
 
-      call run%manifest%reopen(run%folder//'/'//overlaps_name, error)
-      if (.not. allocated(error)) call list_overlaps(run%simulation, run%folder, run%log, error)
-      call run%manifest%close_file(run%folder//'/'//overlaps_name, error)
+      if (run%comm%is_root()) call run%manifest%reopen(run%folder//'/'//overlaps_name, error)
+      call run%comm%all_reduce_error(error)
+      if (.not. allocated(error)) call list_overlaps(run%simulation, run%measures, run%folder, run%log, error)
+      if (run%comm%is_root()) call run%manifest%close_file(run%folder//'/'//overlaps_name, error)
+      call run%comm%all_reduce_error(error)
    end subroutine write_overlaps
 
 end module polydem_prepare

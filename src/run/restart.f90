@@ -4,21 +4,26 @@ module polydem_restart
    use polydem_checked_files, only: check_closed, find_segments, read_frames
    use polydem_checkpoint_fields, only: attempts_t, serialize_progress, serialize_run
    use polydem_checkpoint_file, only: checkpoint_file_t
+   use polydem_domain, only: new_domain
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_system, only: exists
-   use polydem_kinds, only: ip, lp
+   use polydem_global_order, only: global_order_t
+   use polydem_kinds, only: dp, ip, lp
    use polydem_log, only: log_t
    use polydem_manifest, only: manifest_t
    use polydem_monitor, only: monitor_t
+   use polydem_ownership, only: order_bodies
    use polydem_profile_file, only: read_final_status
    use polydem_provenance, only: origin_of
    use polydem_result_files, only: checkpoint_path, n_checkpoints, name_in, profile_name, segment_path, trace_name
+   use polydem_serializer, only: serializer_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
+   use polydem_timers, only: timers_t
    implicit none
    private
-   public :: earlier_attempts_t, find_finished, find_restart, restore, remove_surplus_files
+   public :: earlier_attempts_t, find_finished, find_restart, restore, remove_surplus_files, serialize_earlier
 
    !> State of the result folder after earlier attempts
    type :: earlier_attempts_t
@@ -280,7 +285,23 @@ contains
       if (.not. manifest%entry(k)%is_closed) call manifest%close_file(folder//'/'//trace_name, error)
    end subroutine remove_surplus_files
 
-   !> Restore the simulation from the checkpoint.
+   !> Serialize what all ranks must know of the earlier attempts.
+   subroutine serialize_earlier(serializer, earlier)
+      !> Serializer
+      class(serializer_t), intent(inout) :: serializer
+      !> State of the folder after earlier attempts
+      type(earlier_attempts_t), intent(inout) :: earlier
+      integer(ip) :: numbers(2)
+
+      numbers = [earlier%checkpoint, earlier%segments]
+      call serializer%field('/run/files', numbers, '1', 'number of the checkpoint, number of segments')
+      earlier%checkpoint = numbers(1)
+      earlier%segments = numbers(2)
+      call serializer%field('/run/step', earlier%step, '1', 'step of the checkpoint')
+      call serializer%field('/run/last_frame', earlier%last_frame, '1', 'step of the last frame')
+   end subroutine serialize_earlier
+
+   !> Restore the simulation from the checkpoint. Collective; all ranks get the same error.
    subroutine restore(folder, earlier, revision, simulation, attempts, monitor, log, error)
       !> Result folder
       character(len=*), intent(in) :: folder
@@ -299,15 +320,28 @@ contains
       !> Allocated if the checkpoint does not fit this run
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
+      type(global_order_t) :: rows
 
-      call file%open(checkpoint_path(folder, earlier%checkpoint), error)
+      call file%open(checkpoint_path(folder, earlier%checkpoint), error, simulation%comm)
       if (allocated(error)) return
+      call order_bodies(simulation%comm, simulation%bodies, rows)
+      call file%set_rows('/bodies/', rows)
       call serialize_run(file, simulation, attempts, monitor)
       call file%close(error)
       if (allocated(error)) then
          error%message = checkpoint_path(folder, earlier%checkpoint)//' does not fit this run: '//error%message
          return
       end if
+      ! The first step distributes the bodies anew. The sums over all ranks continue on the root rank.
+      associate (s => simulation, median_diameter => simulation%domain%median_diameter)
+         call new_domain(s%domain, s%settings%decomposition, (median_diameter), s%comm, error)
+         if (.not. s%comm%is_root()) then
+            s%sums = 0_lp
+            s%timers = timers_t()
+            s%neighbours%finder%work%value = 0_lp
+            s%neighbours%finder%work%seconds = 0.0_dp
+         end if
+      end associate
       attempts%attempts = attempts%attempts + 1_lp
       call log%write_line('attempt    '//to_text(attempts%attempts))
       if (revision /= earlier%revision) call log%write_line('warning: another revision of this program ('// &

@@ -16,6 +16,7 @@ module polydem_run
    use polydem_result_files, only: default_folder
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
+   use polydem_scene_measures, only: scene_measures_t
    use polydem_trajectory_writer, only: trajectory_writer_t
    implicit none
    private
@@ -49,6 +50,8 @@ module polydem_run
       type(checkpoints_t) :: checkpoints
       !> The simulation
       type(simulation_t) :: simulation
+      !> Measures of the initial scene
+      type(scene_measures_t) :: measures
       !> Writer of frames
       type(trajectory_writer_t) :: trajectory
       !> Recorder of boxes and of times of every step
@@ -65,6 +68,8 @@ module polydem_run
       character(len=:), allocatable :: folder
       !> Manifest of the result; only the root rank writes it
       type(manifest_t) :: manifest
+      !> Remark on how the folder was locked; unallocated if there is none
+      character(len=:), allocatable :: lock_note
       !> Lock of the result folder; the root rank acquires it
       type(folder_lock_t) :: lock
       !> Whether another run has taken over the result folder; the same on all ranks

@@ -9,13 +9,13 @@ module polydem_run_simulation
    use polydem_kinds, only: ip, lp
    use polydem_monitor, only: check_step, set_warning_counts, report_pending_warnings, warning_counts
    use polydem_oversubscription, only: oversubscription
-   use polydem_prepare, only: begin
+   use polydem_prepare, only: build_and_lock, prepare
    use polydem_replacement, only: remove_replaced, restore_replaced
    use polydem_run, only: attempt_t, run_t, result_folder
    use polydem_run_output, only: end_step, finish
    use polydem_serial_communicator, only: serial_communicator_t
    use polydem_settings, only: settings_t
-   use polydem_start, only: join
+   use polydem_start, only: open_output
    use polydem_strings, only: to_text
    use polydem_time_step, only: advance
    use polydem_timers, only: stage_decomposition, stage_output
@@ -45,20 +45,19 @@ contains
       if (present(comm)) allocate (run%comm, source=comm)
       if (.not. allocated(run%comm)) allocate (serial_communicator_t :: run%comm)
       run%folder = result_folder(settings)
-      if (run%comm%is_root() .and. run%attempt%continues) call find_finished_result(settings, run, last_state, error)
+      if (run%attempt%continues) call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return
       run%oversubscription = oversubscription(run%comm)
       call check_ranks(settings, run%comm, error)
-      if (run%comm%is_root() .and. .not. allocated(error)) call begin(settings, force, run, last_state, error)
-      call run%comm%all_reduce_error(error)
+      if (.not. allocated(error)) call build_and_lock(settings, force, run, last_state, error)
       if (.not. allocated(error)) then
          if (is_finished(run, last_state)) then
             call run%lock%release()
             return
          end if
-         if (.not. run%comm%is_root()) call run%lock%join(run%folder)
+         call prepare(settings, force, run, error)
       end if
-      if (.not. allocated(error)) call join(settings, run, error)
+      if (.not. allocated(error)) call open_output(settings, run, error)
       if (.not. allocated(error)) call run_steps(run, error)
       if (run%lock%is_held() .and. allocated(error) .and. .not. run%has_lost_folder) call restore_replaced(run%folder)
       call run%lock%release()

@@ -1,12 +1,20 @@
-!> Measures of an initial scene: sizes, masses and speeds of its bodies, and the elastic energy of its contacts.
+!> Measures of an initial scene: sizes, masses and speeds of its bodies, and depth and energy of its contacts. They are
+!> those of the bodies of all ranks.
 module polydem_scene_measures
    use polydem_bodies, only: bodies_t
-   use polydem_body_sizes, only: measure_body
-   use polydem_energy_guard, only: stored_energy
-   use polydem_kinds, only: ip, wp
+   use polydem_body_sizes, only: measure_body, thickness_of_bodies
+   use polydem_communicator, only: communicator_t
+   use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
+   use polydem_energy_guard, only: find_stored_energy
+   use polydem_guards, only: greatest_displacement, place_of
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_ownership, only: owns_body, owns_pair
    use polydem_polygon, only: diameter
    use polydem_prescribed_motion, only: motion_t
    use polydem_simulation, only: simulation_t
+   use polydem_stability_check, only: find_stable_step
+   use polydem_strings, only: to_text
+   use polydem_whole_run, only: keep_greatest, reduce_to_greatest, reduce_to_least, sum_exactly
    implicit none
    private
    public :: scene_measures_t, measure_scene
@@ -17,14 +25,14 @@ module polydem_scene_measures
       real(wp) :: extent(2, 2) = 0.0_wp
       !> Bounding box of the vertices of free bodies, as `extent` [m]
       real(wp) :: free_extent(2, 2) = 0.0_wp
-      !> Number of vertices of all bodies
-      integer(ip) :: corners = 0_ip
+      !> Number of free bodies, fixed bodies, vertices, boxes and boxes of fixed bodies
+      integer(lp) :: free = 0_lp, fixed = 0_lp, corners = 0_lp, boxes = 0_lp, fixed_boxes = 0_lp
       !> Diameter of the free bodies: least, median, greatest, (3) [m]
       real(wp) :: diameter(3) = 0.0_wp
       !> Thickness of the thinnest body [m]
       real(wp) :: thickness = 0.0_wp
-      !> Slot of the thinnest body
-      integer(ip) :: thinnest = 0_ip
+      !> Identifier of the thinnest body
+      integer(lp) :: thinnest = 0_lp
       !> Mass of the free bodies: least, greatest, total, (3) [kg/m]
       real(wp) :: mass(3) = 0.0_wp
       !> Mass over area of the free bodies: least, greatest, (2) [kg/m3]
@@ -37,32 +45,50 @@ module polydem_scene_measures
       real(wp) :: fall_speed = 0.0_wp
       !> Greatest depth of overlap that the initial speed of a free body can cause [m]
       real(wp) :: impact = 0.0_wp
-      !> Slot of that body; 0 if no free body moves
-      integer(ip) :: fastest = 0_ip
+      !> Identifier of that body
+      integer(lp) :: fastest = 0_lp
+      !> Greatest displacement of a point of a body in a step [m]
+      real(wp) :: move = 0.0_wp
+      !> Identifier of that body
+      integer(lp) :: farthest = 0_lp
       !> Pressure under the full height of the free bodies, over the stiffness [1]
       real(wp) :: softness = 0.0_wp
       !> Kinetic energy of the free bodies, and their weight times the extent along gravity [J/m]
       real(wp) :: kinetic = 0.0_wp, potential = 0.0_wp
       !> Elastic energy of the contacts [J/m]
       real(wp) :: stored = 0.0_wp
+      !> Number of contacts, and number of those deeper than `listed_depth` in &guards
+      integer(lp) :: contacts = 0_lp, deep = 0_lp
+      !> Greatest depth of a contact over the thickness of the thinner body
+      real(wp) :: depth_share = 0.0_wp
+      !> Clause about this contact
+      character(len=:), allocatable :: deepest
+      !> Clause about the contact with the greatest depth in metres
+      character(len=:), allocatable :: longest_depth
+      !> Stable time step of the contacts [s]
+      real(wp) :: stable_step = huge(1.0_wp)
    end type scene_measures_t
 
 contains
 
-   !> Compute the measures of a scene.
+   !> Compute the measures of a scene. Collective; all ranks get the same measures.
    subroutine measure_scene(simulation, measures)
       !> A simulation at time 0
-      type(simulation_t), intent(in) :: simulation
+      type(simulation_t), intent(inout) :: simulation
       !> Measures of the scene
       type(scene_measures_t), intent(out) :: measures
       real(wp) :: gravity, down(2)
+      integer(ip) :: slot
       integer :: k
 
-      associate (s => simulation, bodies => simulation%bodies)
-         measures%corners = bodies%vertex_start(bodies%n + 1_ip) - 1_ip
-         call survey_bodies(bodies, measures)
-         if (size(bodies%free) > 0) measures%diameter(2) = s%maker%median_diameter
-         call survey_free_bodies(bodies, s%settings%forces%stiffness, measures)
+      call count_parts(simulation, measures)
+      associate (s => simulation, comm => simulation%comm)
+         call measure_bodies(comm, s%bodies, measures)
+         if (measures%free > 0_lp) measures%diameter(2) = s%maker%median_diameter
+         if (measures%free > 0_lp) call measure_free_bodies(comm, s%bodies, s%settings%forces%stiffness, measures)
+         call greatest_displacement(s%guard, s%bodies, s%dt, measures%move, slot)
+         if (slot > 0_ip) measures%farthest = int(s%bodies%id(slot), lp)
+         call keep_greatest(comm, measures%move, measures%farthest)
          do k = 1, size(s%motions)
             measures%wall_speed = max(measures%wall_speed, greatest_speed(s%motions(k), s%guard%radius))
          end do
@@ -73,8 +99,10 @@ contains
             measures%fall_speed = sqrt(2.0_wp*gravity*along(measures%extent))
             measures%softness = measures%density(2)*gravity*along(measures%free_extent)/s%settings%forces%stiffness
          end if
-         measures%stored = stored_energy(s%contacts)
       end associate
+      call find_stored_energy(simulation, measures%stored)
+      call measure_contacts(simulation, measures)
+      call find_stable_step(simulation, measures%stable_step, slot)
 
    contains
 
@@ -87,8 +115,79 @@ contains
 
    end subroutine measure_scene
 
+   !> Count bodies, vertices, boxes and contacts.
+   subroutine count_parts(simulation, measures)
+      type(simulation_t), intent(inout) :: simulation
+      type(scene_measures_t), intent(inout) :: measures
+      integer(lp) :: counts(5)
+      real(wp), allocatable :: thickness(:)
+      integer(ip) :: c, k
+
+      counts = 0_lp
+      associate (bodies => simulation%bodies, boxes => simulation%boxes, contacts => simulation%contacts, &
+                 limit => simulation%settings%guards%listed_depth)
+         measures%fixed = count(bodies%fixed, kind=lp)
+         measures%fixed_boxes = count(boxes%fixed(:boxes%n), kind=lp)
+         counts(1) = size(bodies%free, kind=lp)
+         do k = 1_ip, bodies%n
+            if (owns_body(simulation%comm%is_root(), bodies%in_halo(k), bodies%fixed(k))) &
+               counts(2) = counts(2) + int(bodies%vertex_start(k + 1_ip) - bodies%vertex_start(k), lp)
+         end do
+         counts(3) = count(.not. boxes%passive(:boxes%n), kind=lp)
+         thickness = thickness_of_bodies(bodies)
+         do c = 1_ip, contacts%n
+            if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
+            counts(4) = counts(4) + 1_lp
+            if (depth_share(contacts, thickness, c) > limit) counts(5) = counts(5) + 1_lp
+         end do
+      end associate
+      call simulation%comm%all_reduce_sum(counts)
+      measures%free = counts(1)
+      measures%corners = counts(2)
+      measures%boxes = counts(3) + measures%fixed_boxes
+      measures%contacts = counts(4)
+      measures%deep = counts(5)
+   end subroutine count_parts
+
+   !> Find the deepest contact in terms of its thinner body, and that with the greatest depth in metres.
+   subroutine measure_contacts(simulation, measures)
+      type(simulation_t), intent(inout) :: simulation
+      type(scene_measures_t), intent(inout) :: measures
+      real(wp), allocatable :: thickness(:)
+      real(wp) :: depth, greatest
+      integer(lp) :: place, longest
+      integer(ip) :: c, worst
+
+      place = 0_lp
+      longest = 0_lp
+      greatest = -1.0_wp
+      associate (bodies => simulation%bodies, contacts => simulation%contacts)
+         thickness = thickness_of_bodies(bodies)
+         worst = deepest_contact(contacts, thickness)
+         if (worst > 0_ip) then
+            measures%depth_share = depth_share(contacts, thickness, worst)
+            measures%deepest = depth_text(bodies, contacts, thickness, worst)
+            place = place_of(bodies, contacts%first(worst), contacts%second(worst))
+         end if
+         do c = 1_ip, contacts%n
+            depth = contacts%area(c)/contacts%length(c)
+            if (depth <= greatest) cycle
+            greatest = depth
+            worst = c
+         end do
+         if (worst > 0_ip) then
+            longest = place_of(bodies, contacts%first(worst), contacts%second(worst))
+            measures%longest_depth = to_text(greatest, 3)//' m between the bodies '// &
+               to_text(bodies%id(contacts%first(worst)))//' and '//to_text(bodies%id(contacts%second(worst)))
+         end if
+      end associate
+      call keep_greatest(simulation%comm, measures%depth_share, place, measures%deepest)
+      call keep_greatest(simulation%comm, greatest, longest, measures%longest_depth)
+   end subroutine measure_contacts
+
    !> Find the extents and the thinnest body.
-   pure subroutine survey_bodies(bodies, measures)
+   subroutine measure_bodies(comm, bodies, measures)
+      class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
       type(scene_measures_t), intent(inout) :: measures
       real(wp) :: thickness, radius
@@ -103,10 +202,17 @@ contains
          call measure_body(bodies, s, thickness, radius)
          if (thickness >= measures%thickness) cycle
          measures%thickness = thickness
-         measures%thinnest = s
+         measures%thinnest = int(bodies%id(s), lp)
       end do
-      if (size(bodies%free) == 0) measures%free_extent = 0.0_wp
-   end subroutine survey_bodies
+      call reduce_to_least(comm, measures%extent(:, 1))
+      call reduce_to_greatest(comm, measures%extent(:, 2))
+      call reduce_to_least(comm, measures%free_extent(:, 1))
+      call reduce_to_greatest(comm, measures%free_extent(:, 2))
+      if (measures%free == 0_lp) measures%free_extent = 0.0_wp
+      measures%thickness = -measures%thickness
+      call keep_greatest(comm, measures%thickness, measures%thinnest)
+      measures%thickness = -measures%thickness
+   end subroutine measure_bodies
 
    !> Extend a bounding box to the vertices of a body.
    pure subroutine extend_extent(extent, bodies, s)
@@ -125,14 +231,16 @@ contains
    !>
    !> A body of mass m and speed v causes an overlap of at most v sqrt(m/E) in a contact of stiffness E, if the contact
    !> is as long as the length in the force law and the other body is at rest.
-   pure subroutine survey_free_bodies(bodies, stiffness, measures)
+   subroutine measure_free_bodies(comm, bodies, stiffness, measures)
+      class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: stiffness
       type(scene_measures_t), intent(inout) :: measures
-      real(wp) :: length, density, speed, impact
+      real(wp) :: length, density, speed, impact, least(3), greatest(4)
+      real(wp), allocatable :: kinetic(:)
       integer(ip) :: k, s
 
-      if (size(bodies%free) == 0) return
+      allocate (kinetic(size(bodies%free)))
       measures%diameter(1) = huge(1.0_wp)
       measures%mass(1) = huge(1.0_wp)
       measures%density(1) = huge(1.0_wp)
@@ -144,18 +252,27 @@ contains
          end associate
          speed = hypot(bodies%velocity(1, s), bodies%velocity(2, s))
          measures%diameter([1, 3]) = [min(measures%diameter(1), length), max(measures%diameter(3), length)]
-         measures%mass = [min(measures%mass(1), bodies%mass(s)), max(measures%mass(2), bodies%mass(s)), &
-                        measures%mass(3) + bodies%mass(s)]
+         measures%mass(:2) = [min(measures%mass(1), bodies%mass(s)), max(measures%mass(2), bodies%mass(s))]
          measures%density = [min(measures%density(1), density), max(measures%density(2), density)]
          measures%speed = max(measures%speed, speed)
-         measures%kinetic = measures%kinetic + 0.5_wp*bodies%mass(s)*speed**2 &
-            + 0.5_wp*bodies%inertia(s)*bodies%angular_velocity(s)**2
+         kinetic(k) = 0.5_wp*bodies%mass(s)*speed**2 + 0.5_wp*bodies%inertia(s)*bodies%angular_velocity(s)**2
          impact = speed*sqrt(bodies%mass(s)/stiffness)
          if (impact <= measures%impact) cycle
          measures%impact = impact
-         measures%fastest = s
+         measures%fastest = int(bodies%id(s), lp)
       end do
-   end subroutine survey_free_bodies
+      least = [measures%diameter(1), measures%mass(1), measures%density(1)]
+      greatest = [measures%diameter(3), measures%mass(2), measures%density(2), measures%speed]
+      call reduce_to_least(comm, least)
+      call reduce_to_greatest(comm, greatest)
+      measures%diameter([1, 3]) = [least(1), greatest(1)]
+      measures%mass(:2) = [least(2), greatest(2)]
+      measures%density = [least(3), greatest(3)]
+      measures%speed = greatest(4)
+      call sum_exactly(comm, bodies%mass(bodies%free), measures%mass(3))
+      call sum_exactly(comm, kinetic, measures%kinetic)
+      call keep_greatest(comm, measures%impact, measures%fastest)
+   end subroutine measure_free_bodies
 
    !> Area of a polygon [m2]
    pure real(wp) function area_of(shape)

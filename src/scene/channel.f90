@@ -5,7 +5,7 @@ module polydem_channel
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_gas, only: append_moving_grains, total_area
-   use polydem_grains, only: draw_grains, grain_t
+   use polydem_grains, only: draw_grains, grains_t
    use polydem_kinds, only: ip, wp
    use polydem_pour, only: loose_spacing, displace_randomly
    use polydem_random, only: new_random, random_t
@@ -30,17 +30,17 @@ contains
       !> Allocated if the fraction is too large for a start without overlaps
       type(error_t), allocatable, intent(inout) :: error
       type(random_t) :: random
-      type(grain_t), allocatable :: grains(:)
+      type(grains_t) :: grains
       real(wp), allocatable :: centres(:, :)
       real(wp) :: height, length, spacing
       integer(ip) :: k, n
 
       n = scene%bodies
-      allocate (grains(n), centres(2, n))
+      allocate (centres(2, n))
       random = new_random(scene%seed)
-      call draw_grains(scene, random, grains)
+      call draw_grains(scene, random, n, grains)
       height = height_share*scene%long_axis_max
-      length = total_area(grains)/(scene%fraction*height)
+      length = total_area(grains%area)/(scene%fraction*height)
       spacing = length/real(n, wp)
       if (spacing < loose_spacing(scene)) then
          call raise(error, input_error, 'fraction is too large for a row of grains without overlap at the start; '// &

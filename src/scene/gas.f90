@@ -6,7 +6,7 @@ module polydem_gas
    use polydem_body_list, only: body_list_t
    use polydem_cut_cells, only: fit_cells
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_grains, only: append_grains, draw_grains, draw_sizes, grain_t
+   use polydem_grains, only: append_grains, draw_grains, draw_sizes, grains_t
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: fill_lattice, row_height
    use polydem_pour, only: loose_spacing_ratio, loose_spacing, displace_randomly
@@ -29,14 +29,14 @@ contains
       !> Allocated if the fraction is too large for a start without overlaps
       type(error_t), allocatable, intent(inout) :: error
       type(random_t) :: random
-      type(grain_t), allocatable :: grains(:)
+      type(grains_t) :: grains
       real(wp), allocatable :: centres(:, :)
       real(wp) :: area, width, inside(2, 4), spacing
 
-      allocate (grains(scene%bodies), centres(2, scene%bodies))
+      allocate (centres(2, scene%bodies))
       random = new_random(scene%seed)
-      call draw_grains(scene, random, grains, draw_sizes(scene%size_ratio, scene%bodies))
-      area = total_area(grains)/scene%fraction
+      call draw_grains(scene, random, scene%bodies, grains, draw_sizes(scene%size_ratio, scene%bodies))
+      area = total_area(grains%area)/scene%fraction
       width = scene%width
       if (.not. width > 0.0_wp) width = sqrt(area)
       inside = rectangle(-0.5_wp*width, 0.5_wp*width, -0.5_wp*area/width, 0.5_wp*area/width)
@@ -68,30 +68,30 @@ contains
       !> Stream of random numbers
       type(random_t), intent(inout) :: random
       !> Grains
-      type(grain_t), intent(in) :: grains(:)
+      type(grains_t), intent(in) :: grains
       !> Centres of the grains, (2, grain) [m]
       real(wp), intent(in) :: centres(:, :)
       real(wp), allocatable :: velocities(:, :), spins(:)
       logical, allocatable :: moves(:)
 
-      allocate (velocities(2, size(grains)), spins(size(grains)))
+      allocate (velocities(2, size(centres, 2)), spins(size(centres, 2)))
       call draw_velocities(random, 1.0_wp, velocities)
-      moves = choose_moving_grains(size(grains, kind=ip), scene%moving_grains)
-      if (count(moves) > 1) call remove_momentum(grains, moves, velocities)
+      moves = choose_moving_grains(size(centres, 2, kind=ip), scene%moving_grains)
+      if (count(moves) > 1) call remove_momentum(grains%area, moves, velocities)
       call set_speed(scene%speed, moves, velocities)
       call draw_spins(random, scene%spin, spins)
       call append_grains(list, scene, grains, centres, velocities, spins)
    end subroutine append_moving_grains
 
    !> Total area of the grains [m2]
-   pure real(wp) function total_area(grains)
-      !> Grains
-      type(grain_t), intent(in) :: grains(:)
+   pure real(wp) function total_area(areas)
+      !> Area of each grain, (grain) [m2]
+      real(wp), intent(in) :: areas(:)
       integer :: k
 
       total_area = 0.0_wp
-      do k = 1, size(grains)
-         total_area = total_area + grains(k)%area
+      do k = 1, size(areas)
+         total_area = total_area + areas(k)
       end do
    end function total_area
 

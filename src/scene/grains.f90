@@ -5,14 +5,14 @@
 !> differ in size, both axes are multiplied by the size factor of the grain.
 module polydem_grains
    use polydem_body_list, only: body_list_t
-   use polydem_kinds, only: ip, wp
+   use polydem_kinds, only: ip, lp, wp
    use polydem_polygon, only: mass_properties
    use polydem_random, only: random_t
    use polydem_settings, only: scene_settings_t
    use polydem_sort_reals, only: sort_reals
    implicit none
    private
-   public :: grain_t, draw_grains, draw_sizes, append_grains, settled_area, pi
+   public :: grain_t, grains_t, draw_grains, draw_sizes, append_grains, settled_area, pi
 
    !> The number pi
    real(wp), parameter :: pi = 3.141592653589793238462643383279503_wp
@@ -30,26 +30,82 @@ module polydem_grains
       real(wp) :: area = 0.0_wp
    end type grain_t
 
+   !> Grains without positions, in little memory: their corners lie one after the other
+   type :: grains_t
+      !> As in `grain_t`, (grain)
+      real(wp), allocatable :: length(:), area(:)
+      !> First corner of each grain, (grains + 1)
+      integer(ip), allocatable, private :: first(:)
+      !> Corners of all grains, (2, corner) [m]
+      real(wp), allocatable, private :: corner(:, :)
+   contains
+      procedure :: reserve
+      procedure :: set
+      procedure :: corners
+   end type grains_t
+
 contains
 
+   !> Make room for grains. Pages of memory beyond their last corner remain unused.
+   subroutine reserve(self, n, most_corners)
+      class(grains_t), intent(inout) :: self
+      !> Number of grains
+      integer(ip), intent(in) :: n
+      !> Greatest number of corners of a grain
+      integer(ip), intent(in) :: most_corners
+
+      allocate (self%length(n), self%area(n), self%first(n + 1_ip), &
+                self%corner(2, int(n, lp)*int(most_corners, lp)))
+      self%first(1) = 1_ip
+   end subroutine reserve
+
+   !> Set the next grain; grains must be set in ascending order.
+   pure subroutine set(self, k, corners, length, area)
+      class(grains_t), intent(inout) :: self
+      !> Number of the grain
+      integer(ip), intent(in) :: k
+      !> Corners, length and area as in `grain_t`
+      real(wp), intent(in) :: corners(:, :), length, area
+
+      self%length(k) = length
+      self%area(k) = area
+      self%first(k + 1_ip) = self%first(k) + size(corners, 2, kind=ip)
+      self%corner(:, self%first(k):self%first(k + 1_ip) - 1_ip) = corners
+   end subroutine set
+
+   !> Corners of a grain, (2, corner) [m]
+   pure function corners(self, k)
+      class(grains_t), intent(in) :: self
+      !> Number of the grain
+      integer(ip), intent(in) :: k
+      real(wp), allocatable :: corners(:, :)
+
+      corners = self%corner(:, self%first(k):self%first(k + 1_ip) - 1_ip)
+   end function corners
+
    !> Draw grains of random shape and orientation.
-   subroutine draw_grains(scene, random, grains, sizes)
+   subroutine draw_grains(scene, random, n, grains, sizes)
       !> Numbers of corners and axes of the ellipses
       type(scene_settings_t), intent(in) :: scene
       !> Stream of random numbers
       type(random_t), intent(inout) :: random
+      !> Number of grains
+      integer(ip), intent(in) :: n
       !> Grains to draw
-      type(grain_t), intent(out) :: grains(:)
+      type(grains_t), intent(out) :: grains
       !> Size factor (of both axes) of each grain, (grain); 1 if absent
       real(wp), intent(in), optional :: sizes(:)
-      real(wp) :: centroid(2), second_moment, factor
-      integer :: k
+      real(wp), allocatable :: corners(:, :)
+      real(wp) :: length, area, centroid(2), second_moment, factor
+      integer(ip) :: k
 
+      call grains%reserve(n, scene%corners_max)
       factor = 1.0_wp
-      do k = 1, size(grains)
+      do k = 1_ip, n
          if (present(sizes)) factor = sizes(k)
-         call draw_corners(scene, factor, random, grains(k)%corners, grains(k)%length)
-         call mass_properties(grains(k)%corners, grains(k)%area, centroid, second_moment)
+         call draw_corners(scene, factor, random, corners, length)
+         call mass_properties(corners, area, centroid, second_moment)
+         call grains%set(k, corners, length, area)
       end do
    end subroutine draw_grains
 
@@ -87,7 +143,7 @@ contains
       !> Order and density
       type(scene_settings_t), intent(in) :: scene
       !> Grains
-      type(grain_t), intent(in) :: grains(:)
+      type(grains_t), intent(in) :: grains
       !> Position of the origin of the corners of each grain, (2, grain) [m]
       real(wp), intent(in) :: centres(:, :)
       !> Velocities, (2, grain) [m/s]
@@ -96,14 +152,20 @@ contains
       real(wp), intent(in), optional :: spins(:)
       real(wp), allocatable :: corners(:, :)
       real(wp) :: spin
-      integer(ip) :: order(size(grains)), j, k
+      integer(ip), allocatable :: order(:)
+      integer(ip) :: j, k
 
-      order = [(k, k=1_ip, size(grains, kind=ip))]
+      allocate (order(size(centres, 2)))
+      order = [(k, k=1_ip, size(order, kind=ip))]
       if (scene%order == 'descending') call sort_reals(-centres(1, :), order)
       spin = 0.0_wp
-      do j = 1_ip, size(grains, kind=ip)
+      do j = 1_ip, size(order, kind=ip)
          k = order(j)
-         corners = grains(k)%corners
+         if (list%leaves_next()) then
+            call list%skip()
+            cycle
+         end if
+         corners = grains%corners(k)
          corners(1, :) = corners(1, :) + centres(1, k)
          corners(2, :) = corners(2, :) + centres(2, k)
          if (present(spins)) spin = spins(k)

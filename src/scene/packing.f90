@@ -4,7 +4,7 @@
 !> lowest to the highest. Time and memory are proportional to the number of grains.
 module polydem_packing
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_grains, only: grain_t, pi
+   use polydem_grains, only: grain_t, grains_t, pi
    use polydem_kinds, only: ip, wp
    use polydem_patch, only: patch_t, read_patch
    use polydem_settings, only: scene_settings_t
@@ -33,27 +33,35 @@ contains
       type(scene_settings_t), intent(in) :: scene
       !> Corners of the container, convex, anticlockwise, (2, corner) [m]
       real(wp), intent(in) :: corners(:, :)
-      !> Grains, (grain); their number is given
-      type(grain_t), intent(out) :: grains(:)
-      !> Centres of the grains, (2, grain) [m]
+      !> Grains
+      type(grains_t), intent(out) :: grains
+      !> Centres of the grains, (2, grain) [m]; their number is given
       real(wp), intent(out) :: centres(:, :)
       !> Allocated if the packing cannot be read, or if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error
       type(patch_t) :: patch
       integer(ip), allocatable :: source(:)
-      integer(ip) :: k, n_found
+      integer(ip) :: k, most, n, n_found
 
+      n = size(centres, 2, kind=ip)
       call read_patch(scene%packing, patch, error)
       if (allocated(error)) return
-      allocate (source(size(grains)))
+      allocate (source(n))
       call fill_with_patch(corners, patch, centres, source, n_found)
-      if (n_found < size(grains)) then
+      if (n_found < n) then
          call raise(error, input_error, 'the container has room for '//to_text(n_found)//' packed grains, not for ' &
-                    //to_text(size(grains, kind=ip))//'; enlarge the container or reduce the number of grains')
+                    //to_text(n)//'; enlarge the container or reduce the number of grains')
          return
       end if
-      do k = 1_ip, size(grains, kind=ip)
-         grains(k) = patch%grains(source(k))
+      most = 0_ip
+      do k = 1_ip, size(patch%grains, kind=ip)
+         most = max(most, size(patch%grains(k)%corners, 2, kind=ip))
+      end do
+      call grains%reserve(n, most)
+      do k = 1_ip, n
+         associate (grain => patch%grains(source(k)))
+            call grains%set(k, grain%corners, grain%length, grain%area)
+         end associate
       end do
    end subroutine pack_grains
 

@@ -4,7 +4,7 @@ module polydem_pour
    use polydem_body_list, only: body_list_t
    use polydem_cut_cells, only: fit_cells
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_grains, only: append_grains, draw_grains, draw_sizes, grain_t
+   use polydem_grains, only: append_grains, draw_grains, draw_sizes, grains_t
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: fill_lattice
    use polydem_packing, only: pack_grains, rotate_with_walls
@@ -34,10 +34,10 @@ contains
       !> Allocated if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error
       type(random_t) :: random
-      type(grain_t), allocatable :: grains(:)
+      type(grains_t) :: grains
       real(wp), allocatable :: centres(:, :), velocities(:, :), spins(:)
 
-      allocate (grains(n), centres(2, n), velocities(2, n), spins(n))
+      allocate (centres(2, n))
       random = new_random(scene%seed)
       if (scene%packing /= '') then
          call pack_grains(scene, outline, grains, centres, error)
@@ -47,6 +47,7 @@ contains
          call pour_loosely(scene, outline, random, grains, centres, error)
       end if
       if (allocated(error)) return
+      allocate (velocities(2, n), spins(n))
       call draw_velocities(random, scene%speed, velocities)
       spins = 0.0_wp
       if (scene%packing /= '') call rotate_with_walls(scene, centres, velocities, spins)
@@ -58,18 +59,19 @@ contains
       type(scene_settings_t), intent(in) :: scene
       real(wp), intent(in) :: outline(:, :)
       type(random_t), intent(inout) :: random
-      type(grain_t), intent(out) :: grains(:)
+      type(grains_t), intent(out) :: grains
       real(wp), intent(out) :: centres(:, :)
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: n_found
+      integer(ip) :: n, n_found
 
+      n = size(centres, 2, kind=ip)
       call fill_lattice(outline, loose_spacing(scene), centres, n_found)
-      if (n_found < size(grains)) then
+      if (n_found < n) then
          call raise(error, input_error, 'the container has room for '//to_text(n_found)//' loose grains, not for ' &
-                    //to_text(size(grains, kind=ip))//'; enlarge the container or reduce the number of grains')
+                    //to_text(n)//'; enlarge the container or reduce the number of grains')
          return
       end if
-      call draw_grains(scene, random, grains)
+      call draw_grains(scene, random, n, grains)
       call displace_randomly(random, loose_spacing(scene) - scene%long_axis_max, centres)
    end subroutine pour_loosely
 
@@ -78,12 +80,14 @@ contains
       type(scene_settings_t), intent(in) :: scene
       real(wp), intent(in) :: outline(:, :)
       type(random_t), intent(inout) :: random
-      type(grain_t), intent(out) :: grains(:)
+      type(grains_t), intent(out) :: grains
       real(wp), intent(out) :: centres(:, :)
       type(error_t), allocatable, intent(inout) :: error
       real(wp) :: spread
 
-      call draw_grains(scene, random, grains, draw_sizes(scene%size_ratio, size(grains, kind=ip)))
+      associate (n => size(centres, 2, kind=ip))
+         call draw_grains(scene, random, n, grains, draw_sizes(scene%size_ratio, n))
+      end associate
       call fit_cells(outline, loose_spacing_ratio*grains%length, random, centres, spread)
       if (.not. spread > 0.0_wp) then
          call raise(error, input_error, 'the container has no room for grains of such different sizes; enlarge the '// &

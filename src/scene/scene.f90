@@ -17,7 +17,7 @@ module polydem_scene
    use polydem_heap, only: list_heap
    use polydem_hopper, only: list_hopper
    use polydem_incline, only: list_incline
-   use polydem_kinds, only: ip, wp
+   use polydem_kinds, only: ip, lp, wp
    use polydem_prescribed_motion, only: motion_t, new_motion
    use polydem_settings, only: scene_settings_t, settings_t
    use polydem_stack, only: list_stack
@@ -29,7 +29,7 @@ module polydem_scene
 contains
 
    !> Make the bodies of a scene and the motions of its walls.
-   subroutine build_scene(settings, bodies, motions, error)
+   subroutine build_scene(settings, bodies, motions, error, rank, n_ranks)
       !> Settings: groups &scene and &forces (gravity and stiffness, for blocks at rest)
       type(settings_t), intent(in) :: settings
       !> Bodies at the start; free bodies come first unless a bodies file has another order
@@ -38,8 +38,14 @@ contains
       type(motion_t), allocatable, intent(out) :: motions(:)
       !> Error in the namelist or the bodies file
       type(error_t), allocatable, intent(inout) :: error
+      !> Number of this rank, from 0, and number of ranks; each rank makes all fixed bodies and its share of the free
+      !> bodies. Default: one rank
+      integer(ip), intent(in), optional :: rank, n_ranks
       type(body_list_t) :: list
       character(len=:), allocatable :: origin
+
+      if (present(rank)) list%rank = rank
+      if (present(n_ranks)) list%n_ranks = n_ranks
 
       origin = settings%file//': &scene'
       if (settings%scene%name == 'file') then
@@ -139,7 +145,10 @@ contains
          else if (any(ids(:k - 1_ip) == ids(k))) then
             call raise(error, input_error, 'motion_bodies: body '//to_text(ids(k))//' is named twice')
          end if
-         if (allocated(error)) return
+         if (.not. allocated(error)) cycle
+         ! A rank does not know the free bodies of other ranks. The rank that has the body reports that it is free.
+         error%place = 2_lp*int(k, lp) + merge(1_lp, 0_lp, slots(k) == 0_ip)
+         return
       end do
    end subroutine find_moved
 

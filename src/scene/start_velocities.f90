@@ -1,6 +1,5 @@
 !> Initial velocities and angular velocities of grains.
 module polydem_start_velocities
-   use polydem_grains, only: grain_t
    use polydem_kinds, only: ip, wp
    use polydem_random, only: random_t
    implicit none
@@ -64,9 +63,9 @@ contains
 
    !> Subtract the velocity of the common centre of mass of the moving grains. At least one grain must move. All grains
    !> have the same density.
-   pure subroutine remove_momentum(grains, moves, velocities)
-      !> Grains
-      type(grain_t), intent(in) :: grains(:)
+   pure subroutine remove_momentum(areas, moves, velocities)
+      !> Area of each grain, (grain) [m2]
+      real(wp), intent(in) :: areas(:)
       !> Whether each grain moves, (grain)
       logical, intent(in) :: moves(:)
       !> Velocities, (2, grain) [m/s]
@@ -76,13 +75,13 @@ contains
 
       drift = 0.0_wp
       area = 0.0_wp
-      do k = 1, size(grains)
+      do k = 1, size(areas)
          if (.not. moves(k)) cycle
-         drift = drift + grains(k)%area*velocities(:, k)
-         area = area + grains(k)%area
+         drift = drift + areas(k)*velocities(:, k)
+         area = area + areas(k)
       end do
       drift = drift/area
-      do k = 1, size(grains)
+      do k = 1, size(areas)
          velocities(:, k) = velocities(:, k) - drift
       end do
    end subroutine remove_momentum

@@ -8,16 +8,17 @@
 module polydem_energy_guard
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_contacts, only: contacts_t
    use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_ownership, only: owns_pair
    use polydem_simulation, only: simulation_t, compute_balance
    use polydem_strings, only: to_text
    use polydem_warning, only: warning_t
+   use polydem_whole_run, only: sum_exactly
    implicit none
    private
-   public :: energy_guard_t, open_energy_guard, check_energy, stored_energy
+   public :: energy_guard_t, open_energy_guard, check_energy, find_stored_energy
 
    !> State of the guard
    type :: energy_guard_t
@@ -29,27 +30,34 @@ module polydem_energy_guard
 
 contains
 
-   !> Record the elastic energy of the contacts. Call it at the start of the energy balance, on a rank with all bodies.
-   subroutine open_energy_guard(guard, contacts)
+   !> Record the elastic energy of the contacts. Call it at the start of the energy balance. Collective.
+   subroutine open_energy_guard(guard, simulation)
       !> The guard
       type(energy_guard_t), intent(out) :: guard
-      !> Contacts at the start, with their forces
-      type(contacts_t), intent(in) :: contacts
+      !> Simulation at the start, with the forces of its contacts
+      type(simulation_t), intent(inout) :: simulation
 
-      guard%stored = stored_energy(contacts)
+      call find_stored_energy(simulation, guard%stored)
    end subroutine open_energy_guard
 
-   !> Elastic energy of contacts, estimated as half of force times depth [J/m]
-   pure real(wp) function stored_energy(contacts)
-      !> Contacts, with their forces
-      type(contacts_t), intent(in) :: contacts
+   !> Find the elastic energy of the contacts of all ranks, estimated as half of force times depth. Collective.
+   subroutine find_stored_energy(simulation, stored)
+      !> Simulation with the forces of its contacts
+      type(simulation_t), intent(inout) :: simulation
+      !> Elastic energy [J/m]
+      real(wp), intent(out) :: stored
+      real(wp), allocatable :: terms(:)
       integer(ip) :: c
 
-      stored_energy = 0.0_wp
-      do c = 1_ip, contacts%n
-         stored_energy = stored_energy + 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)
-      end do
-   end function stored_energy
+      associate (contacts => simulation%contacts)
+         allocate (terms(contacts%n), source=0.0_wp)
+         do c = 1_ip, contacts%n
+            if (owns_pair(simulation%bodies, contacts%first(c), contacts%second(c))) &
+               terms(c) = 0.5_wp*contacts%elastic(c)*contacts%area(c)/contacts%length(c)
+         end do
+      end associate
+      call sum_exactly(simulation%comm, terms, stored)
+   end subroutine find_stored_energy
 
    !> Warn or stop if the unexplained energy gain exceeds its limit. Collective; the result is the same on all ranks.
    subroutine check_energy(guard, simulation, error)

@@ -3,16 +3,16 @@ module polydem_local_bodies
    use polydem_box_maker, only: new_box_maker
    use polydem_contact_history, only: contact_history_t, add_column
    use polydem_contact_incidence, only: incidence_t
-   use polydem_errors, only: error_t, raise, run_error
+   use polydem_errors, only: error_t
    use polydem_finder_statistics, only: finder_statistics_t
    use polydem_force_law, only: new_force_law
    use polydem_guards, only: motion_guard_t, new_motion_guard
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: ip, wp
    use polydem_neighbours, only: new_neighbours
    use polydem_simulation, only: simulation_t, former_direction
    implicit none
    private
-   public :: fit_to_bodies, rebuild_pairs
+   public :: fit_to_bodies
 
 contains
 
@@ -98,20 +98,5 @@ contains
       end do
       self%moving = [self%moving, pack([(s, s=1_ip, self%bodies%n)], self%bodies%in_halo)]
    end subroutine list_moving
-
-   !> Rebuild the pair list from the boxes of the last search.
-   subroutine rebuild_pairs(s, error)
-      !> The simulation
-      type(simulation_t), intent(inout) :: s
-      !> Allocated if the finder fails
-      type(error_t), allocatable, intent(inout) :: error
-
-      call new_neighbours(s%neighbours, s%settings%neighbours%finder, s%boxes, error, s%settings%neighbours%skin)
-      if (allocated(error)) return
-      call s%neighbours%update(s%boxes)
-      if (s%neighbours%pairs%contradictions > 0_lp) call raise(error, run_error, 'finder '// &
-         s%settings%neighbours%finder//' reported contradictory pairs. This is a program error; use finder '// &
-         'all_pairs instead')
-   end subroutine rebuild_pairs
 
 end module polydem_local_bodies

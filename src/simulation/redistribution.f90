@@ -3,7 +3,7 @@
 !> A redistribution takes place in the middle of a step, when the bodies have the positions of the next pair search.
 !> Afterwards each rank has its own bodies, the halo (copies of nearby bodies of other ranks) and all fixed bodies, in
 !> ascending order of global index. The pair list is rebuilt from scratch, and the contact history of the pairs is
-!> restored. At the start of a run the root rank has all bodies; the first step distributes them.
+!> restored. At the start of a run the bodies of a rank are anywhere; the first redistribution gives each rank its own.
 module polydem_redistribution
    use polydem_bodies, only: turn_bodies
    use polydem_body_fields, only: serialize_bodies
@@ -14,7 +14,7 @@ module polydem_redistribution
    use polydem_local_bodies, only: fit_to_bodies
    use polydem_migration_buffer, only: migration_buffer_t
    use polydem_packed_bodies, only: packed_bodies_t, join_packed, pack_bodies, all_to_all_bodies, unpack_bodies
-   use polydem_packed_history, only: receive_pairs, send_pairs
+   use polydem_packed_history, only: pack_pairs, receive_pairs, send_pairs
    use polydem_rank_order, only: sort_by_rank
    use polydem_redistribution_plan, only: divide, needs_repartition, list_needed, owners_of, padded_boxes, &
       slots_of_global_indices, work_of_bodies
@@ -74,10 +74,10 @@ contains
 
       if (.not. allocated(self%received_history)) return
       associate (pairs => self%neighbours%pairs)
-         call receive_pairs(self%received_history, pairs%n, pairs%first, pairs%second, self%bodies%global_index, &
-            self%history, &
-            n_known)
+         call receive_pairs(self%received_history, pairs%n, pairs%first, pairs%second, self%bodies%id, self%history, &
+                            n_known)
          pairs%n_began = pairs%n_began - n_known
+         pairs%n_ended = pairs%n_ended + size(self%received_history%key, kind=ip) - n_known
       end associate
       deallocate (self%received_history)
    end subroutine restore_history
@@ -109,6 +109,8 @@ contains
       call self%domain%halo%follow(self%comm, self%bodies)
       call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
       call fit_to_bodies(self, error, self%domain%median_diameter)
+      call self%comm%all_reduce_error(error)
+      if (allocated(error)) return
       call self%domain%set_reference(self%boxes%bounds(:, :self%boxes%n), self%step)
       associate (domain => self%domain)
          domain%redistributions = domain%redistributions + 1_lp
@@ -119,25 +121,18 @@ contains
       end associate
    end subroutine migrate
 
-   !> Send the contact history of the pairs that this rank owns. The owner of a pair is the owner of its leading body:
-   !> the first body, or the second if the first is fixed.
+   !> Send the contact history of all pairs to the next owners of their bodies. The history that a restart has read
+   !> belongs to pairs that are not found yet.
    subroutine send_history(self, owner)
       type(simulation_t), intent(inout) :: self
       integer(ip), intent(in) :: owner(:)
-      logical, allocatable :: is_own(:)
-      integer(ip) :: p, leading
 
       associate (pairs => self%neighbours%pairs, bodies => self%bodies)
-         allocate (is_own(pairs%n))
-         do p = 1_ip, pairs%n
-            leading = pairs%first(p)
-            if (bodies%fixed(leading)) leading = pairs%second(p)
-            is_own(p) = .not. bodies%in_halo(leading)
-         end do
-         allocate (self%received_history)
-         call send_pairs(self%comm, pairs%n, pairs%first, pairs%second, bodies%global_index, is_own, owner, &
-            self%history, &
-                         self%received_history)
+         if (.not. allocated(self%received_history)) then
+            allocate (self%received_history)
+            call pack_pairs(pairs%n, pairs%first, pairs%second, bodies%id, self%history, self%received_history)
+         end if
+         call send_pairs(self%comm, bodies%id, merge(-1_ip, owner, bodies%in_halo), self%received_history)
       end associate
    end subroutine send_history
 

@@ -5,12 +5,11 @@
 !> No sweep therefore overshoots (the element bound of `stable_step`). The method is the position projection of
 !> M. Mueller et al., J. Vis. Commun. Image Represent. 18 (2007) 109, but with all contacts at once (Jacobi iteration).
 !> Forces and velocities are not involved, and fixed bodies do not move. The result is bitwise identical for any number
-!> of threads.
+!> of threads and ranks.
 module polydem_relaxation
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_body_sizes, only: thickness_of_bodies
-   use polydem_box_maker, only: box_maker_t, new_box_maker, update_boxes
-   use polydem_boxes, only: boxes_t
+   use polydem_box_maker, only: update_boxes
    use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
    use polydem_contact_history, only: contact_history_t
    use polydem_contact_incidence, only: incidence_t, index_contacts
@@ -18,116 +17,166 @@ module polydem_relaxation
    use polydem_errors, only: error_t, input_error, raise
    use polydem_find_contacts, only: find_contacts
    use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_local_bodies, only: fit_to_bodies
    use polydem_neighbours, only: neighbours_t, new_neighbours
-   use polydem_settings, only: settings_t
+   use polydem_redistribution, only: redistribute
+   use polydem_simulation, only: simulation_t
+   use polydem_stable_step, only: contact_numbers
    use polydem_strings, only: to_text
+   use polydem_whole_run, only: reduce_to_greatest
    implicit none
    private
-   public :: relaxation_t, relax_bodies
-
-   !> Summary of a relaxation
-   type :: relaxation_t
-      !> Number of sweeps, 0 if no relaxation was necessary
-      integer(ip) :: sweeps = 0_ip
-      !> Depth of the deepest contact before and after, as a fraction of the thickness of the thinner body
-      real(wp) :: before = 0.0_wp, after = 0.0_wp
-      !> Greatest displacement of the centre of a body [m]
-      real(wp) :: move = 0.0_wp
-   end type relaxation_t
+   public :: relax_bodies
 
    !> Maximum number of sweeps
    integer(ip), parameter :: most_sweeps = 10000_ip
 
 contains
 
-   !> Push bodies apart until no contact is deeper than `relaxed_depth` of &guards.
-   subroutine relax_bodies(settings, bodies, relaxation, error)
-      !> Settings; the groups &boxes, &neighbours and &guards are used
-      type(settings_t), intent(in) :: settings
-      !> Bodies; position and angle of the free ones change
-      type(bodies_t), intent(inout) :: bodies
-      !> Summary of the relaxation
-      type(relaxation_t), intent(out) :: relaxation
+   !> Push bodies apart until no contact is deeper than `relaxed_depth` of &guards. Collective; all ranks get the same
+   !> error.
+   subroutine relax_bodies(self, error)
+      !> The simulation before time 0; positions and angles of free bodies change, and `relaxation` is set
+      type(simulation_t), intent(inout) :: self
       !> Names a contact that is still too deep after `most_sweeps` sweeps
       type(error_t), allocatable, intent(inout) :: error
-      type(box_maker_t) :: maker
-      type(boxes_t) :: boxes
       type(neighbours_t) :: neighbours
       type(contacts_t) :: contacts
-      type(contact_history_t) :: no_memory
-      type(incidence_t) :: incidence
-      real(wp), allocatable :: thickness(:), start(:, :)
-      integer(ip) :: worst
+      real(wp), allocatable :: thickness(:)
+      real(wp) :: greatest(1)
+      integer(ip) :: worst, generation
 
-      call new_box_maker(maker, bodies, settings%boxes%largest_ratio, settings%boxes%margin, boxes, error)
-      if (allocated(error)) return
-      call new_neighbours(neighbours, settings%neighbours%finder, boxes, error, settings%neighbours%skin)
-      if (allocated(error)) return
-      thickness = thickness_of_bodies(bodies)
-      start = bodies%position
+      generation = -1_ip
+
+      ! Until the forces are computed, the column `force` holds the positions before the relaxation.
+      self%bodies%force = self%bodies%position
       do
-         call update_boxes(maker, bodies, bodies%free, boxes)
-         call neighbours%update(boxes)
-         call find_contacts(bodies, neighbours%pairs%n, neighbours%pairs%first, neighbours%pairs%second, no_memory, &
-                            contacts)
+         call find_overlaps(self, neighbours, generation, contacts, error)
+         call self%comm%all_reduce_error(error)
+         if (allocated(error)) return
+         thickness = thickness_of_bodies(self%bodies)
          worst = deepest_contact(contacts, thickness)
-         relaxation%after = 0.0_wp
-         if (worst > 0_ip) relaxation%after = depth_share(contacts, thickness, worst)
-         if (relaxation%sweeps == 0_ip) relaxation%before = relaxation%after
-         if (relaxation%after <= settings%guards%relaxed_depth) exit
-         if (relaxation%sweeps == most_sweeps) then
-            call raise(error, input_error, settings%file//': after '//to_text(most_sweeps)//' sweeps '// &
-                       depth_text(bodies, contacts, thickness, worst)//'. Provide more space for the bodies, or '// &
-                       'increase relaxed_depth in &guards')
-            return
-         end if
-         call index_contacts(bodies%n, contacts, incidence)
-         call push_apart(contacts, incidence, bodies)
-         relaxation%sweeps = relaxation%sweeps + 1_ip
+         greatest = 0.0_wp
+         if (worst > 0_ip) greatest = depth_share(contacts, thickness, worst)
+         call reduce_to_greatest(self%comm, greatest)
+         associate (relaxation => self%relaxation)
+            relaxation%after = greatest(1)
+            if (relaxation%sweeps == 0_ip) relaxation%before = relaxation%after
+            if (relaxation%after <= self%settings%guards%relaxed_depth) exit
+            if (relaxation%sweeps == most_sweeps) then
+               if (worst > 0_ip) call report_depth(self, contacts, thickness, worst, error)
+               call self%comm%all_reduce_error(error)
+               return
+            end if
+            call push_apart(self, contacts)
+            relaxation%sweeps = relaxation%sweeps + 1_ip
+         end associate
       end do
-      relaxation%move = sqrt(maxval((bodies%position(1, :) - start(1, :))**2 &
-                                    + (bodies%position(2, :) - start(2, :))**2))
+      associate (bodies => self%bodies)
+         greatest = 0.0_wp
+         if (bodies%n > 0_ip) greatest = sqrt(maxval((bodies%position(1, :) - bodies%force(1, :))**2 &
+                                                     + (bodies%position(2, :) - bodies%force(2, :))**2, &
+                                                     .not. bodies%in_halo))
+         call reduce_to_greatest(self%comm, greatest)
+         self%relaxation%move = greatest(1)
+         bodies%force = 0.0_wp
+      end associate
+      call fit_to_bodies(self, error, self%domain%median_diameter)
    end subroutine relax_bodies
 
-   !> One sweep: compute the impulses of all contacts, then move all free bodies.
-   subroutine push_apart(contacts, incidence, bodies)
+   !> Find the contacts of the bodies at their present positions. Collective.
+   subroutine find_overlaps(self, neighbours, generation, contacts, error)
+      type(simulation_t), intent(inout) :: self
+      !> Pairs, found with a finder of their own; that of the simulation starts at time 0
+      type(neighbours_t), intent(inout) :: neighbours
+      !> Generation of the bodies that the finder belongs to
+      integer(ip), intent(inout) :: generation
+      type(contacts_t), intent(inout) :: contacts
+      type(error_t), allocatable, intent(inout) :: error
+      type(contact_history_t) :: no_history
+
+      call self%domain%halo%follow(self%comm, self%bodies)
+      call turn_bodies(self%bodies, self%moving)
+      call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
+      call redistribute(self, error)
+      if (allocated(error)) return
+      ! The history of a redistribution is empty here.
+      if (allocated(self%received_history)) deallocate (self%received_history)
+      if (generation /= self%generation) call new_neighbours(neighbours, self%settings%neighbours%finder, self%boxes, &
+                                                             error, self%settings%neighbours%skin)
+      if (allocated(error)) return
+      generation = self%generation
+      call neighbours%update(self%boxes)
+      associate (pairs => neighbours%pairs)
+         call find_contacts(self%bodies, pairs%n, pairs%first, pairs%second, no_history, contacts)
+      end associate
+   end subroutine find_overlaps
+
+   !> Report the deepest contact of all ranks. Two ranks may have it.
+   subroutine report_depth(self, contacts, thickness, worst, error)
+      type(simulation_t), intent(in) :: self
       type(contacts_t), intent(in) :: contacts
-      type(incidence_t), intent(in) :: incidence
-      type(bodies_t), intent(inout) :: bodies
+      real(wp), intent(in) :: thickness(:)
+      integer(ip), intent(in) :: worst
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (depth_share(contacts, thickness, worst) < self%relaxation%after) return
+      call raise(error, input_error, self%settings%file//': after '//to_text(most_sweeps)//' sweeps '// &
+                 depth_text(self%bodies, contacts, thickness, worst)//'. Provide more space for the bodies, or '// &
+                 'increase relaxed_depth in &guards')
+   end subroutine report_depth
+
+   !> One sweep: compute the impulses of all contacts, then move all free bodies. Collective.
+   subroutine push_apart(self, contacts)
+      type(simulation_t), intent(inout) :: self
+      type(contacts_t), intent(in) :: contacts
+      type(incidence_t) :: incidence
       !> Impulse of each contact, with displacements in place of velocities, (contact) [kg]
       real(wp), allocatable :: impulse(:)
+      !> Number of contacts of each body, (slot)
+      real(wp), allocatable :: numbers(:)
+
+      call index_contacts(self%bodies%n, contacts, incidence)
+      numbers = contact_numbers(self%bodies%n, incidence)
+      call self%domain%halo%exchange_column(self%comm, numbers)
+      call find_impulses(contacts, numbers, self%bodies, impulse)
+      call move_free(contacts, incidence, impulse, self%bodies)
+   end subroutine push_apart
+
+   !> Compute the impulses of all contacts.
+   subroutine find_impulses(contacts, numbers, bodies, impulse)
+      type(contacts_t), intent(in) :: contacts
+      real(wp), intent(in) :: numbers(:)
+      type(bodies_t), intent(in) :: bodies
+      real(wp), allocatable, intent(out) :: impulse(:)
       real(wp) :: mobility
       integer(ip) :: c
 
       allocate (impulse(contacts%n))
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(contacts, incidence, bodies, impulse) private(c, mobility)
+      !$omp    shared(contacts, numbers, bodies, impulse) private(c, mobility)
       do c = 1_ip, contacts%n
          associate (direction => contacts%direction(:, c))
-            mobility = mobility_of(contacts%first(c), contacts%arm_first(:, c), direction, incidence, bodies) &
-               + mobility_of(contacts%second(c), contacts%arm_second(:, c), direction, incidence, bodies)
+            mobility = mobility_of(contacts%first(c), contacts%arm_first(:, c), direction, numbers, bodies) &
+               + mobility_of(contacts%second(c), contacts%arm_second(:, c), direction, numbers, bodies)
          end associate
          impulse(c) = contacts%area(c)/(contacts%length(c)*mobility)
       end do
       !$omp end parallel do
-      call move_free(contacts, incidence, impulse, bodies)
-      call turn_bodies(bodies, bodies%free)
-   end subroutine push_apart
+   end subroutine find_impulses
 
    !> Displacement of a point of a body along a direction per unit impulse, times the number of contacts of the body
    !> [m/kg]
-   pure real(wp) function mobility_of(s, arm, direction, incidence, bodies)
+   pure real(wp) function mobility_of(s, arm, direction, numbers, bodies)
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: arm(2), direction(2)
-      type(incidence_t), intent(in) :: incidence
+      !> Number of contacts of each body, (slot)
+      real(wp), intent(in) :: numbers(:)
       type(bodies_t), intent(in) :: bodies
-      integer(ip) :: n
 
       mobility_of = 0.0_wp
       if (bodies%fixed(s)) return
-      n = incidence%start_first(s + 1_ip) - incidence%start_first(s) &
-         + incidence%start_second(s + 1_ip) - incidence%start_second(s)
-      mobility_of = real(n, wp)*(bodies%inverse_mass(s) + lever(arm, direction)**2*bodies%inverse_inertia(s))
+      mobility_of = numbers(s)*(bodies%inverse_mass(s) + lever(arm, direction)**2*bodies%inverse_inertia(s))
    end function mobility_of
 
    !> Lever arm of a unit vector at a point, the cross product of both [m]

@@ -16,18 +16,27 @@ module polydem_simulation
    use polydem_neighbours, only: neighbours_t
    use polydem_packed_history, only: packed_history_t
    use polydem_prescribed_motion, only: motion_t
-   use polydem_relaxation, only: relaxation_t
    use polydem_settings, only: settings_t
    use polydem_timers, only: timers_t
    implicit none
    private
-   public :: simulation_t, former_direction, time_of, compute_balance
+   public :: simulation_t, relaxation_t, former_direction, time_of, compute_balance
    public :: sum_pairs, sum_contacts, sum_began, sum_ended, sum_degenerate
 
    !> Elements of `sums`: pairs, contacts, pairs that began, pairs that ended, contacts without direction
    integer, parameter :: sum_pairs = 1, sum_contacts = 2, sum_began = 3, sum_ended = 4, sum_degenerate = 5
    !> Number of these elements
    integer, parameter :: n_sums = 5
+
+   !> Summary of the relaxation before time 0
+   type :: relaxation_t
+      !> Number of sweeps, 0 if no relaxation was necessary
+      integer(ip) :: sweeps = 0_ip
+      !> Depth of the deepest contact before and after, as a fraction of the thickness of the thinner body
+      real(wp) :: before = 0.0_wp, after = 0.0_wp
+      !> Greatest displacement of the centre of a body [m]
+      real(wp) :: move = 0.0_wp
+   end type relaxation_t
 
    !> The complete state of a simulation on one rank
    type :: simulation_t

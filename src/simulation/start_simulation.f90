@@ -1,7 +1,9 @@
-!> Start of a simulation from given bodies: time step, forces and accelerations at time 0.
+!> Start of a simulation: time step, forces and accelerations at time 0. All ranks start alike, one or many.
 module polydem_start_simulation
    use polydem_bodies, only: bodies_t
-   use polydem_box_maker, only: update_boxes
+   use polydem_box_maker, only: diameters_of, update_boxes
+   use polydem_communicator, only: communicator_t
+   use polydem_domain, only: new_domain
    use polydem_energy_balance, only: start_energy_balance
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_law, only: check_law, choose_parts, force_law_t
@@ -9,6 +11,8 @@ module polydem_start_simulation
    use polydem_kinds, only: ip, lp, wp
    use polydem_local_bodies, only: fit_to_bodies
    use polydem_prescribed_motion, only: motion_t
+   use polydem_redistribution, only: redistribute
+   use polydem_relaxation, only: relax_bodies
    use polydem_serial_communicator, only: serial_communicator_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
@@ -16,9 +20,10 @@ module polydem_start_simulation
    use polydem_strings, only: to_text
    use polydem_time_step, only: compute_forces, move_walls
    use polydem_timers, only: timers_t
+   use polydem_whole_run, only: find_median, reduce_to_greatest, reduce_to_least
    implicit none
    private
-   public :: start_simulation
+   public :: start_simulation, start_with_bodies
 
    !> Upper limit of the number of steps
    real(wp), parameter :: most_steps = 1.0e15_wp
@@ -38,25 +43,53 @@ contains
       !> Allocated if bodies or settings are invalid
       type(error_t), allocatable, intent(inout) :: error
 
-      call check_law(settings, 1_ip, error)
-      if (allocated(error)) return
-      allocate (serial_communicator_t :: self%comm)
-      self%settings = settings
       self%bodies = bodies
       self%motions = motions
+      call start_with_bodies(settings, serial_communicator_t(), self, error)
+   end subroutine start_simulation
+
+   !> Set up a simulation with the bodies that it has: all fixed bodies, and any share of the free bodies of the run.
+   !> Then compute the forces at time 0. Collective; all ranks get the same error.
+   subroutine start_with_bodies(settings, comm, self, error)
+      !> Checked settings; the group &scene is not used
+      type(settings_t), intent(in) :: settings
+      !> Ranks that share the bodies
+      class(communicator_t), intent(in) :: comm
+      !> On entry with bodies and motions, on return ready to advance
+      type(simulation_t), intent(inout) :: self
+      !> Allocated if bodies or settings are invalid
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: median_diameter, limit(1)
+
+      call check_law(settings, 1_ip, error)
+      if (allocated(error)) return
+      allocate (self%comm, source=comm)
+      self%settings = settings
       call new_integrator(settings%integrate, self%integrator)
       call choose_step(self, error)
-      if (.not. allocated(error)) call fit_to_bodies(self, error)
+      if (allocated(error)) return
+      call find_median(self%comm, diameters_of(self%bodies), median_diameter)
+      call new_domain(self%domain, settings%decomposition, median_diameter, self%comm, error)
+      if (.not. allocated(error)) call fit_to_bodies(self, error, median_diameter)
+      call self%comm%all_reduce_error(error)
+      if (allocated(error)) return
+      limit = self%guard%limit
+      call reduce_to_least(self%comm, limit)
+      self%guard%limit = limit(1)
+      call self%integrator%start(self%bodies)
+      if (settings%guards%relaxed_depth > 0.0_wp) call relax_bodies(self, error)
       if (allocated(error)) return
       call move_walls(self, 0.0_wp)
       call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
-      call compute_forces(self, 0.0_wp, error)
+      call redistribute(self, error)
+      if (.not. allocated(error)) call compute_forces(self, 0.0_wp, error)
+      call self%comm%all_reduce_error(error)
       if (allocated(error)) return
       call start_integration(self)
       if (settings%output%energy_balance) call start_energy_balance( &
          self%energy_balance, self%comm, settings%forces%gravity, self%bodies, self%incidence, self%contacts)
       self%timers = timers_t()
-   end subroutine start_simulation
+   end subroutine start_with_bodies
 
    !> Set the accelerations at time 0: from the forces, or from gravity alone, depending on the integration scheme.
    subroutine start_integration(self)
@@ -86,18 +119,23 @@ contains
    end subroutine start_integration
 
    !> Use dt of the settings, or compute it: a fraction of the stable time step, reduced to divide the duration evenly.
+   !> Collective; all ranks get the same error.
    subroutine choose_step(self, error)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
       type(force_law_t) :: law
       integer(ip) :: critical
-      real(wp) :: steps
+      real(wp) :: steps, least(1), has_free(1)
 
       call choose_parts(self%settings%forces, law)
-      call stable_step_of_shapes(law, self%integrator%stability(), self%bodies, self%expected_stable_step, critical)
+      call stable_step_of_shapes(law, self%integrator%stability(), self%bodies, least(1), critical)
+      has_free = merge(1.0_wp, 0.0_wp, critical > 0_ip)
+      call reduce_to_least(self%comm, least)
+      call reduce_to_greatest(self%comm, has_free)
+      self%expected_stable_step = least(1)
       associate (settings => self%settings%integrate)
          self%dt = settings%dt
-         if (self%dt <= 0.0_wp .and. (critical == 0_ip .or. .not. self%expected_stable_step > 0.0_wp)) then
+         if (self%dt <= 0.0_wp .and. (has_free(1) < 1.0_wp .or. .not. self%expected_stable_step > 0.0_wp)) then
             call raise(error, input_error, self%settings%file//': cannot choose dt: there is no free body, or '// &
                        'stiffness or mass is extreme. Set dt in &integrate')
             return

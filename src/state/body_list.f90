@@ -17,34 +17,35 @@ module polydem_body_list
    !> of two such values are normal numbers; in single precision only the values themselves are.
    real(wp), parameter :: least_mass = 10.0_wp**(-min(100, range(1.0_wp)))
 
-   !> One body before its mass properties are computed
-   type :: entry_t
-      !> Identifier
-      integer(ip) :: id = 0_ip
-      !> Whether it is fixed
-      logical :: fixed = .false.
-      !> Vertices in world coordinates, (2, vertex) [m]
-      real(wp), allocatable :: vertices(:, :)
-      !> Density [kg/m3]
-      real(wp) :: density = default_density
-      !> Velocity of the centre of mass [m/s]
-      real(wp) :: velocity(2) = 0.0_wp
-      !> Angular velocity [rad/s]
-      real(wp) :: angular_velocity = 0.0_wp
-      !> Mass, 0 if not given [kg/m]
-      real(wp) :: mass = 0.0_wp
-      !> Moment of inertia, 0 if not given [kg m]
-      real(wp) :: inertia = 0.0_wp
-   end type entry_t
-
-   !> A growing list of bodies
+   !> A growing list of bodies before their mass properties are computed. One of several ranks keeps all fixed bodies
+   !> and its share of the free ones; the shares of the ranks are pieces of `piece` bodies in turn.
    type :: body_list_t
-      !> Number of bodies in the list
+      !> Number of bodies in the list, including those that the rank leaves to others
       integer(ip) :: n = 0_ip
-      type(entry_t), allocatable, private :: entries(:)
+      !> Number of this rank, from 0, and number of ranks that share the free bodies
+      integer(ip) :: rank = 0_ip, n_ranks = 1_ip
+      !> Identifiers of all bodies, (n)
+      integer(ip), allocatable, private :: id(:)
+      !> Number of kept bodies
+      integer(ip), private :: n_kept = 0_ip
+      !> Number of each kept body in the list, (kept)
+      integer(ip), allocatable, private :: entry(:)
+      !> Whether it is fixed, (kept)
+      logical, allocatable, private :: fixed(:)
+      !> Density, velocity, angular velocity, mass and moment of inertia, 0 if not given, (6, kept)
+      real(wp), allocatable, private :: number(:, :)
+      !> First vertex of each kept body, (kept + 1)
+      integer(ip), allocatable, private :: first(:)
+      !> Vertices in world coordinates, (2, vertex) [m]
+      real(wp), allocatable, private :: vertex(:, :)
    contains
       procedure :: append
+      procedure :: leaves_next
+      procedure :: skip
    end type body_list_t
+
+   !> Number of consecutive bodies of a share
+   integer(ip), parameter :: piece = 256_ip
 
 contains
 
@@ -68,64 +69,146 @@ contains
       real(wp), intent(in), optional :: mass
       !> Moment of inertia instead of that of the polygon [kg m]
       real(wp), intent(in), optional :: inertia
+      real(wp) :: number(6)
+      logical :: is_fixed, is_left
+      integer(ip) :: k, last
 
-      call make_room(self)
-      self%n = self%n + 1_ip
-      associate (entry => self%entries(self%n))
-         entry%vertices = vertices
-         entry%id = self%n
-         if (present(fixed)) entry%fixed = fixed
-         if (present(density)) entry%density = density
-         if (present(velocity)) entry%velocity = velocity
-         if (present(angular_velocity)) entry%angular_velocity = angular_velocity
-         if (present(id)) entry%id = id
-         if (present(mass)) entry%mass = mass
-         if (present(inertia)) entry%inertia = inertia
-      end associate
+      is_fixed = .false.
+      if (present(fixed)) is_fixed = fixed
+      is_left = self%leaves_next() .and. .not. is_fixed
+      call self%skip(id)
+      if (is_left) return
+      number = 0.0_wp
+      number(1) = default_density
+      if (present(density)) number(1) = density
+      if (present(velocity)) number(2:3) = velocity
+      if (present(angular_velocity)) number(4) = angular_velocity
+      if (present(mass)) number(5) = mass
+      if (present(inertia)) number(6) = inertia
+      k = self%n_kept + 1_ip
+      call make_room(self, k, size(vertices, 2, kind=ip))
+      self%n_kept = k
+      self%entry(k) = self%n
+      self%fixed(k) = is_fixed
+      self%number(:, k) = number
+      last = self%first(k) + size(vertices, 2, kind=ip) - 1_ip
+      self%vertex(:, self%first(k):last) = vertices
+      self%first(k + 1_ip) = last + 1_ip
    end subroutine append
 
-   !> Check every polygon and build the arrays, in ascending order of the identifiers, at angle 0.
+   !> Whether the rank leaves the next body to another rank if it is free
+   pure logical function leaves_next(self)
+      class(body_list_t), intent(in) :: self
+
+      leaves_next = modulo(self%n/piece, self%n_ranks) /= self%rank
+   end function leaves_next
+
+   !> Count a body that the rank does not keep.
+   subroutine skip(self, id)
+      class(body_list_t), intent(inout) :: self
+      !> Identifier; the position in the list if absent
+      integer(ip), intent(in), optional :: id
+      integer(ip), allocatable :: longer(:)
+
+      if (.not. allocated(self%id)) allocate (self%id(64))
+      if (self%n == size(self%id)) then
+         allocate (longer(2*size(self%id)))
+         longer(:self%n) = self%id
+         call move_alloc(longer, self%id)
+      end if
+      self%n = self%n + 1_ip
+      self%id(self%n) = self%n
+      if (present(id)) self%id(self%n) = id
+   end subroutine skip
+
+   !> Check the polygons of the kept bodies and build the arrays, in ascending order of the identifiers, at angle 0.
    subroutine new_bodies(list, bodies, error)
       !> List of bodies
       type(body_list_t), intent(in) :: list
-      !> The same bodies as a structure of arrays
+      !> The kept bodies as a structure of arrays
       type(bodies_t), intent(out) :: bodies
       !> Allocated if a body is invalid; the message names it
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp), allocatable :: key(:), spare_key(:)
-      integer(ip), allocatable :: order(:), spare(:)
+      integer(ip), allocatable :: order(:), kept(:)
       integer(ip) :: k, s
 
-      allocate (key(list%n), spare_key(list%n), order(list%n), spare(list%n))
+      call rank_identifiers(list, order, error)
+      if (allocated(error)) return
+      allocate (kept(list%n))
+      kept = 0_ip
+      do k = 1_ip, list%n_kept
+         kept(list%entry(k)) = k
+      end do
+      call allocate_bodies(bodies, list%n_kept)
+      bodies%n_all = list%n
+      s = 0_ip
       do k = 1_ip, list%n
-         key(k) = int(list%entries(k)%id, lp)
-         order(k) = k
-      end do
-      call sort_keys(list%n, key, order, spare_key, spare)
-      do k = 2_ip, list%n
-         if (key(k) == key(k - 1_ip)) then
-            call raise(error, input_error, 'body '//to_text(key(k))// &
-                       ': the identifier is used twice; each body needs its own')
-            return
-         end if
-      end do
-      call allocate_bodies(bodies, list%n)
-      do s = 1_ip, list%n
-         call place(list%entries(order(s)), s, bodies, error)
-         if (allocated(error)) return
+         if (kept(order(k)) == 0_ip) cycle
+         s = s + 1_ip
+         bodies%global_index(s) = k
+         call place(list, kept(order(k)), s, bodies, error)
+         if (.not. allocated(error)) cycle
+         error%place = int(k, lp)
+         return
       end do
       call finish(bodies)
    end subroutine new_bodies
 
-   subroutine make_room(self)
-      type(body_list_t), intent(inout) :: self
-      type(entry_t), allocatable :: longer(:)
+   !> Find the ascending order of the identifiers of all bodies, and check that no two are equal.
+   subroutine rank_identifiers(list, order, error)
+      type(body_list_t), intent(in) :: list
+      !> Number in the list of the body with the k-th identifier, (n)
+      integer(ip), allocatable, intent(out) :: order(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp), allocatable :: key(:), spare_key(:)
+      integer(ip), allocatable :: spare(:)
+      integer(ip) :: k
 
-      if (.not. allocated(self%entries)) allocate (self%entries(64))
-      if (self%n < size(self%entries)) return
-      allocate (longer(2*size(self%entries)))
-      longer(1:self%n) = self%entries
-      call move_alloc(longer, self%entries)
+      order = [(k, k=1_ip, list%n)]
+      if (list%n == 0_ip) return
+      if (all(list%id(2:list%n) > list%id(:list%n - 1_ip))) return
+      allocate (spare_key(list%n), spare(list%n))
+      key = int(list%id(:list%n), lp)
+      call sort_keys(list%n, key, order, spare_key, spare)
+      do k = 2_ip, list%n
+         if (key(k) > key(k - 1_ip)) cycle
+         call raise(error, input_error, 'body '//to_text(key(k))// &
+                    ': the identifier is used twice; each body needs its own')
+         return
+      end do
+   end subroutine rank_identifiers
+
+   !> Make room for one more body with its vertices.
+   subroutine make_room(self, k, n_vertices)
+      type(body_list_t), intent(inout) :: self
+      !> Number of kept bodies with the new one, and of its vertices
+      integer(ip), intent(in) :: k, n_vertices
+      integer(ip), allocatable :: longer(:)
+      logical, allocatable :: longer_fixed(:)
+      real(wp), allocatable :: table(:, :)
+
+      if (.not. allocated(self%entry)) then
+         allocate (self%entry(64), self%fixed(64), self%number(6, 64), self%first(65), self%vertex(2, 512))
+         self%first(1) = 1_ip
+      end if
+      if (k > size(self%entry)) then
+         allocate (longer(2_ip*k), longer_fixed(2_ip*k), table(6, 2_ip*k))
+         longer(:k - 1_ip) = self%entry
+         call move_alloc(longer, self%entry)
+         longer_fixed(:k - 1_ip) = self%fixed
+         call move_alloc(longer_fixed, self%fixed)
+         table(:, :k - 1_ip) = self%number
+         call move_alloc(table, self%number)
+         allocate (longer(2_ip*k + 1_ip))
+         longer(:k) = self%first
+         call move_alloc(longer, self%first)
+      end if
+      associate (first => self%first(k))
+         if (first + n_vertices - 1_ip <= size(self%vertex, 2)) return
+         allocate (table(2, 2_ip*(first + n_vertices)))
+         table(:, :first - 1_ip) = self%vertex(:, :first - 1_ip)
+         call move_alloc(table, self%vertex)
+      end associate
    end subroutine make_room
 
    subroutine allocate_bodies(bodies, n)
@@ -133,7 +216,7 @@ contains
       integer(ip), intent(in) :: n
 
       bodies%n = n
-      allocate (bodies%id(n), bodies%fixed(n), bodies%mass(n), bodies%inertia(n), &
+      allocate (bodies%id(n), bodies%global_index(n), bodies%fixed(n), bodies%mass(n), bodies%inertia(n), &
                 bodies%inverse_mass(n), bodies%inverse_inertia(n), bodies%position(2, n), &
                 bodies%angle(n), bodies%velocity(2, n), bodies%angular_velocity(n), &
                 bodies%acceleration(2, n), bodies%angular_acceleration(n), bodies%force(2, n), &
@@ -148,61 +231,68 @@ contains
    end subroutine allocate_bodies
 
    !> Check one body and store it in its slot.
-   subroutine place(entry, s, bodies, error)
-      type(entry_t), intent(in) :: entry
+   subroutine place(list, k, s, bodies, error)
+      type(body_list_t), intent(in) :: list
+      !> Number of the body among the kept bodies
+      integer(ip), intent(in) :: k
       integer(ip), intent(in) :: s
       type(bodies_t), intent(inout) :: bodies
       type(error_t), allocatable, intent(inout) :: error
       real(wp), allocatable :: cleaned(:, :)
       character(len=:), allocatable :: problem
       real(wp) :: area, centroid(2), second_moment
-      integer(ip) :: k
+      integer(ip) :: v
 
-      call clean_polygon(entry%vertices, cleaned, problem)
+      bodies%id(s) = list%id(list%entry(k))
+      bodies%fixed(s) = list%fixed(k)
+      call clean_polygon(list%vertex(:, list%first(k):list%first(k + 1_ip) - 1_ip), cleaned, problem)
       if (allocated(problem)) then
-         call raise(error, input_error, 'body '//to_text(entry%id)//': the polygon '//problem)
+         call raise(error, input_error, 'body '//to_text(bodies%id(s))//': the polygon '//problem)
          return
       end if
-      if (.not. entry%density > 0.0_wp) then
-         call raise(error, input_error, 'body '//to_text(entry%id)//': the density must be positive')
-         return
-      end if
-      if (entry%fixed .and. any(abs([entry%velocity, entry%angular_velocity]) > 0.0_wp)) then
-         call raise(error, input_error, 'body '//to_text(entry%id)//': it is fixed and cannot have a velocity '// &
-                    'or an angular velocity; set motion in &scene of the namelist to move it')
-         return
-      end if
-      call mass_properties(cleaned, area, centroid, second_moment)
-      bodies%id(s) = entry%id
-      bodies%fixed(s) = entry%fixed
-      bodies%position(:, s) = centroid
-      bodies%velocity(:, s) = entry%velocity
-      bodies%angular_velocity(s) = entry%angular_velocity
-      bodies%mass(s) = entry%mass
-      bodies%inertia(s) = entry%inertia
-      if (.not. entry%fixed .and. bodies%mass(s) <= 0.0_wp) bodies%mass(s) = entry%density*area
-      call check_mass('mass', bodies%mass(s), entry, error)
+      associate (density => list%number(1, k), velocity => list%number(2:3, k), angular_velocity => list%number(4, k))
+         if (.not. density > 0.0_wp) then
+            call raise(error, input_error, 'body '//to_text(bodies%id(s))//': the density must be positive')
+            return
+         end if
+         if (bodies%fixed(s) .and. any(abs([velocity, angular_velocity]) > 0.0_wp)) then
+            call raise(error, input_error, 'body '//to_text(bodies%id(s))//': it is fixed and cannot have a '// &
+                       'velocity or an angular velocity; set motion in &scene of the namelist to move it')
+            return
+         end if
+         call mass_properties(cleaned, area, centroid, second_moment)
+         bodies%position(:, s) = centroid
+         bodies%velocity(:, s) = velocity
+         bodies%angular_velocity(s) = angular_velocity
+         bodies%mass(s) = list%number(5, k)
+         bodies%inertia(s) = list%number(6, k)
+         if (.not. bodies%fixed(s) .and. bodies%mass(s) <= 0.0_wp) bodies%mass(s) = density*area
+      end associate
+      call check_mass('mass', bodies%mass(s), bodies%id(s), bodies%fixed(s), error)
       if (allocated(error)) return
-      if (.not. entry%fixed .and. bodies%inertia(s) <= 0.0_wp) bodies%inertia(s) = bodies%mass(s)*(second_moment/area)
-      call check_mass('moment of inertia', bodies%inertia(s), entry, error)
+      if (.not. bodies%fixed(s) .and. bodies%inertia(s) <= 0.0_wp) &
+         bodies%inertia(s) = bodies%mass(s)*(second_moment/area)
+      call check_mass('moment of inertia', bodies%inertia(s), bodies%id(s), bodies%fixed(s), error)
       call reserve_vertices(bodies, bodies%vertex_start(s), size(cleaned, 2, kind=ip))
-      do k = 1_ip, size(cleaned, 2, kind=ip)
-         bodies%shape(:, bodies%vertex_start(s) + k - 1_ip) = cleaned(:, k) - centroid
+      do v = 1_ip, size(cleaned, 2, kind=ip)
+         bodies%shape(:, bodies%vertex_start(s) + v - 1_ip) = cleaned(:, v) - centroid
       end do
       bodies%vertex_start(s + 1_ip) = bodies%vertex_start(s) + size(cleaned, 2, kind=ip)
    end subroutine place
 
    !> Reject a mass so small or large that its inverse or products leave the range of normal numbers. 0 is infinite and
    !> valid for fixed bodies.
-   subroutine check_mass(name, mass, entry, error)
+   subroutine check_mass(name, mass, id, is_fixed, error)
       character(len=*), intent(in) :: name
       real(wp), intent(in) :: mass
-      type(entry_t), intent(in) :: entry
+      !> Identifier of the body, and whether it is fixed
+      integer(ip), intent(in) :: id
+      logical, intent(in) :: is_fixed
       type(error_t), allocatable, intent(inout) :: error
 
       if (mass >= least_mass .and. mass <= 1.0_wp/least_mass) return
-      if (entry%fixed .and. abs(mass) <= 0.0_wp) return
-      call raise(error, input_error, 'body '//to_text(entry%id)//': the '//name//' is '//to_text(mass)// &
+      if (is_fixed .and. abs(mass) <= 0.0_wp) return
+      call raise(error, input_error, 'body '//to_text(id)//': the '//name//' is '//to_text(mass)// &
                  ', but must be between '//to_text(least_mass)//' and '//to_text(1.0_wp/least_mass)// &
                  '; choose units that bring it into this range')
    end subroutine check_mass
@@ -229,8 +319,6 @@ contains
       bodies%inverse_inertia = 0.0_wp
       where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass
       where (bodies%inertia > 0.0_wp) bodies%inverse_inertia = 1.0_wp/bodies%inertia
-      bodies%n_all = bodies%n
-      bodies%global_index = [(s, s=1_ip, bodies%n)]
       bodies%in_halo = spread(.false., 1, bodies%n)
       bodies%free = pack([(s, s=1_ip, bodies%n)],.not. bodies%fixed)
       call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])

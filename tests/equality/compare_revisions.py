@@ -116,8 +116,8 @@ def compare(case, base, present, keep):
         if case.replay:
             expected, found = read_samples(folder, base.names), read_samples(other, present.names)
         else:
-            expected, found = (read_result(place, side.names, whole) for place, side in ((folder, base),
-                                                                                        (other, present)))
+            expected, found = (read_result(place, side.names, whole, case.ranks or 1)
+                               for place, side in ((folder, base), (other, present)))
         if code != other_code:
             outcome.wrong.append(f"exit code {code} became {other_code}: {other_output.strip()[-300:]}")
         wrong, outcome.notes = differences(expected, found, present.names)

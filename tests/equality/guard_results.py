@@ -55,8 +55,11 @@ def read_trajectory(folder, names):
             for name, value in parts[0].items()}
 
 
-def read_result(folder, names, whole=True):
-    """What a run left, by name; not `whole`: only what does not depend on where it was interrupted."""
+def read_result(folder, names, whole=True, ranks=1):
+    """What a run left, by name; not `whole`: only what does not depend on where it was interrupted.
+
+    On several ranks, counters of work and messages depend on which rank has which body; they are left out.
+    """
     found = read_trajectory(folder, names)
     if whole:
         segments = [path.name for path in Path(folder).glob(names.file("trajectory"))]
@@ -69,7 +72,7 @@ def read_result(folder, names, whole=True):
         path = Path(folder) / names.file(kind)
         if path.exists():
             found.update(read_file(path, kind, names))
-    if not whole:
+    if not whole or ranks > 1:
         kept = ("counter profile steps", "counter profile contacts", "counter profile bodies")
         found = {name: value for name, value in found.items() if not name.startswith("counter") or name in kept}
     return found

@@ -12,16 +12,14 @@ module spread_world
    private
    public :: world_t, whole_world, part_of_world, some_number
 
-   !> Bodies, their contacts, and boxes
+   !> Bodies and their contacts
    type :: world_t
       !> Bodies with the forces of their contacts
       type(bodies_t) :: bodies
       !> Contacts
       type(contacts_t) :: contacts
-      !> Slot of the body of each box
-      integer(ip), allocatable :: box_body(:)
-      !> A number for each box, (1, box), and for each contact
-      real(wp), allocatable :: box_value(:, :), pair_value(:)
+      !> A number for each contact
+      real(wp), allocatable :: pair_value(:)
    end type world_t
 
    !> Number of bodies, and numbers of the fixed ones
@@ -86,18 +84,11 @@ contains
       logical, intent(in) :: here(:), in_halo(:)
       type(world_t), intent(out) :: world
       type(incidence_t) :: incidence
-      integer(ip) :: b, s
 
       call make_bodies(step, here, in_halo, world%bodies)
       call make_contacts(step, world%bodies, world%contacts, world%pair_value)
       call index_contacts(world%bodies%n, world%contacts, incidence)
       call assemble_forces([0.0_wp, -9.81_wp], incidence, world%contacts, world%bodies)
-      associate (bodies => world%bodies)
-         world%box_body = [((s, b=1_ip, 1_ip + mod(bodies%global_index(s), 3_ip)), s=1_ip, bodies%n)]
-         world%box_value = reshape([((some_number(step, bodies%global_index(s), b), &
-                                      b=1_ip, 1_ip + mod(bodies%global_index(s), 3_ip)), s=1_ip, bodies%n)], &
-                                   [1, size(world%box_body)])
-      end associate
    end subroutine make_world
 
    subroutine make_bodies(step, here, in_halo, bodies)

@@ -1,5 +1,6 @@
 !> Writes a trajectory and a checkpoint twice, by one rank with all bodies and by all ranks collectively. Compares the
-!> numbers, their order, the total forces on fixed bodies and the state hash.
+!> numbers, their order, the total forces on fixed bodies and the hashes of state and scene. All ranks read the
+!> checkpoint.
 !>
 !>     mpirun -n 4 write_together
 !>
@@ -10,14 +11,14 @@ program write_together
    use compare_files, only: expect_equal_files
    use polydem_bodies, only: state_hash
    use polydem_checkpoint_file, only: checkpoint_file_t
-   use polydem_global_hash, only: hash_all_bodies
+   use polydem_global_hash, only: hash_all_bodies, hash_scene
    use polydem_errors, only: error_t, io_error, raise, run_error
    use polydem_hdf5_file, only: start_library
    use polydem_world_communicator, only: create_world
    use polydem_kinds, only: ip, lp, wp
    use polydem_named_values, only: named_values_t
    use polydem_serial_communicator, only: serial_communicator_t
-   use polydem_ownership, only: order_bodies, order_pairs, order_parts
+   use polydem_ownership, only: order_bodies, order_pairs
    use polydem_provenance, only: provenance_t
    use polydem_global_order, only: global_order_t
    use polydem_strings, only: to_text
@@ -45,8 +46,8 @@ program write_together
       '/walls/torque', '/frames/step', '/frames/time', '/frames/position', '/frames/angle', '/frames/velocity', &
       '/frames/angular_velocity', '/contacts/start', '/contacts/first', '/contacts/second', '/contacts/area', &
       '/contacts/point', '/contacts/normal', '/contacts/force', '/energy_balance/kinetic']
-   character(len=*), parameter :: in_checkpoint(9) = [character(len=24) :: '/run/sums', '/bodies/id', &
-      '/bodies/position', '/bodies/angle', '/bodies/force', '/boxes/bounds', '/pairs/first', '/pairs/second', &
+   character(len=*), parameter :: in_checkpoint(8) = [character(len=24) :: '/run/sums', '/bodies/id', &
+      '/bodies/position', '/bodies/angle', '/bodies/force', '/pairs/first', '/pairs/second', &
       '/pairs/tangential']
 
    class(communicator_t), allocatable :: comm
@@ -57,6 +58,7 @@ program write_together
    call create_world(comm, error)
    folder = 'together_'//to_text(comm%size)
    call write_both(error)
+   if (.not. allocated(error)) call read_checkpoint_together(error)
    if (.not. allocated(error)) call compare_hashes(error)
    if (.not. allocated(error)) call refuse_a_bad_folder(error)
    if (allocated(error) .and. comm%is_root()) then
@@ -135,8 +137,6 @@ contains
       associate (bodies => world%bodies, pairs => world%contacts, n => world%contacts%n)
          call order_bodies(comm, bodies, rows)
          call file%set_rows('/bodies/', rows)
-         call order_parts(comm, bodies, world%box_body, rows)
-         call file%set_rows('/boxes/', rows)
          call order_pairs(comm, bodies, pairs%first(:n), pairs%second(:n), rows)
          call file%set_rows('/pairs/', rows)
          ! The group /run has the values of the root rank.
@@ -146,7 +146,6 @@ contains
          call file%field('/bodies/position', bodies%position, 'm', 'positions')
          call file%field('/bodies/angle', bodies%angle, 'rad', 'angles')
          call file%field('/bodies/force', bodies%force, 'N/m', 'forces')
-         call file%field('/boxes/bounds', world%box_value, 'm', 'bounds')
          call file%match('/pairs/first', int(bodies%id(pairs%first(:n)), lp), '1', 'lower identifier')
          call file%match('/pairs/second', int(bodies%id(pairs%second(:n)), lp), '1', 'higher identifier')
          call file%field('/pairs/tangential', world%pair_value, 'N/m', 'memory')
@@ -173,16 +172,65 @@ contains
          call raise(error, run_error, 'positions read from the checkpoint differ from those written')
    end subroutine read_checkpoint
 
+   !> Read the checkpoint on all ranks: each rank gets the rows of the bodies that it owns, and the pairs that it
+   !> chooses. An error of one rank reaches all ranks.
+   subroutine read_checkpoint_together(error)
+      type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: expected
+      type(checkpoint_file_t) :: file
+      type(global_order_t) :: rows
+      type(world_t) :: world, whole
+      real(wp), allocatable :: position(:, :), angle(:), force(:, :)
+      integer(lp) :: n, second(1)
+      integer(ip) :: s
+
+      call make_part(comm, n_frames, world)
+      call whole_world(n_frames, whole)
+      associate (bodies => world%bodies, contacts => whole%contacts)
+         allocate (position(2, bodies%n), force(2, bodies%n), angle(bodies%n), source=-7.0_wp)
+         call file%open(folder//'/checkpoint_1.h5', error, comm)
+         if (allocated(error)) return
+         call order_bodies(comm, bodies, rows)
+         call file%set_rows('/bodies/', rows)
+         call file%match('/bodies/id', int(bodies%id, lp), '1', 'identifiers')
+         call file%field('/bodies/position', position, 'm', 'positions')
+         call file%field('/bodies/angle', angle, 'rad', 'angles')
+         call file%count_rows('/pairs/second', n)
+         call file%choose_rows('/pairs/', [n - 1_lp - int(comm%rank, lp), 1_lp])
+         call file%field('/pairs/second', second, '1', 'higher identifier')
+         ! A rank that expects other bodies fails, and all ranks get its error.
+         call file%match('/bodies/id', int(bodies%id, lp) + merge(1_lp, 0_lp, comm%rank == 0_ip), '1', 'identifiers')
+         call file%field('/bodies/force', force, 'N/m', 'forces')
+         call file%close(expected)
+         if (.not. allocated(expected)) call raise(error, run_error, 'a wrong identifier was not reported')
+         do s = 1_ip, bodies%n
+            if (all(abs(position(:, s) - bodies%position(:, s)) <= 0.0_wp) .and. &
+                abs(angle(s) - bodies%angle(s)) <= 0.0_wp) cycle
+            if (bodies%in_halo(s) .or. (bodies%fixed(s) .and. .not. comm%is_root())) cycle
+            call raise(error, run_error, 'rank '//to_text(comm%rank)//' read a wrong pose of body '// &
+                       to_text(bodies%id(s)))
+         end do
+         if (second(1) /= int(whole%bodies%id(contacts%second(contacts%n - comm%rank)), lp)) &
+            call raise(error, run_error, 'rank '//to_text(comm%rank)//' read a wrong pair')
+      end associate
+      call comm%all_reduce_error(error)
+   end subroutine read_checkpoint_together
+
    subroutine compare_hashes(error)
       type(error_t), allocatable, intent(inout) :: error
+      type(serial_communicator_t) :: alone
       type(world_t) :: whole, world
-      integer(lp) :: hash
+      integer(lp) :: hash, expected
 
       call whole_world(2_lp, whole)
       call make_part(comm, 2_lp, world)
       call hash_all_bodies(comm, world%bodies, hash)
       if (hash /= state_hash(whole%bodies)) call raise(error, run_error, 'wrong hash of all bodies on rank '// &
          to_text(comm%rank)//' of '//to_text(comm%size))
+      call hash_scene(alone, whole%bodies, expected)
+      call hash_scene(comm, world%bodies, hash)
+      if (hash /= expected) call raise(error, run_error, 'wrong hash of the scene on rank '//to_text(comm%rank)// &
+         ' of '//to_text(comm%size))
       call comm%all_reduce_error(error)
    end subroutine compare_hashes
 

@@ -1,0 +1,37 @@
+"""No rank needs memory for all bodies."""
+
+import re
+import subprocess
+import sys
+
+from runs import ENVIRONMENT, PARALLEL
+
+#: A scene whose bodies take far more memory than the program and MPI
+BED = """&scene name = 'bed' bodies = 200000 speed = 0.1 /
+&integrate dt = 1e-5 duration = 2e-5 /
+&output energy_balance = .false. /
+"""
+#: Runs a program and prints its peak memory
+MEASURE = """import resource, subprocess, sys
+subprocess.run(sys.argv[1:], check=True)
+print('peak', resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss, file=sys.stderr)
+"""
+#: Greatest share of the memory for bodies of one process that each of eight ranks may take
+MOST = 0.35
+
+
+def peaks(folder, ranks, bodies):
+    """Peak memory of each rank in KiB"""
+    (folder / "bed.nml").write_text(BED.replace("200000", str(bodies)), encoding="utf-8")
+    command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "-c", MEASURE, PARALLEL,
+               "run", str(folder / "bed.nml"), "--threads", "1", "--set", f"output.folder={folder}/of_{ranks}_{bodies}"]
+    done = subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, check=True, timeout=300)
+    return [int(text) for text in re.findall(r"peak (\d+)", done.stderr)]
+
+
+def test_each_of_eight_ranks_takes_a_small_share_of_the_memory_of_one(tmp_path):
+    few, many = 1000, 200000
+    alone = max(peaks(tmp_path, 1, many)) - max(peaks(tmp_path, 1, few))
+    shared = peaks(tmp_path, 8, many)
+    assert len(shared) == 8
+    assert max(shared) - min(peaks(tmp_path, 8, few)) < MOST*alone, (alone, shared)
