@@ -7,7 +7,7 @@ module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
    use polydem_conservative_law, only: conservative_law_t
-   use polydem_contact_block, only: block_size, contact_block_t, load_block, store_forces
+   use polydem_contact_block, only: block_size, contact_block_t, copy_motion, load_block, store_forces
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contacts, only: contacts_t
@@ -255,6 +255,7 @@ contains
       contacts%energy_is_quadratic = law%energy_is_quadratic
       do high = contacts%n, 1_ip, -block_size
          call load_block(bodies, contacts, max(1_ip, high - block_size + 1_ip), high, block)
+         call copy_motion(bodies, block)
          call law%apply(bodies, dt, block, history)
          do b = 1_ip, block%n
             call store_forces(block, b, contacts, high - b + 1_ip)

@@ -15,7 +15,7 @@
 module polydem_force_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t
-   use polydem_contact_block, only: contact_block_t, load_block, store_forces, block_size
+   use polydem_contact_block, only: contact_block_t, copy_motion, load_block, store_forces, block_size
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
    use polydem_law_part, only: law_part_t
@@ -87,6 +87,7 @@ contains
 
       do high = contacts%n, 1_ip, -block_size
          call load_block(bodies, contacts, max(1_ip, high - block_size + 1_ip), high, block)
+         call copy_motion(bodies, block)
          call self%add(bodies, dt, block, history)
          do b = 1_ip, block%n
             call store_forces(block, b, contacts, high - b + 1_ip)

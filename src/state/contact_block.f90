@@ -95,9 +95,9 @@ contains
       end do
    end subroutine copy_motion
 
-   !> Copy some contacts of a table into a block.
+   !> Copy some contacts of a table into a block, without the motion of their bodies.
    pure subroutine load_block(bodies, contacts, low, high, block)
-      !> Bodies with the velocities of this step
+      !> Bodies with their radii
       type(bodies_t), intent(in) :: bodies
       !> Table of contacts
       type(contacts_t), intent(in) :: contacts
@@ -144,7 +144,6 @@ contains
          block%twist(b) = 0.0_wp
          if (contacts%has_twist) block%twist(b) = side*contacts%twist(c)
       end do
-      call copy_motion(bodies, block)
    end subroutine load_block
 
    !> Copy what the force law has computed for contact b of a block to contact c of a table, and set `force`.
