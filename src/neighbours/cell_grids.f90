@@ -20,7 +20,9 @@ module polydem_cell_grids
    use omp_lib, only: omp_get_max_threads
    use polydem_box_pairs, only: found_pairs_t
    use polydem_boxes, only: boxes_t
+   use polydem_candidates, only: index_list_t
    use polydem_cell_grid, only: cell_grid_t, extent_t, measure, measure_levels, new_grid
+   use polydem_cell_order, only: cell_order_t
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
    implicit none
    private
@@ -50,12 +52,10 @@ module polydem_cell_grids
       integer(ip), allocatable, private :: first(:)
       !> Number of cells, including empty cells at borders
       integer(ip) :: n_cells = 0_ip
-      !> Box numbers in the order of cells
-      integer(ip), allocatable, private :: box(:)
-      !> Cell of each box, in the order of cells and in the order of box numbers
-      integer(ip), allocatable, private :: cell(:), cell_of(:)
-      !> Bounds of the boxes in the order of cells [m]
-      real(wp), allocatable, private :: xmin(:), ymin(:), xmax(:), ymax(:)
+      !> Boxes in the order of cells
+      type(cell_order_t), private :: order
+      !> Cell of each box, (box)
+      integer(ip), allocatable, private :: cell_of(:)
       !> Pairs of each thread in the last search, lower box first, (thread)
       type(found_pairs_t), allocatable :: found(:)
       !> Counts summed over all searches
@@ -64,6 +64,7 @@ module polydem_cell_grids
       procedure :: set_levels
       procedure :: build
       procedure :: search
+      procedure :: search_window
       procedure :: bytes
    end type cell_grids_t
 
@@ -133,8 +134,7 @@ contains
       end do
       call reserve_cells(self, self%n_cells + 2_ip)
       call find_cells(n, bounds, self%grid, self%level, self%cell_of)
-      call sort_by_cell(n, self%n_cells, bounds, self%cell_of, self%first, self%box, self%cell, &
-                        self%xmin, self%ymin, self%xmax, self%ymax)
+      call self%order%sort(n, self%n_cells, bounds, self%cell_of, self%first)
    end subroutine build
 
    !> Column of a point, from 0
@@ -168,37 +168,6 @@ contains
          end associate
       end do
    end subroutine find_cells
-
-   !> Sort the boxes by cell; boxes of the same cell are in the order of their numbers.
-   pure subroutine sort_by_cell(n, n_cells, bounds, cell_of, first, box, cell, xmin, ymin, xmax, ymax)
-      integer(ip), intent(in) :: n, n_cells
-      real(wp), intent(in) :: bounds(4, n)
-      integer(ip), intent(in) :: cell_of(n)
-      integer(ip), intent(out) :: first(n_cells + 2), box(n), cell(n)
-      real(wp), intent(out) :: xmin(n), ymin(n), xmax(n), ymax(n)
-      integer(ip) :: i, k, c
-
-      first = 0_ip
-      do i = 1_ip, n
-         first(cell_of(i) + 2_ip) = first(cell_of(i) + 2_ip) + 1_ip
-      end do
-      first(1:2) = 1_ip
-      do c = 1_ip, n_cells
-         first(c + 2_ip) = first(c + 1_ip) + first(c + 2_ip)
-      end do
-      ! first(c + 1) is the next free index of cell c, and at the end the first index of the next cell.
-      do i = 1_ip, n
-         c = cell_of(i)
-         k = first(c + 1_ip)
-         first(c + 1_ip) = k + 1_ip
-         box(k) = i
-         cell(k) = c
-         xmin(k) = bounds(1, i)
-         ymin(k) = bounds(2, i)
-         xmax(k) = bounds(3, i)
-         ymax(k) = bounds(4, i)
-      end do
-   end subroutine sort_by_cell
 
    !> Find all overlapping pairs of boxes of different bodies that are not both passive.
    subroutine search(self, boxes)
@@ -262,19 +231,18 @@ contains
       integer(ip), intent(in) :: low, high
       type(found_pairs_t), intent(inout) :: found
       type(tally_t), intent(inout) :: tally
-      integer(ip) :: n, k, cell, beside, from, to, more
+      integer(ip) :: k, cell, beside, from, to, more
 
-      n = size(self%box, kind=ip)
       do k = low, high
-         cell = self%cell(k)
+         cell = self%order%cell(k)
          beside = self%first(cell + 2_ip) - 1_ip
          from = self%first(cell + grid%stride - 1_ip)
          to = self%first(cell + grid%stride + 2_ip) - 1_ip
          more = (beside - k) + (to - from + 1_ip)
          tally%tests = tally%tests + int(more, lp)
          if (size(found%box, 2) < found%n + more + 1_ip) call found%reserve(more + 1_ip)
-         call compare(n, self%xmin, self%ymin, self%xmax, self%ymax, self%box, k, k + 1_ip, beside, found%n, found%box)
-         call compare(n, self%xmin, self%ymin, self%xmax, self%ymax, self%box, k, from, to, found%n, found%box)
+         call self%order%compare(k, k + 1_ip, beside, found%n, found%box)
+         call self%order%compare(k, from, to, found%n, found%box)
       end do
       tally%visits = tally%visits + 5_lp*int(high - low + 1_ip, lp)
       tally%searches = tally%searches + int(high - low + 1_ip, lp)
@@ -287,61 +255,67 @@ contains
       integer(ip), intent(in) :: low, high
       type(found_pairs_t), intent(inout) :: found
       type(tally_t), intent(inout) :: tally
-      integer(ip) :: n, k, r, left, right, from, to
+      integer(ip) :: k, r, left, right, from, to
 
       if (grid%last_box < grid%first_box) return
-      n = size(self%box, kind=ip)
       do k = low, high
-         left = max(column(grid, self%xmin(k)) - 1_ip, 0_ip)
-         right = column(grid, self%xmax(k))
-         do r = max(row(grid, self%ymin(k)) - 1_ip, 0_ip), row(grid, self%ymax(k))
+         left = max(column(grid, self%order%xmin(k)) - 1_ip, 0_ip)
+         right = column(grid, self%order%xmax(k))
+         do r = max(row(grid, self%order%ymin(k)) - 1_ip, 0_ip), row(grid, self%order%ymax(k))
             from = self%first(grid%offset + r*grid%stride + left + 1_ip)
             to = self%first(grid%offset + r*grid%stride + right + 2_ip) - 1_ip
             tally%visits = tally%visits + int(right - left + 1_ip, lp)
             if (to < from) cycle
             tally%tests = tally%tests + int(to - from + 1_ip, lp)
             if (size(found%box, 2) < found%n + to - from + 2_ip) call found%reserve(to - from + 2_ip)
-            call compare(n, self%xmin, self%ymin, self%xmax, self%ymax, self%box, k, from, to, found%n, found%box)
+            call self%order%compare(k, from, to, found%n, found%box)
          end do
       end do
       tally%searches = tally%searches + int(high - low + 1_ip, lp)
    end subroutine search_other_grid
 
-   !> Compare one box with a range of boxes. `found` must have room for one pair more than the number of comparisons.
-   pure subroutine compare(n_boxes, xmin, ymin, xmax, ymax, box, k, from, to, n_found, found)
-      integer(ip), intent(in) :: n_boxes
-      !> Bounds and numbers of the boxes in the order of cells
-      real(wp), intent(in) :: xmin(n_boxes), ymin(n_boxes), xmax(n_boxes), ymax(n_boxes)
-      integer(ip), intent(in) :: box(n_boxes)
-      !> Index of the box, first and last index of the range
-      integer(ip), intent(in) :: k, from, to
-      !> Number of pairs found so far
-      integer(ip), intent(inout) :: n_found
-      !> Pairs, (2, pair)
-      integer(ip), intent(inout) :: found(2, *)
-      integer(ip) :: j, n, own
+   !> List the boxes that overlap a window.
+   subroutine search_window(self, window, near)
+      class(cell_grids_t), intent(inout) :: self
+      !> Bounds xmin, ymin, xmax, ymax of the window [m]
+      real(wp), intent(in) :: window(4)
+      !> List to which the boxes are appended
+      type(index_list_t), intent(inout) :: near
+      integer(ip) :: j, r, left, right, from, to
+      integer :: l
 
-      own = box(k)
-      n = n_found
-      do j = from, to
-         found(1, n + 1_ip) = own
-         found(2, n + 1_ip) = box(j)
-         n = n + merge(1_ip, 0_ip, min(min(xmax(j) - xmin(k), xmax(k) - xmin(j)), &
-                                       min(ymax(j) - ymin(k), ymax(k) - ymin(j))) >= 0.0_wp)
+      do l = 1, self%n_levels + 1
+         associate (grid => self%grid(l))
+            if (grid%last_box < grid%first_box) cycle
+            left = max(column(grid, window(1)) - 1_ip, 0_ip)
+            right = column(grid, window(3))
+            do r = max(row(grid, window(2)) - 1_ip, 0_ip), row(grid, window(4))
+               from = self%first(grid%offset + r*grid%stride + left + 1_ip)
+               to = self%first(grid%offset + r*grid%stride + right + 2_ip) - 1_ip
+               self%total%visits = self%total%visits + int(right - left + 1_ip, lp)
+               self%total%tests = self%total%tests + int(to - from + 1_ip, lp)
+               do j = from, to
+                  if (min(min(self%order%xmax(j) - window(1), window(3) - self%order%xmin(j)), &
+                          min(self%order%ymax(j) - window(2), window(4) - self%order%ymin(j))) >= 0.0_wp) &
+                     call near%push(self%order%box(j))
+               end do
+            end do
+         end associate
       end do
-      n_found = n
-   end subroutine compare
+      self%total%searches = self%total%searches + 1_lp
+   end subroutine search_window
 
    !> Allocate the arrays over boxes.
    subroutine reserve_boxes(self, n)
       type(cell_grids_t), intent(inout) :: self
       integer(ip), intent(in) :: n
 
-      if (allocated(self%box)) then
-         if (size(self%box) == n) return
-         deallocate (self%box, self%cell, self%cell_of, self%xmin, self%ymin, self%xmax, self%ymax)
+      call self%order%reserve(n)
+      if (allocated(self%cell_of)) then
+         if (size(self%cell_of) == n) return
+         deallocate (self%cell_of)
       end if
-      allocate (self%box(n), self%cell(n), self%cell_of(n), self%xmin(n), self%ymin(n), self%xmax(n), self%ymax(n))
+      allocate (self%cell_of(n))
    end subroutine reserve_boxes
 
    !> Allocate the array over cells.
@@ -362,9 +336,9 @@ contains
       integer :: w
 
       bytes = 0_lp
-      if (.not. allocated(self%box)) return
-      bytes = int(storage_size(self%box)/8, lp)*(4_lp*size(self%box, kind=lp) + size(self%first, kind=lp)) + &
-         int(storage_size(self%xmin)/8, lp)*4_lp*size(self%xmin, kind=lp)
+      if (.not. allocated(self%cell_of)) return
+      bytes = self%order%bytes() + &
+         int(storage_size(self%first)/8, lp)*(2_lp*size(self%cell_of, kind=lp) + size(self%first, kind=lp))
       do w = 1, size(self%found)
          if (allocated(self%found(w)%box)) bytes = bytes + int(storage_size(self%found(w)%box)/8, lp)* &
             size(self%found(w)%box, kind=lp)

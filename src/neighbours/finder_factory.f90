@@ -11,6 +11,7 @@ module polydem_finder_factory
    use polydem_partitioned_sweep, only: partitioned_sweep_t
    use polydem_quadtree_inlined, only: quadtree_t
    use polydem_sort_and_sweep, only: sort_and_sweep_t
+   use polydem_two_level, only: two_level_t
    use polydem_verlet, only: verlet_t
    implicit none
    private
@@ -54,6 +55,8 @@ contains
          allocate (list)
          if (present(skin)) list%skin = skin
          call move_alloc(list, finder)
+      case ('two_level')
+         allocate (two_level_t :: finder)
       case ('hierarchical_grid')
          allocate (hierarchical_grid_t :: finder)
       case default

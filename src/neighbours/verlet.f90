@@ -18,9 +18,8 @@
 !> rebuilt with half the skin.
 module polydem_verlet
    use omp_lib, only: omp_get_max_threads
-   use polydem_box_pairs, only: box_pairs_t
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t
+   use polydem_candidate_rows, only: candidate_rows_t
    use polydem_cell_grids, only: cell_grids_t, part
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_nodes, count_rebuilds, &
@@ -40,14 +39,6 @@ module polydem_verlet
    !> Number of boxes in a block; after each block there is a test whether a box has left its padded box
    integer(ip), parameter :: block_size = 256_ip
 
-   !> Results of one thread for its part of the lists
-   type :: worker_t
-      !> Changes of pairs
-      type(pair_changes_t) :: changes
-      !> Whether all boxes lie inside their padded boxes
-      logical :: inside = .true.
-   end type worker_t
-
    !> Finder that stores a list of possible pairs until a box has moved too far
    type, extends(finder_t) :: verlet_t
       !> Approach of two boxes after which the list must be rebuilt [m]; 0: automatic
@@ -63,17 +54,13 @@ module polydem_verlet
       !> Padded boxes of the last rebuild, (4, box) [m]
       real(wp), allocatable, private :: padded(:, :)
       !> Candidates in ascending order, lower box first
-      type(candidates_t), private :: candidates
-      !> Present and previous list of candidates in rows, in alternating order
-      type(box_pairs_t), private :: list(2)
-      !> Index of the present list in `list`
-      integer, private :: now = 1
-      !> 1 if a candidate of the previous list overlapped, else 0, (candidate)
-      integer(bp), allocatable, private :: overlap_before(:)
+      type(candidate_rows_t), private :: candidates
       !> Grids for the search of a rebuild
       type(cell_grids_t), private :: grids
-      !> Results of the threads, (thread)
-      type(worker_t), allocatable, private :: worker(:)
+      !> Changes that each thread recorded, (thread)
+      type(pair_changes_t), allocatable, private :: changes(:)
+      !> Whether all boxes of each thread lie inside their padded boxes, (thread)
+      logical, allocatable, private :: inside(:)
    contains
       procedure :: find
       procedure :: survey
@@ -89,7 +76,7 @@ contains
       integer :: w
       logical :: keep
 
-      call prepare_workers(self)
+      call prepare_threads(self)
       if (allocated(self%padded)) then
          self%age = self%age + 1_lp
          keep = all_inside(self, boxes) .and. .not. is_too_thick(self, boxes%n)
@@ -103,25 +90,26 @@ contains
       call compare_candidates(self, boxes)
       if (.not. keep) self%surplus = int(self%candidates%n, lp) - &
          count(self%candidates%overlap(1:self%candidates%n) /= 0_bp, kind=lp)
-      do w = 1, size(self%worker)
-         call changes%append(self%worker(w)%changes)
+      do w = 1, size(self%changes)
+         call changes%append(self%changes(w))
       end do
       call self%work%lap(phase_filter)
    end subroutine find
 
-   !> Make one worker per thread and clear the workers.
-   subroutine prepare_workers(self)
+   !> Make the results of all threads empty.
+   subroutine prepare_threads(self)
       type(verlet_t), intent(inout) :: self
-      integer :: w
+      integer :: w, m
 
-      if (allocated(self%worker)) then
-         if (size(self%worker) /= omp_get_max_threads()) deallocate (self%worker)
+      if (allocated(self%changes)) then
+         if (size(self%changes) /= omp_get_max_threads()) deallocate (self%changes, self%inside)
       end if
-      if (.not. allocated(self%worker)) allocate (self%worker(omp_get_max_threads()))
-      do w = 1, size(self%worker)
-         call self%worker(w)%changes%clear()
+      m = omp_get_max_threads()
+      if (.not. allocated(self%changes)) allocate (self%changes(m), self%inside(m))
+      do w = 1, size(self%changes)
+         call self%changes(w)%clear()
       end do
-   end subroutine prepare_workers
+   end subroutine prepare_threads
 
    !> Choose skin and grids, and make an empty list.
    subroutine start(self, boxes)
@@ -136,9 +124,8 @@ contains
       if (.not. self%skin > 0.0_wp) self%thickness = first_skin*self%side
       call choose_levels(boxes, self%thickness, n_levels, level, largest)
       call self%grids%set_levels(n_levels, level, boxes%fixed(1:boxes%n))
-      call self%list(1)%start(boxes%n)
-      call self%list(2)%start(boxes%n)
-      allocate (self%padded(4, boxes%n), self%candidates%box(2, 0), self%candidates%overlap(0), self%overlap_before(0))
+      call self%candidates%start(boxes%n)
+      allocate (self%padded(4, boxes%n))
    end subroutine start
 
    !> Whether every box lies inside its padded box
@@ -150,12 +137,12 @@ contains
 
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
-      do w = 1, size(self%worker)
-         call part(1_ip, boxes%n, size(self%worker), w, low, high)
-         self%worker(w)%inside = part_inside(boxes%n, boxes%bounds, self%padded, low, high)
+      do w = 1, size(self%changes)
+         call part(1_ip, boxes%n, size(self%changes), w, low, high)
+         self%inside(w) = part_inside(boxes%n, boxes%bounds, self%padded, low, high)
       end do
       !$omp end parallel do
-      all_inside = all(self%worker%inside)
+      all_inside = all(self%inside)
    end function all_inside
 
    !> Whether the boxes low..high lie inside their padded boxes; the loop over a block has no branches
@@ -201,10 +188,7 @@ contains
    subroutine rebuild(self, boxes)
       type(verlet_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
-      integer(bp), allocatable :: spare(:)
       integer(lp) :: tests
-      integer(ip) :: low, high
-      integer :: w
 
       self%age = 0_lp
       self%padded(1:2, :) = boxes%bounds(1:2, 1:boxes%n) - 0.5_wp*self%thickness
@@ -217,64 +201,9 @@ contains
       call self%work%add(count_tests, self%grids%total%tests - tests)
       self%work%value(count_searches) = self%grids%total%searches
       self%work%value(count_visits) = self%grids%total%visits
-      self%now = 3 - self%now
-      call self%list(self%now)%gather(self%grids%found)
-      call move_alloc(self%overlap_before, spare)
-      call move_alloc(self%candidates%overlap, self%overlap_before)
-      call move_alloc(spare, self%candidates%overlap)
-      self%candidates%n = self%list(self%now)%n()
-      call reserve(self%candidates)
-      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes) private(w, low, high)
-      do w = 1, size(self%worker)
-         call part(1_ip, boxes%n, size(self%worker), w, low, high)
-         call self%list(self%now)%sort_rows(low, high)
-         call carry_over(self%list(3 - self%now), self%overlap_before, self%list(self%now), low, high, boxes%body, &
-                         self%candidates%box, self%candidates%overlap, self%worker(w)%changes)
-      end do
-      !$omp end parallel do
+      call self%candidates%replace(self%grids%found, boxes, self%changes)
       call self%work%lap(phase_search)
    end subroutine rebuild
-
-   !> Fill a range of rows of the candidates. The state of a candidate is copied from the previous list; new candidates
-   !> did not overlap. Pairs that overlapped and are no longer candidates are recorded as separated.
-   pure subroutine carry_over(before, overlap_before, now, low, high, body, box, overlap, changes)
-      !> Previous list, and 1 where its candidates overlapped
-      type(box_pairs_t), intent(in) :: before
-      integer(bp), intent(in) :: overlap_before(:)
-      !> New list
-      type(box_pairs_t), intent(in) :: now
-      !> First and last row
-      integer(ip), intent(in) :: low, high
-      !> Body of each box, (box)
-      integer(ip), intent(in) :: body(:)
-      !> Candidates to fill, (2, candidate), and 1 where they overlapped
-      integer(ip), intent(inout) :: box(:, :)
-      integer(bp), intent(inout) :: overlap(:)
-      type(pair_changes_t), intent(inout) :: changes
-      integer(ip) :: row, old, k
-
-      do row = low, high
-         old = before%first(row)
-         do k = now%first(row), now%first(row + 1_ip) - 1_ip
-            box(1, k) = row
-            box(2, k) = now%partner(k)
-            overlap(k) = 0_bp
-            do while (old < before%first(row + 1_ip))
-               if (before%partner(old) >= now%partner(k)) exit
-               if (overlap_before(old) /= 0_bp) call changes%record(body(row), body(before%partner(old)), -1_ip)
-               old = old + 1_ip
-            end do
-            if (old == before%first(row + 1_ip)) cycle
-            if (before%partner(old) /= now%partner(k)) cycle
-            overlap(k) = overlap_before(old)
-            old = old + 1_ip
-         end do
-         do old = old, before%first(row + 1_ip) - 1_ip
-            if (overlap_before(old) /= 0_bp) call changes%record(body(row), body(before%partner(old)), -1_ip)
-         end do
-      end do
-   end subroutine carry_over
 
    !> Compare the boxes of all candidates.
    subroutine compare_candidates(self, boxes)
@@ -285,28 +214,13 @@ contains
 
       !$omp parallel do if (self%candidates%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
-      do w = 1, size(self%worker)
-         call part(1_ip, self%candidates%n, size(self%worker), w, low, high)
-         call self%candidates%compare(low, high, boxes%bounds, boxes%body, self%worker(w)%changes)
+      do w = 1, size(self%changes)
+         call part(1_ip, self%candidates%n, size(self%changes), w, low, high)
+         call self%candidates%compare(low, high, boxes%bounds, boxes%body, self%changes(w))
       end do
       !$omp end parallel do
       call self%work%add(count_tests, int(self%candidates%n, lp))
    end subroutine compare_candidates
-
-   !> Allocate memory for the candidates; their old values are lost.
-   pure subroutine reserve(candidates)
-      type(candidates_t), intent(inout) :: candidates
-      integer(ip) :: n
-
-      n = candidates%n + candidates%n/4_ip + 64_ip
-      if (size(candidates%overlap) < candidates%n) then
-         deallocate (candidates%overlap)
-         allocate (candidates%overlap(n))
-      end if
-      if (size(candidates%box, 2) >= candidates%n) return
-      deallocate (candidates%box)
-      allocate (candidates%box(2, n))
-   end subroutine reserve
 
    !> Set the counters: candidates, cells, grids, and memory [B].
    subroutine survey(self)
@@ -316,10 +230,8 @@ contains
       self%work%value(count_candidates) = int(self%candidates%n, lp)
       self%work%value(count_nodes) = int(self%grids%n_cells, lp)
       self%work%value(count_depth) = int(self%grids%n_levels, lp)
-      self%work%value(count_bytes) = self%list(1)%bytes() + self%list(2)%bytes() + self%grids%bytes() + &
-         int(storage_size(self%candidates%box)/8, lp)*size(self%candidates%box, kind=lp) + &
-         int(storage_size(self%overlap_before)/8, lp)*(size(self%candidates%overlap, kind=lp) + &
-         size(self%overlap_before, kind=lp)) + int(storage_size(self%padded)/8, lp)*size(self%padded, kind=lp)
+      self%work%value(count_bytes) = self%candidates%bytes() + self%grids%bytes() + &
+         int(storage_size(self%padded)/8, lp)*size(self%padded, kind=lp)
    end subroutine survey
 
 end module polydem_verlet

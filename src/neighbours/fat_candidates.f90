@@ -1,0 +1,342 @@
+!> Candidates of fat boxes: a Verlet list in which single boxes can get a new fat box.
+!>
+!> A *fat box* is a box enlarged by a margin h on every side, and further in the direction in which its sides move.
+!> Pairs of boxes whose fat boxes overlap are candidates. `search_all` makes all fat boxes and finds all candidates in
+!> cells (`polydem_cell_grids`); they form rows. `search_single` makes a new fat box for one box, finds its new
+!> candidates in the cells of the last `search_all`, and appends them behind the rows. Boxes with such a fat box are
+!> *moved*; they are kept in a list, since the cells contain their former fat boxes.
+!>
+!> The margin is set where two costs are equal: the searches, and the work that is done on candidates that are separate.
+!> Both are counted, so runs are reproducible. `must_search` asks for a search of all boxes when single searches have
+!> cost as much.
+module polydem_fat_candidates
+   use polydem_box_lines, only: box_lines_t
+   use polydem_boxes, only: boxes_t
+   use polydem_candidate_rows, only: candidate_rows_t
+   use polydem_candidates, only: index_list_t, overlapping
+   use polydem_cell_grids, only: cell_grids_t, part
+   use polydem_kinds, only: bp, dp, ip, lp, wp, min_parallel_size
+   use polydem_pair_changes, only: pair_changes_t
+   use polydem_size_levels, only: choose_levels, typical_side
+   implicit none
+   private
+   public :: fat_candidates_t
+
+   !> Costs in units of a comparison of two boxes (measured): a search for all boxes, per box and per candidate; a
+   !> search for a single box
+   real(dp), parameter :: box_cost = 25.0_dp, candidate_cost = 14.0_dp, single_cost = 300.0_dp
+   !> Initial value, lower and upper bound of the margin in units of the typical side of a box
+   real(wp), parameter :: first_margin = 0.2_wp, least_margin = 2.0_wp**(-10), greatest_margin = 1.0_wp
+   !> Largest extension of a fat box in the direction of motion, in units of the margin
+   real(wp), parameter :: most_stretch = 4.0_wp
+
+   !> Rows of the last search for all boxes, and behind them the candidates of single searches
+   type, extends(candidate_rows_t) :: fat_candidates_t
+      !> Fat boxes, (4, box) [m]
+      real(wp), allocatable :: fat(:, :)
+      !> Grids of the fat boxes of the last search for all boxes
+      type(cell_grids_t) :: grids
+      !> Typical side of a box [m]
+      real(wp) :: side = 0.0_wp
+      !> Number of steps since the last search for all boxes, and between the last two
+      integer(lp) :: age = 0_lp, life = 0_lp
+      !> Work on separate candidates since the last search for all boxes [comparisons]
+      real(dp) :: surplus = 0.0_dp
+      !> Cost of single searches since then [comparisons]
+      real(dp), private :: singles = 0.0_dp
+      !> Margin of the fat boxes [m]
+      real(wp), private :: margin = 0.0_wp
+      !> Number of candidates in the rows
+      integer(ip), private :: n_listed = 0_ip
+      !> First link of each box, (box), 0: none. The link 2(k - 1) + s is box s of candidate k. Boxes are linked to the
+      !> candidates in which they are the higher box, and to those behind the rows
+      integer(ip), allocatable, private :: first_link(:)
+      !> Next link of the same box, (2, candidate), 0: none
+      integer(ip), allocatable, private :: next_link(:, :)
+      !> Boxes that moved
+      type(index_list_t), private :: moved
+      !> 1 if a box is in `moved`, else 0, (box)
+      integer(bp), allocatable, private :: is_moved(:)
+      !> Number of the single search that last met a box, (box)
+      integer(ip), allocatable, private :: met_by(:)
+      !> Number of single searches
+      integer(ip), private :: n_single = 0_ip
+      !> Boxes that a single search found, and the candidates that its box had
+      type(index_list_t), private :: near, known
+   contains
+      procedure :: prepare
+      procedure :: must_search
+      procedure :: search_all
+      procedure :: search_single
+      procedure :: candidates_of
+      procedure :: bytes => bytes_of_all
+   end type fat_candidates_t
+
+contains
+
+   !> Choose margin and grids, and make an empty list.
+   subroutine prepare(self, boxes)
+      class(fat_candidates_t), intent(inout) :: self
+      !> Boxes of the first step
+      type(boxes_t), intent(in) :: boxes
+      integer(ip), allocatable :: level(:)
+      real(dp), allocatable :: largest(:)
+      integer :: n_levels
+
+      self%side = typical_side(boxes)
+      self%margin = first_margin*self%side
+      call choose_levels(boxes, 2.0_wp*self%margin, n_levels, level, largest)
+      call self%grids%set_levels(n_levels, level, boxes%fixed(1:boxes%n))
+      call self%start(boxes%n)
+      allocate (self%fat(4, boxes%n), source=0.0_wp)
+      allocate (self%first_link(boxes%n), self%met_by(boxes%n), source=0_ip)
+      allocate (self%is_moved(boxes%n), source=0_bp)
+      allocate (self%next_link(2, 0))
+   end subroutine prepare
+
+   !> Whether single searches cost as much as a search for all boxes, or the margin is much too wide
+   pure logical function must_search(self, n_strays)
+      class(fat_candidates_t), intent(in) :: self
+      !> Number of boxes that need a single search now
+      integer(ip), intent(in) :: n_strays
+      real(dp) :: all
+
+      all = box_cost*real(size(self%is_moved), dp) + candidate_cost*real(self%n, dp)
+      must_search = self%singles + real(n_strays, dp)* &
+         (single_cost + real(self%moved%n, dp) + 0.5_dp*real(n_strays, dp)) > all .or. &
+         (self%surplus > 4.0_dp*all .and. self%margin > least_margin*self%side)
+   end function must_search
+
+   !> Set the margin, make all fat boxes, and search for all candidates.
+   subroutine search_all(self, boxes, lines, n_wanted, changes)
+      class(fat_candidates_t), intent(inout) :: self
+      !> Boxes of this step
+      type(boxes_t), intent(in) :: boxes
+      !> Lines of the boxes in this step
+      class(box_lines_t), intent(in) :: lines
+      !> Number of candidates that overlap or may overlap soon
+      integer(ip), intent(in) :: n_wanted
+      !> Changes of each thread; pairs that overlapped and are no longer candidates are appended, (thread)
+      type(pair_changes_t), intent(inout) :: changes(:)
+      type(index_list_t) :: extras
+      integer(ip) :: low, high, k
+      integer :: w
+
+      call adapt_margin(self, boxes%n, n_wanted)
+      call reset(self)
+      do k = self%n_listed + 1_ip, self%n
+         if (self%overlap(k) == 0_bp) cycle
+         call extras%push(self%box(1, k))
+         call extras%push(self%box(2, k))
+      end do
+      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes, lines, changes) private(w, low, high)
+      do w = 1, size(changes)
+         call part(1_ip, boxes%n, size(changes), w, low, high)
+         call fatten(self, low, high, boxes%bounds, lines)
+      end do
+      !$omp end parallel do
+      call self%grids%build(boxes%n, self%fat)
+      call self%grids%search(boxes)
+      call self%replace(self%grids%found, boxes, changes)
+      self%n_listed = self%n
+      do k = 1_ip, extras%n, 2_ip
+         call carry_extra(self, extras%at(k), extras%at(k + 1_ip), boxes%body, changes(1))
+      end do
+      call link_rows(self)
+   end subroutine search_all
+
+   !> Set the margin from the costs of the last list. The first list was made without velocities, so its life says
+   !> nothing.
+   pure subroutine adapt_margin(self, n_boxes, n_wanted)
+      type(fat_candidates_t), intent(inout) :: self
+      integer(ip), intent(in) :: n_boxes, n_wanted
+      real(dp) :: searches, factor
+
+      if (self%life == 0_lp) return
+      searches = box_cost*real(n_boxes, dp) + candidate_cost*real(n_wanted, dp) + self%singles
+      factor = sqrt(searches/max(self%surplus, 1.0_dp))
+      self%margin = self%margin*real(min(max(factor, 0.5_dp), 2.0_dp), wp)
+      self%margin = min(max(self%margin, least_margin*self%side), greatest_margin*self%side)
+   end subroutine adapt_margin
+
+   !> Begin the counts of a new list; no box has moved.
+   pure subroutine reset(self)
+      type(fat_candidates_t), intent(inout) :: self
+      integer(ip) :: k
+
+      self%life = self%age
+      self%age = 0_lp
+      self%singles = 0.0_dp
+      self%surplus = 0.0_dp
+      do k = 1_ip, self%moved%n
+         self%is_moved(self%moved%at(k)) = 0_bp
+      end do
+      self%moved%n = 0_ip
+   end subroutine reset
+
+   !> Copy the state of an overlapping pair that was behind the former rows.
+   pure subroutine carry_extra(self, lower, higher, body, changes)
+      type(fat_candidates_t), intent(inout) :: self
+      integer(ip), intent(in) :: lower, higher
+      integer(ip), intent(in) :: body(:)
+      type(pair_changes_t), intent(inout) :: changes
+      integer(ip) :: k
+
+      k = self%place_of(lower, higher)
+      if (k > 0_ip) then
+         self%overlap(k) = 1_bp
+      else
+         call changes%record(body(lower), body(higher), -1_ip)
+      end if
+   end subroutine carry_extra
+
+   !> Make the fat boxes low to high.
+   pure subroutine fatten(self, low, high, bounds, lines)
+      type(fat_candidates_t), intent(inout) :: self
+      integer(ip), intent(in) :: low, high
+      real(wp), intent(in), contiguous :: bounds(:, :)
+      class(box_lines_t), intent(in) :: lines
+      real(wp) :: reach(4), steps, most
+      integer(ip) :: i
+
+      steps = real(max(int(lines%length, lp), min(self%life, 1000_lp)), wp)
+      most = most_stretch*self%margin
+      do i = low, high
+         reach = lines%reaches(i, steps)
+         self%fat(1:2, i) = bounds(1:2, i) - (self%margin + min(most, max(0.0_wp, max(-reach(1:2), -reach(3:4)))))
+         self%fat(3:4, i) = bounds(3:4, i) + (self%margin + min(most, max(0.0_wp, max(reach(1:2), reach(3:4)))))
+      end do
+   end subroutine fatten
+
+   !> Link each box to the rows in which it is the higher box.
+   pure subroutine link_rows(self)
+      type(fat_candidates_t), intent(inout) :: self
+      integer(ip) :: k, j
+
+      call reserve_links(self, self%n)
+      self%first_link = 0_ip
+      do k = 1_ip, self%n
+         j = self%box(2, k)
+         self%next_link(2, k) = self%first_link(j)
+         self%first_link(j) = 2_ip*k
+      end do
+   end subroutine link_rows
+
+   !> Make room for the links of n candidates.
+   pure subroutine reserve_links(self, n)
+      type(fat_candidates_t), intent(inout) :: self
+      integer(ip), intent(in) :: n
+      integer(ip), allocatable :: longer(:, :)
+
+      if (size(self%next_link, 2) >= n) return
+      allocate (longer(2, n + n/4_ip + 64_ip))
+      longer(:, 1:size(self%next_link, 2)) = self%next_link
+      call move_alloc(longer, self%next_link)
+   end subroutine reserve_links
+
+   !> Give a box a new fat box, and append its new candidates.
+   subroutine search_single(self, i, boxes, lines, changes)
+      class(fat_candidates_t), intent(inout) :: self
+      !> Box
+      integer(ip), intent(in) :: i
+      !> Boxes of this step
+      type(boxes_t), intent(in) :: boxes
+      !> Lines of the boxes in this step
+      class(box_lines_t), intent(in) :: lines
+      !> New candidates that overlap are appended
+      type(pair_changes_t), intent(inout) :: changes
+      integer(ip) :: k, j
+
+      call fatten(self, i, i, boxes%bounds, lines)
+      self%singles = self%singles + single_cost + real(self%moved%n, dp)
+      self%near%n = 0_ip
+      call self%grids%search_window(self%fat(:, i), self%near)
+      call meet_candidates(self, i)
+      do k = 1_ip, self%near%n
+         j = self%near%at(k)
+         if (self%is_moved(j) == 0_bp) call add_candidate(self, i, j, boxes, changes)
+      end do
+      do k = 1_ip, self%moved%n
+         j = self%moved%at(k)
+         if (overlapping(self%fat(:, i), self%fat(:, j))) call add_candidate(self, i, j, boxes, changes)
+      end do
+      if (self%is_moved(i) /= 0_bp) return
+      self%is_moved(i) = 1_bp
+      call self%moved%push(i)
+   end subroutine search_single
+
+   !> Mark a box and the boxes of its candidates as met.
+   subroutine meet_candidates(self, i)
+      type(fat_candidates_t), intent(inout) :: self
+      integer(ip), intent(in) :: i
+      integer(ip) :: k
+
+      if (self%n_single == huge(1_ip)) then
+         self%met_by = 0_ip
+         self%n_single = 0_ip
+      end if
+      self%n_single = self%n_single + 1_ip
+      self%met_by(i) = self%n_single
+      call self%candidates_of(i, self%known)
+      do k = 1_ip, self%known%n
+         self%met_by(self%box(:, self%known%at(k))) = self%n_single
+      end do
+   end subroutine meet_candidates
+
+   !> List the candidates of a box.
+   pure subroutine candidates_of(self, i, list)
+      class(fat_candidates_t), intent(in) :: self
+      !> Box
+      integer(ip), intent(in) :: i
+      !> Numbers of its candidates
+      type(index_list_t), intent(inout) :: list
+      integer(ip) :: ends(2), link, k
+
+      list%n = 0_ip
+      ends = self%row(i)
+      do k = ends(1), ends(2)
+         call list%push(k)
+      end do
+      link = self%first_link(i)
+      do while (link /= 0_ip)
+         k = shiftr(link + 1_ip, 1)
+         call list%push(k)
+         link = self%next_link(2_ip - iand(link, 1_ip), k)
+      end do
+   end subroutine candidates_of
+
+   !> Append a candidate, unless it is one already or no pair is possible.
+   subroutine add_candidate(self, i, j, boxes, changes)
+      type(fat_candidates_t), intent(inout) :: self
+      integer(ip), intent(in) :: i, j
+      type(boxes_t), intent(in) :: boxes
+      type(pair_changes_t), intent(inout) :: changes
+      integer(ip) :: k, s
+      logical :: overlap
+
+      if (self%met_by(j) == self%n_single) return
+      if (boxes%body(i) == boxes%body(j) .or. (boxes%passive(i) .and. boxes%passive(j))) return
+      overlap = overlapping(boxes%bounds(:, i), boxes%bounds(:, j))
+      if (overlap) call changes%record(boxes%body(i), boxes%body(j), 1_ip)
+      call self%append(min(i, j), max(i, j), overlap)
+      k = self%n
+      call reserve_links(self, k)
+      do s = 1_ip, 2_ip
+         self%next_link(s, k) = self%first_link(self%box(s, k))
+         self%first_link(self%box(s, k)) = 2_ip*(k - 1_ip) + s
+      end do
+   end subroutine add_candidate
+
+   !> Allocated memory [B]
+   pure integer(lp) function bytes_of_all(self) result(bytes)
+      class(fat_candidates_t), intent(in) :: self
+
+      bytes = 0_lp
+      if (.not. allocated(self%fat)) return
+      bytes = self%candidate_rows_t%bytes() + self%grids%bytes() + size(self%is_moved, kind=lp) + &
+         (int(storage_size(self%fat), lp)*size(self%fat, kind=lp) + int(storage_size(self%first_link), lp)* &
+          (2_lp*size(self%first_link, kind=lp) + size(self%next_link, kind=lp)))/8_lp
+   end function bytes_of_all
+
+end module polydem_fat_candidates
