@@ -5,7 +5,7 @@ module polydem_namelist_entry
    public :: entry_t, required, group_length, key_length, allowed_length, bench_group
 
    !> Lengths of the character components of a row
-   integer, parameter :: group_length = 13, key_length = 24, allowed_length = 200
+   integer, parameter :: group_length = 13, key_length = 24, allowed_length = 300
 
    !> One row of the table
    type :: entry_t

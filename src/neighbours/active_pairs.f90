@@ -18,6 +18,8 @@ module polydem_active_pairs
    contains
       procedure :: reserve
       procedure :: append
+      procedure :: remove
+      procedure :: write_back
    end type active_pairs_t
 
 contains
@@ -60,5 +62,29 @@ contains
       self%overlap(self%n) = candidates%overlap(k)
       self%owner(self%n) = k
    end subroutine append
+
+   !> Remove a candidate; the last one takes its place.
+   pure subroutine remove(self, p)
+      class(active_pairs_t), intent(inout) :: self
+      !> Place of the candidate
+      integer(ip), intent(in) :: p
+
+      self%box(:, p) = self%box(:, self%n)
+      self%overlap(p) = self%overlap(self%n)
+      self%owner(p) = self%owner(self%n)
+      self%n = self%n - 1_ip
+   end subroutine remove
+
+   !> Copy the states to the list of all candidates.
+   pure subroutine write_back(self, candidates)
+      class(active_pairs_t), intent(in) :: self
+      !> All candidates
+      class(candidates_t), intent(inout) :: candidates
+      integer(ip) :: k
+
+      do k = 1_ip, self%n
+         candidates%overlap(self%owner(k)) = self%overlap(k)
+      end do
+   end subroutine write_back
 
 end module polydem_active_pairs

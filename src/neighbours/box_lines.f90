@@ -35,6 +35,7 @@ module polydem_box_lines
       !> Step of the interval at which the lines of each box were drawn, (box)
       integer(ip), allocatable :: drawn(:)
    contains
+      procedure :: gap_margin
       procedure :: draw_lines
       procedure :: redraw
       procedure :: reaches
@@ -44,6 +45,13 @@ module polydem_box_lines
    end type box_lines_t
 
 contains
+
+   !> Margin of the gaps between two boxes [m]; its excess over two tolerances covers rounding
+   pure real(wp) function gap_margin(self)
+      class(box_lines_t), intent(in) :: self
+
+      gap_margin = (2.0_wp + 2.0_wp**(-5))*self%tolerance
+   end function gap_margin
 
    !> Draw new lines through the present boxes low to high. The deviations from the old lines correct the velocities.
    pure subroutine draw_lines(self, low, high, n_boxes, bounds)
@@ -208,6 +216,7 @@ contains
       do from = low, high, box_block
          to = min(from + box_block - 1_ip, high)
          most = 0.0_wp
+         !GCC$ unroll 4
          do i = from, to
             most = max(most, abs(bounds(:, i) - (line(1:4, i) + line(5:8, i)*step)))
          end do

@@ -31,7 +31,9 @@ module polydem_candidates
       procedure :: start
       procedure :: add
       procedure :: compare
+      procedure :: drop
       procedure :: remove_separated
+      procedure :: candidates_of
       procedure :: bytes
    end type candidates_t
 
@@ -158,12 +160,29 @@ contains
             if (next /= 0_ip) then
                if (place(next) == self%n) next = 2_ip*(moved - 1_ip) + side(next)
             end if
-            call drop(self, moved)
+            call self%drop(moved)
             n_dropped = n_dropped + 1_ip
          end if
          link = next
       end do
    end subroutine remove_separated
+
+   !> List the candidates of a box.
+   pure subroutine candidates_of(self, i, list)
+      class(candidates_t), intent(in) :: self
+      !> Box
+      integer(ip), intent(in) :: i
+      !> Numbers of its candidates
+      type(index_list_t), intent(inout) :: list
+      integer(ip) :: link
+
+      list%n = 0_ip
+      link = self%first(i)
+      do while (link /= 0_ip)
+         call list%push(place(link))
+         link = self%next(side(link), place(link))
+      end do
+   end subroutine candidates_of
 
    !> Allocated memory [B]
    pure integer(lp) function bytes(self)
@@ -177,7 +196,8 @@ contains
 
    !> Remove one candidate; the last candidate is moved to its place.
    pure subroutine drop(self, k)
-      type(candidates_t), intent(inout) :: self
+      class(candidates_t), intent(inout) :: self
+      !> Number of the candidate
       integer(ip), intent(in) :: k
       integer(ip) :: s
 
@@ -199,7 +219,7 @@ contains
    !> Set the pointers of two neighbours in the linked list of a box to a link between them, or to each other if the
    !> link is 0.
    pure subroutine point_at(self, box, previous, next, link)
-      type(candidates_t), intent(inout) :: self
+      class(candidates_t), intent(inout) :: self
       integer(ip), intent(in) :: box, previous, next, link
 
       if (previous == 0_ip) then

@@ -1,5 +1,5 @@
-!> Boxes in the order of cells: copies of their bounds, one array for each bound, so that the boxes of neighbouring cells
-!> of a row are adjacent in memory.
+!> Boxes in the order of cells: copies of their bounds, one array for each bound. Boxes of neighbouring cells of a row
+!> are adjacent in memory.
 module polydem_cell_order
    use polydem_kinds, only: ip, lp, wp
    implicit none

@@ -23,8 +23,8 @@ module polydem_fat_candidates
    public :: fat_candidates_t
 
    !> Costs in units of a comparison of two boxes (measured): a search for all boxes, per box and per candidate; a
-   !> search for a single box
-   real(dp), parameter :: box_cost = 25.0_dp, candidate_cost = 14.0_dp, single_cost = 300.0_dp
+   !> search for a single box without its comparisons
+   real(dp), parameter :: box_cost = 25.0_dp, candidate_cost = 14.0_dp, single_cost = 200.0_dp
    !> Initial value, lower and upper bound of the margin in units of the typical side of a box
    real(wp), parameter :: first_margin = 0.2_wp, least_margin = 2.0_wp**(-10), greatest_margin = 1.0_wp
    !> Largest extension of a fat box in the direction of motion, in units of the margin
@@ -46,6 +46,8 @@ module polydem_fat_candidates
       real(dp), private :: singles = 0.0_dp
       !> Margin of the fat boxes [m]
       real(wp), private :: margin = 0.0_wp
+      !> Number of fixed boxes; every single search compares all of them
+      integer(ip), private :: n_fixed = 0_ip
       !> Number of candidates in the rows
       integer(ip), private :: n_listed = 0_ip
       !> First link of each box, (box), 0: none. The link 2(k - 1) + s is box s of candidate k. Boxes are linked to the
@@ -87,6 +89,7 @@ contains
       self%margin = first_margin*self%side
       call choose_levels(boxes, 2.0_wp*self%margin, n_levels, level, largest)
       call self%grids%set_levels(n_levels, level, boxes%fixed(1:boxes%n))
+      self%n_fixed = count(boxes%fixed(1:boxes%n), kind=ip)
       call self%start(boxes%n)
       allocate (self%fat(4, boxes%n), source=0.0_wp)
       allocate (self%first_link(boxes%n), self%met_by(boxes%n), source=0_ip)
@@ -103,7 +106,7 @@ contains
 
       all = box_cost*real(size(self%is_moved), dp) + candidate_cost*real(self%n, dp)
       must_search = self%singles + real(n_strays, dp)* &
-         (single_cost + real(self%moved%n, dp) + 0.5_dp*real(n_strays, dp)) > all .or. &
+         (single_cost + real(self%n_fixed + self%moved%n, dp) + 0.5_dp*real(n_strays, dp)) > all .or. &
          (self%surplus > 4.0_dp*all .and. self%margin > least_margin*self%side)
    end function must_search
 
@@ -246,12 +249,15 @@ contains
       class(box_lines_t), intent(in) :: lines
       !> New candidates that overlap are appended
       type(pair_changes_t), intent(inout) :: changes
+      integer(lp) :: tests
       integer(ip) :: k, j
 
       call fatten(self, i, i, boxes%bounds, lines)
-      self%singles = self%singles + single_cost + real(self%moved%n, dp)
       self%near%n = 0_ip
+      tests = self%grids%total%tests
       call self%grids%search_window(self%fat(:, i), self%near)
+      tests = self%grids%total%tests - tests + int(self%moved%n, lp)
+      self%singles = self%singles + single_cost + real(tests, dp)
       call meet_candidates(self, i)
       do k = 1_ip, self%near%n
          j = self%near%at(k)

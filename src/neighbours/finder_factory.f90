@@ -44,11 +44,13 @@ contains
       case ('partitioned_sweep')
          allocate (partitioned_sweep_t :: finder)
       case ('quadtree')
-         call new_tree(finder, equal_leaves=.false., one_axis=.false.)
+         call new_tree(finder, equal_leaves=.false., one_axis=.false., filtered=.false.)
       case ('pruned_quadtree')
-         call new_tree(finder, equal_leaves=.true., one_axis=.false.)
+         call new_tree(finder, equal_leaves=.true., one_axis=.false., filtered=.false.)
       case ('binary_tree')
-         call new_tree(finder, equal_leaves=.false., one_axis=.true.)
+         call new_tree(finder, equal_leaves=.false., one_axis=.true., filtered=.false.)
+      case ('filtered_quadtree')
+         call new_tree(finder, equal_leaves=.false., one_axis=.false., filtered=.true.)
       case ('linked_cells')
          allocate (linked_cells_t :: finder)
       case ('verlet')
@@ -65,14 +67,15 @@ contains
    end subroutine new_finder
 
    !> Make one of the tree finders, which differ only in their options.
-   subroutine new_tree(finder, equal_leaves, one_axis)
+   subroutine new_tree(finder, equal_leaves, one_axis, filtered)
       class(finder_t), allocatable, intent(out) :: finder
-      logical, intent(in) :: equal_leaves, one_axis
+      logical, intent(in) :: equal_leaves, one_axis, filtered
       type(quadtree_t), allocatable :: tree
 
       allocate (tree)
       tree%equal_leaves = equal_leaves
       tree%one_axis = one_axis
+      tree%filtered = filtered
       call move_alloc(tree, finder)
    end subroutine new_tree
 

@@ -81,7 +81,7 @@ module polydem_line_filter
       procedure :: is_off
       procedure :: review
       procedure :: activate
-      procedure :: write_back
+      procedure :: forget
       procedure :: surplus
       procedure :: count_step
       procedure :: bytes
@@ -160,27 +160,20 @@ contains
    pure subroutine adapt(self, n_candidates)
       type(line_filter_t), intent(inout) :: self
       integer(ip), intent(in) :: n_candidates
-      real(dp) :: steps, intervals, moving, close, off, factor
+      real(dp) :: steps, intervals, moving, touching, off, factor
 
       steps = real(max(self%step, 1_ip), dp)
       intervals = interval_cost(self, n_candidates)/steps
       off = extra_cost(self)/steps
-      close = real(self%active%n_close, dp)
+      touching = real(self%active%n_close, dp)
       moving = real(self%n_first - self%active%n_close, dp)
       factor = sqrt(intervals/max(moving + off, 1.0_dp))
       self%exact_length = min(self%exact_length, max(2.0_dp*steps, first_length))*min(max(factor, 0.5_dp), 2.0_dp)
       self%exact_length = min(max(self%exact_length, least_length), greatest_length)
-      factor = sqrt(max(off, 1.0_dp)/max(close, 1.0_dp))
+      factor = sqrt(max(off, 1.0_dp)/max(touching, 1.0_dp))
       self%tolerance = self%tolerance*real(min(max(factor, 0.75_dp), 4.0_dp), wp)
       self%tolerance = min(max(self%tolerance, least_tolerance*self%side), greatest_tolerance*self%side)
    end subroutine adapt
-
-   !> Margin of gaps [m]; its excess over two tolerances covers rounding
-   pure real(wp) function margin(self)
-      type(line_filter_t), intent(in) :: self
-
-      margin = (2.0_wp + 2.0_wp**(-5))*self%tolerance
-   end function margin
 
    !> Classify a range of candidates at the start of an interval. The present boxes are those of `draw_lines`.
    pure subroutine classify(self, low, high, body, candidates, found, changes)
@@ -196,38 +189,38 @@ contains
       !> Changes of candidates that are not active; appended
       type(pair_changes_t), intent(inout) :: changes
       integer(ip) :: from, to, k, m
-      integer(bp) :: class(pair_block), differ
+      integer(bp) :: kinds(pair_block), differ
 
       found%n = 0_ip
       found%n_close = 0_ip
       found%n_sure = 0_ip
       do from = low, high, pair_block
          to = min(from + pair_block - 1_ip, high)
-         call classify_pairs(to - from + 1_ip, candidates%box(:, from:to), real(self%length, wp), margin(self), &
-                             size(self%line, 2, ip), self%line, class)
+         call classify_pairs(to - from + 1_ip, candidates%box(:, from:to), real(self%length, wp), self%gap_margin(), &
+                             size(self%line, 2, ip), self%line, kinds)
          call found%reserve(found%n + pair_block)
-         found%n_sure = found%n_sure + count(class(1:to - from + 1_ip) == overlapping, kind=ip)
+         found%n_sure = found%n_sure + count(kinds(1:to - from + 1_ip) == overlapping, kind=ip)
          differ = 0_bp
          do k = from, to
-            differ = ior(differ, merge(ieor(class(k - from + 1_ip), candidates%overlap(k)), 0_bp, &
-                                       class(k - from + 1_ip) /= active))
+            differ = ior(differ, merge(ieor(kinds(k - from + 1_ip), candidates%overlap(k)), 0_bp, &
+                                       kinds(k - from + 1_ip) /= active))
          end do
          m = found%n
          do k = from, to
-            if (class(k - from + 1_ip) /= active) cycle
+            if (kinds(k - from + 1_ip) /= active) cycle
             m = m + 1_ip
             found%box(1, m) = candidates%box(1, k)
             found%box(2, m) = candidates%box(2, k)
             found%overlap(m) = candidates%overlap(k)
             found%owner(m) = k
-            if (is_close(self%line(:, found%box(1, m)), self%line(:, found%box(2, m)), margin(self))) &
+            if (is_close(self%line(:, found%box(1, m)), self%line(:, found%box(2, m)), self%gap_margin())) &
                found%n_close = found%n_close + 1_ip
          end do
          found%n = m
          if (differ == 0_bp) cycle
          do k = from, to
-            if (class(k - from + 1_ip) == active .or. class(k - from + 1_ip) == candidates%overlap(k)) cycle
-            candidates%overlap(k) = class(k - from + 1_ip)
+            if (kinds(k - from + 1_ip) == active .or. kinds(k - from + 1_ip) == candidates%overlap(k)) cycle
+            candidates%overlap(k) = kinds(k - from + 1_ip)
             call changes%record(body(candidates%box(1, k)), body(candidates%box(2, k)), &
                                 2_ip*int(candidates%overlap(k), ip) - 1_ip)
          end do
@@ -321,7 +314,7 @@ contains
          if (.not. self%is_off(i)) then
             self%n_reviewed = self%n_reviewed + 1_lp
             if (class_of(self%line(:, candidates%box(1, k)), self%line(:, candidates%box(2, k)), real(self%step, wp), &
-                         real(self%length, wp), margin(self)) == candidates%overlap(k)) cycle
+                         real(self%length, wp), self%gap_margin()) == candidates%overlap(k)) cycle
          end if
          call self%activate(k, candidates)
       end do
@@ -341,6 +334,25 @@ contains
       self%place(k) = self%active%n
    end subroutine activate
 
+   !> Take a candidate out of the active ones before it is removed; the last candidate gets its number.
+   pure subroutine forget(self, k, last)
+      class(line_filter_t), intent(inout) :: self
+      !> Number of the candidate, and of the last candidate
+      integer(ip), intent(in) :: k, last
+      integer(ip) :: p
+
+      call reserve_places(self, last)
+      p = self%place(k)
+      if (p /= 0_ip) then
+         call self%active%remove(p)
+         self%place(self%active%owner(p)) = p
+      end if
+      self%place(k) = self%place(last)
+      if (k == last) self%place(k) = 0_ip
+      if (self%place(k) /= 0_ip) self%active%owner(self%place(k)) = k
+      self%place(last) = 0_ip
+   end subroutine forget
+
    !> Make room for the places of n candidates; new ones are not active.
    pure subroutine reserve_places(self, n)
       type(line_filter_t), intent(inout) :: self
@@ -353,18 +365,6 @@ contains
       call move_alloc(longer, self%place)
    end subroutine reserve_places
 
-   !> Copy the states of the active candidates to the list of all candidates.
-   pure subroutine write_back(self, candidates)
-      class(line_filter_t), intent(in) :: self
-      !> All candidates
-      class(candidates_t), intent(inout) :: candidates
-      integer(ip) :: k
-
-      do k = 1_ip, self%active%n
-         candidates%overlap(self%active%owner(k)) = self%active%overlap(k)
-      end do
-   end subroutine write_back
-
    !> Work in this interval on candidates that were separate when it began [comparisons]
    pure real(dp) function surplus(self)
       class(line_filter_t), intent(in) :: self
@@ -376,7 +376,7 @@ contains
    pure subroutine count_step(self)
       class(line_filter_t), intent(inout) :: self
 
-      self%n_extra = self%n_extra + int(self%active%n - self%n_first, lp)
+      self%n_extra = self%n_extra + max(0_lp, int(self%active%n - self%n_first, lp))
    end subroutine count_step
 
    !> Allocated memory [B]

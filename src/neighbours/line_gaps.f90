@@ -13,7 +13,7 @@ module polydem_line_gaps
 contains
 
    !> Classify candidates from their gaps at the start and at the end of an interval. Both loops are without branches.
-   pure subroutine classify_pairs(n, box, length, margin, n_boxes, line, class)
+   pure subroutine classify_pairs(n, box, length, margin, n_boxes, line, kinds)
       !> Number of candidates, at most `pair_block`
       integer(ip), intent(in) :: n
       !> Boxes of each candidate, (2, n)
@@ -25,7 +25,7 @@ contains
       !> Lines of the boxes, (8, box)
       real(wp), intent(in) :: line(8, n_boxes)
       !> Class of each candidate: `separate`, `overlapping` or `active`
-      integer(bp), intent(out) :: class(pair_block)
+      integer(bp), intent(out) :: kinds(pair_block)
       real(wp) :: left, right, below, above, left_end, right_end, below_end, above_end
       real(wp) :: greatest(pair_block), least(pair_block)
       integer(ip) :: k, i, j
@@ -47,8 +47,8 @@ contains
                         max(min(right, right_end), min(above, above_end)))
       end do
       do k = 1_ip, n
-         class(k) = merge(overlapping, active, greatest(k) < -margin)
-         class(k) = merge(separate, class(k), least(k) > margin)
+         kinds(k) = merge(overlapping, active, greatest(k) < -margin)
+         kinds(k) = merge(separate, kinds(k), least(k) > margin)
       end do
    end subroutine classify_pairs
 

@@ -30,7 +30,8 @@ module polydem_partitioned_sweep
       phase_waiting
    use polydem_kinds, only: dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
-   use polydem_sweep_ends, only: bytes_of, ends_t, add_report, place_ends, refresh_ends, report_t, sort_ends
+   use polydem_sweep_ends, only: bytes_of, ends_t, add_report, place_ends, range_t, refresh_ends, report_t, &
+      sort_ends
    implicit none
    private
    public :: partitioned_sweep_t
@@ -160,8 +161,8 @@ contains
       call limits(p, pass, size(self%part, kind=ip), 2_ip*boxes%n, low, middle, high)
       do a = 1, 2
          if (pass == 1_ip) call refresh_ends(a, low, high, boxes, self%ends(a))
-         call sort_ends(a, low, merge(low, middle, pass == 1_ip) + 1_ip, high, pass > 1_ip, self%work%thorough, boxes, &
-                        self%before, self%ends(a), self%part(p)%report, moved)
+         call sort_ends(range_t(a, low, merge(low, middle, pass == 1_ip) + 1_ip, high, pass > 1_ip), &
+                        self%work%thorough, boxes, self%before, self%ends(a), self%part(p)%report, moved)
          at_border = at_border .or. moved(1) == low .or. moved(2) == high
       end do
       self%part(p)%at_border(iand(pass, 1_ip)) = at_border

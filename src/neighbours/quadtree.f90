@@ -24,8 +24,9 @@
 module polydem_quadtree
    use omp_lib, only: omp_get_max_threads
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t, overlapping, index_list_t
+   use polydem_candidates, only: overlapping, index_list_t
    use polydem_exponential, only: exponential, logarithm
+   use polydem_filtered_candidates, only: filtered_candidates_t
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_leaf_changes, &
       count_left_leaf, count_nodes, count_searches, count_tests, count_visits, phase_filter, phase_search, &
@@ -65,10 +66,12 @@ module polydem_quadtree
       logical :: equal_leaves = .false.
       !> Whether the tree uses only the longer axis of the scene (binary tree); set before the first step
       logical :: one_axis = .false.
+      !> Whether to compare only candidates whose state can change (`polydem_line_filter`); set before the first step
+      logical :: filtered = .false.
       !> Tree of the boxes
       type(tree_t), private :: tree
       !> Candidates
-      type(candidates_t), private :: candidates
+      type(filtered_candidates_t), private :: candidates
       !> Padded cells of the boxes
       type(padded_cells_t), private :: padded
       !> Largest side of each box for which its reach is sufficient, (box) [m]
@@ -139,9 +142,12 @@ contains
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       integer(ip) :: i
-      real(dp) :: reach, origin(2)
+      real(dp) :: reach, least, origin(2)
 
       call self%candidates%start(boxes%n)
+      self%candidates%filtered = self%filtered
+      call measure_reaches(boxes, reach, least)
+      if (self%filtered) call self%candidates%start_filter(boxes%n, 2.0_wp*real(reach, wp))
       allocate (self%padded%before(4, boxes%n), self%greatest_side(boxes%n))
       self%padded%before = spread([1.0_dp, 1.0_dp, -1.0_dp, -1.0_dp]*huge(1.0_dp), 2, boxes%n)
       self%padded%now = self%padded%before
@@ -160,9 +166,25 @@ contains
    !> Side of the finest cells [m]: at most the smallest reach, but not less than a limit set by `most_levels`
    pure real(dp) function finest_cell(boxes)
       type(boxes_t), intent(in) :: boxes
-      real(dp) :: logarithms, least, reach
-      integer(ip) :: i, n
+      real(dp) :: typical, least
       integer :: level
+
+      call measure_reaches(boxes, typical, least)
+      finest_cell = 1.0_dp
+      if (.not. typical > 0.0_dp) return
+      finest_cell = typical_share*typical
+      do level = 1, most_levels
+         if (finest_cell <= least) exit
+         finest_cell = 0.5_dp*finest_cell
+      end do
+   end function finest_cell
+
+   !> Geometric mean and smallest value of the positive reaches [m]; 0 and a large number if there are none
+   pure subroutine measure_reaches(boxes, typical, least)
+      type(boxes_t), intent(in) :: boxes
+      real(dp), intent(out) :: typical, least
+      real(dp) :: logarithms, reach
+      integer(ip) :: i, n
 
       n = 0_ip
       logarithms = 0.0_dp
@@ -174,14 +196,9 @@ contains
          logarithms = logarithms + logarithm(reach)
          least = min(least, reach)
       end do
-      finest_cell = 1.0_dp
-      if (n == 0_ip) return
-      finest_cell = typical_share*exponential(logarithms/real(n, dp))
-      do level = 1, most_levels
-         if (finest_cell <= least) exit
-         finest_cell = 0.5_dp*finest_cell
-      end do
-   end function finest_cell
+      typical = 0.0_dp
+      if (n > 0_ip) typical = exponential(logarithms/real(n, dp))
+   end subroutine measure_reaches
 
    !> Axis along which the scene is shorter: 1 (x) or 2 (y)
    pure integer function shorter_axis(boxes)
@@ -275,6 +292,11 @@ contains
       integer(ip) :: low, high
       integer :: w
 
+      if (self%filtered) then
+         call self%candidates%compare_active(boxes, changes, low)
+         call self%work%add(count_tests, int(low, lp))
+         return
+      end if
       !$omp parallel do if (self%candidates%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, size(self%worker)
@@ -346,7 +368,7 @@ contains
       self%work%value(count_candidates) = int(self%candidates%n, lp)
       self%work%value(count_nodes) = int(self%tree%n_nodes, lp)
       self%work%value(count_depth) = int(self%tree%depth(), lp)
-      self%work%value(count_bytes) = self%tree%bytes() + self%candidates%bytes() + &
+      self%work%value(count_bytes) = self%tree%bytes() + self%candidates%bytes() + self%candidates%filter%bytes() + &
          (int(storage_size(self%padded%now), lp)*2_lp*size(self%padded%now, kind=lp) + &
           int(storage_size(self%greatest_side), lp)*size(self%greatest_side, kind=lp))/8_lp
    end subroutine survey

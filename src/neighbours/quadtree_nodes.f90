@@ -76,7 +76,8 @@ contains
       real(dp), intent(in) :: origin(2)
       real(dp), parameter :: off_border = 0.381966_dp
 
-      call self%reserve(4_ip*n + 64_ip)
+      ! A packing has 1.6 nodes per box; the pool grows by a half if it needs more.
+      call self%reserve(n + n/4_ip + 64_ip)
       allocate (self%leaf(n), self%next(n), self%cell(4, n), self%reach(n))
       allocate (self%changed(n), self%is_changed(n))
       self%leaf = 0_ip

@@ -54,7 +54,7 @@ contains
          self%free = self%node(node)%parent
       else
          if (self%n_touched == size(self%node)) then
-            allocate (longer(2*size(self%node)))
+            allocate (longer(size(self%node) + size(self%node)/2))
             longer(1:self%n_touched) = self%node
             call move_alloc(longer, self%node)
          end if

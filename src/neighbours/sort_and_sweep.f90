@@ -16,7 +16,8 @@ module polydem_sort_and_sweep
    use polydem_finder_statistics, only: count_bytes, phase_filter, phase_structure
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
-   use polydem_sweep_ends, only: bytes_of, ends_t, add_report, place_ends, refresh_ends, report_t, sort_ends
+   use polydem_sweep_ends, only: bytes_of, ends_t, add_report, place_ends, range_t, refresh_ends, report_t, &
+      sort_ends
    implicit none
    private
    public :: sort_and_sweep_t
@@ -51,7 +52,7 @@ contains
       do a = 1, 2
          call self%report(a)%clear()
          call refresh_ends(a, 1_ip, 2_ip*boxes%n, boxes, self%ends(a))
-         call sort_ends(a, 1_ip, 2_ip, 2_ip*boxes%n, .false., self%work%thorough, boxes, self%before, self%ends(a), &
+         call sort_ends(range_t(axis=a, high=2_ip*boxes%n), self%work%thorough, boxes, self%before, self%ends(a), &
                         self%report(a))
       end do
       !$omp end parallel do

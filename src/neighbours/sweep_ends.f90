@@ -23,7 +23,7 @@ module polydem_sweep_ends
    use polydem_sort_reals, only: sort_reals
    implicit none
    private
-   public :: ends_t, report_t, place_ends, refresh_ends, sort_ends, add_report, bytes_of
+   public :: ends_t, range_t, report_t, place_ends, refresh_ends, sort_ends, add_report, bytes_of
 
    !> Ends of all boxes along one axis
    type :: ends_t
@@ -32,6 +32,21 @@ module polydem_sweep_ends
       !> Code of each end, (end): twice the number of the box, plus one for a higher end
       integer(ip), allocatable :: code(:)
    end type ends_t
+
+   !> Range of ends to sort; the ends before `first` must be sorted already
+   type :: range_t
+      !> 1 for x, 2 for y
+      integer :: axis = 1
+      !> First index of the range
+      integer(ip) :: low = 1_ip
+      !> Index of the first end that may move down
+      integer(ip) :: first = 2_ip
+      !> Last index of the range
+      integer(ip) :: high = 0_ip
+      !> Whether the ends from `first` on are sorted too. The sort then stops at the first end that does not move down,
+      !> and the merge of two runs that hardly overlap is cheap
+      logical :: two_runs = .false.
+   end type range_t
 
    !> Changes and counts of the sort of a part of the ends in a step
    type :: report_t
@@ -112,15 +127,10 @@ contains
       end do
    end subroutine gather
 
-   !> Sort the ends low to high by exchanges of neighbours. The ends before `first` must be sorted already.
-   subroutine sort_ends(a, low, first, high, two_runs, thorough, boxes, before, ends, report, moved)
-      !> 1 for x, 2 for y
-      integer, intent(in) :: a
-      !> First index of the range, index of the first end that may move down, last index of the range
-      integer(ip), intent(in) :: low, first, high
-      !> Whether the ends from `first` on are sorted too. The sort then stops at the first end that does not move down,
-      !> and the merge of two runs that hardly overlap is cheap
-      logical, intent(in) :: two_runs
+   !> Sort a range of ends by exchanges of neighbours.
+   subroutine sort_ends(range, thorough, boxes, before, ends, report, moved)
+      !> Range to sort
+      type(range_t), intent(in) :: range
       !> Whether to count idle exchanges
       logical, intent(in) :: thorough
       !> Boxes of this step
@@ -135,37 +145,37 @@ contains
       integer(ip), intent(out), optional :: moved(2)
       integer(ip) :: places(2)
 
-      call insert(a, low, max(first, low + 1_ip), high, two_runs, thorough, boxes, boxes%n, boxes%bounds, before, &
-                  2_ip*boxes%n, ends%value, ends%code, report, places)
+      call insert(range, thorough, boxes, boxes%n, boxes%bounds, before, ends%value, ends%code, report, places)
       if (present(moved)) moved = places
    end subroutine sort_ends
 
    !> Kernel of `sort_ends` on arrays of explicit shape. Counts are local variables of the thread until the end.
-   subroutine insert(a, low, first, high, two_runs, thorough, boxes, n_boxes, now, before, n_ends, value, code, &
-                     report, moved)
-      integer, intent(in) :: a
-      integer(ip), intent(in) :: low, first, high
-      logical, intent(in) :: two_runs, thorough
+   subroutine insert(range, thorough, boxes, n_boxes, now, before, value, code, report, moved)
+      type(range_t), intent(in) :: range
+      logical, intent(in) :: thorough
       type(boxes_t), intent(in) :: boxes
       integer(ip), intent(in) :: n_boxes
       real(wp), intent(in) :: now(4, n_boxes), before(4, n_boxes)
-      integer(ip), intent(in) :: n_ends
-      real(wp), intent(inout) :: value(n_ends)
-      integer(ip), intent(inout) :: code(n_ends)
+      real(wp), intent(inout) :: value(2_ip*n_boxes)
+      integer(ip), intent(inout) :: code(2_ip*n_boxes)
       type(report_t), intent(inout) :: report
       integer(ip), intent(out) :: moved(2)
       real(wp) :: new
-      integer(ip) :: k, place, buffer, other, lowest, highest
+      integer(ip) :: k, place, buffer, other, lowest, highest, low, high
       integer(lp) :: swaps, tests
+      integer :: a
 
       swaps = 0_lp
       tests = 0_lp
       lowest = huge(1_ip)
       highest = 0_ip
-      k = first - 1_ip
+      a = range%axis
+      low = range%low
+      high = range%high
+      k = max(range%first, low + 1_ip) - 1_ip
       do
          k = k + 1_ip
-         if (.not. two_runs) k = next_unsorted(k, high, n_ends, value)
+         if (.not. range%two_runs) k = next_unsorted(k, high, 2_ip*n_boxes, value)
          if (k > high) exit
          new = value(k)
          buffer = code(k)
@@ -185,7 +195,7 @@ contains
             place = place - 1_ip
          end do
          if (place == k) then
-            if (two_runs) exit
+            if (range%two_runs) exit
             cycle
          end if
          value(place) = new

@@ -186,7 +186,7 @@ contains
          longest = int(min(max(shortest, self%list%life/3_lp, self%list%age/2_lp), 1024_lp), ip)
       n_wanted = self%filter%active%n_sure + self%filter%active%n
       self%list%surplus = self%list%surplus + self%filter%surplus()
-      call self%filter%write_back(self%list)
+      call self%filter%active%write_back(self%list)
       call self%filter%begin_interval(self%list%n, longest)
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)

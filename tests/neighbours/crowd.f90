@@ -91,7 +91,7 @@ contains
       type(boxes_t), intent(in) :: boxes
       !> Bounds, (4, box, step)
       real(wp), intent(in) :: frames(:, :, :)
-      character(len=200), allocatable :: finders(:)
+      character(len=300), allocatable :: finders(:)
       integer :: f
 
       wrong_steps = 0_ip
