@@ -10,6 +10,11 @@ import numpy as np
 IGNORED = re.compile(r"\w+/provenance/.*|profile/(profile/.*|status)|steps/steps/(stage|phase)(_name)?|"
                      r"sample/steps/(elapsed|processor|(phase|stage)(_name)?)|"
                      r"sample/case/(trace|load|clock_cost|time_utc)")
+#: Counters that a restart continues
+CONTINUED = {f"counter profile {name}" for name in ("steps", "contacts", "bodies")}
+#: Counters that do not depend on which rank has which body
+OF_THE_WHOLE_RUN = CONTINUED | {f"counter profile {name}" for name in
+                                ("contacts without direction", "pair_contradictions", "processes")}
 #: Data of a trajectory that do not grow from frame to frame
 STANDING = re.compile(r"trajectory/(bodies/.*|walls/id)")
 
@@ -58,7 +63,11 @@ def read_trajectory(folder, names):
 def read_result(folder, names, whole=True, ranks=1):
     """What a run left, by name; not `whole`: only what does not depend on where it was interrupted.
 
-    On several ranks, counters of work and messages depend on which rank has which body; they are left out.
+    On several ranks, counters of boxes, pairs, searches and messages are left out. They depend on which rank has which
+    body, and the two revisions may divide the bodies differently: older ones divide a scene by the work of its bodies,
+    which the root rank has counted; newer ones give all bodies equal work first, and count the pairs that a
+    redistribution ends. Frames, contacts, ledger, walls and state hash depend on no division, so their bits are
+    compared for every number of ranks. One rank divides nothing, so there all counters are compared.
     """
     found = read_trajectory(folder, names)
     if whole:
@@ -73,7 +82,7 @@ def read_result(folder, names, whole=True, ranks=1):
         if path.exists():
             found.update(read_file(path, kind, names))
     if not whole or ranks > 1:
-        kept = ("counter profile steps", "counter profile contacts", "counter profile bodies")
+        kept = OF_THE_WHOLE_RUN if whole else CONTINUED
         found = {name: value for name, value in found.items() if not name.startswith("counter") or name in kept}
     return found
 
