@@ -122,7 +122,8 @@ contains
          + self%damping*sqrt(element%tangential_mass*self%stiffness)
    end subroutine stiffen
 
-   !> Velocity of the first body relative to the second at the force point, along (-direction_y, direction_x) [m/s]
+   !> Find the velocity of the first body relative to the second at the force point, along (-direction_y, direction_x)
+   !> [m/s].
    pure subroutine find_slip(block, slip)
       type(contact_block_t), intent(in) :: block
       real(wp), intent(inout) :: slip(block_size)
@@ -138,8 +139,8 @@ contains
       end do
    end subroutine find_slip
 
-   !> Subtract half of the change of the slip velocity in a step. The centripetal acceleration of the arms does not extend
-   !> the spring and is left out.
+   !> Subtract half of the change of the slip velocity in a step. The centripetal acceleration of the arms does not
+   !> extend the spring and is left out.
    pure subroutine move_to_midstep(bodies, dt, block, slip)
       !> Bodies, for their accelerations
       type(bodies_t), intent(in) :: bodies
