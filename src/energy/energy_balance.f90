@@ -181,8 +181,8 @@ contains
          balance%wall_work = on_walls(1)
          balance%impulse = on_walls(2:3) + mass_time*gravity
          balance%angular_impulse = on_walls(4) + torques(1)
-         call find_residuals(sums, on_walls(5) + mass_time*(abs(gravity(1)) + abs(gravity(2))), on_walls(6) + torques(2), &
-                             balance)
+         call find_residuals(sums, on_walls(5) + mass_time*(abs(gravity(1)) + abs(gravity(2))), &
+                             on_walls(6) + torques(2), balance)
       end associate
    end subroutine evaluate_balance
 

@@ -123,14 +123,14 @@ contains
       end associate
    end subroutine list_overlaps
 
-   !> Remark if the requested duration is not an integer of steps; else empty
+   !> Remark if the requested duration is not a whole number of steps; else empty
    function rounding_text(duration, wanted) result(text)
       real(wp), intent(in) :: duration, wanted
       character(len=:), allocatable :: text
 
       text = ''
       if (abs(duration - wanted) > 1.0e-6_wp*wanted) text = ' (requested: '//to_text(wanted)// &
-                                                            ' s, not an integer of steps)'
+                                                            ' s, not a whole number of steps)'
    end function rounding_text
 
    !> ', gravity' if there is gravity; else empty

@@ -67,7 +67,7 @@ contains
       end do
       call table%note_error(error)
       call table%expect_relative('elastic: greatest depth [m]', 2.0_wp*speed/frequency, deepest, 1.0e-4_wp)
-      ! The duration is an integer of steps of 0.002/w0.
+      ! The duration is a whole number of steps of 0.002/w0.
       call table%expect_relative('elastic: duration [s]', pi/frequency, touched, 1.5e-3_wp)
       call table%expect_relative('elastic: restitution', 1.0_wp, separation_speed(simulation)/(2.0_wp*speed), 1.0e-4_wp)
    end subroutine collide_elastically
