@@ -54,6 +54,7 @@ contains
       self%stiffness = settings%tangential_stiffness*settings%stiffness
       self%damping = settings%tangential_damping
       self%midstep = settings%midstep_slip
+      self%needs_accelerations = self%midstep
    end subroutine configure
 
    !> Contact history of this part: the spring force

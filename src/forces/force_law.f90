@@ -47,6 +47,8 @@ module polydem_force_law
       logical :: needs_cohesion = .false.
       !> Whether a part adds to the column `twist`
       logical :: needs_twist = .false.
+      !> Whether a part needs the accelerations of the last step
+      logical :: needs_accelerations = .false.
       !> Whether the energy of all elastic forces is half of elastic area/length
       logical :: energy_is_quadratic = .false.
       !> Names of the parts, for `polydem check` and the log
@@ -99,9 +101,11 @@ contains
          end if
          if (s%damping == 'hunt_crossley') call law%add(hunt_crossley_t(name='Hunt-Crossley damping'), s)
          if (s%damping == 'matuttis_chen') call law%add(matuttis_chen_damping_t(name='Matuttis-Chen damping'), s)
-         if (s%damping_from_touch) call law%add(damping_onset_t(name='from first touch', stage=stage_on_damping), s)
+         if (s%damping == 'rate' .and. s%damping_from_touch) &
+            call law%add(damping_onset_t(name='from first touch', stage=stage_on_damping), s)
          if (s%tilt_damping > 0.0_wp) call law%add(tilt_damping_t(name='damping of tilts'), s)
-         if (s%friction == 'cundall_strack') call law%add(cundall_strack_t(name='Cundall-Strack friction'), s)
+         if (s%friction == 'cundall_strack' .and. s%friction_coefficient > 0.0_wp) &
+            call law%add(cundall_strack_t(name='Cundall-Strack friction'), s)
          if (s%friction == 'exact') call law%add(exact_friction_t(name='exact friction'), s)
       end associate
       call law%collect_needs()
@@ -163,6 +167,7 @@ contains
             law%needs_effective_area = law%needs_effective_area .or. part%needs_effective_area
             law%needs_cohesion = law%needs_cohesion .or. part%needs_cohesion
             law%needs_twist = law%needs_twist .or. part%needs_twist
+            law%needs_accelerations = law%needs_accelerations .or. part%needs_accelerations
             law%energy_is_quadratic = law%energy_is_quadratic .or. part%energy_is_quadratic
             part%first_column = size(law%history_kinds) + 1
             law%history_kinds = [law%history_kinds, part%history_kinds()]

@@ -38,6 +38,8 @@ module polydem_force_part
       logical :: needs_cohesion = .false.
       !> Whether it adds to the column `twist`
       logical :: needs_twist = .false.
+      !> Whether it needs the accelerations of the last step
+      logical :: needs_accelerations = .false.
       !> Whether the energy of its elastic force is half of elastic area/length
       logical :: energy_is_quadratic = .false.
       !> Whether it dissipates energy in every normal impact

@@ -191,7 +191,7 @@ contains
       call self%integrator%start(self%bodies)
       call serialize_columns(buffer, self)
       call new_halo(self%domain%halo, counts, slots(sent), counts_received, slots(n + 1_ip:), &
-                      self%settings%forces%midstep_slip)
+                      self%law%needs_accelerations)
       n_halo = int(self%bodies%n - n, lp)
       call self%comm%all_reduce_sum(n_halo)
       self%domain%halo_share = real(n_halo(1), wp)/real(self%bodies%n_all, wp)

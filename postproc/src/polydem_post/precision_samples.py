@@ -37,7 +37,7 @@ NUMERICS = {
 }
 
 #: Damping or friction -> entry that makes its integration one of second order
-SECOND_ORDER = {"rate": "forces.damping_from_touch=.true.", "cundall_strack": "forces.midstep_slip=.true."}
+SECOND_ORDER = {"rate": "forces.damping_from_touch", "cundall_strack": "forces.midstep_slip"}
 
 #: Precisions that are compared, and the one that the references have
 PRECISIONS, REFERENCE = ("double", "single"), "quadruple"
@@ -268,15 +268,16 @@ def references_of(scene: Scene) -> list[Choice]:
     ]
 
 
-def second_order_entries(model: Model) -> list[str]:
-    """Entries that integrate damping and friction of a model with second order, where they are not so anyway."""
-    return [SECOND_ORDER[part] for part in (model.damping, model.friction) if part in SECOND_ORDER]
+def second_order_entries(model: Model, second: bool = True) -> list[str]:
+    """Entries that integrate damping and friction of a model with second or first order, where both are possible."""
+    value = ".true." if second else ".false."
+    return [f"{SECOND_ORDER[part]}={value}" for part in (model.damping, model.friction) if part in SECOND_ORDER]
 
 
 def numerics_overrides(numerics: str, model: Model) -> list[str]:
     """Entries for --set."""
     scheme, second = NUMERICS[numerics]
-    return [f"integrate.scheme={scheme}", *(second_order_entries(model) if second else [])]
+    return [f"integrate.scheme={scheme}", *second_order_entries(model, second)]
 
 
 def numerics_of(model: Model) -> list[str]:
