@@ -17,6 +17,7 @@ PAGES = [
     "postproc/verdicts/precision/README.md",
     "postproc/verdicts/scale/README.md",
     "postproc/verdicts/tables/revision.txt",
+    "tests/equality/bits.md",
     "tests/ranks/equality.md",
     "tests/verification/README.md",
     "tests/verification/results.md",

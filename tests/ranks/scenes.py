@@ -8,7 +8,7 @@ SCENES = {
    name = 'drum' bodies = 300 speed = 1.0
    motion = 'rotation' motion_rate = 2.0
 /
-&forces gravity = 0, -80 stiffness = 2e5 /
+&forces gravity = 0, -80 stiffness = 2e5 midstep_slip = .false. /
 &integrate duration = 0.03 /
 """,
     # Grains that fly about between walls that shake; most change their region several times.
