@@ -37,12 +37,18 @@ N_FRAMES = 10
 
 #: Coefficients of order one for each damping
 COEFFICIENTS = {"rate": "0.1", "hunt_crossley": "5", "book": "0.1", "none": None}
+#: Entries that make contacts second order: a condition, and their value where a case does not say another. Their
+#: default differs between revisions.
+SECOND_ORDER = {"forces.damping_from_touch": (("forces.damping", "rate"), ".true."),
+                "forces.midstep_slip": (("forces.friction", "cundall_strack"), ".true.")}
+FIRST_ORDER = dict.fromkeys(SECOND_ORDER, ".false.")
 #: Switches of models beside law, damping, friction and scheme
 SWITCHES = {
-    "touch": {"forces.damping_from_touch": ".true."},
+    "first_order": FIRST_ORDER,
+    "touch": {**FIRST_ORDER, "forces.damping_from_touch": ".true."},
     "restitution": {"forces.restitution": "0.5"},
     "tilt": {"forces.tilt_damping": "0.5"},
-    "midstep": {"forces.midstep_slip": ".true."},
+    "midstep": {**FIRST_ORDER, "forces.midstep_slip": ".true."},
     "compensated": {"integrate.accumulation": "compensated"},
     "all": {"forces.damping_from_touch": ".true.", "forces.tilt_damping": "0.5", "forces.midstep_slip": ".true."},
 }
@@ -154,7 +160,8 @@ def choices(entries, name):
 def generated(name, settings, **others):
     """A case without a namelist file, with frames."""
     interval = float(settings["integrate.duration"]) / N_FRAMES
-    settings = {**OUTPUT, "output.frame_interval": f"{interval:.6g}", **settings}
+    order = {name: value for name, ((key, word), value) in SECOND_ORDER.items() if settings.get(key, word) == word}
+    settings = {**OUTPUT, "output.frame_interval": f"{interval:.6g}", **order, **settings}
     # How work that was timed is shared differs from run to run, and with it the counters of ranks.
     whole = settings["exchange.balance"] != "measured"
     return Case(name, {key: value for key, value in settings.items() if value is not None}, whole=whole, **others)

@@ -26,13 +26,13 @@ SCENES = {
     # Long oblique walls, and an integrator that remembers and moves bodies twice a step.
     "hopper": """\
 &scene name = 'hopper' bodies = 150 opening = 0.04 slope = 60 speed = 1.0 /
-&forces gravity = 0, -80 stiffness = 1e5 midstep_slip = .true. /
+&forces gravity = 0, -80 stiffness = 1e5 damping_from_touch = .false. midstep_slip = .true. /
 &integrate scheme = 'gear' duration = 0.012 /
 """,
     # Grains of sizes 1 to 10, of which the large ones reach over several regions; sums with their remainders.
     "bed": """\
 &scene name = 'bed' bodies = 200 size_ratio = 10 speed = 2.0 /
-&forces gravity = 0, -80 stiffness = 2e5 damping_from_touch = .true. damping_coefficient = 0.2 /
+&forces gravity = 0, -80 stiffness = 2e5 damping_from_touch = .true. damping_coefficient = 0.2 midstep_slip = .false. /
 &integrate accumulation = 'compensated' fraction = 0.2 duration = 0.02 /
 """,
     # At rest: nothing goes over a border unless the border moves.
