@@ -49,12 +49,13 @@ def test_the_result_has_the_same_bits(combination, expected, outcomes, tmp_path)
         outcome.migrations.append(count(output, "migrations"))
 
 
-@pytest.mark.parametrize("scene, row_bytes", [("drum", 48), ("hopper", 72)])
-def test_what_ranks_tell_each_other_is_counted(scene, row_bytes, tmp_path):
+@pytest.mark.parametrize("scene, midstep, row_bytes", [("drum", ".false.", 48), ("hopper", ".true.", 72)])
+def test_what_ranks_tell_each_other_is_counted(scene, midstep, row_bytes, tmp_path):
     ranks = 3
     write_scene(tmp_path / "scene.nml", scene)
     # With such a margin every rank has all bodies, once and for all.
-    output, _ = run(tmp_path / "scene.nml", tmp_path / "result", ranks, 1, ("--set", "decomposition.margin=100"))
+    overrides = ("--set", "decomposition.margin=100", "--set", f"forces.midstep_slip={midstep}")
+    output, _ = run(tmp_path / "scene.nml", tmp_path / "result", ranks, 1, overrides)
     counts = {name: count(output, name) for name in (
         "steps", "redistributions", "migrations", "migrations at the start", "messages", "messages at the start",
         "bytes in messages", "bytes at the start", "rectangles")}
