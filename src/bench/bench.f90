@@ -6,10 +6,11 @@
 !> that are on disk.
 module polydem_bench
    use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_set_num_threads
-   use polydem_bench_cases, only: bench_t, measure_scene
+   use polydem_bench_cases, only: bench_t, measure_scene, write_end
    use polydem_bench_scene, only: provide_result, read_scene, scene_t
    use polydem_bench_settings, only: bench_settings_t
    use polydem_bench_summary, only: write_summary
+   use polydem_clock, only: wall_seconds
    use polydem_errors, only: error_t
    use polydem_file_system, only: make_folder
    use polydem_finder, only: finder_t
@@ -42,6 +43,7 @@ contains
       bench%folder = settings%folder
       if (bench%folder == '') bench%folder = default_folder(settings%file)
       bench%all_threads = omp_get_max_threads()
+      bench%began = wall_seconds()
       bench%n_samples = size(settings%scenes)*size(settings%finders)*size(settings%threads)*(settings%repeats + 1)
       call read_scenes(bench, scenes, first_runs, error)
       if (.not. allocated(error)) call make_folder(bench%folder, error)
@@ -122,6 +124,7 @@ contains
          if (allocated(error)) error%message = 'scene '//scenes(k)%name//': '//error%message
       end do
       if (allocated(error)) return
+      call write_end(bench)
       call bench%log%write_line('')
       do k = 1, size(scenes)
          if (.not. allocated(error)) call write_summary(bench%settings, scenes(k)%name, n_boxes(k), &

@@ -4,8 +4,8 @@ module polydem_bench_cases
    use polydem_bench_scene, only: scene_t
    use polydem_bench_settings, only: bench_settings_t
    use polydem_bench_subject, only: complete_case, find_reference, load_subject, subject_t, take_sample
-   use polydem_bench_summary, only: ns_per_box
    use polydem_check_sample, only: check_sample
+   use polydem_clock, only: wall_seconds
    use polydem_errors, only: error_t
    use polydem_file_system, only: exists
    use polydem_finder_statistics, only: count_names, phase_names
@@ -16,11 +16,12 @@ module polydem_bench_cases
    use polydem_reference, only: reference_t
    use polydem_reference_file, only: read_reference, write_reference
    use polydem_replay, only: sample_path
-   use polydem_sample_file, only: sample_t, write_sample
+   use polydem_sample_file, only: case_t, sample_t, write_sample
    use polydem_strings, only: to_text
+   use polydem_waiting_cost, only: measure_waiting
    implicit none
    private
-   public :: bench_t, measure_scene
+   public :: bench_t, measure_scene, write_end
 
    !> State of a bench
    type :: bench_t
@@ -34,8 +35,10 @@ module polydem_bench_cases
       type(log_t) :: log
       !> Number of threads outside timed sections
       integer :: all_threads = 1
-      !> Number of samples taken or found on disk, and total number of samples
-      integer :: n_done = 0, n_samples = 0
+      !> Number of samples taken, found on disk, and in all
+      integer :: n_taken = 0, n_found = 0, n_samples = 0
+      !> Wall-clock time of the start [s]
+      real(dp) :: began = 0.0_dp
    end type bench_t
 
 contains
@@ -55,6 +58,7 @@ contains
       integer :: n_cases, c, k, r
 
       associate (settings => bench%settings)
+         call announce(bench, scene)
          call load_subject(scene, settings%mode == 'live', settings%steps, subject, error)
          n_boxes = subject%case%boxes
          if (.not. allocated(error)) call provide_reference(bench, subject, reference, error)
@@ -72,6 +76,18 @@ contains
       end associate
    end subroutine measure_scene
 
+   !> Tell what takes long before the samples of a scene: the run that makes its boxes.
+   subroutine announce(bench, scene)
+      type(bench_t), intent(inout) :: bench
+      type(scene_t), intent(in) :: scene
+
+      if (bench%settings%mode == 'live') then
+         call bench%log%show_line(scene%name//': running to its first step')
+      else if (.not. scene%is_trace) then
+         if (.not. exists(scene%path)) call bench%log%show_line(scene%name//': making its boxes '//scene%path)
+      end if
+   end subroutine announce
+
    !> Read the reference lists of pairs from disk, or compute and write them.
    subroutine provide_reference(bench, subject, reference, error)
       type(bench_t), intent(inout) :: bench
@@ -86,7 +102,7 @@ contains
       if (exists(path)) then
          call read_reference(path, subject%case%steps, subject%start, reference, finish, error)
       else
-         call bench%log%write_line(subject%case%scene//': '//to_text(subject%case%boxes)//' boxes, '// &
+         call bench%log%show_line(subject%case%scene//': '//to_text(subject%case%boxes)//' boxes, '// &
             to_text(subject%case%steps)//' steps; comparing all pairs')
          call find_reference(subject, bench%settings%finders(1)%text, reference, finish, error)
          if (allocated(error)) return
@@ -113,33 +129,50 @@ contains
       path = sample_path(bench%folder//'/samples', sample%case)
       if (exists(path)) then
          call check_sample(path, sample%case, provenance, error)
-         bench%n_done = bench%n_done + 1
+         bench%n_found = bench%n_found + 1
          return
       end if
+      if (sample%case%threads > 1_ip) call measure_waiting(sample%barrier_cost, sample%region_cost)
       call take_sample(subject, reference, sample, error)
       call bench%lock%check(is_lost, error)
       if (allocated(error)) return
       call write_sample(path, sample, phase_names, count_names, provenance, error)
       if (allocated(error)) return
-      bench%n_done = bench%n_done + 1
-      call write_progress(bench, sample)
+      bench%n_taken = bench%n_taken + 1
+      call show_progress(bench, sample%case)
    end subroutine measure_case
 
-   !> Print one line with the time per box and step of a sample [ns].
-   subroutine write_progress(bench, sample)
+   !> Show how far the bench is: a line that is rewritten on a terminal, and a line now and then elsewhere.
+   subroutine show_progress(bench, case)
       type(bench_t), intent(inout) :: bench
-      type(sample_t), intent(in) :: sample
-      character(len=110) :: line
-      real(dp) :: time
+      type(case_t), intent(in) :: case
+      integer :: n_done
 
-      associate (case => sample%case)
-         if (case%threads == 1_ip) time = ns_per_box(sample%processor, case%boxes)
-         if (case%threads > 1_ip) time = ns_per_box(sample%elapsed, case%boxes)
-         write (line, '(i6,a,i0,7a,f10.2,a)') bench%n_done, ' of ', bench%n_samples, '  '//case%scene//'  ', &
-            case%finder, '  threads ', to_text(case%threads), '  repeat ', to_text(case%repeat), ': ', time, ' ns'
-         call bench%log%write_line(trim(line))
-      end associate
-   end subroutine write_progress
+      n_done = bench%n_taken + bench%n_found
+      call bench%log%show_line(to_text(int(n_done, ip))//' of '//to_text(int(bench%n_samples, ip))//' samples, '// &
+         to_text(int(100_lp*int(n_done, lp)/int(max(1, bench%n_samples), lp), ip))//' %, '// &
+         elapsed_text(bench)//'; '//case%scene//'  '//case%finder//'  threads '//to_text(case%threads)// &
+         '  repeat '//to_text(case%repeat))
+   end subroutine show_progress
+
+   !> Write how many samples were taken and found.
+   subroutine write_end(bench)
+      !> The bench
+      type(bench_t), intent(inout) :: bench
+
+      call bench%log%write_line(to_text(int(bench%n_taken, ip))//' samples taken, '// &
+         to_text(int(bench%n_found, ip))//' found in '//bench%folder//', '//elapsed_text(bench))
+   end subroutine write_end
+
+   !> Time since the start of the bench
+   function elapsed_text(bench) result(text)
+      type(bench_t), intent(in) :: bench
+      character(len=:), allocatable :: text
+      character(len=16) :: number
+
+      write (number, '(f16.1)') wall_seconds() - bench%began
+      text = trim(adjustl(number))//' s'
+   end function elapsed_text
 
    !> Collect the provenance of a sample.
    subroutine collect(bench, provenance)

@@ -7,6 +7,7 @@ module polydem_bench_scene
    use polydem_replaced_result, only: holds_result
    use polydem_result_files, only: profile_name, trace_name
    use polydem_run, only: result_folder
+   use polydem_run, only: attempt_t
    use polydem_run_simulation, only: run_simulation
    use polydem_settings, only: settings_t
    use polydem_strings, only: quoted
@@ -88,7 +89,8 @@ contains
       character(len=:), allocatable :: folder
 
       folder = result_folder(settings)
-      if (.not. exists(folder//'/'//profile_name)) call run_simulation(settings, holds_result(folder), error)
+      if (.not. exists(folder//'/'//profile_name)) call run_simulation(settings, &
+         holds_result(folder), error, attempt_t(is_brief=.true.))
       if (.not. allocated(error)) call check_origin(folder//'/'//profile_name, settings, error)
       if (.not. allocated(error)) call check_end(folder//'/'//profile_name, error)
    end subroutine provide_result
@@ -102,7 +104,8 @@ contains
 
       if (scene%is_trace) return
       associate (settings => scene%settings)
-         if (.not. exists(scene%path)) call run_simulation(settings, holds_result(result_folder(settings)), error)
+         if (.not. exists(scene%path)) call run_simulation(settings, holds_result(result_folder(settings)), error, &
+            attempt_t(is_brief=.true.))
          if (allocated(error)) return
          if (.not. exists(scene%path)) then
             call raise(error, input_error, quoted(scene%text)//': the run ended before its trace began; reduce '// &

@@ -10,7 +10,7 @@ module polydem_bench_summary
    use polydem_step_clock, only: median
    implicit none
    private
-   public :: write_summary, ns_per_box
+   public :: write_summary
 
 contains
 

@@ -49,6 +49,8 @@ module polydem_sample_file
       real(dp) :: load = 0.0_dp
       !> Cost of reading the processor time, subtracted from each step [s]
       real(dp) :: clock_cost = 0.0_dp
+      !> Cost of a barrier of all threads, and of starting and joining them; 0: one thread [s]
+      real(dp) :: barrier_cost = 0.0_dp, region_cost = 0.0_dp
       !> Elapsed time, and processor time of the calling thread, of each step, (steps) [s]
       real(dp), allocatable :: elapsed(:), processor(:)
       !> Number of pairs of each step, (steps)
@@ -120,6 +122,10 @@ contains
       call file%write('/case/load', sample%load, error, '1', 'load average of the machine at the start, over a minute')
       call file%write('/case/clock_cost', sample%clock_cost, error, 's', &
                       'cost of reading processor time, subtracted from each step')
+      call file%write('/case/barrier_cost', sample%barrier_cost, error, 's', &
+                      'time of a barrier of all threads just before the sample; 0: one thread')
+      call file%write('/case/region_cost', sample%region_cost, error, 's', &
+                      'time to start and join all threads just before the sample; 0: one thread')
    end subroutine write_case
 
    !> Write the measurements of all steps.

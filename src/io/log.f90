@@ -17,6 +17,8 @@ module polydem_log
    integer, parameter :: line_width = 110
    !> Minimum time between two updates of the progress line [s]
    real(dp), parameter :: live_interval = 0.2_dp
+   !> Minimum time between two progress lines where the screen is no terminal [s]
+   real(dp), parameter :: plain_interval = 15.0_dp
 
    !> A log, open for writing
    type :: log_t
@@ -25,6 +27,8 @@ module polydem_log
       type(line_writer_t) :: screen
       !> The file log.txt; closed if there is none
       type(line_writer_t) :: file
+      !> Whether only the progress line, and no other, is shown on the screen
+      logical :: is_brief = .false.
       !> Whether the screen is an interactive terminal and shows a progress line
       logical :: is_interactive = .false.
       !> Length of the progress line on the screen
@@ -42,6 +46,7 @@ module polydem_log
       procedure :: write_line
       procedure :: write_interval
       procedure :: show_progress
+      procedure :: show_line
       procedure :: check => check_log
       procedure :: close => close_log
    end type log_t
@@ -49,7 +54,7 @@ module polydem_log
 contains
 
    !> Open a log.
-   subroutine open_log(self, folder, error, quiet, appended)
+   subroutine open_log(self, folder, error, quiet, appended, brief)
       class(log_t), intent(inout) :: self
       !> Folder of the result, which must exist; empty: no log.txt
       character(len=*), intent(in) :: folder
@@ -59,12 +64,16 @@ contains
       logical, intent(in), optional :: quiet
       !> Whether lines are appended to the log of an earlier attempt; default: false
       logical, intent(in), optional :: appended
+      !> Whether the screen shows nothing but the progress line; default: false
+      logical, intent(in), optional :: brief
       logical :: on_screen
 
       on_screen = .true.
       if (present(quiet)) on_screen = .not. quiet
       if (on_screen) call self%screen%open_screen()
       self%is_interactive = is_terminal() .and. on_screen
+      self%is_brief = .false.
+      if (present(brief)) self%is_brief = brief
       self%has_heading = .false.
       if (folder /= '') call self%file%open(folder//'/'//log_name, error, appended)
    end subroutine open_log
@@ -78,7 +87,7 @@ contains
       if (self%live_length > 0) call write_live(self, repeat(' ', self%live_length))
       if (self%live_length > 0) call self%screen%put(achar(13))
       self%live_length = 0
-      call self%screen%put_line(printable(text, keeps_lines=.true.))
+      if (.not. self%is_brief) call self%screen%put_line(printable(text, keeps_lines=.true.))
       call self%file%put_line(printable(text, keeps_lines=.true.))
    end subroutine write_line
 
@@ -147,6 +156,20 @@ contains
       call write_live(self, trim(text))
       self%live_seconds = now
    end subroutine show_progress
+
+   !> Show a line of progress: rewritten on a terminal a few times per second, else written now and then.
+   subroutine show_line(self, text)
+      class(log_t), intent(inout) :: self
+      !> The line
+      character(len=*), intent(in) :: text
+      real(dp) :: now
+
+      now = wall_seconds()
+      if (now - self%live_seconds < merge(live_interval, plain_interval, self%is_interactive)) return
+      if (self%is_interactive) call write_live(self, text(:min(len(text), line_width)))
+      if (.not. self%is_interactive) call self%write_line(text)
+      self%live_seconds = now
+   end subroutine show_line
 
    !> Report a failed write to log.txt early, to let the run end soon.
    subroutine check_log(self, error)

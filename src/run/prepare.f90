@@ -131,7 +131,8 @@ contains
          call find_restart(run%folder, run%manifest, settings, scene, run%attempt%may_change, run%earlier, error)
       if (allocated(error)) return
       call claim_folder(settings, run%measures%deep > 0_lp, run%folder, force, is_restart(run), run%manifest, error)
-      if (.not. allocated(error)) call run%log%open(run%folder, error, appended=is_restart(run))
+      if (.not. allocated(error)) call run%log%open(run%folder, error, appended=is_restart(run), &
+         brief=run%attempt%is_brief)
       if (allocated(error)) return
       call write_header(run%log, run%provenance, run%folder)
       if (run%oversubscription /= '') call run%log%write_line(run%oversubscription)

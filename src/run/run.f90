@@ -30,6 +30,8 @@ module polydem_run
       logical :: may_change = .false.
       !> Limit of the elapsed time of the attempt [s]; 0: no limit
       real(dp) :: limit = 0.0_dp
+      !> Whether the screen shows nothing but the progress line
+      logical :: is_brief = .false.
    end type attempt_t
 
    !> State of a run

@@ -7,6 +7,7 @@ undisturbed bench, and no sample may be taken twice.
 """
 
 import os
+import pty
 import random
 import re
 import subprocess
@@ -58,6 +59,40 @@ def hash_of(path):
         return sorted(set(re.findall(rb"(?<![0-9a-f])[0-9a-f]{16}", file.read())))
 
 
+def times_of(folder):
+    """When each finished sample was written."""
+    samples = os.path.join(folder, "samples")
+    if not os.path.isdir(samples):
+        return {}
+    names = [name for name in os.listdir(samples) if name.endswith(".h5")]
+    return {name: os.stat(os.path.join(samples, name)).st_mtime_ns for name in names}
+
+
+def counts_of(output):
+    """Numbers of samples taken and found, from the last line of progress."""
+    ((taken, found),) = re.findall(r"^(\d+) samples taken, (\d+) found", output, re.MULTILINE)
+    return int(taken), int(found)
+
+
+def check_terminal(program):
+    """On a terminal one line is rewritten in place."""
+    main_end, other_end = pty.openpty()
+    arguments = [program, "bench", "bench.nml", "--set", "bench.folder=shown", "--set", "bench.repeats=9"]
+    with subprocess.Popen(arguments, stdout=other_end, stderr=other_end) as process:
+        os.close(other_end)
+        shown = b""
+        try:
+            while piece := os.read(main_end, 65536):
+                shown += piece
+        except OSError:
+            pass
+    os.close(main_end)
+    assert process.returncode == 0, shown
+    lines = [line for line in shown.decode().replace("\r\n", "\n").split("\n") if " of 80 samples" in line]
+    assert 1 <= len(lines) <= 2 and all("\r" in line for line in lines), lines
+    assert "steps/s" not in shown.decode(), "the log of a run that makes boxes belongs into its folder"
+
+
 def main():
     program = os.path.abspath(sys.argv[1])
     chance = random.Random(3)
@@ -68,17 +103,19 @@ def main():
                 file.write(text)
         code, output = call(program, "whole")
         assert code == 0, output
-        assert len(re.findall(r" of 48 ", output)) == SAMPLES == 48, output
+        assert counts_of(output) == (SAMPLES, 0) == (48, 0), output
+        assert len(re.findall(r" of 48 samples", output)) < 10, output
 
-        taken, killed, code = 0, 0, -9
+        times, killed, code = {}, 0, -9
         while code == -9:
             code, output = call(program, "killed", chance.uniform(0.05, 0.3) if killed < MOST_KILLS else None)
-            taken += len(re.findall(r" of 48 ", output))
             killed += code == -9
+            now = times_of("killed")
+            assert {path: now[path] for path in times} == times, "a sample was taken twice"
+            times = now
         assert code == 0, output
         assert killed >= 3, f"killed only {killed} times: the bench is too short for this test"
-        # A kill between the renaming of a sample and its line on the screen hides one line.
-        assert SAMPLES - killed <= taken <= SAMPLES, (taken, killed)
+        assert sum(counts_of(output)) == SAMPLES, output
         assert files_of("killed") == files_of("whole"), (files_of("killed"), files_of("whole"))
         for name in files_of("whole"):
             if name.startswith(("samples", "oracle")):
@@ -86,7 +123,8 @@ def main():
                 assert hash_of(f"killed/{name}") == hash_of(f"whole/{name}"), name
 
         code, output = call(program, "killed")
-        assert code == 0 and " of 48 " not in output, output
+        assert code == 0 and counts_of(output) == (0, SAMPLES), output
+        check_terminal(program)
 
 
 if __name__ == "__main__":
