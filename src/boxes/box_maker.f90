@@ -151,8 +151,7 @@ contains
       end do
    end subroutine set_reach
 
-   !> Turn bodies to their angles and update their boxes in one pass, block by block, while a block is in the cache: the
-   !> same as `turn_bodies` and then `update_boxes`.
+   !> Turn bodies to their angles and update their boxes in one pass: the same as `turn_bodies` and then `update_boxes`.
    subroutine turn_and_bound(maker, moving, isa, bodies, boxes)
       !> From `new_box_maker`
       type(box_maker_t), intent(in) :: maker
@@ -164,15 +163,16 @@ contains
       type(bodies_t), intent(inout) :: bodies
       !> Boxes; only `bounds` changes
       type(boxes_t), intent(inout) :: boxes
+      real(wp) :: extent(4, block_size)
       integer(ip) :: low, high, k
 
       !$omp parallel do if (size(moving) > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(maker, moving, isa, bodies, boxes) private(low, high, k)
+      !$omp    shared(maker, moving, isa, bodies, boxes) private(low, high, k, extent)
       do low = 1_ip, size(moving, kind=ip), block_size
          high = min(low + block_size - 1_ip, size(moving, kind=ip))
-         call turn_block(bodies, moving(low:high), isa)
+         call turn_block(bodies, moving(low:high), isa, extent)
          do k = low, high
-            call bound_body(maker, bodies, moving(k), boxes)
+            call bound_body(maker, bodies, moving(k), extent(:, k - low + 1_ip), boxes)
          end do
       end do
       !$omp end parallel do
@@ -193,49 +193,60 @@ contains
       !$omp parallel do if (size(moving) > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(maker, bodies, moving, boxes) private(k)
       do k = 1_ip, size(moving, kind=ip)
-         call bound_body(maker, bodies, moving(k), boxes)
+         associate (s => moving(k))
+            call bound_body(maker, bodies, s, &
+                            extent_of(bodies%turned(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip)), &
+                            boxes)
+         end associate
       end do
       !$omp end parallel do
    end subroutine update_boxes
 
    !> Update the boxes of a body.
-   pure subroutine bound_body(maker, bodies, s, boxes)
+   pure subroutine bound_body(maker, bodies, s, extent, boxes)
       type(box_maker_t), intent(in) :: maker
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
+      !> Extent of the turned vertices of the whole body [m]
+      real(wp), intent(in) :: extent(4)
       type(boxes_t), intent(inout) :: boxes
       integer(ip) :: b
 
       b = maker%first_box(s)
       if (maker%piece_start(b + 1_ip) == maker%piece_start(b)) then
-         call bound(bodies%turned(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip), &
-                    maker%padding(b), bodies%position(:, s), boxes%bounds(:, b))
+         call place_box(extent, maker%padding(b), bodies%position(:, s), boxes%bounds(:, b))
          return
       end if
       do b = maker%first_box(s), maker%first_box(s + 1_ip) - 1_ip
-         call bound(turn(maker%piece(:, maker%piece_start(b):maker%piece_start(b + 1_ip) - 1_ip), &
-                         bodies%direction(:, s)), &
-                    maker%padding(b), bodies%position(:, s), boxes%bounds(:, b))
+         call place_box(extent_of(turn(maker%piece(:, maker%piece_start(b):maker%piece_start(b + 1_ip) - 1_ip), &
+                                       bodies%direction(:, s))), &
+                        maker%padding(b), bodies%position(:, s), boxes%bounds(:, b))
       end do
    end subroutine bound_body
 
-   !> Box of turned vertices. The padding is applied before the position is added: rounding then remains monotonic.
-   pure subroutine bound(turned, padding, position, box)
-      real(wp), intent(in) :: turned(:, :)
-      real(wp), intent(in) :: padding, position(2)
+   !> Box of vertices with an extent. The padding is applied before the position is added: rounding then remains
+   !> monotonic.
+   pure subroutine place_box(extent, padding, position, box)
+      real(wp), intent(in) :: extent(4), padding, position(2)
       real(wp), intent(out) :: box(4)
-      real(wp) :: low(2), high(2)
+
+      box(1:2) = position + (extent(1:2) - padding)
+      box(3:4) = position + (extent(3:4) + padding)
+   end subroutine place_box
+
+   !> Least x and y and greatest x and y of vertices [m]
+   pure function extent_of(vertices) result(extent)
+      real(wp), intent(in) :: vertices(:, :)
+      real(wp) :: extent(4)
       integer(ip) :: v
 
-      low = turned(:, 1)
-      high = low
-      do v = 2_ip, size(turned, 2, kind=ip)
-         low = min(low, turned(:, v))
-         high = max(high, turned(:, v))
+      extent(1:2) = vertices(:, 1)
+      extent(3:4) = vertices(:, 1)
+      do v = 2_ip, size(vertices, 2, kind=ip)
+         extent(1:2) = min(extent(1:2), vertices(:, v))
+         extent(3:4) = max(extent(3:4), vertices(:, v))
       end do
-      box(1:2) = position + (low - padding)
-      box(3:4) = position + (high + padding)
-   end subroutine bound
+   end function extent_of
 
    !> Vertices turned by an angle
    pure function turn(vertices, direction) result(turned)

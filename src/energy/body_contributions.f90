@@ -13,7 +13,7 @@ module polydem_body_contributions
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: n_channels, n_wall_channels, n_motions, powers_of, add_walls, motion_of
+   public :: n_channels, n_wall_channels, n_motions, add_powers, add_walls, motion_of
 
    !> Number of channels of a body: powers of the elastic normal forces with cohesion, of the other normal forces with
    !> the damping of tilts, and of the tangential forces [W/m]
@@ -26,33 +26,36 @@ module polydem_body_contributions
 
 contains
 
-   !> Powers of the elastic, damping and tangential forces on a body [W/m]
-   pure function powers_of(bodies, forces, s) result(power)
+   !> Add the powers of the elastic, damping and tangential forces on a body, times a weight, to its channels.
+   pure subroutine add_powers(bodies, forces, weight, s, channels)
       !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Sums of the forces on each body
       type(force_sums_t), intent(in) :: forces
+      !> Factor of what is added
+      real(wp), intent(in) :: weight
       !> Slot of the body
       integer(ip), intent(in) :: s
-      real(wp) :: power(n_channels)
+      !> Channels of the body [W/m]
+      real(wp), intent(inout) :: channels(n_channels)
 
-      power = powers_of_term(bodies, forces%value(:, s), s)
-   end function powers_of
+      channels = channels + weight*powers_of_term(bodies, forces%value(:, s), s)
+   end subroutine add_powers
 
    !> Powers of the elastic, damping and tangential rows of a term on a body [W/m]
    pure function powers_of_term(bodies, term, s) result(power)
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: term(n_terms)
       integer(ip), intent(in) :: s
-      real(wp) :: power(n_channels)
+      real(wp) :: power(n_channels), x, y, w
+      integer, parameter :: e = sum_elastic, n = sum_normal, f = sum_tangential
 
-      associate (v => bodies%velocity(:, s), w => bodies%angular_velocity(s), &
-                 e => term(sum_elastic + 1:sum_elastic + 3), &
-                 n => term(sum_normal + 1:sum_normal + 3), t => term(sum_tangential + 1:sum_tangential + 3))
-         power(1) = (e(1)*v(1) + e(2)*v(2)) + e(3)*w
-         power(2) = ((n(1) - e(1))*v(1) + (n(2) - e(2))*v(2)) + (n(3) - e(3))*w
-         power(3) = (t(1)*v(1) + t(2)*v(2)) + t(3)*w
-      end associate
+      x = bodies%velocity(1, s)
+      y = bodies%velocity(2, s)
+      w = bodies%angular_velocity(s)
+      power(1) = (term(e + 1)*x + term(e + 2)*y) + term(e + 3)*w
+      power(2) = ((term(n + 1) - term(e + 1))*x + (term(n + 2) - term(e + 2))*y) + (term(n + 3) - term(e + 3))*w
+      power(3) = (term(f + 1)*x + term(f + 2)*y) + term(f + 3)*w
    end function powers_of_term
 
    !> Add the action of a fixed body on a free one: its terms of the powers, and the wall channels.

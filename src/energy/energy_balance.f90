@@ -21,24 +21,24 @@
 !> bodies, and over bodies for gravity. Forces that cancel within a fixed body therefore add to the scale.
 module polydem_energy_balance
    use polydem_bodies, only: bodies_t
-   use polydem_body_contributions, only: add_walls, motion_of, n_channels, n_motions, n_wall_channels, powers_of
+   use polydem_body_contributions, only: add_powers, add_walls, motion_of, n_channels, n_motions, n_wall_channels
    use polydem_communicator, only: communicator_t
    use polydem_contacts, only: contacts_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
    use polydem_force_sums, only: force_sums_t, sum_energy
-   use polydem_kinds, only: ip, lp, wp, min_parallel_size
+   use polydem_kinds, only: ip, lp, wp
    use polydem_serializer, only: serializer_t
    implicit none
    private
-   public :: energy_balance_t, balance_t, start_energy_balance, accumulate_step, evaluate_balance, serialize_balance, &
-      serialize_contributions
+   public :: energy_balance_t, balance_t, start_energy_balance, accumulate_step, &
+      accumulate_bodies, accumulate_walls, evaluate_balance, serialize_balance, serialize_contributions
 
    !> Running sums of the energy and momentum balance, and its values at the start
    type :: energy_balance_t
       !> Energy scale of the residual: largest kinetic energy or work of a channel so far [J/m]
       real(wp) :: energy_scale = 0.0_wp
-      !> Whether bodies and contacts are those of the last accumulated step. `accumulate_step` sets it. The caller must
+      !> Whether bodies and contacts are those of the last accumulated step. `accumulate_walls` sets it. The caller must
       !> clear it when a step begins; the last rates then have full weight, as is right in the middle of a step
       logical :: is_current = .false.
       !> Sums over steps of the powers of forces on each body, (n_channels, slot); not allocated without a balance [W/m]
@@ -120,7 +120,8 @@ contains
       real(wp) :: total(n_totals)
 
       call allocate_channels(sums, bodies%n)
-      call accumulate_rates(sums, 0.5_wp, gravity, bodies, forces, walls)
+      call accumulate_bodies(sums, 0.5_wp, gravity, bodies, forces, bodies%free)
+      call add_walls(bodies, walls, 0.5_wp, sums%power_sum, sums%wall_sum)
       sums%is_current = .true.
       total = totals(sums, comm, gravity, bodies, forces, walls)
       sums%energy_scale = total(1)
@@ -141,10 +142,47 @@ contains
       !> Contacts with fixed bodies
       type(contacts_t), intent(in) :: walls
 
-      call accumulate_rates(sums, 1.0_wp, gravity, bodies, forces, walls)
+      call accumulate_bodies(sums, 1.0_wp, gravity, bodies, forces, bodies%free)
+      call accumulate_walls(sums, bodies, walls)
+   end subroutine accumulate_step
+
+   !> Accumulate the rates of some bodies, times a weight. Several threads may call it for different bodies.
+   pure subroutine accumulate_bodies(sums, weight, gravity, bodies, forces, slots)
+      !> Running sums; only those of these bodies change
+      type(energy_balance_t), intent(inout) :: sums
+      !> Factor of the rates: 1 for a step
+      real(wp), intent(in) :: weight
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Bodies at the end of this step
+      type(bodies_t), intent(in) :: bodies
+      !> Sums of the contact forces on each body
+      type(force_sums_t), intent(in) :: forces
+      !> Slots of some free bodies
+      integer(ip), intent(in) :: slots(:)
+      integer(ip) :: k
+
+      do k = 1_ip, size(slots, kind=ip)
+         associate (s => slots(k))
+            sums%torque(s) = sums%torque(s) + weight*torque_of(gravity, bodies, s)
+            call add_powers(bodies, forces, weight, s, sums%power_sum(:, s))
+         end associate
+      end do
+   end subroutine accumulate_bodies
+
+   !> Accumulate the action of fixed bodies in one step, after the rates of all bodies of this step.
+   subroutine accumulate_walls(sums, bodies, walls)
+      !> Running sums
+      type(energy_balance_t), intent(inout) :: sums
+      !> Bodies at the end of this step
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with fixed bodies
+      type(contacts_t), intent(in) :: walls
+
+      call add_walls(bodies, walls, 1.0_wp, sums%power_sum, sums%wall_sum)
       sums%steps = sums%steps + 1_lp
       sums%is_current = .true.
-   end subroutine accumulate_step
+   end subroutine accumulate_walls
 
    !> Evaluate all terms and residuals. Collective.
    subroutine evaluate_balance(sums, comm, dt, gravity, bodies, forces, walls, balance)
@@ -261,28 +299,6 @@ contains
       if (whole > 0.0_wp) share = abs(part)/whole
    end function share
 
-   !> Add the present rates, times a weight, to the channels of all bodies of this rank.
-   subroutine accumulate_rates(sums, weight, gravity, bodies, forces, walls, energy)
-      type(energy_balance_t), intent(inout) :: sums
-      real(wp), intent(in) :: weight, gravity(2)
-      type(bodies_t), intent(in) :: bodies
-      type(force_sums_t), intent(in) :: forces
-      type(contacts_t), intent(in) :: walls
-      !> Elastic energy of each body; the shares of fixed bodies are added [J/m]
-      real(wp), intent(inout), optional :: energy(:)
-      integer(ip) :: k, s
-
-      !$omp parallel do if (size(bodies%free) > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(sums, weight, gravity, bodies, forces) private(k, s)
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
-         sums%torque(s) = sums%torque(s) + weight*torque_of(gravity, bodies, s)
-         sums%power_sum(:, s) = sums%power_sum(:, s) + weight*powers_of(bodies, forces, s)
-      end do
-      !$omp end parallel do
-      call add_walls(bodies, walls, weight, sums%power_sum, sums%wall_sum, energy)
-   end subroutine accumulate_rates
-
    !> Totals over all bodies of the communicator
    function totals(sums, comm, gravity, bodies, forces, walls) result(total)
       type(energy_balance_t), intent(in) :: sums
@@ -301,7 +317,10 @@ contains
       ! The last rates have half their weight.
       now = sums
       energy = forces%value(sum_energy, :)
-      if (sums%is_current) call accumulate_rates(now, -0.5_wp, gravity, bodies, forces, walls, energy)
+      if (sums%is_current) then
+         call accumulate_bodies(now, -0.5_wp, gravity, bodies, forces, bodies%free)
+         call add_walls(bodies, walls, -0.5_wp, now%power_sum, now%wall_sum, energy)
+      end if
       if (.not. walls%energy_is_quadratic) energy = 0.0_wp
       n = size(bodies%free, kind=ip)
       n_blocks = max(1_ip, min(n/block, most_blocks))

@@ -7,7 +7,7 @@
 !> one. Only the rounded value is visible to other modules. The compiler must not reorder sums (no -ffast-math).
 module polydem_compensated_verlet
    use polydem_bodies, only: bodies_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
    use polydem_serializer, only: serializer_t
    use polydem_velocity_verlet, only: velocity_verlet_t
    implicit none
@@ -45,18 +45,18 @@ contains
    end subroutine start
 
    !> Move to the end of the step and predict the velocities there.
-   subroutine predict(self, dt, bodies)
+   subroutine predict(self, dt, slots, bodies)
       class(compensated_verlet_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Bodies; position, angle and velocities of the free ones change
+      !> Slots of some free bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Bodies; position, angle and velocities of these change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: k, s
 
-      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, dt) private(k, s)
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
          call move(dt, bodies%acceleration(1, s), bodies%position(1, s), bodies%velocity(1, s), self%half(1, s), &
                    self%lost_place(1, s), self%lost_speed(1, s))
          call move(dt, bodies%acceleration(2, s), bodies%position(2, s), bodies%velocity(2, s), self%half(2, s), &
@@ -64,24 +64,23 @@ contains
          call move(dt, bodies%angular_acceleration(s), bodies%angle(s), bodies%angular_velocity(s), self%half(3, s), &
                    self%lost_place(3, s), self%lost_speed(3, s))
       end do
-      !$omp end parallel do
    end subroutine predict
 
    !> Final velocities and accelerations from the forces at the end of the step.
-   subroutine correct(self, dt, bodies)
+   subroutine correct(self, dt, slots, bodies)
       class(compensated_verlet_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Bodies; velocities and accelerations of the free ones change
+      !> Slots of some free bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Bodies; velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: k, s
       real(wp) :: h
 
       h = 0.5_wp*dt
-      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, h) private(k, s)
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
          bodies%acceleration(1, s) = bodies%force(1, s)*bodies%inverse_mass(s)
          bodies%acceleration(2, s) = bodies%force(2, s)*bodies%inverse_mass(s)
          bodies%angular_acceleration(s) = bodies%torque(s)*bodies%inverse_inertia(s)
@@ -91,7 +90,6 @@ contains
          call add(h*bodies%acceleration(2, s), bodies%velocity(2, s), self%lost_speed(2, s))
          call add(h*bodies%angular_acceleration(s), bodies%angular_velocity(s), self%lost_speed(3, s))
       end do
-      !$omp end parallel do
    end subroutine correct
 
    !> Serialize the rounding errors.

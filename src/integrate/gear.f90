@@ -8,7 +8,7 @@
 module polydem_gear
    use polydem_bodies, only: bodies_t
    use polydem_integrator, only: integrator_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
    use polydem_serializer, only: serializer_t
    use polydem_stability_limit, only: stability_table_t
    implicit none
@@ -52,39 +52,38 @@ contains
    end subroutine start
 
    !> Predict by a Taylor expansion to the end of the step.
-   subroutine predict(self, dt, bodies)
+   subroutine predict(self, dt, slots, bodies)
       class(gear_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Bodies; position, angle, velocities and accelerations of the free ones change
+      !> Slots of some free bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Bodies; position, angle, velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: k, s
 
-      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, dt) private(k, s)
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
          call expand(dt, bodies%position(1, s), bodies%velocity(1, s), bodies%acceleration(1, s), self%higher(:, 1, s))
          call expand(dt, bodies%position(2, s), bodies%velocity(2, s), bodies%acceleration(2, s), self%higher(:, 2, s))
          call expand(dt, bodies%angle(s), bodies%angular_velocity(s), bodies%angular_acceleration(s), &
                      self%higher(:, 3, s))
       end do
-      !$omp end parallel do
    end subroutine predict
 
    !> Correct all derivatives by the difference between computed and predicted acceleration.
-   subroutine correct(self, dt, bodies)
+   subroutine correct(self, dt, slots, bodies)
       class(gear_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Bodies; position, angle, velocities and accelerations of the free ones change
+      !> Slots of some free bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Bodies; position, angle, velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: k, s
 
-      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, dt) private(k, s)
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
          call adjust(self%c0, dt, bodies%force(1, s)*bodies%inverse_mass(s), bodies%position(1, s), &
                      bodies%velocity(1, s), bodies%acceleration(1, s), self%higher(:, 1, s))
          call adjust(self%c0, dt, bodies%force(2, s)*bodies%inverse_mass(s), bodies%position(2, s), &
@@ -92,7 +91,6 @@ contains
          call adjust(self%c0, dt, bodies%torque(s)*bodies%inverse_inertia(s), bodies%angle(s), &
                      bodies%angular_velocity(s), bodies%angular_acceleration(s), self%higher(:, 3, s))
       end do
-      !$omp end parallel do
    end subroutine correct
 
    !> Serialize the derivatives above the second.

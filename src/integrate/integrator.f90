@@ -6,7 +6,7 @@
 !> scheme changes neither turned vertices nor fixed bodies.
 module polydem_integrator
    use polydem_bodies, only: bodies_t
-   use polydem_kinds, only: wp
+   use polydem_kinds, only: ip, wp
    use polydem_serializer, only: serializer_t
    use polydem_stability_limit, only: stability_table_t
    implicit none
@@ -20,9 +20,9 @@ module polydem_integrator
    contains
       !> Prepare for bodies whose accelerations are known
       procedure(start), deferred :: start
-      !> Predict the free bodies at the end of the step
+      !> Predict bodies at the end of the step
       procedure(advance), deferred :: predict
-      !> Compute the final state from the forces
+      !> Compute the final state of bodies from the forces
       procedure(advance), deferred :: correct
       !> Greatest stable products of angular frequency and time step
       procedure(stability), deferred :: stability
@@ -39,13 +39,15 @@ module polydem_integrator
          type(bodies_t), intent(in) :: bodies
       end subroutine start
 
-      !> Predict or correct.
-      subroutine advance(self, dt, bodies)
-         import :: bodies_t, integrator_t, wp
+      !> Predict or correct some of the bodies. Several threads may call it for different bodies.
+      subroutine advance(self, dt, slots, bodies)
+         import :: bodies_t, integrator_t, ip, wp
          class(integrator_t), intent(inout) :: self
          !> Time step [s]
          real(wp), intent(in) :: dt
-         !> Bodies; only the free ones change
+         !> Slots of some free bodies
+         integer(ip), intent(in) :: slots(:)
+         !> Bodies; only these change
          type(bodies_t), intent(inout) :: bodies
       end subroutine advance
 

@@ -5,7 +5,7 @@
 module polydem_velocity_verlet
    use polydem_bodies, only: bodies_t
    use polydem_integrator, only: integrator_t
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
    use polydem_serializer, only: serializer_t
    use polydem_stability_limit, only: stability_table_t
    implicit none
@@ -37,20 +37,20 @@ contains
    end subroutine start
 
    !> Move the bodies to the end of the step and predict the velocities there.
-   subroutine predict(self, dt, bodies)
+   subroutine predict(self, dt, slots, bodies)
       class(velocity_verlet_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Bodies; position, angle and velocities of the free ones change
+      !> Slots of some free bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Bodies; position, angle and velocities of these change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: k, s
       real(wp) :: h, half(3)
 
       h = 0.5_wp*dt
-      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, dt, h) private(k, s, half)
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
          half(1) = bodies%velocity(1, s) + h*bodies%acceleration(1, s)
          half(2) = bodies%velocity(2, s) + h*bodies%acceleration(2, s)
          half(3) = bodies%angular_velocity(s) + h*bodies%angular_acceleration(s)
@@ -62,24 +62,23 @@ contains
          bodies%angular_velocity(s) = half(3) + h*bodies%angular_acceleration(s)
          self%half(:, s) = half
       end do
-      !$omp end parallel do
    end subroutine predict
 
    !> Compute final velocities and accelerations from the forces at the end of the step.
-   subroutine correct(self, dt, bodies)
+   subroutine correct(self, dt, slots, bodies)
       class(velocity_verlet_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Bodies; velocities and accelerations of the free ones change
+      !> Slots of some free bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Bodies; velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: k, s
       real(wp) :: h
 
       h = 0.5_wp*dt
-      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bodies, h) private(k, s)
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
          bodies%acceleration(1, s) = bodies%force(1, s)*bodies%inverse_mass(s)
          bodies%acceleration(2, s) = bodies%force(2, s)*bodies%inverse_mass(s)
          bodies%angular_acceleration(s) = bodies%torque(s)*bodies%inverse_inertia(s)
@@ -87,7 +86,6 @@ contains
          bodies%velocity(2, s) = self%half(2, s) + h*bodies%acceleration(2, s)
          bodies%angular_velocity(s) = self%half(3, s) + h*bodies%angular_acceleration(s)
       end do
-      !$omp end parallel do
    end subroutine correct
 
    !> Serialize the velocities in the middle of the step.

@@ -10,7 +10,7 @@ module polydem_contact_walk
    use polydem_contact_rows, only: append_rows, gather_rows, start_rows
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_fill_block, only: fill_block
-   use polydem_force_sums, only: add_late_terms, add_terms, contact_terms_t, start_sums, terms_of_block, total_forces
+   use polydem_force_sums, only: add_late_terms, add_terms, contact_terms_t, reserve_sums, terms_of_block
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: owns_pair
    use polydem_pair_ranges, only: divide_pairs, most_ranges
@@ -26,9 +26,9 @@ module polydem_contact_walk
 
 contains
 
-   !> Compute the forces on all bodies from the pairs of this step.
+   !> Sum the contact forces on all bodies over the pairs of this step.
    subroutine walk_contacts(self, dt, overlap_share)
-      !> The simulation with its pair list; forces, contact history and the results of the walk are set
+      !> The simulation with its pair list; sums of forces, contact history and the results of the walk are set
       type(simulation_t), intent(inout) :: self
       !> Time since the last evaluation [s]
       real(wp), intent(in) :: dt
@@ -46,8 +46,13 @@ contains
          end do
          last(n) = self%bodies%n
       end associate
-      call start_sums(self%bodies%n, self%force_sums)
+      call reserve_sums(self%bodies%n, self%force_sums)
       !$omp parallel num_threads(n) default(none) shared(self, dt, ends, last, n) private(r, k, low, high)
+      !$omp do schedule(static, 1)
+      do r = 1_ip, n
+         self%force_sums%value(:, share_of(self%bodies%n, r - 1_ip, n) + 1_ip:share_of(self%bodies%n, r, n)) = 0.0_wp
+      end do
+      !$omp end do
       !$omp do schedule(static, 1)
       do r = 1_ip, n
          call walk_range(self, dt, ends(r - 1_ip:r), last(r), self%ranges(r))
@@ -64,7 +69,6 @@ contains
       end do
       !$omp end do
       !$omp end parallel
-      call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
       call gather_results(self, n)
       overlap_share = 0.5_dp
       associate (seconds => self%ranges(1)%seconds)

@@ -1,19 +1,18 @@
 !> Guards of a run: checks that warn or stop before the results become meaningless. They test for non-finite states,
 !> for displacements that are too large per step, for an unstable time step and for contacts without direction.
 module polydem_guards
-   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_bodies, only: bodies_t
    use polydem_body_sizes, only: measure_body
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_errors, only: error_t, raise, run_error
-   use polydem_kinds, only: far, dp, ip, lp, wp, min_parallel_size
+   use polydem_kinds, only: far, dp, ip, lp, wp
    use polydem_settings, only: guards_settings_t
    use polydem_strings, only: to_text
    use polydem_warning, only: warning_t
    implicit none
    private
-   public :: motion_guard_t, new_motion_guard, check_poses, check_motion, check_step, check_contacts, &
-      place_of, greatest_displacement
+   public :: motion_guard_t, new_motion_guard, have_valid_poses, check_poses, move_within_limit, check_motion, &
+      check_step, check_contacts, place_of, greatest_displacement
 
    !> Guard of the displacement of bodies per step
    type :: motion_guard_t
@@ -57,6 +56,20 @@ contains
       end do
    end subroutine new_motion_guard
 
+   !> Whether all of some bodies have valid poses
+   pure logical function have_valid_poses(bodies, slots)
+      !> Bodies in the middle of a step
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      integer(ip) :: k
+
+      have_valid_poses = .true.
+      do k = 1_ip, size(slots, kind=ip)
+         have_valid_poses = have_valid_poses .and. has_valid_pose(bodies, slots(k))
+      end do
+   end function have_valid_poses
+
    !> Stop if a body has an invalid pose, before boxes and neighbours are computed from it.
    subroutine check_poses(guard, bodies, step, error)
       !> The guard
@@ -68,16 +81,7 @@ contains
       !> Names the body and the step
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: k
-      logical :: good
 
-      good = .true.
-      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(guard, bodies) private(k) reduction(.and.:good)
-      do k = 1_ip, size(guard%moving, kind=ip)
-         good = good .and. has_valid_pose(bodies, guard%moving(k))
-      end do
-      !$omp end parallel do
-      if (good) return
       do k = 1_ip, size(guard%moving, kind=ip)
          associate (s => guard%moving(k))
             if (has_valid_pose(bodies, s)) cycle
@@ -91,15 +95,32 @@ contains
       end do
    end subroutine check_poses
 
-   !> Whether position and angle of a body are finite and small enough to compute boxes
+   !> Whether position and angle of a body are finite and small enough to compute boxes; false for NaN
    pure logical function has_valid_pose(bodies, s)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
 
-      has_valid_pose = ieee_is_finite(bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s))
-      if (has_valid_pose) has_valid_pose = abs(bodies%position(1, s)) <= far .and. abs(bodies%position(2, s)) <= far &
-                                       .and. abs(bodies%angle(s)) <= far
+      has_valid_pose = abs(bodies%position(1, s)) <= far .and. abs(bodies%position(2, s)) <= far &
+                       .and. abs(bodies%angle(s)) <= far
    end function has_valid_pose
+
+   !> Whether the states of all of some bodies are finite and none moves too far in a step
+   pure logical function move_within_limit(guard, bodies, slots, dt)
+      !> The guard
+      type(motion_guard_t), intent(in) :: guard
+      !> Bodies at the end of a step
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      integer(ip) :: k
+
+      move_within_limit = .true.
+      do k = 1_ip, size(slots, kind=ip)
+         move_within_limit = move_within_limit .and. moves_within_limit(guard, bodies, slots(k), dt)
+      end do
+   end function move_within_limit
 
    !> Stop if the state of a body is not finite. Stop or warn if a body moves too far in a step.
    subroutine check_motion(guard, bodies, step, dt, error)
@@ -114,16 +135,8 @@ contains
       !> Names the body, its position and velocity, and the step
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: k, s
-      logical :: good, is_first
+      logical :: is_first
 
-      good = .true.
-      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(guard, bodies, dt) private(k) reduction(.and.:good)
-      do k = 1_ip, size(guard%moving, kind=ip)
-         good = good .and. moves_within_limit(guard, bodies, guard%moving(k), dt)
-      end do
-      !$omp end parallel do
-      if (good) return
       is_first = .true.
       do k = 1_ip, size(guard%moving, kind=ip)
          s = guard%moving(k)
@@ -203,8 +216,7 @@ contains
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: dt
 
-      moves_within_limit = is_finite(guard, bodies, s, dt)
-      if (moves_within_limit) moves_within_limit = move_of(guard, bodies, s, dt) <= guard%limit
+      moves_within_limit = is_finite(guard, bodies, s, dt) .and. move_of(guard, bodies, s, dt) <= guard%limit
    end function moves_within_limit
 
    !> Whether position, angle and velocities of a body are finite
@@ -214,8 +226,8 @@ contains
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: dt
 
-      is_finite = ieee_is_finite(move_of(guard, bodies, s, dt) &
-                                 + (bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s)))
+      is_finite = abs(move_of(guard, bodies, s, dt) &
+                      + (bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s))) <= huge(dt)
    end function is_finite
 
    !> Greatest displacement per step of a point of any moving body, at the present velocities [m]

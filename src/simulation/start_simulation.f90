@@ -1,6 +1,7 @@
 !> Start of a simulation: time step, forces and accelerations at time 0. All ranks start alike, one or many.
 module polydem_start_simulation
    use polydem_bodies, only: bodies_t
+   use polydem_body_passes, only: move_walls
    use polydem_box_maker, only: diameters_of, update_boxes
    use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_communicator, only: communicator_t
@@ -19,7 +20,7 @@ module polydem_start_simulation
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: stable_step_of_shapes
    use polydem_strings, only: to_text
-   use polydem_time_step, only: compute_forces, move_walls
+   use polydem_time_step, only: compute_forces
    use polydem_timers, only: timers_t
    use polydem_whole_run, only: find_median, reduce_to_greatest, reduce_to_least
    implicit none

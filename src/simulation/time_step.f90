@@ -1,23 +1,22 @@
 !> The time step of a simulation.
 module polydem_time_step
+   use polydem_body_passes, only: complete_step, predict_bodies
    use polydem_box_maker, only: turn_and_bound
    use polydem_contact_incidence, only: index_contacts
    use polydem_contact_walk, only: walk_contacts
-   use polydem_energy_balance, only: accumulate_step
    use polydem_errors, only: error_t, raise, run_error
-   use polydem_force_sums, only: assemble_forces, select_walls
-   use polydem_guards, only: check_contacts, check_motion, check_poses
+   use polydem_force_sums, only: assemble_forces, select_walls, total_forces
+   use polydem_guards, only: check_contacts
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_prescribed_motion, only: move_bodies
    use polydem_redistribution, only: restore_history, redistribute
-   use polydem_simulation, only: simulation_t, time_of, sum_began, sum_ended
+   use polydem_simulation, only: simulation_t, sum_began, sum_ended
    use polydem_simulation_counters, only: count_pairs
    use polydem_strings, only: to_text
    use polydem_timers, only: stage_boxes, stage_decomposition, stage_forces, stage_integrate, stage_neighbours, &
       stage_overlap
    implicit none
    private
-   public :: advance, compute_forces, move_walls
+   public :: advance, compute_forces
 
 contains
 
@@ -32,24 +31,15 @@ contains
       self%step = self%step + 1_lp
       self%energy_balance%is_current = .false.
       call self%timers%start()
-      call self%integrator%predict(self%dt, self%bodies)
-      call move_walls(self, time_of(self))
-      call check_poses(self%guard, self%bodies, self%step, error)
+      call predict_bodies(self, error)
       call self%timers%lap(stage_integrate)
       call place_boxes(self, error)
       if (allocated(error)) return
-      call compute_forces(self, self%dt, error)
+      call sum_forces(self, self%dt, error)
       ! A contact may stop the run here. Then no rank completes the step.
       if (self%settings%overlap%degenerate == 'stop') call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      call self%integrator%correct(self%dt, self%bodies)
-      call self%timers%lap(stage_integrate)
-      if (self%settings%output%energy_balance) then
-         call accumulate_step(self%energy_balance, self%settings%forces%gravity, self%bodies, self%force_sums, &
-                              self%walls)
-         call self%timers%lap(stage_forces)
-      end if
-      call check_motion(self%guard, self%bodies, self%step, self%dt, error)
+      call complete_step(self, error)
       call self%timers%lap(stage_integrate)
    end subroutine advance
 
@@ -80,8 +70,23 @@ contains
       call self%timers%lap(stage_decomposition)
    end subroutine place_boxes
 
-   !> Compute the forces on the bodies from their boxes: neighbours, contacts, force law. This is the middle of a step.
+   !> Compute the forces on the bodies from their boxes.
    subroutine compute_forces(self, dt, error)
+      !> The simulation with updated boxes
+      type(simulation_t), intent(inout) :: self
+      !> Time step of the force law [s]; 0 at time 0
+      real(wp), intent(in) :: dt
+      !> Names the step and the contact or the finder that failed
+      type(error_t), allocatable, intent(inout) :: error
+
+      call sum_forces(self, dt, error)
+      if (allocated(error)) return
+      call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, self%bodies%n, self%bodies)
+   end subroutine compute_forces
+
+   !> Sum the contact forces on the bodies from their boxes: neighbours, contacts, force law. This is the middle of a
+   !> step.
+   subroutine sum_forces(self, dt, error)
       !> The simulation with updated boxes
       type(simulation_t), intent(inout) :: self
       !> Time step of the force law [s]; 0 at time 0
@@ -112,7 +117,7 @@ contains
       if (self%keeps_contacts) call index_contacts(self%bodies%n, self%contacts, self%incidence)
       if (allocated(self%law%constraint)) call constrain(self, error)
       call self%timers%lap(stage_forces)
-   end subroutine compute_forces
+   end subroutine sum_forces
 
    !> Add the forces of a velocity constraint.
    subroutine constrain(self, error)
@@ -120,6 +125,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
+      call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, self%bodies%n, self%bodies)
       call self%law%constraint%apply(self%dt, self%incidence, self%bodies, self%contacts, self%history, error)
       if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
       call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%force_sums)
@@ -139,18 +145,5 @@ contains
          end do
       end associate
    end subroutine carry_history
-
-   !> Move the bodies with prescribed motion to their poses at a given time.
-   subroutine move_walls(self, time)
-      !> The simulation
-      type(simulation_t), intent(inout) :: self
-      !> Simulated time [s]
-      real(wp), intent(in) :: time
-      integer :: k
-
-      do k = 1, size(self%motions)
-         if (time >= self%motions(k)%start) call move_bodies(self%motions(k), time, self%bodies)
-      end do
-   end subroutine move_walls
 
 end module polydem_time_step

@@ -85,12 +85,13 @@ contains
       integer(ip), intent(in) :: slots(:)
       !> Instruction set of the kernels
       integer, intent(in) :: isa
+      real(wp) :: extent(4, block_size)
       integer(ip) :: low
 
       !$omp parallel do if (size(slots) > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(bodies, slots, isa) private(low)
+      !$omp    shared(bodies, slots, isa) private(low, extent)
       do low = 1_ip, size(slots, kind=ip), block_size
-         call turn_block(bodies, slots(low:min(low + block_size - 1_ip, size(slots, kind=ip))), isa)
+         call turn_block(bodies, slots(low:min(low + block_size - 1_ip, size(slots, kind=ip))), isa, extent)
       end do
       !$omp end parallel do
    end subroutine turn_bodies
@@ -116,31 +117,64 @@ contains
    !> Update `direction` and `turned` of up to `block_size` bodies to their angles.
    !>
    !> No other procedure of the program takes the sine or cosine of the angle of a body.
-   subroutine turn_block(bodies, slots, isa)
+   subroutine turn_block(bodies, slots, isa, extent)
       !> Bodies; only `direction` and `turned` of these bodies change
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in) :: slots(:)
       !> Instruction set of the kernels
       integer, intent(in) :: isa
-      real(wp) :: angle(block_size), c(block_size), si(block_size)
-      integer(ip) :: k, s, v, n
+      !> Least x and y and greatest x and y of the turned vertices of each body, (4, body) [m]
+      real(wp), intent(out) :: extent(4, block_size)
+      real(wp) :: angle(block_size), cosine(block_size), sine(block_size)
+      integer(ip) :: k, n
 
       n = size(slots, kind=ip)
       do k = 1_ip, n
          angle(k) = bodies%angle(slots(k))
       end do
-      call sines_and_cosines(isa, angle(1:n), si(1:n), c(1:n))
+      call sines_and_cosines(isa, angle(1:n), sine(1:n), cosine(1:n))
       do k = 1_ip, n
-         s = slots(k)
-         bodies%direction(1, s) = c(k)
-         bodies%direction(2, s) = si(k)
-         do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-            bodies%turned(1, v) = c(k)*bodies%shape(1, v) - si(k)*bodies%shape(2, v)
-            bodies%turned(2, v) = si(k)*bodies%shape(1, v) + c(k)*bodies%shape(2, v)
-         end do
+         associate (s => slots(k))
+            bodies%direction(:, s) = [cosine(k), sine(k)]
+            associate (first => bodies%vertex_start(s), last => bodies%vertex_start(s + 1_ip) - 1_ip)
+               call turn_vertices(last - first + 1_ip, bodies%shape(:, first:last), cosine(k), sine(k), &
+                                  bodies%turned(:, first:last), extent(:, k))
+            end associate
+         end associate
       end do
    end subroutine turn_block
+
+   !> Turn vertices, and find their extent.
+   pure subroutine turn_vertices(n, vertex, cosine, sine, turned, extent)
+      !> Number of vertices
+      integer(ip), intent(in) :: n
+      !> Vertices, (2, n) [m]
+      real(wp), intent(in) :: vertex(2, n)
+      !> Cosine and sine of the angle
+      real(wp), intent(in) :: cosine, sine
+      !> The turned vertices, (2, n) [m]
+      real(wp), intent(out) :: turned(2, n)
+      !> Their least x and y and greatest x and y [m]
+      real(wp), intent(out) :: extent(4)
+      real(wp) :: x, y, low(2), high(2)
+      integer(ip) :: v
+
+      low = huge(1.0_wp)
+      high = -huge(1.0_wp)
+      do v = 1_ip, n
+         x = cosine*vertex(1, v) - sine*vertex(2, v)
+         y = cosine*vertex(2, v) + sine*vertex(1, v)
+         turned(1, v) = x
+         turned(2, v) = y
+         low(1) = min(low(1), x)
+         low(2) = min(low(2), y)
+         high(1) = max(high(1), x)
+         high(2) = max(high(2), y)
+      end do
+      extent(1:2) = low
+      extent(3:4) = high
+   end subroutine turn_vertices
 
    !> Hash of the bits of every body's identifier, position, angle and velocities in identifier order.
    !>

@@ -12,11 +12,11 @@ module polydem_force_sums
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t, load_block
    use polydem_contacts, only: contacts_t, copy_contact, grow_contacts, set_force_of_contact
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, wp
    implicit none
    private
    public :: force_sums_t, contact_terms_t, late_terms_t, n_terms, sum_elastic, sum_normal, sum_tangential, sum_energy
-   public :: start_sums, terms_of_block, term_of, add_terms, add_late_terms, assemble_forces, select_walls
+   public :: reserve_sums, start_sums, terms_of_block, term_of, add_terms, add_late_terms, assemble_forces, select_walls
    public :: total_forces, set_force
 
    !> Rows of a term: force along x and y and torque of the elastic forces with cohesion, of all normal forces with the
@@ -51,23 +51,29 @@ module polydem_force_sums
 
 contains
 
+   !> Make room for the sums of n bodies.
+   subroutine reserve_sums(n, sums)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> Sums of the bodies
+      type(force_sums_t), intent(inout) :: sums
+
+      if (allocated(sums%value)) then
+         if (size(sums%value, 2) == n) return
+         deallocate (sums%value)
+      end if
+      allocate (sums%value(n_terms, n))
+   end subroutine reserve_sums
+
    !> Set the sums of all bodies to zero.
    subroutine start_sums(n, sums)
       !> Number of bodies
       integer(ip), intent(in) :: n
       !> Sums of the bodies
       type(force_sums_t), intent(inout) :: sums
-      integer(ip) :: s
 
-      if (allocated(sums%value)) then
-         if (size(sums%value, 2) /= n) deallocate (sums%value)
-      end if
-      if (.not. allocated(sums%value)) allocate (sums%value(n_terms, n))
-      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(n, sums) private(s)
-      do s = 1_ip, n
-         sums%value(:, s) = 0.0_wp
-      end do
-      !$omp end parallel do
+      call reserve_sums(n, sums)
+      sums%value = 0.0_wp
    end subroutine start_sums
 
    !> Compute the terms of all contacts of a block.
@@ -136,30 +142,57 @@ contains
       type(force_sums_t), intent(inout) :: sums
       !> Terms of the bodies after `last`
       type(late_terms_t), intent(inout) :: late
-      integer(ip) :: c, i, j
-      real(wp) :: t(n_terms)
+      integer(ip) :: c
 
+      if (all(block%first(:block%n) <= last) .and. all(block%second(:block%n) <= last)) then
+         call add_pairs(block%n, block%first, block%second, terms%first, terms%torque_second, last, sums%value)
+         return
+      end if
       call reserve_late(late, block%n)
       do c = 1_ip, block%n
-         i = block%first(c)
-         j = block%second(c)
-         t = terms%first(c, :)
-         if (i <= last) then
-            sums%value(:, i) = sums%value(:, i) + t
-         else
-            call append_late(i, t, late)
-         end if
-         t(1:9) = -t(1:9)
-         t(3) = -terms%torque_second(c, 1)
-         t(6) = -terms%torque_second(c, 2)
-         t(9) = -terms%torque_second(c, 3)
-         if (j <= last) then
-            sums%value(:, j) = sums%value(:, j) + t
-         else
-            call append_late(j, t, late)
-         end if
+         call add_or_keep(block%first(c), term_of(terms, c, .true.), last, sums, late)
+         call add_or_keep(block%second(c), term_of(terms, c, .false.), last, sums, late)
       end do
    end subroutine add_terms
+
+   !> Add the terms of contacts to the sums of their bodies, in the order of the contacts.
+   pure subroutine add_pairs(n, i, j, first, torque_second, last, value)
+      integer(ip), intent(in) :: n, i(n), j(n), last
+      real(wp), intent(in) :: first(block_size, n_terms), torque_second(block_size, 3)
+      real(wp), intent(inout) :: value(n_terms, last)
+      real(wp) :: t(n_terms)
+      integer(ip) :: c
+      integer :: k
+
+      do c = 1_ip, n
+         do k = 1, n_terms
+            t(k) = first(c, k)
+            value(k, i(c)) = value(k, i(c)) + t(k)
+         end do
+         t(1:9) = -t(1:9)
+         do k = 1, 3
+            t(3*k) = -torque_second(c, k)
+         end do
+         do k = 1, n_terms
+            value(k, j(c)) = value(k, j(c)) + t(k)
+         end do
+      end do
+   end subroutine add_pairs
+
+   !> Add a term to the sums of a body, or append it to the late terms.
+   pure subroutine add_or_keep(slot, term, last, sums, late)
+      integer(ip), intent(in) :: slot
+      real(wp), intent(in) :: term(n_terms)
+      integer(ip), intent(in) :: last
+      type(force_sums_t), intent(inout) :: sums
+      type(late_terms_t), intent(inout) :: late
+
+      if (slot > last) then
+         call append_late(slot, term, late)
+      else
+         sums%value(:, slot) = sums%value(:, slot) + term
+      end if
+   end subroutine add_or_keep
 
    !> Make room for more late terms.
    pure subroutine reserve_late(late, more)
@@ -231,7 +264,7 @@ contains
       do c = 1_ip, contacts%n
          call set_force_of_contact(contacts, c)
       end do
-      call total_forces(gravity, sums, bodies)
+      call total_forces(gravity, sums, 1_ip, bodies%n, bodies)
    end subroutine assemble_forces
 
    !> Select the contacts with fixed bodies from a table.
@@ -256,25 +289,25 @@ contains
       end do
    end subroutine select_walls
 
-   !> Set the forces and torques on all bodies from the sums, and add gravity to free bodies.
-   subroutine total_forces(gravity, sums, bodies)
+   !> Set the forces and torques on some bodies from the sums, and add gravity to free bodies. Several threads may call
+   !> it for different bodies.
+   pure subroutine total_forces(gravity, sums, low, high, bodies)
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
       !> Sums of the bodies
       type(force_sums_t), intent(in) :: sums
+      !> First and last slot
+      integer(ip), intent(in) :: low, high
       !> Bodies; `force` and `torque` are set
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: s
 
-      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(gravity, sums, bodies) private(s)
-      do s = 1_ip, bodies%n
+      do s = low, high
          call set_force(sums%value(:, s), s, bodies)
          if (bodies%fixed(s)) cycle
          bodies%force(1, s) = bodies%force(1, s) + bodies%mass(s)*gravity(1)
          bodies%force(2, s) = bodies%force(2, s) + bodies%mass(s)*gravity(2)
       end do
-      !$omp end parallel do
    end subroutine total_forces
 
    !> Set the force and torque on one body from the sum of its terms.
