@@ -161,7 +161,7 @@ def test_no_flipped_bit_of_a_segment_stays_unseen(result, name, capsys):
 
 
 def test_only_what_is_used_is_hashed(result, monkeypatch):
-    monkeypatch.setattr("polydem_post.trajectory.CHECKED_AT_ONCE", 1)
+    monkeypatch.setattr("polydem_post.result_folder.CHECKED_AT_ONCE", 1)
     with h5py.File(result / NAMES[1], "r+") as file:
         at = file["frames/velocity"].id.get_chunk_info(0).byte_offset
     write_manifest(result, texts_of(result))

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import h5py
 from polydem_post import Trajectory
+from polydem_post.columns import field_names
 
 #: Programs without and with MPI
 SERIAL = os.environ["POLYDEM_PROGRAM"]
@@ -66,7 +67,8 @@ def frames(folder):
     found = {}
     for number in range(len(result)):
         for part in (result.frame(number), result.contacts(number), result.walls(number)):
-            for name, value in vars(part).items():
+            for name in field_names(type(part)):
+                value = getattr(part, name)
                 found[f"frame {number}: {type(part).__name__}.{name}"] = getattr(value, "tobytes", lambda: value)()
     for name, values in result.energy_balance.items():
         found[f"energy balance: {name}"] = values.tobytes()

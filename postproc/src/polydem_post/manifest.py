@@ -153,7 +153,9 @@ def file_hashes(paths: list) -> list[str]:
     """Hash of all bytes of each file, 16 hexadecimal digits."""
     sizes = [Path(path).stat().st_size for path in paths]
     parts: list[list] = [[] for _ in paths]
-    rests, lengths, owners = [], [], []
+    rests: list[int] = []
+    lengths: list[int] = []
+    owners: list[int] = []
     slices = sum(-(-(size // 8) // SLICE) for size in sizes)
     table = np.zeros((min(slices, SLICES), SLICE), dtype="<u8")
 
@@ -169,7 +171,7 @@ def file_hashes(paths: list) -> list[str]:
             while left > 0:
                 words = min(SLICE, left)
                 row = table[len(lengths), :words]
-                if file.readinto(row) != row.nbytes:
+                if file.readinto(row.data) != row.nbytes:
                     raise OSError(0, "it becomes shorter while it is read", str(path))
                 owners.append(k)
                 lengths.append(words)

@@ -50,7 +50,7 @@ def find_segments(folder: Path) -> list[Segment]:
         except ResultError as error:
             if not present_path(path).name.endswith(OPEN_SUFFIX):
                 raise
-            warnings.warn(f"left out: {error}", stacklevel=3)
+            warnings.warn(f"left out: {error}", stacklevel=4)
     _check_order(folder, segments)
     return segments
 

@@ -2,197 +2,221 @@
 
 from __future__ import annotations
 
-import warnings
+import copy
+from collections.abc import Iterator
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
+from typing import Any, Union, overload
 
+import h5py
 import numpy as np
+import numpy.typing as npt
 
 from .former_names import COUNTERS, STAGES, balance_of, present
-from .frames import Contacts, Frame, Walls, sound_frame
-from .manifest import MANIFEST, ManifestError, check_bytes, check_hashes, read_manifest
-from .result_file import (
-    OPEN_SUFFIX,
-    UNREADABLE,
-    ResultError,
-    insist,
-    insist_on_own_data,
-    open_file,
-    plain,
-    reading,
-)
-from .segments import SEGMENT_NAME, Segment, check_names, check_steps, find_segments, number_of, read_segment
+from .frames import CONTACT_FIELDS, Contacts, Frame, Walls, find_contacts, sound_frame
+from .result_file import UNREADABLE, ResultError, insist, insist_on_own_data, open_file, plain, reading
+from .result_folder import NoManifest, ResultFolder
+from .segments import Segment
+from .settings import Settings
 
-__all__ = ["UNREADABLE", "Contacts", "Frame", "NoManifest", "ResultError", "Trajectory", "Walls", "input_of",
-           "insist_on_own_data", "open_file", "status_of"]
+__all__ = ["UNREADABLE", "Contacts", "Frame", "NoFrame", "NoManifest", "ResultError", "Trajectory", "Walls",
+           "input_of", "insist_on_own_data", "open_file", "status_of"]
 
-#: Segments are compared with their hashes as they are needed, with those that follow up to so many bytes: many at once
-#: take hardly longer than one
-CHECKED_AT_ONCE = 2**26
+#: Columns of bodies that change from frame to frame
+GROWING = ("position", "angle", "velocity", "angular_velocity")
+
+#: Several frames: a slice, or numbers or truth values of frames
+Choice = Union[slice, list[int], npt.NDArray[Any]]
 
 
-class NoManifest(UserWarning):
-    """A result without a manifest is read: whether its files are what the run wrote is not known."""
+class NoFrame(ResultError, IndexError):
+    """A frame that a trajectory does not have."""
 
 
 class Trajectory:
     """The frames of a run, joined from the segments in a folder, or those of one segment.
 
-    `times` and `steps` hold one entry per frame; frames are numbered from 0, negative numbers count from the end.
+    A trajectory is a sequence of frames that are read when they are used, one at a time: `len(run)`, `run[0]`,
+    `run[-1]`, `for frame in run`, `run.at(0.5)`. `run[10:20]`, `run[::5]` and `run[run.times > 1.0]` are trajectories
+    of some of the frames; nothing is read for them.
+
+        times  [s]  simulated time of each frame, (frames)
+        steps  [1]  number of the time step of each frame, (frames)
+
     Names, sizes, numbers and steps of the segments are compared with the manifest of the result at once, all their
     bytes when a segment is first used; `check=False` leaves that out. A result without a manifest is read with a
     warning.
     """
 
-    def __init__(self, path, check: bool = True):
-        path = Path(path)
-        if not path.exists():
-            raise ResultError(f"{path}: there is no such file or folder")
-        if path.is_file() and path.name == "profile.h5":
-            path = path.parent
-        self.folder = path if path.is_dir() else path.parent
-        self._segments = find_segments(path) if path.is_dir() else [read_segment(path)]
-        if not self._segments and not self._profile_path.exists():
-            raise ResultError(f"{path}: holds no result (neither trajectory_0001.h5 nor profile.h5)")
-        self._manifest, self._unchecked = None, {}
-        if check:
-            self._check_manifest(path.is_dir())
-        self.times = np.concatenate([np.empty(0)] + [s.times for s in self._segments])
-        self.steps = np.concatenate([np.empty(0, dtype=np.int64)] + [s.steps for s in self._segments])
+    def __init__(self, path: str | PathLike[str], check: bool = True):
+        self._files = ResultFolder(Path(path), check)
+        self.folder = self._files.folder
+        self.times = self._files.times
+        self.steps = self._files.steps
+        #: Numbers of the frames of this trajectory in the whole run
+        self._numbers = np.arange(len(self.times))
+        self._bodies: tuple[Path | None, dict[str, Any]] = (None, {})
+
+    # --- a sequence of frames -------------------------------------------------------------------------------------
 
     def __len__(self) -> int:
         return len(self.times)
 
-    def _check_manifest(self, whole: bool) -> None:
-        """Compare what is there with the manifest, but for the bytes of the segments."""
-        try:
-            self._manifest = read_manifest(self.folder)
-            if self._manifest is None:
-                warnings.warn(f"{self.folder}: has no {MANIFEST}, since an older version made it; whether its "
-                              "files are what was written is not known", NoManifest, stacklevel=3)
-                return
-            check_names(self._segments, self._manifest, whole)
-            names = sorted(set(self._manifest.closed) & {segment.name for segment in self._segments})
-            if whole:
-                names = sorted(name for name in self._manifest.closed if SEGMENT_NAME.fullmatch(name))
-            check_bytes(self.folder, names, self._manifest)
-            for segment in self._segments:
-                check_steps(segment, self._manifest.closed.get(segment.name))
-        except ManifestError as error:
-            raise ResultError(f"{self.folder}: {error}. The result is not what the run wrote: take it from a copy "
-                              "or run it again; Trajectory(..., check=False) reads it as it is") from error
-        sizes = {segment.name: self._manifest.closed[segment.name].bytes
-                 for segment in self._segments if segment.name in self._manifest.closed}
-        self._unchecked = dict(sorted(sizes.items(), key=lambda item: number_of(item[0])))
-        if "profile.h5" in self._manifest.closed:
-            self._unchecked["profile.h5"] = self._manifest.closed["profile.h5"].bytes
+    def __iter__(self) -> Iterator[Frame]:
+        """All frames in turn. Each segment is opened once."""
+        numbers = list(self._numbers)
+        while numbers:
+            segment, _ = self._files.locate(int(numbers[0]))
+            with self._files.open_segment(segment) as file:
+                while numbers:
+                    here, row = self._files.locate(int(numbers[0]))
+                    if here is not segment:
+                        break
+                    yield self._frame_in(file, segment, row, int(numbers.pop(0)))
 
-    def _check_bytes(self, name: str) -> None:
-        """Compare all bytes of a file with the manifest when it is first used, and those of some that follow."""
-        if name not in self._unchecked:
-            return
-        names, total = [], 0
-        for each in list(self._unchecked)[list(self._unchecked).index(name) :]:
-            total += self._unchecked[each]
-            if names and total > CHECKED_AT_ONCE:
-                break
-            names.append(each)
-        for chosen in (names, [name]):  # if a later one is wrong, it is told when it is used
-            try:
-                check_bytes(self.folder, chosen, self._manifest)
-                check_hashes(self.folder, chosen, self._manifest)
-            except ManifestError as error:
-                if chosen == [name]:
-                    raise ResultError(f"{self.folder}: {error}") from error
-            else:
-                for each in chosen:
-                    del self._unchecked[each]
-                return
+    @overload
+    def __getitem__(self, which: int) -> Frame: ...
+
+    @overload
+    def __getitem__(self, which: Choice) -> Trajectory: ...
+
+    def __getitem__(self, which: Any) -> Frame | Trajectory:
+        if isinstance(which, (int, np.integer)):
+            return self.frame(int(which))
+        chosen = copy.copy(self)
+        chosen.__dict__.pop("energy_balance", None)
+        index = which if isinstance(which, slice) else np.asarray(which)
+        try:
+            chosen.times, chosen.steps = self.times[index], self.steps[index]
+            chosen._numbers = self._numbers[index]
+        except IndexError as error:
+            raise NoFrame(f"{self.folder}: {error}") from error
+        return chosen
+
+    def __repr__(self) -> str:
+        if len(self) == 0:
+            return f"<Trajectory {self.folder}: no frames>"
+        try:
+            first = self.frame(0)
+            bodies = f"{len(first)} bodies ({int(first.free.sum())} free)"
+            contacts = "with contacts" if self.has_contacts else "without contacts"
+        except ResultError as error:
+            return f"<Trajectory {self.folder}: {len(self)} frames that cannot be read: {error}>"
+        ended = "finished" if status_of(self.folder) == "finished" else "not finished"
+        return (f"<Trajectory {self.folder}: {len(self)} frames, {self.times[0]:.6g} to {self.times[-1]:.6g} s, "
+                f"{bodies}, {contacts}, {ended}>")
 
     def frame(self, number: int) -> Frame:
-        """The bodies of a frame."""
-        segment, row = self._locate(number)
-        self._check_bytes(segment.name)
-        with reading(segment.path) as file:
-            bodies, frames = file["bodies"], file["frames"]
-            return sound_frame(segment.path, Frame(
-                step=int(segment.steps[row]),
-                time=float(segment.times[row]),
-                id=bodies["id"][:],
-                fixed=bodies["fixed"][:].astype(bool),
-                position=frames["position"][row],
-                angle=frames["angle"][row],
-                velocity=frames["velocity"][row],
-                angular_velocity=frames["angular_velocity"][row],
-                shape=bodies["vertex"][:],
-                vertex_start=bodies["vertex_start"][:],
-            ))
+        """A frame by its number in this trajectory, from 0; negative numbers count from the end."""
+        whole = self._whole_number(number)
+        segment, row = self._files.locate(whole)
+        with self._files.open_segment(segment) as file:
+            return self._frame_in(file, segment, row, whole)
+
+    def at(self, time: float) -> Frame:
+        """The frame that is nearest to a time [s]; of two equally near ones the earlier.
+
+        The time may lie at most one interval between frames outside the span of the trajectory.
+        """
+        if len(self) == 0:
+            raise NoFrame(f"{self.folder}: there are no frames")
+        interval = float(np.max(np.diff(self.times))) if len(self) > 1 else 0.0
+        if not self.times[0] - interval <= time <= self.times[-1] + interval:
+            raise NoFrame(f"{self.folder}: there is no frame near {time:g} s, but from {self.times[0]:g} to "
+                          f"{self.times[-1]:g} s")
+        return self.frame(int(np.argmin(np.abs(self.times - time))))
 
     def contacts(self, number: int) -> Contacts:
         """The contacts of a frame."""
-        segment, row = self._locate(number)
-        self._check_bytes(segment.name)
-        with reading(segment.path) as file:
-            if "contacts" not in file:
-                raise ResultError(f"{segment.path}: holds no contacts; run with output.contacts = .true.")
-            group = file["contacts"]
-            low, high = group["start"][row : row + 2]
-            names = ("first", "second", "area", "point", "normal", "force")
-            contacts = Contacts(**{name: group[name][low:high] for name in names})
-            wide = {"point": 2, "normal": 2, "force": 2}
-            shapes = {name: (int(high - low), *([2] if name in wide else [])) for name in names}
-            insist(segment.path, "contacts", {name: getattr(contacts, name) for name in names}, shapes)
-            return contacts
+        return self.frame(number).contacts
 
     def walls(self, number: int) -> Walls:
         """Forces and torques on the fixed bodies in a frame; empty if there are none."""
-        segment, row = self._locate(number)
-        self._check_bytes(segment.name)
-        with reading(segment.path) as file:
-            if "walls" not in file:
-                return Walls(np.empty(0, dtype=np.int32), np.empty((0, 2)), np.empty(0))
-            group = file["walls"]
-            walls = Walls(group["id"][:], group["force"][row], group["torque"][row])
-            n = len(walls.id)
-            insist(segment.path, "walls", vars(walls), {"id": (n,), "force": (n, 2), "torque": (n,)})
-            return walls
+        return self._read_walls(self._whole_number(number))
 
     @cached_property
-    def energy_balance(self) -> dict[str, np.ndarray]:
+    def has_contacts(self) -> bool:
+        """Whether the run wrote its contacts."""
+        if not self._files.segments:
+            return False
+        with self._files.open_segment(self._files.segments[0]) as file:
+            return "contacts" in file
+
+    def series(self, name: str, index: Any = None) -> npt.NDArray[Any]:
+        """A column of all frames as one array, (frames, n, ...); only of the bodies with these indices, if given.
+
+        All of it is in memory at once: 16 bytes per frame and body for positions.
+        """
+        parts = []
+        identifiers = None
+        for frame in self:
+            if identifiers is not None and not np.array_equal(identifiers, frame.id):
+                raise ResultError(f"{self.folder}: the bodies are not the same in all frames")
+            identifiers = frame.id
+            column = np.asarray(getattr(frame, name))
+            if len(column) != len(frame):
+                raise ResultError(f"{name} is not one value per body")
+            parts.append(column if index is None else column[index])
+        if not parts:
+            raise NoFrame(f"{self.folder}: there are no frames")
+        return np.stack(parts)
+
+    def to_pandas(self) -> Any:
+        """The bodies of all frames as one pandas table, indexed by time and identifier; all of it is in memory."""
+        from .tables import trajectory_table
+
+        return trajectory_table(self)
+
+    def to_xarray(self) -> Any:
+        """The bodies of all frames as an xarray data set with the dimensions time, id and axis, and with units."""
+        from .tables import trajectory_dataset
+
+        return trajectory_dataset(self)
+
+    # --- what belongs to the run ----------------------------------------------------------------------------------
+
+    @cached_property
+    def settings(self) -> Settings:
+        """The stored namelist with all defaults filled in: run.settings.forces.stiffness."""
+        text = str(self.provenance.get("resolved_input", ""))
+        return Settings(text)
+
+    @cached_property
+    def energy_balance(self) -> dict[str, npt.NDArray[Any]]:
         """Entries of the energy and momentum balance, one value per frame; empty if it was not computed."""
-        columns: dict[str, list[np.ndarray]] = {}
-        for segment in self._segments:
-            self._check_bytes(segment.name)
-            with reading(segment.path) as file:
+        columns: dict[str, list[npt.NDArray[Any]]] = {}
+        for segment in self._files.segments:
+            with self._files.open_segment(segment) as file:
                 for name, values in balance_of(file).items():
                     part = values[: len(segment.times)]
                     insist(segment.path, "energy_balance", {name: part}, {name: (len(segment.times),)}, finite=False)
                     columns.setdefault(name, []).append(part)
         lengths = {sum(map(len, parts)) for parts in columns.values()}
-        if lengths - {len(self)}:
+        if lengths - {len(self._files.times)}:
             raise ResultError(f"{self.folder}: the energy balance lacks entries in some of its segments")
-        return {name: np.concatenate(parts) for name, parts in columns.items()}
+        return {name: np.concatenate(parts)[self._numbers] for name, parts in columns.items()}
 
     @cached_property
     def balance_units(self) -> dict[str, str]:
         """Unit of each entry of the energy balance."""
         units: dict[str, str] = {}
-        for segment in self._segments:
+        for segment in self._files.segments:
             with reading(segment.path) as file:
                 for name, values in balance_of(file).items():
                     units[name] = str(values.attrs.get("unit", ""))
         return units
 
     @cached_property
-    def profile(self) -> dict:
+    def profile(self) -> dict[str, Any]:
         """Per stage: `stage` (list), `calls`, `total`, `least`, `most` [s]; of the run `seconds`, `memory` [KiB]."""
-        with self._open_profile() as file:
+        with self._files.open_profile() as file:
             group = file["profile"]
-            profile = {name: group[name][:] for name in ("calls", "total", "least", "most")}
+            profile: dict[str, Any] = {name: group[name][:] for name in ("calls", "total", "least", "most")}
             profile["stage"] = [present(STAGES, str(name)) for name in group["stage"].asstr()[:]]
             n = len(profile["stage"])
             columns = {name: profile[name] for name in ("calls", "total", "least", "most")}
-            insist(self._profile_path, "profile", columns, dict.fromkeys(columns, (n,)), finite=False)
+            insist(self._files.profile_path, "profile", columns, dict.fromkeys(columns, (n,)), finite=False)
             profile["seconds"] = float(group["seconds"][()])
             if "memory" in group:
                 profile["memory"] = int(group["memory"][()])
@@ -201,7 +225,7 @@ class Trajectory:
     @cached_property
     def counters(self) -> dict[str, int]:
         """Exact counts of the run."""
-        with self._open_profile() as file:
+        with self._files.open_profile() as file:
             if "counters" not in file:
                 return {}
             group = file["counters"]
@@ -209,59 +233,107 @@ class Trajectory:
             return dict(zip(names, map(int, group["value"][:])))
 
     @cached_property
-    def provenance(self) -> dict:
+    def provenance(self) -> dict[str, Any]:
         """Where the result comes from: program, build, machine, input."""
-        path = self._profile_path if self._profile_path.exists() else self._segments[0].path
-        self._check_bytes(path.name.removesuffix(OPEN_SUFFIX))
-        with reading(path) as file:
+        with self._files.open_any() as file:
             return {name: plain(entry) for name, entry in file["provenance"].items()}
 
     @property
     def state_hash(self) -> str:
         """Hash of the bits of the last state, 16 hexadecimal digits."""
-        with self._open_profile() as file:
-            return plain(file["state_hash"])
+        with self._files.open_profile() as file:
+            return str(plain(file["state_hash"]))
 
     @property
     def status(self) -> str:
         """How the run ended."""
-        with self._open_profile() as file:
-            return plain(file["status"])
+        with self._files.open_profile() as file:
+            return str(plain(file["status"]))
 
-    @property
-    def _profile_path(self) -> Path:
-        return self.folder / "profile.h5"
+    # --- reading --------------------------------------------------------------------------------------------------
 
-    def _open_profile(self):
-        if not self._profile_path.exists():
-            raise ResultError(f"{self._profile_path}: there is no such file; it is written when a run ends")
-        self._check_bytes(self._profile_path.name)
-        return reading(self._profile_path)
-
-    def _locate(self, number: int) -> tuple[Segment, int]:
+    def _whole_number(self, number: int) -> int:
+        """Number in the whole run of a frame of this trajectory."""
         row = number + len(self) if number < 0 else number
         if not 0 <= row < len(self):
-            raise ResultError(f"{self.folder}: there is no frame {number}, only {len(self)} frames counted from 0")
-        for segment in self._segments:
-            if row < len(segment.times):
-                return segment, row
-            row -= len(segment.times)
-        raise AssertionError("frames are counted over the same segments")
+            raise NoFrame(f"{self.folder}: there is no frame {number}, only {len(self)} frames counted from 0")
+        return int(self._numbers[row])
+
+    def _frame_in(self, file: h5py.File, segment: Segment, row: int, number: int) -> Frame:
+        frames = file["frames"]
+        if self._bodies[0] != segment.path:
+            self._bodies = (segment.path, _bodies_in(file))
+        return sound_frame(segment.path, Frame(
+            step=int(segment.steps[row]), time=float(segment.times[row]), number=number,
+            **{name: frames[name][row] for name in GROWING}, **self._bodies[1], _source=self))
+
+    def contacts_of(self, frame: Frame) -> Contacts:
+        """The contacts of a frame of this run."""
+        segment, row = self._files.locate(frame.number)
+        with self._files.open_segment(segment) as file:
+            if "contacts" not in file:
+                raise ResultError(f"{segment.path}: holds no contacts; run with output.contacts = .true.")
+            group = file["contacts"]
+            low, high = (int(each) for each in group["start"][row : row + 2])
+            columns = {name: group[name][low:high] for name in CONTACT_FIELDS}
+            shapes = {name: (high - low, *([2] if name in ("point", "normal", "force") else []))
+                      for name in CONTACT_FIELDS}
+            insist(segment.path, "contacts", columns, shapes)
+        try:
+            return find_contacts(frame, columns)
+        except ResultError as error:
+            raise ResultError(f"{segment.path}: contacts: {error}") from error
+
+    def walls_of(self, frame: Frame) -> Walls:
+        """Forces and torques on the fixed bodies in a frame of this run."""
+        return self._read_walls(frame.number)
+
+    def _read_walls(self, number: int) -> Walls:
+        segment, row = self._files.locate(number)
+        with self._files.open_segment(segment) as file:
+            if "walls" not in file:
+                return Walls(np.empty(0, dtype=np.int32), np.empty((0, 2)), np.empty(0))
+            group = file["walls"]
+            walls = Walls(group["id"][:], group["force"][row], group["torque"][row])
+            n = len(walls.id)
+            insist(segment.path, "walls", vars(walls), {"id": (n,), "force": (n, 2), "torque": (n,)})
+            return walls
+
+    def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
+        """Which bodies the stored namelist moves: all fixed ones, or those in scene.motion_bodies."""
+        scene = self.settings["scene"]
+        if scene.get("motion", "none") == "none":
+            return np.zeros(len(frame), dtype=bool)
+        chosen = scene.get("motion_bodies")
+        if chosen is None:
+            return frame.fixed
+        return frame.fixed & np.isin(frame.id, np.atleast_1d(chosen))
+
+
+def _bodies_in(file: h5py.File) -> dict[str, Any]:
+    """Columns of bodies that do not change; a stored mass of 0 is an infinite one."""
+    bodies = file["bodies"]
+    columns = {"id": bodies["id"][:], "fixed": bodies["fixed"][:].astype(bool), "shape": bodies["vertex"][:],
+               "vertex_start": bodies["vertex_start"][:]}
+    for name in ("mass", "inertia"):
+        values = bodies[name][:]
+        columns[name] = np.where(values == 0.0, np.inf, values)
+    return columns
 
 
 def status_of(folder: Path) -> str:
     """How the run of a result folder ended; empty if there is no readable profile.h5."""
-    try:
-        with reading(folder / "profile.h5") as file:
-            return str(plain(file["status"]))
-    except ResultError:
-        return ""
+    return _entry_of(folder, "status")
 
 
 def input_of(folder: Path) -> str:
     """The resolved input of a result folder; empty if there is no readable profile.h5 that has it."""
+    return _entry_of(folder, "provenance/resolved_input")
+
+
+def _entry_of(folder: Path, name: str) -> str:
     try:
         with reading(folder / "profile.h5") as file:
-            return str(plain(file["provenance/resolved_input"]))
+            return str(plain(file[name]))
     except ResultError:
         return ""

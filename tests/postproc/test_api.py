@@ -1,0 +1,250 @@
+"""The Python interface of a trajectory, on a finished run of the program: a heap of 60 grains with contacts."""
+
+import inspect
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from polydem_post import Contacts, Frame, NoFrame, ResultError, Trajectory, Walls
+from polydem_post.columns import columns_of, field_names
+from polydem_post.settings import Settings
+
+PROGRAM = os.environ["POLYDEM_PROGRAM"]
+HEAP = """&scene
+   name = 'heap'
+   bodies = 60
+   {scene}
+/
+&forces
+   friction_coefficient = 0.5
+/
+&integrate
+   duration = 0.4
+/
+&output
+   frame_interval = 0.05
+   frames_per_segment = 4
+   contacts = .true.
+/
+"""
+
+
+def make_run(folder, scene=""):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "heap.nml").write_text(HEAP.format(scene=scene))
+    subprocess.run([PROGRAM, "run", "heap.nml"], cwd=folder, check=True, capture_output=True)
+    return folder / "results" / "heap"
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return make_run(tmp_path_factory.mktemp("api"))
+
+
+@pytest.fixture(scope="module")
+def run(folder):
+    return Trajectory(folder)
+
+
+def test_a_trajectory_is_a_sequence(run):
+    frames = list(run)
+    assert len(frames) == len(run) == len(run.times) >= 9
+    assert [frame.number for frame in frames] == list(range(len(run)))
+    assert_array_equal([frame.time for frame in frames], run.times)
+    for number in (0, 3, 4, -1, -len(run)):
+        assert run[number].step == frames[number].step == run.frame(number).step
+        assert_array_equal(run[number].position, frames[number].position)
+
+
+def test_a_slice_is_a_trajectory(run):
+    some = run[1:8:3]
+    assert isinstance(some, Trajectory)
+    assert [frame.number for frame in some] == [1, 4, 7]
+    assert_array_equal(some.times, run.times[1:8:3])
+    assert some[-1].step == run[7].step and len(some[1].contacts) == len(run[4].contacts)
+    assert_array_equal(some.energy_balance["kinetic"], run.energy_balance["kinetic"][1:8:3])
+    assert [frame.number for frame in run[::-1]] == list(range(len(run)))[::-1]
+    late = run.times > 0.3
+    assert [frame.number for frame in run[late]] == list(np.flatnonzero(late))
+    assert [frame.number for frame in some[[0, -1]]] == [1, 7]
+    assert len(run[99:]) == 0 and list(run[99:]) == []
+    assert run[2:][1:].at(0.0 + run.times[3]).number == 3
+
+
+def test_a_frame_that_is_not_there_is_an_index_error(run):
+    for number in (len(run), -len(run) - 1):
+        with pytest.raises(IndexError, match=f"there is no frame {number}, only {len(run)} frames"):
+            run[number]
+    with pytest.raises(NoFrame, match="out of bounds"):
+        run[[0, 99]]
+
+
+def test_at_takes_the_nearest_frame(run):
+    assert run.at(run.times[3]).number == 3
+    assert run.at(0.7 * run.times[3] + 0.3 * run.times[4]).number == 3
+    assert run.at(0.3 * run.times[3] + 0.7 * run.times[4]).number == 4
+    assert run.at(-0.01).number == 0
+    with pytest.raises(NoFrame, match="there is no frame near 7 s, but from 0 to 0.4 s"):
+        run.at(7.0)
+
+
+def test_a_repr_says_what_there_is(run):
+    assert repr(run) == (f"<Trajectory {run.folder}: {len(run)} frames, 0 to 0.4 s, {len(run[0])} bodies (60 free), "
+                         "with contacts, finished>")
+    assert repr(run[0]) == f"<Frame 0: t = 0 s, step 0, {len(run[0])} bodies (60 free)>"
+    assert repr(run[-1].contacts).startswith(f"<Contacts: {len(run[-1].contacts)} pairs, greatest force ")
+
+
+def test_settings_are_those_of_the_namelist(run):
+    assert run.settings.forces.friction_coefficient == 0.5
+    assert run.settings["scene"]["bodies"] == 60 and run.settings.scene.name == "heap"
+    assert run.settings.output.contacts is True
+    assert run.settings.forces.gravity == [0.0, -9.81]
+    assert "friction_coefficient" in dir(run.settings.forces)
+    with pytest.raises(AttributeError, match="&forces has no entry stifness; it has gravity, stiffness"):
+        _ = run.settings.forces.stifness
+    with pytest.raises(AttributeError, match="there is no group &force; there are &scene"):
+        _ = run.settings.force
+
+
+def test_settings_print_as_a_namelist_that_reads_the_same(run):
+    assert run.settings == Settings(repr(run.settings))
+    assert Settings("&a\n   b = 'it''s, so'\n   c = 1, 2\n/")["a"]["b"] == "it's, so"
+    with pytest.raises(ResultError, match="line 2 of the stored input is no entry"):
+        Settings("&a\n   what\n/")
+
+
+def test_masses_follow_from_density_and_polygon(run):
+    frame = run[-1]
+    free, fixed = frame.free, frame.fixed
+    assert_allclose(frame.mass[free], 2500.0 * frame.area[free], rtol=1e-12)
+    assert_allclose(frame.density[free], 2500.0, rtol=1e-12)
+    expected = Frame.from_polygons([frame.vertices[k] for k in np.flatnonzero(free)], density=2500.0)
+    assert_allclose(frame.inertia[free], expected.inertia, rtol=1e-9)
+    assert np.isinf(frame.mass[fixed]).all() and np.isinf(frame.inertia[fixed]).all()
+    assert set(frame.material) == {0}
+
+
+def test_shapes_of_a_rectangle():
+    frame = Frame.from_polygons([[(1, 1), (5, 1), (5, 3), (1, 3)]], density=3.0)
+    assert_allclose(frame.position, [[3, 2]])
+    assert_allclose([frame.area[0], frame.mass[0], frame.inertia[0]], [8.0, 24.0, 24.0 * (16 + 4) / 12])
+    assert_allclose([frame.radius[0], frame.thickness[0], frame.diameter[0]], [5**0.5, 2.0, (32 / np.pi) ** 0.5])
+    assert_allclose(frame.bounds, [[1, 1, 5, 3]])
+    assert frame.corners[0] == 4
+
+
+def test_kinetic_energies_sum_to_the_balance(run):
+    for number in (1, -1):
+        assert_allclose(run[number].kinetic_energy.sum(), run.energy_balance["kinetic"][number], rtol=1e-12)
+
+
+def test_contacts_have_indices_and_parts(run):
+    frame = run[-1]
+    contacts = frame.contacts
+    assert len(contacts) > 10
+    assert_array_equal(frame.id[contacts.first_index], contacts.first)
+    assert_array_equal(frame.index_of(contacts.second), contacts.second_index)
+    assert_allclose(contacts.normal_vector + contacts.tangential_vector, contacts.force,
+                    atol=1e-12 * contacts.force_magnitude.max())
+    assert_allclose(np.sum(contacts.direction**2, axis=1), 1.0)
+    # Repulsion, within the Coulomb limit; the direction is the one in which the first body faces the second.
+    assert (contacts.normal_force >= 0.0).all()
+    assert (np.abs(contacts.tangential_force) <= 0.5 * contacts.normal_force * (1 + 1e-9) + 1e-12).all()
+    both = ~contacts.with_fixed
+    assert (np.sum(contacts.direction * contacts.branch, axis=1)[both] < 0.0).all()
+    assert_allclose(contacts.first_arm - contacts.second_arm, -contacts.branch, atol=1e-15)
+    assert (contacts.depth < 0.1 * frame.thickness[frame.free].min()).all()
+    assert_array_equal(run.contacts(-1).force, contacts.force)
+
+
+def test_forces_of_bodies_are_the_sums_over_contacts(run):
+    frame = run[-1]
+    k = int(np.argmax(frame.coordination * frame.free))
+    own = np.zeros(2)
+    for first, second, force in zip(frame.contacts.first_index, frame.contacts.second_index, frame.contacts.force):
+        own += force * (first == k) - force * (second == k)
+    assert frame.coordination[k] >= 3
+    assert_allclose(frame.force[k], own, rtol=1e-9, atol=1e-9)
+    # What the stored walls feel is what the contacts with them say.
+    total = np.zeros((len(frame), 2))
+    np.add.at(total, frame.contacts.first_index, frame.contacts.force)
+    np.subtract.at(total, frame.contacts.second_index, frame.contacts.force)
+    assert_allclose(frame.walls.force, total[frame.index_of(frame.walls.id)], rtol=1e-9, atol=1e-9)
+    assert_array_equal(frame.force[frame.fixed], frame.walls.force)
+
+
+def test_flags_say_which_walls_move(run, tmp_path):
+    assert not run[0].driven.any() and (run[0].static == run[0].fixed).all()
+    motion = "motion = 'translation'\n   motion_velocity = 0.0, 0.01\n   motion_bodies = 61"
+    moved = make_run(tmp_path, motion)
+    frame = Trajectory(moved)[-1]
+    assert list(frame.id[frame.driven]) == [61]
+    assert_array_equal(frame.static, frame.fixed & (frame.id != 61))
+    assert frame.speed[frame.driven] == pytest.approx(0.01)
+
+
+def test_series_stacks_a_column(run):
+    positions = run.series("position")
+    assert positions.shape == (len(run), len(run[0]), 2)
+    assert_array_equal(positions[4], run[4].position)
+    assert_array_equal(run.series("angle", [3, 5]), run.series("angle")[:, [3, 5]])
+    with pytest.raises(ResultError, match="vertex is not one value per body"):
+        run.series("vertex")
+
+
+def test_tables_of_pandas(run):
+    pytest.importorskip("pandas")
+    frame = run[-1]
+    table = frame.to_pandas()
+    assert_array_equal(table.index, frame.id)
+    assert_array_equal(table["position_y"], frame.position[:, 1])
+    assert_array_equal(frame.contacts.to_pandas()["normal_force"], frame.contacts.normal_force)
+    whole = run[:6:2].to_pandas()
+    assert whole.shape[0] == 3 * len(frame)
+    assert_array_equal(whole.loc[run.times[2]]["angle"], run[2].angle)
+
+
+def test_data_sets_of_xarray(run):
+    pytest.importorskip("xarray")
+    data = run.to_xarray()
+    assert dict(data.sizes) == {"time": len(run), "id": len(run[0]), "axis": 2}
+    assert_array_equal(data.position.sel(axis="y").isel(time=4), run[4].position[:, 1])
+    assert data.velocity.attrs["units"] == "m/s"
+    assert data.mass.dims == ("id",)
+    assert_array_equal(data.kinetic, run.energy_balance["kinetic"])
+
+
+@pytest.mark.parametrize("package, call", [("pandas", "run[0].to_pandas()"), ("xarray", "run.to_xarray()"),
+                                           ("pandas", "run.to_pandas()"), ("pandas", "run[0].contacts.to_pandas()")])
+def test_a_missing_package_is_named(run, monkeypatch, package, call):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(ResultError, match=rf"needs the package {package}: install it with pip install {package}"):
+        eval(call, {"run": run})
+
+
+@pytest.mark.parametrize("kind", [Frame, Contacts, Walls])
+def test_help_shows_every_field_with_its_unit(kind):
+    columns = columns_of(kind)
+    assert set(field_names(kind)) <= set(columns)
+    text = inspect.getdoc(kind)
+    for name, column in columns.items():
+        assert column.unit and column.meaning, name
+        assert name in text or f"[{column.unit}]" in inspect.getdoc(inspect.getattr_static(kind, name))
+
+
+def test_frames_made_of_polygons_take_contacts():
+    square = np.array([(0, 0), (1, 0), (1, 1), (0, 1)])
+    frame = Frame.from_polygons([square, square + np.array([1, 0])])
+    frame = frame.with_contacts([1], [2], [[-3.0, 2.0]], [[1.0, 0.5]])
+    contacts = frame.contacts
+    assert_allclose([contacts.normal_force[0], contacts.tangential_force[0]], [3.0, 2.0])
+    assert_allclose(frame.force, [[-3, 2], [3, -2]])
+    assert_array_equal(frame.coordination, [1, 1])
+    with pytest.raises(ResultError, match="made without contacts"):
+        _ = Frame.from_polygons([square]).contacts
+    with pytest.raises(ResultError, match="bodies that are not there"):
+        frame.with_contacts([1], [3], [[0, 0]], [[0, 0]])
