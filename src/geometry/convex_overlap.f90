@@ -8,7 +8,7 @@ module polydem_convex_overlap
    use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, wp
    use polydem_lens_search, only: search_pair
-   use polydem_overlap_batch, only: add_lane, overlap_batch_t
+   use polydem_overlap_batch, only: add_lane, overlap_batch_t, overlap_columns_t
    use polydem_overlap_integrals, only: overlap_t
    use polydem_pair_memory, only: most_lens_corners, unpack_edge
    use polydem_separation, only: remembered_edge, test_separation
@@ -63,25 +63,23 @@ contains
       logical, intent(out) :: certified
       real(wp) :: vertices(2, 2*most_lens_corners)
       type(overlap_batch_t) :: batch
+      type(overlap_columns_t) :: columns
       integer(ip) :: n, m
-      logical :: usable
 
       n = size(p, 2, kind=ip)
       m = size(q, 2, kind=ip)
       vertices(:, 1:n) = p
       vertices(:, n + 1_ip:n + m) = q
-      certified = .false.
-      call add_lane(batch, 1_ip, memory, [1_ip, n, n + 1_ip, n + m], offset, radius_p, radius_q, usable)
-      if (.not. usable) return
-      call evaluate_batch(batch, 1_ip, vertices, effective, isa_base)
+      call add_lane(batch, 1_ip, memory, [1_ip, n, n + 1_ip, n + m], offset, radius_p, radius_q)
+      call evaluate_batch(batch, 1_ip, vertices(:, 1:n + m), effective, isa_base, columns)
       certified = batch%certified(1) > 0.0_wp
       if (.not. certified) return
-      overlap%area = batch%area(1)
-      overlap%centroid = batch%centroid(1, 1:2)
-      overlap%centroid_b = batch%centroid(1, 3:4)
-      overlap%normal = batch%normal(1, :)
-      overlap%moment_a = batch%moment(1, 1)
-      overlap%moment_b = batch%moment(1, 2)
+      overlap%area = columns%area(1)
+      overlap%centroid = columns%arm_first(1, :)
+      overlap%centroid_b = columns%arm_second(1, :)
+      overlap%normal = columns%normal(1, :)
+      overlap%moment_a = columns%moment(1, 1)
+      overlap%moment_b = columns%moment(1, 2)
    end subroutine evaluate_lens
 
    !> Overlap of two convex polygons in any order.

@@ -4,7 +4,7 @@ module polydem_evaluate_batch
    use polydem_kinds, only: ip, wp
    use polydem_lens_kernel_avx2, only: evaluate_with_avx2 => evaluate_batch
    use polydem_lens_kernel_base, only: evaluate_with_base => evaluate_batch
-   use polydem_overlap_batch, only: overlap_batch_t
+   use polydem_overlap_batch, only: overlap_batch_t, overlap_columns_t
    implicit none
    private
    public :: evaluate_batch
@@ -12,8 +12,8 @@ module polydem_evaluate_batch
 contains
 
    !> Evaluate the first lanes of a batch.
-   pure subroutine evaluate_batch(batch, n, turned, effective, isa)
-      !> The batch; its results are written
+   pure subroutine evaluate_batch(batch, n, turned, effective, isa, columns)
+      !> The batch
       type(overlap_batch_t), intent(inout) :: batch
       !> Number of lanes
       integer(ip), intent(in) :: n
@@ -23,11 +23,13 @@ contains
       logical, intent(in) :: effective
       !> Instruction set of the kernels
       integer, intent(in) :: isa
+      !> The overlaps; these lanes are written
+      type(overlap_columns_t), intent(inout) :: columns
 
       if (isa == isa_avx2) then
-         call evaluate_with_avx2(batch, 1_ip, n, turned, effective)
+         call evaluate_with_avx2(batch, 1_ip, n, turned, effective, columns)
       else
-         call evaluate_with_base(batch, 1_ip, n, turned, effective)
+         call evaluate_with_base(batch, 1_ip, n, turned, effective, columns)
       end if
    end subroutine evaluate_batch
 

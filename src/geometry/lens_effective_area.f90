@@ -13,7 +13,7 @@
 !> difference of both parts serves as F and D, and an exchange of P and Q changes no bit but signs.
 module polydem_lens_effective_area
    use polydem_kinds, only: ip, wp
-   use polydem_overlap_batch, only: column_length, overlap_batch_t
+   use polydem_overlap_batch, only: column_length, overlap_batch_t, overlap_columns_t
    use polydem_overlap_tolerances, only: least_square, no_length, sure_area
    implicit none
    private
@@ -45,13 +45,15 @@ module polydem_lens_effective_area
 contains
 
    !> Effective area, its gradient, moments, and the centroid of all lenses.
-   pure subroutine integrate_effective_area(from, to, batch)
+   pure subroutine integrate_effective_area(from, to, batch, columns)
       !> First lane
       integer(ip), intent(in) :: from
       !> Last lane
       integer(ip), intent(in) :: to
       !> The batch with crossings
       type(overlap_batch_t), intent(inout) :: batch
+      !> Overlaps of these lanes
+      type(overlap_columns_t), intent(inout) :: columns
       type(work_t) :: work
 
       call straighten(from, to, batch, work)
@@ -60,7 +62,7 @@ contains
       call find_centroid(from, to, work%fan(:, :, 1), work%fan(:, :, 2), work%centroid)
       call find_second_moments(from, to, work%place(:, :, :, 1), work%centroid, -0.5_wp, work%second(:, :, 1))
       call find_second_moments(from, to, work%place(:, :, :, 2), work%centroid, 0.5_wp, work%second(:, :, 2))
-      call weigh(from, to, work, batch)
+      call weigh(from, to, work, batch, columns)
    end subroutine integrate_effective_area
 
    !> Find the coordinates of the corners along and across the chord.
@@ -186,11 +188,12 @@ contains
    end subroutine find_second_moments
 
    !> Compute the results from the moments.
-   pure subroutine weigh(from, to, work, batch)
+   pure subroutine weigh(from, to, work, batch, columns)
       integer(ip), intent(in) :: from
       integer(ip), intent(in) :: to
       type(work_t), intent(in) :: work
       type(overlap_batch_t), intent(inout) :: batch
+      type(overlap_columns_t), intent(inout) :: columns
       real(wp) :: zx, zy, zz, h, cx, cy, mxx, mxy, myy, dxx, dxy, dyy, fx, fy
       real(wp) :: determinant, product, safe, root, unit, on_chord, slope, along, across, turn, gx, gy, area, worst
       integer(ip) :: i
@@ -228,21 +231,29 @@ contains
                       - 12.0_wp*(h*(h/zz))*(myy*dxy - mxy*dyy))
          gx = (0.5_wp*(batch%crossing(i, 1, 1) + batch%crossing(i, 1, 2)) + cx*zx) - (h/zz)*cy*zy
          gy = (0.5_wp*(batch%crossing(i, 2, 1) + batch%crossing(i, 2, 2)) + cx*zy) + (h/zz)*cy*zx
-         batch%area(i) = h*root
-         batch%normal(i, 1) = across*zy + along*zx
-         batch%normal(i, 2) = along*zy - across*zx
-         batch%length(i) = sqrt(batch%normal(i, 1)*batch%normal(i, 1) + batch%normal(i, 2)*batch%normal(i, 2))
-         batch%centroid(i, 1) = gx - batch%centre(i, 1)
-         batch%centroid(i, 2) = gy - batch%centre(i, 2)
-         batch%centroid(i, 3) = gx - batch%centre(i, 3)
-         batch%centroid(i, 4) = gy - batch%centre(i, 4)
-         batch%moment(i, 1) = turn + (batch%centroid(i, 1)*batch%normal(i, 2) - batch%centroid(i, 2)*batch%normal(i, 1))
-         batch%moment(i, 2) = turn + (batch%centroid(i, 3)*batch%normal(i, 2) - batch%centroid(i, 4)*batch%normal(i, 1))
-         worst = min(zz - 4.0_wp*no_length**2*area, batch%length(i)*batch%length(i) - 4.0_wp*no_length**2*batch%area(i))
+         columns%area(i) = h*root
+         columns%normal(i, 1) = across*zy + along*zx
+         columns%normal(i, 2) = along*zy - across*zx
+         columns%length(i) = sqrt(columns%normal(i, 1)*columns%normal(i, 1) + columns%normal(i, 2)*columns%normal(i, 2))
+         columns%arm_first(i, 1) = gx - batch%centre(i, 1)
+         columns%arm_first(i, 2) = gy - batch%centre(i, 2)
+         columns%arm_second(i, 1) = gx - batch%centre(i, 3)
+         columns%arm_second(i, 2) = gy - batch%centre(i, 4)
+         columns%moment(i, 1) = turn + cross(columns%arm_first(i, :), columns%normal(i, :))
+         columns%moment(i, 2) = turn + cross(columns%arm_second(i, :), columns%normal(i, :))
+         worst = min(zz - 4.0_wp*no_length**2*area, &
+                     columns%length(i)*columns%length(i) - 4.0_wp*no_length**2*columns%area(i))
          worst = min(worst, min(determinant - least_determinant, determinant - least_ratio*product))
          worst = min(worst, area - sure_area*batch%scale(i, 1)*batch%scale(i, 1))
          batch%certified(i) = min(batch%certified(i), worst)
       end do
    end subroutine weigh
+
+   !> Cross product of two vectors
+   pure real(wp) function cross(a, b)
+      real(wp), intent(in) :: a(2), b(2)
+
+      cross = a(1)*b(2) - a(2)*b(1)
+   end function cross
 
 end module polydem_lens_effective_area

@@ -23,8 +23,9 @@
 module polydem_lens_kernel
    use polydem_kinds, only: ip, wp
    use polydem_lens_effective_area, only: integrate_effective_area
-   use polydem_overlap_batch, only: column_length, overlap_batch_t
+   use polydem_overlap_batch, only: column_length, overlap_batch_t, overlap_columns_t
    use polydem_overlap_tolerances, only: far, no_length, sure, sure_area, sure_in_fan
+   use polydem_pair_memory, only: lens_bits, most_lens_corners
    implicit none
    private
    public :: evaluate_batch
@@ -36,8 +37,8 @@ module polydem_lens_kernel
 contains
 
    !> Evaluate some lanes.
-   pure subroutine evaluate_batch(batch, from, to, turned, effective)
-      !> The batch; its results are written
+   pure subroutine evaluate_batch(batch, from, to, turned, effective, columns)
+      !> The batch
       type(overlap_batch_t), intent(inout) :: batch
       !> First lane
       integer(ip), intent(in) :: from
@@ -47,31 +48,115 @@ contains
       real(wp), intent(in), contiguous :: turned(:, :)
       !> Whether to compute the effective area (see `polydem_effective_area`) instead of the area
       logical, intent(in) :: effective
+      !> The overlaps; these lanes are written
+      type(overlap_columns_t), intent(inout) :: columns
 
-      integer(ip) :: lane
-
+      call unpack_lenses(from, to, batch)
+      call prepare(from, to, batch)
       call gather_corners(from, to, batch%vertex, size(turned, 2, kind=ip), turned, batch%corner)
       call cross_edges(from, to, batch%corner(:, :, :, 1), batch%centre(:, 1:2), batch%corner(:, :, :, 2), &
                        batch%centre(:, 3:4), batch%scale, batch%on_entering(:, 1), batch%crossing(:, :, 1), &
-                       batch%crossed(:, 1))
+                       batch%certified)
       call cross_edges(from, to, batch%corner(:, :, :, 2), batch%centre(:, 3:4), batch%corner(:, :, :, 1), &
                        batch%centre(:, 1:2), batch%scale, batch%on_entering(:, 2), batch%crossing(:, :, 2), &
-                       batch%crossed(:, 2))
+                       batch%certified)
       call test_corners(from, to, batch%corner(:, :, :, 1), batch%centre(:, 1:2), batch%corner(:, :, :, 2), &
-                        batch%centre(:, 3:4), batch%scale, batch%radius(:, 2), batch%two(:, 2), batch%inside(:, 1))
+                        batch%centre(:, 3:4), batch%radius(:, 1), batch%radius(:, 2), batch%ignored(:, :, 1), &
+                        batch%certified)
       call test_corners(from, to, batch%corner(:, :, :, 2), batch%centre(:, 3:4), batch%corner(:, :, :, 1), &
-                        batch%centre(:, 1:2), batch%scale, batch%radius(:, 1), batch%two(:, 1), batch%inside(:, 2))
-      do lane = from, to
-         batch%certified(lane) = min(min(batch%crossed(lane, 1), batch%crossed(lane, 2)), &
-                                     min(batch%inside(lane, 1) + huge_number*(1.0_wp - batch%some(lane, 1)), &
-                                         batch%inside(lane, 2) + huge_number*(1.0_wp - batch%some(lane, 2))))
-      end do
+                        batch%centre(:, 1:2), batch%radius(:, 1), batch%radius(:, 1), batch%ignored(:, :, 2), &
+                        batch%certified)
       if (effective) then
-         call integrate_effective_area(from, to, batch)
+         call integrate_effective_area(from, to, batch, columns)
       else
-         call integrate_area(from, to, batch)
+         call integrate_area(from, to, batch, columns)
       end if
    end subroutine evaluate_batch
+
+   !> Find the vertices of the lenses that are remembered.
+   !>
+   !> These are whole numbers, and -1 is true, so that the compiler handles several lanes at a time. Where nothing is
+   !> remembered that these polygons can have, the first edges are taken.
+   pure subroutine unpack_lenses(from, to, batch)
+      integer(ip), intent(in) :: from
+      integer(ip), intent(in) :: to
+      type(overlap_batch_t), intent(inout) :: batch
+      integer(ip), parameter :: mask = 2_ip**lens_bits - 1_ip
+      integer(ip) :: i, edge(4), inside_p, inside_q, possible
+
+      do i = from, to
+         edge(1) = iand(batch%memory(i), mask)
+         edge(2) = iand(shiftr(batch%memory(i), lens_bits), mask)
+         edge(3) = iand(shiftr(batch%memory(i), 2*lens_bits), mask)
+         edge(4) = iand(shiftr(batch%memory(i), 3*lens_bits), mask)
+         inside_p = edge(2) - edge(1)
+         inside_p = inside_p + iand(shifta(inside_p, 31), batch%corners(i, 1))
+         inside_q = edge(4) - edge(3)
+         inside_q = inside_q + iand(shifta(inside_q, 31), batch%corners(i, 2))
+         ! A lens has edges that exist, and at most two corners of each body inside the other. The search without
+         ! memory leaves polygons with more corners than can be remembered to clipping.
+         possible = iand(not(shifta(batch%memory(i), 31)), less(max(inside_p, inside_q), 3_ip))
+         possible = iand(possible, iand(less(max(edge(1), edge(2)), batch%corners(i, 1)), &
+                                        less(max(edge(3), edge(4)), batch%corners(i, 2))))
+         possible = iand(possible, less(max(batch%corners(i, 1), batch%corners(i, 2)), most_lens_corners + 1_ip))
+         batch%possible(i) = iand(1_ip, possible)
+         batch%inner(i, 1) = iand(inside_p, possible)
+         batch%inner(i, 2) = iand(inside_q, possible)
+         batch%vertex(i, 1) = batch%start(i, 1) + iand(edge(1), possible)
+         batch%vertex(i, 2) = batch%start(i, 1) + next(iand(edge(1), possible), batch%corners(i, 1))
+         batch%vertex(i, 3) = batch%start(i, 1) + iand(edge(2), possible)
+         batch%vertex(i, 4) = batch%start(i, 1) + next(iand(edge(2), possible), batch%corners(i, 1))
+         batch%vertex(i, 5) = batch%start(i, 2) + iand(edge(3), possible)
+         batch%vertex(i, 6) = batch%start(i, 2) + next(iand(edge(3), possible), batch%corners(i, 2))
+         batch%vertex(i, 7) = batch%start(i, 2) + iand(edge(4), possible)
+         batch%vertex(i, 8) = batch%start(i, 2) + next(iand(edge(4), possible), batch%corners(i, 2))
+      end do
+   end subroutine unpack_lenses
+
+   !> -1 if the first number is less than the second one, otherwise 0; their difference must not overflow
+   elemental integer(ip) function less(a, b)
+      integer(ip), intent(in) :: a, b
+
+      less = shifta(a - b, 31)
+   end function less
+
+   !> Corner behind another of n, counted from 0
+   elemental integer(ip) function next(corner, n)
+      integer(ip), intent(in) :: corner, n
+
+      next = iand(corner + 1_ip, less(corner + 1_ip, n))
+   end function next
+
+   !> Prepare the numbers that the tests need.
+   pure subroutine prepare(from, to, batch)
+      integer(ip), intent(in) :: from
+      integer(ip), intent(in) :: to
+      type(overlap_batch_t), intent(inout) :: batch
+      real(wp) :: equal, half, two_p, two_q
+      integer(ip) :: i
+
+      do i = from, to
+         equal = merge(0.0_wp, 1.0_wp, batch%radius(i, 1) < batch%radius(i, 2))
+         half = 0.5_wp*equal
+         batch%centre(i, 1) = -half*batch%offset(i, 1)
+         batch%centre(i, 2) = -half*batch%offset(i, 2)
+         batch%centre(i, 3) = batch%offset(i, 1) + batch%centre(i, 1)
+         batch%centre(i, 4) = batch%offset(i, 2) + batch%centre(i, 2)
+         batch%on_entering(i, 1) = 1.0_wp
+         batch%on_entering(i, 2) = equal
+         batch%scale(i, 1) = batch%radius(i, 1)
+         batch%scale(i, 2) = (1.0_wp - half)*far*batch%radius(i, 1)
+         batch%some(i, 1) = real(min(1_ip, batch%inner(i, 1)), wp)
+         batch%some(i, 2) = real(min(1_ip, batch%inner(i, 2)), wp)
+         two_p = real(shiftr(batch%inner(i, 1), 1), wp)
+         two_q = real(shiftr(batch%inner(i, 2), 1), wp)
+         batch%ignored(i, 1, 1) = huge_number*(1.0_wp - batch%some(i, 1))
+         batch%ignored(i, 2, 1) = huge_number*(1.0_wp - two_q)
+         batch%ignored(i, 1, 2) = huge_number*(1.0_wp - batch%some(i, 2))
+         batch%ignored(i, 2, 2) = huge_number*(1.0_wp - two_p)
+         batch%certified(i) = real(batch%possible(i), wp)
+      end do
+   end subroutine prepare
 
    !> Copy the vertices that the lanes name.
    pure subroutine gather_corners(from, to, vertex, n, turned, corner)
@@ -95,7 +180,7 @@ contains
    !> Find the crossing where polygon A enters polygon B, and how far the signs that show it exceed their errors.
    !>
    !> The edge of A begins outside that of B and ends inside, the edge of B begins inside that of A and ends outside.
-   pure subroutine cross_edges(from, to, a, centre_a, b, centre_b, scale, on_entering, crossing, crossed)
+   pure subroutine cross_edges(from, to, a, centre_a, b, centre_b, scale, on_entering, crossing, certified)
       integer(ip), intent(in) :: from
       integer(ip), intent(in) :: to
       !> Vertices of A; 1 to 2 is the entering edge
@@ -107,10 +192,10 @@ contains
       real(wp), intent(in) :: scale(column_length, 2)
       real(wp), intent(in) :: on_entering(column_length)
       real(wp), intent(inout) :: crossing(column_length, 2)
-      !> Positive if the edges cross properly and are near
-      real(wp), intent(inout) :: crossed(column_length)
+      !> Stays positive if the edges cross properly and are near
+      real(wp), intent(inout) :: certified(column_length)
       real(wp) :: ex, ey, fx, fy, a1x, a1y, a2x, a2y, b1x, b1y, b2x, b2y, in_f(2), in_e(2), limit_e, limit_f
-      real(wp) :: share_e, share_f, reach
+      real(wp) :: reach, on_e, on_f, inner, across, share
       integer(ip) :: i
 
       do i = from, to
@@ -134,16 +219,20 @@ contains
          limit_f = sure*scale(i, 1)*(abs(fx) + abs(fy))
          reach = max(max(max(abs(a1x), abs(a1y)), max(abs(a2x), abs(a2y))), &
                      max(max(abs(b1x), abs(b1y)), max(abs(b2x), abs(b2y))))
-         crossed(i) = min(min(min(-in_f(1), in_f(2)) - limit_f, min(in_e(1), -in_e(2)) - limit_e), scale(i, 2) - reach)
-         share_e = in_f(2)/max(in_f(2) - in_f(1), max(abs(in_f(2)), tiny(1.0_wp)))
-         share_f = in_e(1)/max(in_e(1) - in_e(2), max(abs(in_e(1)), tiny(1.0_wp)))
-         crossing(i, 1) = on_entering(i)*(a2x - share_e*ex) + (1.0_wp - on_entering(i))*(b1x + share_f*fx)
-         crossing(i, 2) = on_entering(i)*(a2y - share_e*ey) + (1.0_wp - on_entering(i))*(b1y + share_f*fy)
+         certified(i) = min(min(certified(i), scale(i, 2) - reach), &
+                            min(min(-in_f(1), in_f(2)) - limit_f, min(in_e(1), -in_e(2)) - limit_e))
+         on_e = on_entering(i)
+         on_f = 1.0_wp - on_e
+         inner = on_e*in_f(2) + on_f*in_e(1)
+         across = on_e*(in_f(2) - in_f(1)) + on_f*(in_e(1) - in_e(2))
+         share = inner/max(across, max(abs(inner), tiny(1.0_wp)))
+         crossing(i, 1) = (on_e*a2x + on_f*b1x) + share*(on_f*fx - on_e*ex)
+         crossing(i, 2) = (on_e*a2y + on_f*b1y) + share*(on_f*fy - on_e*ey)
       end do
    end subroutine cross_edges
 
-   !> Find whether the corners of polygon A between the crossings are inside polygon B: `inside` is positive then.
-   pure subroutine test_corners(from, to, a, centre_a, b, centre_b, scale, radius_b, two_of_b, inside)
+   !> Test whether the corners of polygon A between the crossings are inside polygon B.
+   pure subroutine test_corners(from, to, a, centre_a, b, centre_b, scale, radius_b, ignored, certified)
       integer(ip), intent(in) :: from
       integer(ip), intent(in) :: to
       !> Vertices of A; 2 and 3 are the corners to test, the same one if there is only one
@@ -152,10 +241,13 @@ contains
       !> Vertices of B; 2 to 3 is an edge if it has two corners inside A
       real(wp), intent(in) :: b(column_length, 2, 4)
       real(wp), intent(in) :: centre_b(column_length, 2)
-      real(wp), intent(in) :: scale(column_length, 2)
+      !> Radius of P
+      real(wp), intent(in) :: scale(column_length)
       real(wp), intent(in) :: radius_b(column_length)
-      real(wp), intent(in) :: two_of_b(column_length)
-      real(wp), intent(inout) :: inside(column_length)
+      !> Great if A has no such corners, and great if B does not have two of them inside A
+      real(wp), intent(in) :: ignored(column_length, 2)
+      !> Stays positive if they are inside
+      real(wp), intent(inout) :: certified(column_length)
       real(wp) :: a2x, a2y, a3x, a3y, armx, army, in_edges, in_middle, in_fan, ex, ey, limit
       integer(ip) :: i
 
@@ -164,7 +256,7 @@ contains
          a2y = a(i, 2, 2) + centre_a(i, 2)
          a3x = a(i, 1, 3) + centre_a(i, 1)
          a3y = a(i, 2, 3) + centre_a(i, 2)
-         limit = sure*scale(i, 1)
+         limit = sure*scale(i)
          ! The crossings show the first corner inside the edge where B leaves, the last one inside that where B enters.
          ex = b(i, 1, 2) - b(i, 1, 1)
          ey = b(i, 2, 2) - b(i, 2, 1)
@@ -187,15 +279,17 @@ contains
          in_fan = min(min(b(i, 1, 1)*a2y - b(i, 2, 1)*a2x, a2x*b(i, 2, 4) - a2y*b(i, 1, 4)), &
                       min(b(i, 1, 1)*a3y - b(i, 2, 1)*a3x, a3x*b(i, 2, 4) - a3y*b(i, 1, 4))) &
                   - sure_in_fan*radius_b(i)*radius_b(i)
-         inside(i) = min(min(in_edges, in_fan), in_middle + huge_number*(1.0_wp - two_of_b(i)))
+         certified(i) = min(certified(i), &
+                            min(min(in_edges, in_fan), in_middle + ignored(i, 2)) + ignored(i, 1))
       end do
    end subroutine test_corners
 
    !> Area, its gradient, moments and centroid of all lenses.
-   pure subroutine integrate_area(from, to, batch)
+   pure subroutine integrate_area(from, to, batch, columns)
       integer(ip), intent(in) :: from
       integer(ip), intent(in) :: to
       type(overlap_batch_t), intent(inout) :: batch
+      type(overlap_columns_t), intent(inout) :: columns
       real(wp) :: zx, zy, mx, my, v1x, v1y, v2x, v2y, w1x, w1y, w2x, w2y, part(4), arc_p, arc_q, twice, wx, wy, scale
       integer(ip) :: i
 
@@ -225,19 +319,19 @@ contains
          scale = 1.0_wp/max(twice, sure_area*batch%scale(i, 1)*batch%scale(i, 1))
          wx = mx + scale*(0.5_wp*(arc_q - arc_p)*zx + third*wx)
          wy = my + scale*(0.5_wp*(arc_q - arc_p)*zy + third*wy)
-         batch%area(i) = 0.5_wp*twice
-         batch%centroid(i, 1) = wx - batch%centre(i, 1)
-         batch%centroid(i, 2) = wy - batch%centre(i, 2)
-         batch%centroid(i, 3) = wx - batch%centre(i, 3)
-         batch%centroid(i, 4) = wy - batch%centre(i, 4)
-         batch%normal(i, 1) = zy
-         batch%normal(i, 2) = -zx
-         batch%length(i) = sqrt(zx*zx + zy*zy)
-         batch%moment(i, 1) = -(zx*(mx - batch%centre(i, 1)) + zy*(my - batch%centre(i, 2)))
-         batch%moment(i, 2) = -(zx*(mx - batch%centre(i, 3)) + zy*(my - batch%centre(i, 4)))
+         columns%area(i) = 0.5_wp*twice
+         columns%arm_first(i, 1) = wx - batch%centre(i, 1)
+         columns%arm_first(i, 2) = wy - batch%centre(i, 2)
+         columns%arm_second(i, 1) = wx - batch%centre(i, 3)
+         columns%arm_second(i, 2) = wy - batch%centre(i, 4)
+         columns%normal(i, 1) = zy
+         columns%normal(i, 2) = -zx
+         columns%length(i) = sqrt(zx*zx + zy*zy)
+         columns%moment(i, 1) = -(zx*(mx - batch%centre(i, 1)) + zy*(my - batch%centre(i, 2)))
+         columns%moment(i, 2) = -(zx*(mx - batch%centre(i, 3)) + zy*(my - batch%centre(i, 4)))
          batch%certified(i) = min(batch%certified(i), &
-                                  min(batch%area(i) - sure_area*batch%scale(i, 1)*batch%scale(i, 1), &
-                                      zx*zx + zy*zy - 4.0_wp*no_length**2*batch%area(i)))
+                                  min(columns%area(i) - sure_area*batch%scale(i, 1)*batch%scale(i, 1), &
+                                      zx*zx + zy*zy - 4.0_wp*no_length**2*columns%area(i)))
       end do
    end subroutine integrate_area
 

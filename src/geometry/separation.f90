@@ -6,7 +6,7 @@ module polydem_separation
    use polydem_pair_memory, only: packed_edge, unpack_edge
    implicit none
    private
-   public :: test_separation, remembered_edge
+   public :: test_separation, test_in_place, remembered_edge
 
    !> Line of an edge of polygon A, for depths of points of polygon B
    type :: line_t
@@ -25,6 +25,56 @@ module polydem_separation
    end type line_t
 
 contains
+
+   !> As `test_separation`, for polygons in an array of vertices.
+   !>
+   !> Nearly always the remembered corner decides. Here that is found without branches until the end.
+   pure subroutine test_in_place(n, turned, vertices, offset, radius_p, memory, apart)
+      !> Number of vertices in the array
+      integer(ip), intent(in) :: n
+      !> Vertices of all polygons, anticlockwise, each relative to its own centre [m]
+      real(wp), intent(in) :: turned(2, n)
+      !> Places of the first and the last vertex of P and of Q
+      integer(ip), intent(in) :: vertices(4)
+      !> Centre of Q minus centre of P [m]
+      real(wp), intent(in) :: offset(2)
+      !> Radius of P, not greater than that of Q [m]
+      real(wp), intent(in) :: radius_p
+      !> What is remembered, a negative number; the corner is brought up to date
+      integer(ip), intent(inout) :: memory
+      !> Whether the polygons are apart
+      logical, intent(out) :: apart
+      integer(ip) :: edge, corner, k(5)
+      real(wp) :: ex, ey, fx, fy, vx, vy, of_p, level
+      logical :: of_q
+
+      call unpack_edge(memory, of_q, edge, corner)
+      associate (a => merge(3_ip, 1_ip, of_q), b => merge(1_ip, 3_ip, of_q))
+         k(1) = vertices(a) + edge
+         k(2) = merge(vertices(a), k(1) + 1_ip, k(1) == vertices(a + 1_ip))
+         k(3) = vertices(b) + corner
+         k(4) = merge(vertices(b + 1_ip), k(3) - 1_ip, k(3) == vertices(b))
+         k(5) = merge(vertices(b), k(3) + 1_ip, k(3) == vertices(b + 1_ip))
+         apart = k(1) <= vertices(a + 1_ip) .and. k(3) <= vertices(b + 1_ip)
+      end associate
+      if (apart) then
+         of_p = merge(0.0_wp, 1.0_wp, of_q)
+         ex = turned(1, k(2)) - turned(1, k(1))
+         ey = turned(2, k(2)) - turned(2, k(1))
+         fx = turned(1, k(1)) + (1.0_wp - of_p)*offset(1)
+         fy = turned(2, k(1)) + (1.0_wp - of_p)*offset(2)
+         vx = turned(1, k(3)) + of_p*offset(1)
+         vy = turned(2, k(3)) + of_p*offset(2)
+         level = -surely_apart*radius_p*(abs(ex) + abs(ey))
+         apart = max(max(abs(fx), abs(fy)), max(abs(vx), abs(vy))) <= far*radius_p &
+                 .and. ex*(vy - fy) - ey*(vx - fx) < level &
+                 .and. surely_deeper([ex, ey], turned(:, k(3)), turned(:, k(4))) &
+                 .and. surely_deeper([ex, ey], turned(:, k(3)), turned(:, k(5)))
+         if (apart) return
+      end if
+      call test_separation(turned(:, vertices(1):vertices(2)), turned(:, vertices(3):vertices(4)), offset, radius_p, &
+                           memory, apart)
+   end subroutine test_in_place
 
    !> Find whether a remembered edge still separates the polygons.
    !>

@@ -17,9 +17,9 @@ module polydem_fill_block
    use polydem_convex_overlap, only: find_overlap, overlap_t
    use polydem_evaluate_batch, only: evaluate_batch
    use polydem_kinds, only: ip, wp
-   use polydem_overlap_batch, only: add_lane, copy_lane, overlap_batch_t
+   use polydem_overlap_batch, only: overlap_batch_t
    use polydem_overlap_tolerances, only: no_length
-   use polydem_separation, only: test_separation
+   use polydem_separation, only: test_in_place
    implicit none
    private
    public :: fill_block
@@ -46,15 +46,16 @@ contains
       !> Contacts; the columns that the force law fills are not changed
       type(contact_block_t), intent(inout) :: block
       type(overlap_batch_t) :: batch
-      logical :: in_batch(block_size), exists(block_size)
+      logical :: exists(block_size)
       integer(ip) :: c
 
-      call collect_pairs(bodies, first, second, low, next, history, block, batch, in_batch)
-      call evaluate(bodies, effective, isa, block%n, in_batch, batch)
-      call copy_batch(batch, block)
+      call select_pairs(bodies, first, second, low, next, history, block, batch)
+      call copy_shapes(block%n, block%first, block%second, bodies%n, bodies%radius, bodies%vertex_start, batch)
+      call copy_offsets(block%n, block%first, block%second, bodies%n, bodies%position, batch)
+      call evaluate_batch(batch, block%n, bodies%turned, effective, isa, block%overlap_columns_t)
+      block%degenerate(:block%n) = 0.0_wp
       do c = 1_ip, block%n
-         exists(c) = in_batch(c)
-         if (in_batch(c)) exists(c) = batch%certified(c) > 0.0_wp
+         exists(c) = batch%certified(c) > 0.0_wp
          if (.not. exists(c)) call search(bodies, effective, c, history, block, exists(c))
       end do
       if (.not. all(exists(:block%n))) call remove_others(exists, block)
@@ -63,8 +64,8 @@ contains
       call find_directions(bodies, block)
    end subroutine fill_block
 
-   !> Collect the next pairs that may be contacts: those that no remembered edge separates.
-   subroutine collect_pairs(bodies, first, second, low, next, history, block, batch, in_batch)
+   !> Select the next pairs that may be contacts: those that no remembered edge separates.
+   subroutine select_pairs(bodies, first, second, low, next, history, block, batch)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in), contiguous :: first(:), second(:)
       integer(ip), intent(in) :: low
@@ -72,44 +73,127 @@ contains
       type(contact_history_t), intent(inout) :: history
       type(contact_block_t), intent(inout) :: block
       type(overlap_batch_t), intent(inout) :: batch
-      !> Whether the pair has a lane in the batch
-      logical, intent(inout) :: in_batch(block_size)
-      integer(ip) :: exchange, i, j, n, p
-      logical :: apart, remembers
+      integer(ip) :: from, nothing(block_size)
 
-      remembers = allocated(history%memory)
+      block%n = 0_ip
+      do while (next >= low .and. block%n < block_size)
+         ! As many pairs as there is room for
+         from = max(low, next - (block_size - block%n) + 1_ip)
+         if (allocated(history%memory)) then
+            call test_edges(bodies, from, next, first, second, history%memory)
+            call select_in_range(bodies%n, bodies%radius, from, next, first(from:next), second(from:next), &
+                                 history%memory(from:next), block, batch)
+         else
+            nothing = 0_ip
+            call select_in_range(bodies%n, bodies%radius, from, next, first(from:next), second(from:next), &
+                                 nothing(:next - from + 1_ip), block, batch)
+         end if
+         next = from - 1_ip
+      end do
+   end subroutine select_pairs
+
+   !> Forget the remembered edges that do not separate the polygons any more.
+   subroutine test_edges(bodies, from, to, first, second, memory)
+      type(bodies_t), intent(in) :: bodies
+      !> First and last pair, at most `block_size` pairs
+      integer(ip), intent(in) :: from, to
+      integer(ip), intent(in), contiguous :: first(:), second(:)
+      integer(ip), intent(inout), contiguous :: memory(:)
+      integer(ip) :: found(block_size), i, j, k, n, p
+      logical :: apart
+
       n = 0_ip
-      associate (start => bodies%vertex_start, turned => bodies%turned, radius => bodies%radius)
-         do p = next, low, -1_ip
-            if (n == block_size) exit
-            i = first(p)
-            j = second(p)
-            ! The roles of `is_exchanged`, without a branch: which radius is greater, a processor cannot predict.
-            exchange = iand(ieor(i, j), -merge(1_ip, 0_ip, radius(j) < radius(i)))
-            i = ieor(i, exchange)
-            j = ieor(j, exchange)
-            if (remembers) then
-               if (history%memory(p) < 0_ip) then
-                  call test_separation(turned(:, start(i):start(i + 1_ip) - 1_ip), &
-                                       turned(:, start(j):start(j + 1_ip) - 1_ip), offset_of(bodies, i, j), radius(i), &
-                                       history%memory(p), apart)
-                  if (apart) cycle
-               end if
-            end if
-            n = n + 1_ip
-            block%pair(n) = p
-            block%first(n) = i
-            block%second(n) = j
-            in_batch(n) = .false.
-            if (.not. remembers) cycle
-            call add_lane(batch, n, history%memory(p), &
-                          [start(i), start(i + 1_ip) - 1_ip, start(j), start(j + 1_ip) - 1_ip], &
-                          offset_of(bodies, i, j), radius(i), radius(j), in_batch(n))
-         end do
-      end associate
-      next = p
-      block%n = n
-   end subroutine collect_pairs
+      do p = from, to
+         found(n + 1_ip) = p
+         n = n + shiftr(memory(p), bit_size(p) - 1)
+      end do
+      do k = 1_ip, n
+         p = found(k)
+         call choose_roles(bodies%n, bodies%radius, first(p), second(p), i, j)
+         associate (start => bodies%vertex_start)
+            call test_in_place(size(bodies%turned, 2, kind=ip), bodies%turned, &
+                               [start(i), start(i + 1_ip) - 1_ip, start(j), start(j + 1_ip) - 1_ip], &
+                               offset_of(bodies, i, j), bodies%radius(i), memory(p), apart)
+         end associate
+         if (.not. apart) memory(p) = 0_ip
+      end do
+   end subroutine test_edges
+
+   !> The roles of `is_exchanged`, without a branch: which radius is greater, a processor cannot predict.
+   pure subroutine choose_roles(n, radius, low, high, i, j)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: radius(n)
+      !> Slots of a pair
+      integer(ip), intent(in) :: low, high
+      !> The same, P first
+      integer(ip), intent(out) :: i, j
+      integer(ip) :: exchange
+
+      exchange = iand(ieor(low, high), -merge(1_ip, 0_ip, radius(high) < radius(low)))
+      i = ieor(low, exchange)
+      j = ieor(high, exchange)
+   end subroutine choose_roles
+
+   !> Add the pairs of a range without remembered edge to a block, in descending order.
+   pure subroutine select_in_range(n, radius, from, to, first, second, memory, block, batch)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: radius(n)
+      !> First and last pair of the range, for which there is room
+      integer(ip), intent(in) :: from, to
+      integer(ip), intent(in) :: first(from:to), second(from:to), memory(from:to)
+      type(contact_block_t), intent(inout) :: block
+      type(overlap_batch_t), intent(inout) :: batch
+      integer(ip) :: b, c, p
+
+      c = block%n
+      do p = to, from, -1_ip
+         block%pair(c + 1_ip) = p
+         batch%memory(c + 1_ip) = memory(p)
+         c = c + shiftr(not(memory(p)), bit_size(p) - 1)
+      end do
+      do b = block%n + 1_ip, c
+         p = block%pair(b)
+         call choose_roles(n, radius, first(p), second(p), block%first(b), block%second(b))
+      end do
+      block%n = c
+   end subroutine select_in_range
+
+   !> Copy sizes and places of the polygons to the batch.
+   pure subroutine copy_shapes(n_lanes, first, second, n, radius, start, batch)
+      integer(ip), intent(in) :: n_lanes, first(block_size), second(block_size)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: radius(n)
+      integer(ip), intent(in) :: start(n + 1)
+      type(overlap_batch_t), intent(inout) :: batch
+      integer(ip) :: c
+
+      do c = 1_ip, n_lanes
+         batch%radius(c, 1) = radius(first(c))
+         batch%radius(c, 2) = radius(second(c))
+         batch%start(c, 1) = start(first(c))
+         batch%start(c, 2) = start(second(c))
+         batch%corners(c, 1) = start(first(c) + 1_ip) - start(first(c))
+         batch%corners(c, 2) = start(second(c) + 1_ip) - start(second(c))
+      end do
+   end subroutine copy_shapes
+
+   !> Copy the distances of the centres to the batch.
+   pure subroutine copy_offsets(n_lanes, first, second, n, position, batch)
+      integer(ip), intent(in) :: n_lanes, first(block_size), second(block_size)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      real(wp), intent(in) :: position(2, n)
+      type(overlap_batch_t), intent(inout) :: batch
+      integer(ip) :: c
+
+      do c = 1_ip, n_lanes
+         batch%offset(c, 1) = position(1, second(c)) - position(1, first(c))
+         batch%offset(c, 2) = position(2, second(c)) - position(2, first(c))
+      end do
+   end subroutine copy_offsets
 
    !> Centre of the second body minus centre of the first [m]
    pure function offset_of(bodies, i, j) result(offset)
@@ -120,40 +204,6 @@ contains
       offset(1) = bodies%position(1, j) - bodies%position(1, i)
       offset(2) = bodies%position(2, j) - bodies%position(2, i)
    end function offset_of
-
-   !> Evaluate the batch. Lanes without a pair get copies of another, so that there is no gap.
-   pure subroutine evaluate(bodies, effective, isa, n, in_batch, batch)
-      type(bodies_t), intent(in) :: bodies
-      logical, intent(in) :: effective
-      integer, intent(in) :: isa
-      integer(ip), intent(in) :: n
-      logical, intent(in) :: in_batch(block_size)
-      type(overlap_batch_t), intent(inout) :: batch
-      integer(ip) :: c, filled
-
-      filled = findloc(in_batch(:n), .true., dim=1)
-      if (filled == 0_ip) return
-      do c = 1_ip, n
-         if (.not. in_batch(c)) call copy_lane(batch, filled, c)
-      end do
-      call evaluate_batch(batch, n, bodies%turned, effective, isa)
-   end subroutine evaluate
-
-   !> Copy the results of the batch to the block.
-   pure subroutine copy_batch(batch, block)
-      type(overlap_batch_t), intent(in) :: batch
-      type(contact_block_t), intent(inout) :: block
-
-      associate (n => block%n)
-         block%area(:n) = batch%area(:n)
-         block%normal(:n, :) = batch%normal(:n, :)
-         block%length(:n) = batch%length(:n)
-         block%moment(:n, :) = batch%moment(:n, :)
-         block%arm_first(:n, :) = batch%centroid(:n, 1:2)
-         block%arm_second(:n, :) = batch%centroid(:n, 3:4)
-         block%degenerate(:n) = 0.0_wp
-      end associate
-   end subroutine copy_batch
 
    !> Search the overlap of one pair without memory.
    subroutine search(bodies, effective, c, history, block, exists)

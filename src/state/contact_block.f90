@@ -9,35 +9,27 @@ module polydem_contact_block
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t, is_degenerate, set_force_of_contact
    use polydem_kinds, only: ip, wp
+   use polydem_overlap_batch, only: lanes, overlap_columns_t
    implicit none
    private
    public :: contact_block_t, block_size, load_block, store_forces, store_contact, copy_motion, is_exchanged
 
    !> Largest number of contacts in a block
-   integer(ip), parameter :: block_size = 64_ip
+   integer(ip), parameter :: block_size = lanes
 
-   !> Structure of arrays over contacts 1..n
-   type :: contact_block_t
+   !> Structure of arrays over contacts 1..n. Those that it extends are written by the evaluation of a batch of pairs;
+   !> in a degenerate contact, `length` is the square root of the area.
+   type, extends(overlap_columns_t) :: contact_block_t
       !> Number of contacts
       integer(ip) :: n = 0_ip
       !> Index in the pair list
       integer(ip) :: pair(block_size) = 0_ip
       !> Slots of the first and of the second body
       integer(ip) :: first(block_size) = 0_ip, second(block_size) = 0_ip
-      !> Area of the overlap, true or effective [m2]
-      real(wp) :: area(block_size)
       !> Rate of change of the area [m2/s]
       real(wp) :: rate(block_size)
-      !> Integral of the outward normal over the outline of the first body inside the second, (contact, x or y) [m]
-      real(wp) :: normal(block_size, 2)
-      !> Moments of that integral about the centres of the first and of the second body, (contact, body) [m2]
-      real(wp) :: moment(block_size, 2)
-      !> Centroid of the overlap relative to the centre of each body, (contact, x or y) [m]
-      real(wp) :: arm_first(block_size, 2), arm_second(block_size, 2)
       !> Unit vector from the second body to the first, (contact, x or y)
       real(wp) :: direction(block_size, 2)
-      !> Length of the contact |normal|, or the square root of the area if degenerate [m]
-      real(wp) :: length(block_size)
       !> 1 for a degenerate contact, else 0
       real(wp) :: degenerate(block_size)
       !> Velocities of the centres of both bodies, (contact, x or y) [m/s]

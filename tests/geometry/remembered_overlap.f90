@@ -4,13 +4,13 @@ module remembered_overlap
    use polydem_convex_overlap, only: find_overlap, overlap_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_lens_kernel_base, only: evaluate_batch
-   use polydem_overlap_batch, only: add_lane, overlap_batch_t
+   use polydem_overlap_batch, only: add_lane, overlap_batch_t, overlap_columns_t
    use polydem_random, only: random_t
-   use polydem_separation, only: test_separation
+   use polydem_separation, only: test_in_place
    implicit none
    private
-   public :: pair_t, overlap_with_memory, certified_lens, same_bits, radius_of, random_pair, grid_pair, any_integer
-   public :: n_kinds
+   public :: pair_t, overlap_with_memory, separated_by, certified_lens, same_bits, radius_of
+   public :: random_pair, grid_pair, any_integer, n_kinds
 
    !> Kinds of random pairs
    integer, parameter :: n_kinds = 8
@@ -37,12 +37,39 @@ contains
       type(overlap_t), intent(out) :: overlap
       logical :: done
 
-      call test_separation(pair%p, pair%q, pair%offset, radius_of(pair%p), memory, done)
+      call separated_by(pair, memory, done)
       if (done) return
       call certified_lens(pair, effective, memory, overlap, done)
       if (done) return
       call find_overlap(pair%p, pair%q, pair%offset, radius_of(pair%p), radius_of(pair%q), effective, overlap, memory)
    end subroutine overlap_with_memory
+
+   !> Test whether a remembered edge separates a pair
+   subroutine separated_by(pair, memory, apart)
+      !> The pair, P first
+      type(pair_t), intent(in) :: pair
+      !> Any integer; the corner is brought up to date
+      integer(ip), intent(inout) :: memory
+      !> Whether an edge is remembered, and the polygons are apart
+      logical, intent(out) :: apart
+      integer(ip) :: n, m
+
+      apart = .false.
+      if (memory >= 0_ip) return
+      n = size(pair%p, 2, kind=ip)
+      m = size(pair%q, 2, kind=ip)
+      call test_in_place(n + m, vertices_of(pair), [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), memory, &
+                         apart)
+   end subroutine separated_by
+
+   !> Vertices of both polygons of a pair
+   function vertices_of(pair) result(vertices)
+      type(pair_t), intent(in) :: pair
+      real(wp) :: vertices(2, size(pair%p, 2) + size(pair%q, 2))
+
+      vertices(:, :size(pair%p, 2)) = pair%p
+      vertices(:, size(pair%p, 2) + 1:) = pair%q
+   end function vertices_of
 
    !> Overlap of a pair if a remembered lens is certified
    subroutine certified_lens(pair, effective, memory, overlap, certified)
@@ -57,26 +84,21 @@ contains
       !> Whether it is certified
       logical, intent(out) :: certified
       type(overlap_batch_t) :: batch
-      real(wp), allocatable :: vertices(:, :)
+      type(overlap_columns_t) :: columns
       integer(ip) :: n, m
 
       n = size(pair%p, 2, kind=ip)
       m = size(pair%q, 2, kind=ip)
-      allocate (vertices(2, n + m))
-      vertices(:, :n) = pair%p
-      vertices(:, n + 1:) = pair%q
-      call add_lane(batch, 3_ip, memory, [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), &
-                    radius_of(pair%q), certified)
-      if (.not. certified) return
-      call evaluate_batch(batch, 3_ip, 3_ip, vertices, effective)
+      call add_lane(batch, 3_ip, memory, [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), radius_of(pair%q))
+      call evaluate_batch(batch, 3_ip, 3_ip, vertices_of(pair), effective, columns)
       certified = batch%certified(3) > 0.0_wp
       if (.not. certified) return
-      overlap%area = batch%area(3)
-      overlap%centroid = batch%centroid(3, 1:2)
-      overlap%centroid_b = batch%centroid(3, 3:4)
-      overlap%normal = batch%normal(3, :)
-      overlap%moment_a = batch%moment(3, 1)
-      overlap%moment_b = batch%moment(3, 2)
+      overlap%area = columns%area(3)
+      overlap%centroid = columns%arm_first(3, :)
+      overlap%centroid_b = columns%arm_second(3, :)
+      overlap%normal = columns%normal(3, :)
+      overlap%moment_a = columns%moment(3, 1)
+      overlap%moment_b = columns%moment(3, 2)
    end subroutine certified_lens
 
    !> Whether two overlaps are equal
