@@ -143,7 +143,7 @@ contains
 
       command%verb = ''
       command%file = ''
-      command%finder = 'quadtree'
+      command%finder = 'two_level'
       command%samples = ''
       command%output = ''
       used = .false.
