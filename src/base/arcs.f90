@@ -25,6 +25,8 @@ module polydem_arcs
       1.0_dp/[-3.0_dp, 5.0_dp, -7.0_dp, 9.0_dp, -11.0_dp, 13.0_dp]
    !> Below this quotient, as a power of 2, an angle is equal to its tangent
    integer, parameter :: small = -60
+   !> A vector whose greater component is between this number and its reciprocal needs no scaling
+   real(dp), parameter :: least_unscaled = 2.0_dp**(-200)
 
 contains
 
@@ -139,7 +141,6 @@ contains
    elemental real(dp) function hypotenuse(x, y)
       !> Components of the vector
       real(dp), intent(in) :: x, y
-      real(dp) :: scaled(2), square(2), error(2), sum, of_sum, product, of_product
       integer :: power
 
       if (.not. (ieee_is_finite(x) .and. ieee_is_finite(y))) then
@@ -151,15 +152,25 @@ contains
          return
       end if
       hypotenuse = max(abs(x), abs(y))
-      if (.not. hypotenuse > 0.0_dp) return
-      power = exponent(hypotenuse)
-      scaled = scale([x, y], -power)
-      call multiply(scaled, scaled, square, error)
+      if (hypotenuse > least_unscaled .and. hypotenuse < 1.0_dp/least_unscaled) then
+         hypotenuse = root_of_squares(x, y)
+      else if (hypotenuse > 0.0_dp) then
+         power = exponent(hypotenuse)
+         hypotenuse = scale(root_of_squares(scale(x, -power), scale(y, -power)), power)
+      end if
+   end function hypotenuse
+
+   !> Root of x^2 + y^2 if no square overflows and the greater one does not underflow
+   elemental real(dp) function root_of_squares(x, y) result(root)
+      real(dp), intent(in) :: x, y
+      real(dp) :: square(2), error(2), sum, of_sum, product, of_product
+
+      call multiply([x, y], [x, y], square, error)
       call add(square(1), square(2), sum, of_sum)
       of_sum = of_sum + (error(1) + error(2))
-      hypotenuse = sqrt(sum)
-      call multiply(hypotenuse, hypotenuse, product, of_product)
-      hypotenuse = scale(hypotenuse + (((sum - product) - of_product) + of_sum)/(2.0_dp*hypotenuse), power)
-   end function hypotenuse
+      root = sqrt(sum)
+      call multiply(root, root, product, of_product)
+      root = root + (((sum - product) - of_product) + of_sum)/(2.0_dp*root)
+   end function root_of_squares
 
 end module polydem_arcs

@@ -183,11 +183,23 @@ contains
    pure real(wp) function diameter(vertices)
       !> Vertices in any order, (2, n) [m]
       real(wp), intent(in) :: vertices(:, :)
+      real(wp) :: greatest
       integer(ip) :: j, k
+      ! Distances whose squares are less than this share of the greatest square are shorter, in spite of rounding.
+      real(wp), parameter :: share = 1.0_wp - 32.0_wp*epsilon(1.0_wp)
 
+      greatest = 0.0_wp
+      do k = 2_ip, size(vertices, 2, kind=ip)
+         do j = 1_ip, k - 1_ip
+            greatest = max(greatest, square(vertices(:, k) - vertices(:, j)))
+         end do
+      end do
+      ! Of subnormal squares, all distances are measured.
+      if (greatest < tiny(greatest)/epsilon(greatest)) greatest = 0.0_wp
       diameter = 0.0_wp
       do k = 2_ip, size(vertices, 2, kind=ip)
          do j = 1_ip, k - 1_ip
+            if (square(vertices(:, k) - vertices(:, j)) < share*greatest) cycle
             diameter = max(diameter, hypotenuse(vertices(1, k) - vertices(1, j), vertices(2, k) - vertices(2, j)))
          end do
       end do
