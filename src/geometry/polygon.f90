@@ -191,7 +191,7 @@ contains
       greatest = 0.0_wp
       do k = 2_ip, size(vertices, 2, kind=ip)
          do j = 1_ip, k - 1_ip
-            greatest = max(greatest, square(vertices(:, k) - vertices(:, j)))
+            greatest = max(greatest, square_of(k, j))
          end do
       end do
       ! Of subnormal squares, all distances are measured.
@@ -199,10 +199,20 @@ contains
       diameter = 0.0_wp
       do k = 2_ip, size(vertices, 2, kind=ip)
          do j = 1_ip, k - 1_ip
-            if (square(vertices(:, k) - vertices(:, j)) < share*greatest) cycle
+            if (square_of(k, j) < share*greatest) cycle
             diameter = max(diameter, hypotenuse(vertices(1, k) - vertices(1, j), vertices(2, k) - vertices(2, j)))
          end do
       end do
+
+   contains
+
+      !> Square of the distance between two vertices [m2]
+      pure real(wp) function square_of(k, j)
+         integer(ip), intent(in) :: k, j
+
+         square_of = (vertices(1, k) - vertices(1, j))**2 + (vertices(2, k) - vertices(2, j))**2
+      end function square_of
+
    end function diameter
 
    !> The part of a convex polygon on one side of a line: (r - point) . normal <= 0.
