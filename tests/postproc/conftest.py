@@ -16,6 +16,19 @@ def finished(tmp_path_factory):
     return folder
 
 
+@pytest.fixture(scope="session")
+def small_drum(tmp_path_factory):
+    """A run of the program: 150 bodies that fall and settle in a drum, 11 frames with contacts."""
+    folder = tmp_path_factory.mktemp("small_drum")
+    (folder / "drum.nml").write_text("&scene\n name = 'drum'\n boxes = 150\n/\n"
+                                     "&neighbours\n finder = 'quadtree'\n/\n"
+                                     "&integrate\n duration = 0.2\n/\n"
+                                     "&output\n frame_interval = 0.02\n contacts = .true.\n/\n", encoding="utf-8")
+    subprocess.run([os.environ["POLYDEM_PROGRAM"], "run", "drum.nml"], cwd=folder, check=True,
+                   stdout=subprocess.DEVNULL)
+    return folder / "results" / "drum"
+
+
 @pytest.fixture
 def start_writer(tmp_path):
     """Start a writer that prints the number of each frame it has flushed, and waits at its end."""

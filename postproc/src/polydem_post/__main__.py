@@ -1,4 +1,4 @@
-"""Command line: python -m polydem_post plot, table, tables, cache, costs, workprecision, sweep or scale."""
+"""Command line: python -m polydem_post VERB, with a verb for each text in the folder help."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from pathlib import Path
 
 from . import __version__
 from .emit import printable
+from .picture_verbs import add_picture_verbs
 from .table import FORMATS, timing_table
 from .trajectory import ResultError, Trajectory
 
@@ -85,16 +86,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"polydem_post {__version__}")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
-    plot = verbs.add_parser("plot")
-    plot.set_defaults(action=_plot)
-    plot.add_argument("result", type=Path, metavar="RESULT")
-    which = plot.add_mutually_exclusive_group()
-    which.add_argument("--frame", type=int, metavar="K")
-    which.add_argument("--frames", type=_numbers, metavar="A,B,C")
-    plot.add_argument("--output", type=Path, metavar="FILE")
-    plot.add_argument("--colour", choices=("speed", "angle", "id", "none"), default="speed")
-    plot.add_argument("--contacts", action="store_true")
-
+    add_picture_verbs(verbs)
     table = verbs.add_parser("table")
     table.set_defaults(action=_table)
     table.add_argument("result", type=Path, metavar="RESULT")
@@ -226,24 +218,6 @@ def _numbers(text: str) -> list[int]:
 
 def _words(text: str) -> list[str]:
     return [word for word in text.split(",") if word]
-
-
-def _plot(options: argparse.Namespace) -> None:
-    from .plot import plot_frames, save  # matplotlib takes long to load and a table does not need it
-
-    trajectory = Trajectory(options.result)
-    if len(trajectory) == 0:
-        raise ResultError(f"{options.result}: holds no frames")
-    numbers = options.frames or [-1 if options.frame is None else options.frame]
-    figure = plot_frames(trajectory, numbers, options.colour, options.contacts)
-    path = options.output or trajectory.folder / _picture_name(trajectory, numbers)
-    save(figure, path)
-    print(path)
-
-
-def _picture_name(trajectory: Trajectory, numbers: list[int]) -> str:
-    counted = [number % len(trajectory) for number in numbers]
-    return "frame_" + "_".join(f"{number:04d}" for number in counted) + ".png"
 
 
 def _table(options: argparse.Namespace) -> None:

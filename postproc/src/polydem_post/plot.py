@@ -2,134 +2,164 @@
 
 from __future__ import annotations
 
+import math
+import warnings
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colorbar import Colorbar
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from .trajectory import Frame, ResultError, Trajectory
+from . import drawing
+from .drawing import Look
+from .figure_style import FORMS, SETTINGS
+from .result_file import ResultError
+from .snapshot import Snapshot, read_snapshot
+from .trajectory import Trajectory
 
-#: What bodies may be coloured by
-COLOURS = ("speed", "angle", "id", "none")
+#: Longest side of the picture of one frame, and of a page of several [mm]
+LONGEST_SIDE, PAGE = 178.0, 260.0
 
-WALL_COLOUR = "0.55"
-PLAIN_COLOUR = "#d9b98a"
-CONTACT_COLOUR = "#a01020"
-#: Bodies slower than this are at rest: the scale of speeds does not end below it [m/s]
-REST_SPEED = 1e-6
-#: Longest side of the picture of one frame [inch]
-LONGEST_SIDE = 7.0
+#: Millimetres in an inch
+INCH = 25.4
+
+#: Picture elements per inch, unless they are given
+DPI = 150
 
 
-def plot_frames(trajectory: Trajectory, numbers: list[int], colour: str = "speed", contacts: bool = False) -> Figure:
-    """Draw frames side by side on one scale of colours."""
-    frames = [trajectory.frame(number) for number in numbers]
-    low, high = _limits(frames)
-    width, height = _size(low, high)
-    figure = Figure(figsize=(width * len(frames) + 1.2, height + 0.8), layout="constrained")
+def plot_frames(trajectory: Trajectory, numbers: list[int], look: Look | None = None, size: tuple | None = None,
+                columns: int | None = None, dpi: float = DPI) -> Figure:
+    """Draw frames in one figure on one scale of colours and lengths; `size` is its width and height [mm]."""
+    look = drawing.settle(trajectory, numbers, look or Look())
+    snapshots = [read_snapshot(trajectory, number, look.needs_contacts) for number in numbers]
+    columns = min(columns or _columns(len(numbers), look), len(numbers))
+    rows = -(-len(numbers) // columns)
+    width, height = size or _size(look, rows, columns)
+    figure = Figure(figsize=(width / INCH, height / INCH), dpi=dpi, layout="compressed")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(1, len(frames), squeeze=False, sharey=True)[0]
-    norm = _scale(frames, colour)
-    for axis, frame in zip(axes, frames):
-        grains = _draw_bodies(axis, frame, colour, norm)
-        axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", xlabel="x [m]")
-        axis.set_title(f"t = {frame.time:.4g} s")
-        axis.spines[["top", "right"]].set_visible(False)
-    axes[0].set_ylabel("y [m]")
-    if contacts:
-        _draw_contacts(axes, trajectory, numbers, frames)
-    if colour in ("speed", "angle"):
-        label = {"speed": "speed [m/s]", "angle": "angle [rad]"}[colour]
-        figure.colorbar(grains, ax=list(axes), label=label, shrink=0.8, pad=0.02)
+    axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
+    for axis in axes[len(numbers) :]:
+        axis.remove()
+    axes = axes[: len(numbers)]
+    for place, (axis, snapshot) in enumerate(zip(axes, snapshots)):
+        prepare(axis, look, f"t = {snapshot.frame.time:.4g} s")
+        axis.label_outer()
+        if place + columns >= len(axes):  # the lowest of its column, also above an empty place
+            axis.xaxis.set_tick_params(labelbottom=True)
+            axis.set_xlabel("x [m]")
+    _finish(figure, axes, snapshots, look)
     return figure
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write a figure without anything in it that changes from run to run."""
+def prepare(axis, look: Look, title: str) -> None:
+    """Limits, labels and equal scales of axes."""
+    x0, x1, y0, y1 = look.limits
+    axis.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x [m]", ylabel="y [m]")
+    axis.set_aspect("equal", adjustable="box")
+    axis.set_title(title, fontsize=9)
+    axis.spines[["top", "right"]].set_visible(False)
+
+
+def add_scale(figure: Figure, axes, grains, look: Look) -> Colorbar | None:
+    """The scale of colours beside the axes, with arrows where bodies lie outside it."""
+    if not look.quantity:
+        return None
+    low, high = look.colour_range
+    values = np.concatenate([np.asarray(each.get_array()) for each in grains])
+    values = values[np.isfinite(values)]
+    below, above = bool((values < low).any()), bool((values > high).any())
+    extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    bar = figure.colorbar(grains[0], ax=list(axes), label=look.quantity.title, pad=0.02, fraction=0.05, aspect=30,
+                          extend=extend[below, above])
+    if look.quantity.count:
+        bar.set_ticks(range(0, look.quantity.count, max(look.quantity.count // 10, 1)))
+    elif look.quantity.span == "turn" and look.colour_range == (0.0, 2.0 * np.pi):
+        bar.set_ticks([0.0, 0.5 * np.pi, np.pi, 1.5 * np.pi, 2.0 * np.pi], labels=["0", "π/2", "π", "3π/2", "2π"])
+    return bar
+
+
+def _finish(figure: Figure, axes, snapshots: list[Snapshot], look: Look) -> None:
+    """Draw bodies, scale and legend; then, as the axes have their size, what is as wide as bodies."""
+    grains = [drawing.draw_bodies(axis, snapshot, look)[1] for axis, snapshot in zip(axes, snapshots)]
+    add_scale(figure, axes, grains, look)
+    legend = None
+    for _ in range(2):  # the legend takes room, which changes the scale
+        _lay_out(figure)
+        for axis in axes:
+            _fit_ticks(axis)
+        if legend:
+            legend.remove()
+        lines = drawing.legend_of(snapshots[0], look, drawing.points_per_metre(axes[0]))
+        if not lines:
+            break
+        legend = figure.legend(handles=lines, loc="outside lower center", ncols=_legend_columns(figure, lines),
+                               frameon=False, fontsize=7, handlelength=2.2)
+    _lay_out(figure)
+    for axis, snapshot, each in zip(axes, snapshots, grains):
+        drawing.fit_outlines(each, snapshot, drawing.points_per_metre(axis))
+        drawing.overlays(axis, snapshot, look)
+
+
+def _lay_out(figure: Figure) -> None:
+    """Give everything its place."""
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message=".*layout not applied")
+        try:
+            figure.draw_without_rendering()
+        except UserWarning as warning:
+            raise ResultError(f"the figure of {figure.get_figwidth() * INCH:.0f} mm x "
+                              f"{figure.get_figheight() * INCH:.0f} mm is too small for what it shall show; give a "
+                              "greater --size") from warning
+
+
+def _fit_ticks(axis) -> None:
+    """As many numbers at the axes as there is room for."""
+    box = axis.get_window_extent()
+    for which, length, room in ((axis.xaxis, box.width, 0.8), (axis.yaxis, box.height, 0.4)):
+        which.set_major_locator(MaxNLocator(nbins=int(np.clip(length / axis.figure.dpi / room, 1, 7)),
+                                            steps=[1, 2, 2.5, 5, 10], min_n_ticks=2))
+
+
+def _legend_columns(figure: Figure, lines: list) -> int:
+    """As many entries side by side as the figure has room for."""
+    longest = max(len(line.get_label()) for line in lines)
+    return max(1, min(len(lines), int(figure.get_figwidth() / (0.058 * longest + 0.5))))
+
+
+def save(figure: Figure, path: Path, dpi: float = DPI, tight: bool = False) -> None:
+    """Write a figure without anything in it that changes from run to run; `tight`: without empty margins."""
+    form = check_form(path)
     try:
-        figure.savefig(path, dpi=150, metadata={"Software": None} if path.suffix == ".png" else None)
+        with matplotlib.rc_context(SETTINGS):
+            figure.savefig(path, dpi=dpi, metadata=FORMS[form], bbox_inches="tight" if tight else None,
+                           pad_inches=0.05)
     except (OSError, ValueError) as error:
         raise ResultError(f"{path}: cannot be written ({error})") from error
 
 
-def _draw_bodies(axis, frame: Frame, colour: str, norm: Normalize) -> PolyCollection:
-    fixed = np.flatnonzero(frame.fixed)
-    free = np.flatnonzero(~frame.fixed)
-    walls = PolyCollection([frame.vertices[k] for k in fixed], facecolor=WALL_COLOUR, edgecolor="none")
-    line = float(np.clip(20.0 / np.sqrt(len(free) + 1), 0.1, 0.8))
-    grains = PolyCollection([frame.vertices[k] for k in free], edgecolor="black", linewidth=line)
-    if colour == "none":
-        grains.set_facecolor(PLAIN_COLOUR)
-    else:
-        grains.set(array=_values(frame, colour)[free], cmap=_map(colour), norm=norm)
-    axis.add_collection(walls)
-    axis.add_collection(grains)
-    return grains
+def check_form(path: Path) -> str:
+    """The form of a picture by the end of its name."""
+    form = path.suffix[1:].lower()
+    if form not in FORMS:
+        hint = "; ./polydem movie makes films" if form in ("gif", "mp4") else ""
+        raise ResultError(f"{path}: cannot be written: the name must end with {', '.join('.' + each for each in FORMS)}"
+                          f"{hint}")
+    return form
 
 
-def _draw_contacts(axes, trajectory: Trajectory, numbers: list[int], frames: list[Frame]) -> None:
-    """Draw each contact as lines from the two centres to its point, as wide as its force is large."""
-    tables = [trajectory.contacts(number) for number in numbers]
-    for frame, table in zip(frames, tables):
-        if not np.isin(np.concatenate([table.first, table.second]), frame.id).all():
-            raise ResultError(f"{trajectory.folder}: contacts of step {frame.step} name bodies that are not there")
-    forces = [np.hypot(table.force[:, 0], table.force[:, 1]) for table in tables]
-    largest = max((force.max() for force in forces if len(force)), default=0.0)
-    for axis, frame, table, force in zip(axes, frames, tables, forces):
-        if largest == 0.0:
-            continue
-        first = frame.position[np.searchsorted(frame.id, table.first)]
-        second = frame.position[np.searchsorted(frame.id, table.second)]
-        # A wall is large, and its centre may be anywhere: draw no line to it.
-        first = np.where(_of(frame, table.first)[:, None], table.point, first)
-        second = np.where(_of(frame, table.second)[:, None], table.point, second)
-        lines = np.stack([first, table.point, second], axis=1)
-        axis.add_collection(LineCollection(lines, linewidths=4.0 * force / largest, colors=CONTACT_COLOUR))
+def _columns(count: int, look: Look) -> int:
+    """Panels side by side: so many that the figure is about as wide as a page."""
+    x0, x1, y0, y1 = look.limits
+    return max(1, min(count, round(math.sqrt(1.6 * count * (y1 - y0) / (x1 - x0)))))
 
 
-def _of(frame: Frame, identifiers: np.ndarray) -> np.ndarray:
-    """Whether the bodies of these identifiers are fixed."""
-    return frame.fixed[np.searchsorted(frame.id, identifiers)]
-
-
-def _values(frame: Frame, colour: str) -> np.ndarray:
-    if colour == "speed":
-        return np.hypot(frame.velocity[:, 0], frame.velocity[:, 1])
-    if colour == "angle":
-        return np.mod(frame.angle, 2.0 * np.pi)
-    return np.mod(frame.id, 20).astype(float)
-
-
-def _map(colour: str):
-    if colour == "id":
-        # Light and dark halves of matplotlib's tab20, so that neighbours differ and edges stay visible.
-        import matplotlib
-
-        return ListedColormap(matplotlib.colormaps["tab20"].colors)
-    return {"speed": "viridis", "angle": "twilight"}[colour]
-
-
-def _scale(frames: list[Frame], colour: str) -> Normalize:
-    """One scale for all frames; a few fast bodies do not darken the rest."""
-    if colour == "angle":
-        return Normalize(0.0, 2.0 * np.pi)
-    if colour == "speed":
-        speeds = np.concatenate([_values(frame, colour)[~frame.fixed] for frame in frames])
-        greatest = np.percentile(speeds, 99.5) if len(speeds) else 0.0
-        return Normalize(0.0, max(greatest, REST_SPEED))
-    return Normalize(-0.5, 19.5)
-
-
-def _limits(frames: list[Frame]) -> tuple[np.ndarray, np.ndarray]:
-    corners = np.concatenate([outline for frame in frames for outline in frame.vertices])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    margin = 0.02 * max(high - low)
-    return low - margin, high + margin
-
-
-def _size(low: np.ndarray, high: np.ndarray) -> tuple[float, float]:
-    extent = high - low
-    return tuple(np.maximum(LONGEST_SIDE * extent / extent.max(), 1.5))
+def _size(look: Look, rows: int, columns: int) -> tuple[float, float]:
+    """Width and height of a figure whose panels have their shape [mm]."""
+    x0, x1, y0, y1 = look.limits
+    extent = np.array([x1 - x0, y1 - y0])
+    longest = LONGEST_SIDE if rows * columns == 1 else PAGE / max(rows, columns)
+    panel = np.maximum(longest * extent / extent.max(), 30.0)
+    return columns * (panel[0] + 8.0) + 32.0, rows * (panel[1] + 14.0) + 12.0 + 6.0 * bool(look.show)

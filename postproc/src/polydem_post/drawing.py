@@ -1,0 +1,293 @@
+"""Draws one frame into axes: bodies and what is laid over them. Pictures and films share it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import Collection, LineCollection, PolyCollection
+from matplotlib.colors import Colormap, Normalize
+from matplotlib.lines import Line2D
+
+from .quantities import QUANTITIES, Quantity, range_of, stress
+from .result_file import ResultError
+from .snapshot import Snapshot, has_contacts, read_snapshot
+from .trajectory import Trajectory
+from .tree_cells import CellGrid, cell_grid, tree_cells
+
+#: What can be laid over the bodies, with its meaning in a legend
+OVERLAYS = {
+    "contacts": "contact points",
+    "forces": "contact forces",
+    "boxes": "bounding boxes",
+    "cells": "cells of the quadtree",
+    "stress": "principal stresses",
+}
+NEED_CONTACTS = ("contacts", "forces", "stress")
+
+#: Colours of the fixed bodies and of bodies without a scale, of overlays, and of values that are not known
+WALL_COLOUR, PLAIN_COLOUR, UNKNOWN_COLOUR = "0.62", "#d9b98a", "0.85"
+FORCE_COLOUR, CONTACT_COLOUR, BOX_COLOUR, CELL_COLOUR = "#a01020", "#d55e00", "#0072b2", "#7a3db8"
+COMPRESSED_COLOUR, PULLED_COLOUR = "#a01020", "#0072b2"
+
+#: Width of the line of the largest force as a share of the median diameter of the free bodies
+WIDEST_FORCE = 0.45
+
+#: Share of the forces and stresses that the scale of widths and lengths covers: those of a few impacts are greater
+COVERED_FORCES = 99.0
+
+#: Width of outlines as a share of the median diameter of the free bodies, and least and greatest width [pt]
+OUTLINE, OUTLINES = 0.05, (0.05, 0.8)
+
+
+@dataclass(frozen=True)
+class Look:
+    """What pictures of a run show, alike for all frames."""
+
+    #: Name of a quantity, or "none"
+    colour: str = "none"
+    #: Names of OVERLAYS
+    show: tuple = ()
+    #: x0, x1, y0, y1 [m]; by default all bodies of all frames that are shown
+    limits: tuple | None = None
+    #: Least and greatest value of the scale of colours; found from the frames if absent
+    colour_range: tuple | None = None
+    #: Colour map of matplotlib; that of the quantity if absent
+    colours: str | None = None
+    #: Force that has the widest line [N/m]; found from the frames if absent
+    greatest_force: float | None = None
+    #: Pressure that has the longest cross [N/m2]; found from the frames if absent
+    greatest_stress: float | None = None
+    #: Grid of the quadtree
+    grid: CellGrid | None = field(default=None, compare=False)
+
+    @property
+    def quantity(self) -> Quantity | None:
+        """The quantity of the colours."""
+        return QUANTITIES.get(self.colour)
+
+    @property
+    def colour_map(self) -> Colormap:
+        """The colour map."""
+        colours = matplotlib.colormaps[self.colours or self.quantity.colours].with_extremes(bad=UNKNOWN_COLOUR)
+        return colours.resampled(self.quantity.count) if self.quantity.count else colours
+
+    @property
+    def norm(self) -> Normalize:
+        """The scale of colours."""
+        return Normalize(*self.colour_range)
+
+    @property
+    def needs_contacts(self) -> bool:
+        """Whether contacts must be read."""
+        return any(name in NEED_CONTACTS for name in self.show) or bool(self.quantity and self.quantity.needs_contacts)
+
+    def check(self) -> None:
+        """Refuse what is not known."""
+        if self.colour != "none" and self.colour not in QUANTITIES:
+            raise ResultError(f"there is no colour {self.colour}; there are {', '.join(QUANTITIES)} and none")
+        for name in self.show:
+            if name not in OVERLAYS:
+                raise ResultError(f"{name} cannot be shown; there are {', '.join(OVERLAYS)}")
+        if self.colours is not None and self.colours not in matplotlib.colormaps:
+            raise ResultError(f"there is no colour map {self.colours}; there are viridis, cividis, inferno, magma, "
+                              "plasma, coolwarm, PuOr, twilight and the others of matplotlib")
+
+
+class _Extent:
+    """What all frames together span."""
+
+    def __init__(self) -> None:
+        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
+        self.values: list[np.ndarray] = []
+        self.forces: list[np.ndarray] = []
+        self.stresses: list[np.ndarray] = []
+
+    def add(self, snapshot: Snapshot, look: Look) -> None:
+        """Take a frame into account."""
+        if len(snapshot.corners):
+            self.low = np.minimum(self.low, snapshot.corners.min(axis=0))
+            self.high = np.maximum(self.high, snapshot.corners.max(axis=0))
+        free = ~snapshot.frame.fixed
+        if look.quantity and look.colour_range is None:
+            self.values.append(look.quantity.values(snapshot)[free])
+        if "forces" in look.show and look.greatest_force is None:
+            self.forces.append(snapshot.known_contacts().magnitude)
+        if "stress" in look.show and look.greatest_stress is None:
+            self.stresses.append(np.abs(np.linalg.eigvalsh(stress(snapshot)[free])).max(axis=1, initial=0.0))
+
+    def settle(self, look: Look) -> Look:
+        """The look with all that was left open."""
+        limits, colour_range = look.limits, look.colour_range
+        if limits is None:
+            if not np.all(np.isfinite(self.low)):
+                raise ResultError("there are no bodies to draw")
+            margin = 0.02 * max(self.high - self.low)
+            limits = (self.low[0] - margin, self.high[0] + margin, self.low[1] - margin, self.high[1] + margin)
+        if look.quantity and colour_range is None:
+            colour_range = range_of(look.quantity, _joined(self.values))
+        return replace(look, limits=limits, colour_range=colour_range,
+                       greatest_force=look.greatest_force or _covered(self.forces),
+                       greatest_stress=look.greatest_stress or _covered(self.stresses))
+
+
+def _joined(parts: list[np.ndarray]) -> np.ndarray:
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _covered(parts: list[np.ndarray]) -> float:
+    values = _joined(parts)
+    return float(np.percentile(values, COVERED_FORCES)) if len(values) else 0.0
+
+
+def settle(trajectory: Trajectory, numbers: list[int], look: Look) -> Look:
+    """Find from frames what a look leaves open: limits, ranges and the grid of the quadtree."""
+    look.check()
+    if look.needs_contacts and not has_contacts(trajectory):
+        named = [name for name in look.show if name in NEED_CONTACTS] or [look.colour]
+        raise ResultError(f"{trajectory.folder}: holds no contacts, which {named[0]} needs; run with "
+                          "output.contacts = .true.")
+    extent = _Extent()
+    for number in numbers:
+        extent.add(read_snapshot(trajectory, number, look.needs_contacts), look)
+    if "cells" in look.show:
+        look = replace(look, grid=cell_grid(read_snapshot(trajectory, 0, False)))
+    return extent.settle(look)
+
+
+def draw_bodies(axis: Axes, snapshot: Snapshot, look: Look) -> tuple[PolyCollection, PolyCollection]:
+    """Draw the fixed and the free bodies."""
+    fixed, free = snapshot.frame.fixed, ~snapshot.frame.fixed
+    walls = PolyCollection(_chosen(snapshot, fixed), facecolor=WALL_COLOUR, edgecolor="none", zorder=1)
+    grains = PolyCollection(_chosen(snapshot, free), edgecolor="black", linewidth=0.2, zorder=2)
+    if look.quantity:
+        grains.set(array=look.quantity.values(snapshot)[free], cmap=look.colour_map, norm=look.norm)
+    else:
+        grains.set_facecolor(PLAIN_COLOUR)
+    axis.add_collection(walls, autolim=False)
+    axis.add_collection(grains, autolim=False)
+    return walls, grains
+
+
+def move_bodies(walls: PolyCollection, grains: PolyCollection, snapshot: Snapshot, look: Look) -> None:
+    """Move drawn bodies to where they are in another frame."""
+    fixed, free = snapshot.frame.fixed, ~snapshot.frame.fixed
+    walls.set_verts(_chosen(snapshot, fixed))
+    grains.set_verts(_chosen(snapshot, free))
+    if look.quantity:
+        grains.set_array(look.quantity.values(snapshot)[free])
+
+
+def _chosen(snapshot: Snapshot, rows: np.ndarray) -> list[np.ndarray]:
+    outlines = snapshot.outlines
+    return [outlines[k] for k in np.flatnonzero(rows)]
+
+
+def overlays(axis: Axes, snapshot: Snapshot, look: Look) -> list[Collection]:
+    """Draw what is laid over the bodies. Widths are in units of the axes, which must have their final size."""
+    makers = {"cells": _cells, "boxes": _boxes, "stress": _stresses, "forces": _forces, "contacts": _contacts}
+    drawn = [artist for name, make in makers.items() if name in look.show
+             for artist in make(snapshot, look, points_per_metre(axis))]
+    for order, artist in enumerate(drawn):
+        artist.set_zorder(3 + order)
+        axis.add_collection(artist, autolim=False)
+    return drawn
+
+
+def points_per_metre(axis: Axes) -> float:
+    """Points of a line width (1/72 inch) per metre of the axes."""
+    inverse = axis.transData.transform([(0.0, 0.0), (1.0, 0.0)])
+    return float(inverse[1, 0] - inverse[0, 0]) * 72.0 / axis.figure.dpi
+
+
+def fit_outlines(grains: PolyCollection, snapshot: Snapshot, scale: float) -> None:
+    """Give the outlines of bodies a width that suits the size in which they are drawn."""
+    grains.set_linewidth(float(np.clip(OUTLINE * _typical_size(snapshot) * scale, *OUTLINES)))
+
+
+def force_width(snapshot: Snapshot, scale: float) -> float:
+    """Width in points of the line of the greatest force."""
+    return max(WIDEST_FORCE * _typical_size(snapshot) * scale, 1.0)
+
+
+def _typical_size(snapshot: Snapshot) -> float:
+    """Median diameter of the free bodies, of circles of the same area [m]."""
+    free = ~snapshot.frame.fixed
+    return float(np.sqrt(4.0 * np.median(snapshot.area[free]) / np.pi)) if free.any() else 0.0
+
+
+def _forces(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
+    """Each contact as lines from the two centres to its point, as wide as its force is large."""
+    contacts, frame = snapshot.known_contacts(), snapshot.frame
+    if not look.greatest_force or not len(contacts.first):
+        return []
+    # A wall is large, and its centre may be anywhere: draw no line to it.
+    ends = [np.where(frame.fixed[rows][:, None], contacts.point, frame.position[rows])
+            for rows in (contacts.first, contacts.second)]
+    widths = np.minimum(contacts.magnitude / look.greatest_force, 1.0) * force_width(snapshot, scale)
+    seen = widths > 0.02
+    lines = np.stack([ends[0], contacts.point, ends[1]], axis=1)[seen]
+    return [LineCollection(lines, linewidths=widths[seen], colors=FORCE_COLOUR, capstyle="round")]
+
+
+def _contacts(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
+    """The contact points as crosses."""
+    point, size = snapshot.known_contacts().point, 0.07 * _typical_size(snapshot)
+    lines = [np.stack([point - arm, point + arm], axis=1) for arm in (np.array([size, size]), np.array([size, -size]))]
+    return [LineCollection(np.concatenate(lines), linewidths=np.clip(0.5 * size * scale, 0.3, 1.2),
+                           colors=CONTACT_COLOUR)]
+
+
+def _boxes(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
+    x0, y0, x1, y1 = snapshot.boxes[~snapshot.frame.fixed].T
+    outlines = np.stack([x0, y0, x1, y0, x1, y1, x0, y1], axis=1).reshape(-1, 4, 2)
+    return [PolyCollection(outlines, facecolor="none", edgecolor=BOX_COLOUR, linewidth=0.5)]
+
+
+def _cells(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
+    if look.grid is None:
+        return []
+    cells = tree_cells(look.grid, snapshot.boxes)
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+    outlines = cells.low[:, None, :] + cells.side[:, None, None] * corners
+    return [PolyCollection(outlines, facecolor="none", edgecolor=CELL_COLOUR, linewidth=0.5)]
+
+
+def _stresses(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
+    """Each free body's principal stresses as a cross; the longest as long as the bodies are wide."""
+    free = ~snapshot.frame.fixed
+    if not look.greatest_stress or not free.any():
+        return []
+    values, axes = np.linalg.eigh(stress(snapshot)[free])
+    size = 0.9 * _typical_size(snapshot)
+    half = 0.5 * size * np.minimum(np.abs(values) / look.greatest_stress, 1.0)
+    arm = half[:, :, None] * axes.transpose(0, 2, 1)
+    centre = snapshot.frame.position[free][:, None, :]
+    lines = np.stack([centre - arm, centre + arm], axis=2)
+    width = np.clip(0.1 * size * scale, 0.4, 2.0)
+    return [LineCollection(lines[values <= 0.0], linewidths=width, colors=COMPRESSED_COLOUR),
+            LineCollection(lines[values > 0.0], linewidths=width, colors=PULLED_COLOUR)]
+
+
+def legend_of(snapshot: Snapshot, look: Look, scale: float) -> list[Line2D]:
+    """What the overlays are, with a scale of the widths of forces and the lengths of crosses."""
+    lines = []
+    for name in look.show:
+        if name == "forces" and look.greatest_force:
+            widest = force_width(snapshot, scale)
+            lines += [Line2D([], [], color=FORCE_COLOUR, linewidth=share * widest, solid_capstyle="butt",
+                             label=f"force {share * look.greatest_force:.3g} N/m{more}")
+                      for share, more in ((1.0, " or more"), (0.3, ""))]
+        elif name == "stress" and look.greatest_stress:
+            lines += [Line2D([], [], color=colour, linewidth=1.2, label=label) for colour, label in (
+                (COMPRESSED_COLOUR, f"compression {look.greatest_stress:.2g} N/m2 or more"),
+                (PULLED_COLOUR, "tension"))]
+        elif name == "contacts":
+            lines.append(Line2D([], [], color=CONTACT_COLOUR, marker="x", linestyle="none", label=OVERLAYS[name]))
+        elif name in ("boxes", "cells"):
+            colour = BOX_COLOUR if name == "boxes" else CELL_COLOUR
+            lines.append(Line2D([], [], color=colour, marker="s", markerfacecolor="none", linestyle="none",
+                                label=OVERLAYS[name]))
+    return lines

@@ -1,0 +1,174 @@
+"""Pictures of frames: quantities, overlays, cells of the quadtree, layout and files."""
+
+import re
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.image import imread
+from polydem_post import ResultError, Trajectory
+from polydem_post.__main__ import help_text, main
+from polydem_post.drawing import OVERLAYS, Look, settle
+from polydem_post.plot import plot_frames
+from polydem_post.quantities import QUANTITIES, pressure, range_of, resultant, stress
+from polydem_post.snapshot import read_snapshot
+from polydem_post.tree_cells import cell_grid, tree_cells
+
+
+@pytest.fixture(scope="module")
+def run(small_drum):
+    return Trajectory(small_drum)
+
+
+def test_figures_say_time_and_units(finished):
+    figure = plot_frames(Trajectory(finished), [1, 4], Look(colour="speed", show=("forces",)), columns=2)
+    left, right, bar = figure.axes
+    assert (left.get_title(), right.get_title()) == ("t = 1 s", "t = 2.5 s")
+    assert (left.get_xlabel(), left.get_ylabel()) == ("x [m]", "y [m]")
+    assert left.get_aspect() == 1.0
+    assert bar.get_ylabel() == "speed [m/s]"
+    walls, grains, forces = right.collections
+    assert (len(walls.get_paths()), len(grains.get_paths()), len(forces.get_paths())) == (1, 2, 2)
+
+
+def test_the_help_text_names_all_quantities_and_overlays():
+    text = help_text("plot")
+    assert [name for name in [*QUANTITIES, *OVERLAYS] if name not in text.replace(",", " ").split()] == []
+
+
+@pytest.mark.parametrize("name", QUANTITIES)
+def test_every_quantity_has_a_value_for_every_body(run, name):
+    snapshot = read_snapshot(run, -1)
+    quantity = QUANTITIES[name]
+    values = quantity.values(snapshot)
+    free = ~snapshot.frame.fixed
+    assert values.shape == free.shape
+    assert np.isfinite(values[free]).all()
+    low, high = range_of(quantity, values[free])
+    assert low < high
+    assert np.mean((values[free] >= low) & (values[free] <= high)) > 0.98
+    if quantity.constant:
+        assert np.array_equal(values, quantity.values(read_snapshot(run, 0)), equal_nan=True)
+
+
+def test_resultants_on_walls_are_the_stored_ones_and_bodies_are_compressed(run):
+    snapshot, walls = read_snapshot(run, -1), run.walls(-1)
+    rows = np.searchsorted(snapshot.frame.id, walls.id)
+    assert np.abs(walls.force).max() > 1.0
+    assert np.allclose(resultant(snapshot)[rows], walls.force, rtol=0.0, atol=1e-9)
+    free = ~snapshot.frame.fixed
+    assert np.mean(pressure(snapshot)[free] > 0.0) > 0.8
+    tensor = stress(snapshot)
+    assert np.array_equal(tensor, tensor.transpose(0, 2, 1))
+
+
+def test_a_range_is_kept_for_bodies_at_rest_and_for_equal_bodies():
+    assert range_of(QUANTITIES["speed"], np.zeros(5)) == (0.0, 1e-6)
+    assert range_of(QUANTITIES["speed"], np.empty(0)) == (0.0, 1.0)
+    low, high = range_of(QUANTITIES["mass"], np.full(5, 2.0))
+    assert low < 2.0 < high
+    assert range_of(QUANTITIES["velocity_x"], np.array([-1.0, 3.0]))[0] == -range_of(
+        QUANTITIES["velocity_x"], np.array([-1.0, 3.0]))[1]
+
+
+def test_the_cells_are_those_of_the_program(run):
+    """The finder counted its nodes and levels in the last step."""
+    cells = tree_cells(cell_grid(read_snapshot(run, 0)), read_snapshot(run, -1).boxes)
+    assert len(cells.side) == run.counters["finder nodes"]
+    assert np.log2(cells.side.max() / cells.side.min()) + 1 == run.counters["finder depth"]
+
+
+def test_the_leaves_are_the_largest_cells_with_one_box(run):
+    snapshot, grid = read_snapshot(run, -1), cell_grid(read_snapshot(run, 0))
+    cells = tree_cells(grid, snapshot.boxes)
+    centre = 0.5 * (snapshot.boxes[grid.bodies, :2] + snapshot.boxes[grid.bodies, 2:])
+    offset = centre[:, None, :] - cells.low
+    inside = ((offset >= 0.0) & (offset < cells.side[None, :, None])).all(axis=2)
+    assert np.array_equal(inside.sum(axis=0), cells.count)
+    assert (inside[:, cells.leaf].sum(axis=1) == 1).all()
+    finest = cells.side <= 1.001 * grid.finest
+    assert (cells.count[cells.leaf & ~finest] == 1).all()
+    assert (cells.count[~cells.leaf] > 1).all()
+
+
+def test_every_overlay_and_quantity_is_drawn_and_nothing_is_cut(run):
+    look = Look(colour="pressure", show=tuple(OVERLAYS))
+    for size in (None, (178, 90), (100, 220)):
+        figure = plot_frames(run, [0, 5, -1], look, size)
+        if size:
+            assert np.allclose(figure.get_size_inches() * 25.4, size)
+        renderer = figure.canvas.get_renderer()
+        inside = figure.bbox
+        box = figure.get_tightbbox(renderer).extents * figure.dpi
+        assert (box[:2] > [-2.0, -2.0]).all()
+        assert (box[2:] < [inside.width + 2.0, inside.height + 2.0]).all()
+        for axis in figure.axes[:3]:
+            x0, y0, x1, y1 = axis.get_window_extent().extents
+            low, high = axis.get_xlim(), axis.get_ylim()
+            assert (x1 - x0) / (low[1] - low[0]) == pytest.approx((y1 - y0) / (high[1] - high[0]), rel=1e-3)
+        labels = [text.get_text() for text in figure.legends[0].get_texts()]
+        assert len(labels) == 7
+        assert any(label.startswith("force ") and label.endswith("N/m or more") for label in labels)
+
+
+def test_a_figure_that_is_too_small_says_so(run):
+    with pytest.raises(ResultError, match="30 mm x 30 mm is too small"):
+        plot_frames(run, [0, 5, 9], Look(colour="speed"), (30, 30))
+
+
+def test_frames_share_one_scale(run):
+    together = settle(run, [0, -1], Look(colour="speed"))
+    first, last = plot_frames(run, [0], together), plot_frames(run, [-1], together)
+    for figure in (first, last):
+        assert figure.axes[0].collections[1].get_clim() == together.colour_range
+        assert figure.axes[0].get_xlim() == together.limits[:2]
+
+
+def test_bodies_are_drawn_where_they_are_in_their_colour(run, tmp_path):
+    """Compare picture elements at the centres of bodies with the scale of colours."""
+    look = Look(colour="id", limits=(-0.08, 0.08, -0.08, 0.08))
+    figure = plot_frames(run, [-1], look, (100, 90), dpi=200)
+    path = tmp_path / "picture.png"
+    figure.savefig(path, dpi=200)
+    pixels = imread(path)
+    frame = run.frame(-1)
+    colours = look.colour_map(np.mod(frame.id, 20) / 20.0 + 1e-3)
+    axis, found = figure.axes[0], 0
+    for k in np.flatnonzero(~frame.fixed & (np.abs(frame.position) < 0.078).all(axis=1)):
+        x, y = axis.transData.transform(frame.position[k])
+        found += 1
+        assert np.allclose(pixels[round(pixels.shape[0] - y - 0.5), round(x - 0.5), :3], colours[k, :3], atol=0.02), k
+    assert found > 20
+
+
+def test_frames_by_time_slice_and_file(run, small_drum, tmp_path, capsys):
+    out = tmp_path / "f.pdf"
+    assert main(["plot", str(small_drum), "--frames", "0:11:5", "--separate", "-o", str(out), "--dpi", "50"]) == 0
+    assert capsys.readouterr().out.split() == [str(tmp_path / f"f_{k:04d}.pdf") for k in (0, 5, 10)]
+    assert main(["plot", str(small_drum), "--times", "0.1,0.21", "-o", str(tmp_path / "t.svg"), "--colour", "load",
+                 "--range", "0,50", "--map", "magma"]) == 0
+    text = (tmp_path / "t.svg").read_text(encoding="utf-8")
+    times = [float(time) for time in re.findall(r">t = ([\d.]+) s<", text)]
+    assert times == pytest.approx([0.1, 0.2], abs=0.011)
+    assert "sum of the contact forces" in text
+
+
+@pytest.mark.parametrize("form", ["png", "pdf", "svg"])
+def test_pictures_in_every_form_are_reproducible(small_drum, tmp_path, form):
+    paths = [tmp_path / f"{name}.{form}" for name in ("first", "second")]
+    for path in paths:
+        assert main(["plot", str(small_drum), "-o", str(path), "--show", "forces,cells", "--dpi", "60"]) == 0
+    assert paths[0].read_bytes() == paths[1].read_bytes()
+
+
+def test_a_result_without_contacts_says_so(small_drum, tmp_path):
+    for path in small_drum.iterdir():
+        (tmp_path / path.name).write_bytes(path.read_bytes())
+    for path in tmp_path.glob("trajectory_*.h5"):
+        with h5py.File(path, "r+") as file:
+            del file["contacts"]
+    bare = Trajectory(tmp_path, check=False)
+    for look in (Look(colour="load"), Look(show=("stress",))):
+        with pytest.raises(ResultError, match="holds no contacts, which (load|stress) needs; run with"):
+            plot_frames(bare, [0], look)
+    plot_frames(bare, [0], Look(colour="speed", show=("boxes", "cells")))
