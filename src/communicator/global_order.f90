@@ -30,7 +30,7 @@ module polydem_global_order
       integer(ip), allocatable, private :: counts_received(:)
       !> Index of the received row for each row of the block, (n)
       integer(ip), allocatable, private :: source(:)
-      !> Whether there is only one rank and the rows are already in order
+      !> Whether there is only one rank, and its rows are already in order: there is nothing to send
       logical, private :: is_in_order = .false.
    contains
       procedure :: lay_out
@@ -70,6 +70,14 @@ contains
       integer(ip) :: k
 
       self%n_known = n_known
+      self%is_in_order = comm%size == 1_ip .and. all(key(2:) > key(:size(key) - 1))
+      if (self%is_in_order) then
+         self%slot = slot
+         self%n = size(key, kind=ip)
+         self%first = 0_lp
+         self%total = int(self%n, lp)
+         return
+      end if
       destinations = destination_of(key, n_bodies, comm%size)
       call sort_by_rank(destinations, comm%size, self%counts, self%slot)
       allocate (sent(1, size(key)))
@@ -80,7 +88,6 @@ contains
       call comm%all_to_all(sent, self%counts, received, self%counts_received)
       self%n = size(received, 2, kind=ip)
       call rank_keys(received(1, :), self%source)
-      self%is_in_order = comm%size == 1_ip .and. all(self%source(2:) > self%source(:self%n - 1_ip))
       call comm%gather([int(self%n, lp)], sizes, counts)
       self%first = sum(sizes(:comm%rank))
       self%total = sum(sizes)
@@ -127,6 +134,12 @@ contains
       integer(ip), allocatable :: counts(:)
       integer(ip) :: k
 
+      if (self%is_in_order) then
+         do k = 1_ip, self%n
+            values(:, self%slot(k)) = block(:, k)
+         end do
+         return
+      end if
       allocate (sent(size(block, 1), self%n))
       do k = 1_ip, self%n
          sent(:, self%source(k)) = block(:, k)

@@ -91,9 +91,18 @@ contains
       type(global_order_t) :: blocks
       integer(ip), allocatable :: body(:), start(:)
       real(dp), allocatable :: vertices(:, :)
+      character(len=*), parameter :: about_start = &
+         'body k owns the rows vertex_start[k] to vertex_start[k + 1] - 1 of vertex', &
+         about_vertex = 'vertices relative to the centre of mass at angle 0, anticlockwise'
       integer(ip) :: k, n, s
 
       n = bodies%vertex_start(bodies%n + 1_ip) - 1_ip
+      if (comm%size == 1_ip) then
+         ! One rank has all rows in order. It needs no memory for a plan.
+         call file%write('/bodies/vertex_start', bodies%vertex_start - 1_ip, error, '1', about_start)
+         call file%write('/bodies/vertex', real(bodies%shape(:, :n), dp), error, 'm', about_vertex)
+         return
+      end if
       allocate (body(n), start(size(n_vertices) + 1))
       do s = 1_ip, bodies%n
          body(bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip) = s
@@ -107,11 +116,9 @@ contains
       ! The last rank also writes the final entry, the number of all vertices.
       n = size(n_vertices, kind=ip)
       if (comm%rank == comm%size - 1_ip) n = n + 1_ip
-      call file%write('/bodies/vertex_start', start(:n), error, '1', &
-                      'body k owns the rows vertex_start[k] to vertex_start[k + 1] - 1 of vertex', &
+      call file%write('/bodies/vertex_start', start(:n), error, '1', about_start, &
                       part_t(part%first, part%total + 1_lp))
-      call file%write('/bodies/vertex', vertices, error, 'm', &
-                      'vertices relative to the centre of mass at angle 0, anticlockwise', &
+      call file%write('/bodies/vertex', vertices, error, 'm', about_vertex, &
                       part_t(blocks%first, blocks%total))
    end subroutine write_vertices
 
