@@ -4,8 +4,25 @@ import os
 import subprocess
 
 import pytest
+from polydem_post import Trajectory
+from polydem_post.export import FORMATS, export_result
 
 WRITE_SAMPLE = os.environ["POLYDEM_WRITE_SAMPLE"]
+PROGRAM = os.environ["POLYDEM_PROGRAM"]
+
+#: Some grains fall on a floor; the first frame has no contacts
+HEAP = """&scene
+   name = 'heap'
+   bodies = 40
+/
+&integrate
+   duration = 0.3
+/
+&output
+   frame_interval = 0.1
+   contacts = .true.
+/
+"""
 
 
 @pytest.fixture(scope="session")
@@ -27,6 +44,25 @@ def small_drum(tmp_path_factory):
     subprocess.run([os.environ["POLYDEM_PROGRAM"], "run", "drum.nml"], cwd=folder, check=True,
                    stdout=subprocess.DEVNULL)
     return folder / "results" / "drum"
+
+
+@pytest.fixture(scope="session")
+def heap_with_contacts(tmp_path_factory):
+    """A run of the program with contacts."""
+    folder = tmp_path_factory.mktemp("heap")
+    (folder / "heap.nml").write_text(HEAP)
+    subprocess.run([PROGRAM, "run", "heap.nml"], cwd=folder, check=True, capture_output=True)
+    return Trajectory(folder / "results" / "heap")
+
+
+@pytest.fixture(scope="session")
+def exported(heap_with_contacts, tmp_path_factory):
+    """That run in all formats but gsd, which needs a package."""
+    folder = tmp_path_factory.mktemp("exported")
+    for form, suffix in FORMATS.items():
+        if form != "gsd":
+            export_result(heap_with_contacts, form, folder / f"heap{suffix}")
+    return folder
 
 
 @pytest.fixture

@@ -1,12 +1,16 @@
-"""Run the tests of the Python package: run_pytest.py ROOT TESTS WRITE_SAMPLE PROGRAM [OPTION...].
+"""Run the tests of the Python package: run_pytest.py ROOT TESTS WRITE_SAMPLE PROGRAM [--needs=A,B] [OPTION...].
 
-Takes the Python of ROOT/.venv, which the launcher makes, or else the Python that runs this file.
+Without the packages that the tests need it ends with the code for skipped tests, and says how to install them. Takes
+the Python of ROOT/.venv, which the launcher makes, or else the Python that runs this file.
 """
 
 import os
 import subprocess
 import sys
 from pathlib import Path
+
+#: Exit code of tests that are skipped (tests/postproc/CMakeLists.txt)
+SKIPPED = 77
 
 NEEDED = "import h5py, matplotlib, numpy, pytest"
 
@@ -20,13 +24,19 @@ def main() -> int:
         print(f"{python} lacks one of h5py, matplotlib, numpy and pytest. Let the launcher make the environment:")
         print("    ./polydem test")
         return 1
+    needs = [word.partition("=")[2].split(",") for word in sys.argv[5:] if word.startswith("--needs=")]
+    options = [word for word in sys.argv[5:] if not word.startswith("--needs=")]
+    for package in (name for names in needs for name in names):
+        if subprocess.run([str(python), "-c", f"import {package}"], stderr=subprocess.DEVNULL, check=False).returncode:
+            print(f"skipped: {python} lacks {package}. To run these tests: rm -r .venv; .ci/run")
+            return SKIPPED
     environment = dict(os.environ)
     environment["PYTHONPATH"] = str(root / "postproc" / "src")
     environment["PYTHONDONTWRITEBYTECODE"] = "1"
     environment["POLYDEM_WRITE_SAMPLE"] = str(write_sample)
     environment["POLYDEM_PROGRAM"] = str(program)
     environment["POLYDEM_SOURCE_DIR"] = str(root)
-    command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests), *sys.argv[5:]]
+    command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests), *options]
     return subprocess.run(command, env=environment, check=False).returncode
 
 

@@ -11,6 +11,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 from . import __version__
+from .data_verbs import add_data_verbs
 from .emit import printable
 from .picture_verbs import add_picture_verbs
 from .table import FORMATS, timing_table
@@ -102,6 +103,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_workprecision(verbs)
     _add_sweep(verbs)
     _add_scale(verbs)
+    add_data_verbs(verbs)
     return parser
 
 

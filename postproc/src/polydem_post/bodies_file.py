@@ -1,0 +1,124 @@
+"""The bodies file of a scene: polygons of other programs as the bodies of a run."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from .convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
+from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
+from .polygons import FloatArray, join
+from .result_file import ResultError
+
+#: Columns with several numbers per body
+WIDE = {"velocity": 2}
+
+
+class ConcaveOutline(UserWarning):
+    """A concave outline became several bodies, which can move apart."""
+
+
+def import_bodies(path: str | os.PathLike[str], output: str | os.PathLike[str], *, form: str = "", scale: float = 1.0,
+                  fixed: Iterable[int] = (), decomposed: bool = False, overwrite: bool = False) -> int:
+    """Make a bodies file of the polygons of a file (WKT, GeoJSON, plain text); return the number of bodies.
+
+    Coordinates are multiplied by `scale` to give metres. `fixed` are numbers of outlines in the file, from 1. A concave
+    outline is an error, or with `decomposed` becomes several bodies with a warning.
+    """
+    return write_bodies(read_outlines(Path(path), form), output, scale=scale, fixed=fixed, decomposed=decomposed,
+                        overwrite=overwrite)
+
+
+def import_shapely(geometries: Any, output: str | os.PathLike[str], **options: Any) -> int:
+    """Make a bodies file of polygons of shapely, one or several; options as for `import_bodies`."""
+    return write_bodies(shapely_outlines(geometries), output, **options)
+
+
+def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[str], *, scale: float = 1.0,
+                 fixed: Iterable[int] = (), decomposed: bool = False, overwrite: bool = False) -> int:
+    """Write outlines, or arrays (k, 2) of vertices, as a bodies file; return the number of bodies."""
+    path = Path(output)
+    given = [each if isinstance(each, Outline) else Outline(np.asarray(each, dtype=float), f"outline {number}")
+             for number, each in enumerate(outlines, 1)]
+    held = set(fixed)
+    if held - set(range(1, len(given) + 1)):
+        raise ResultError(f"there is no outline {min(held - set(range(1, len(given) + 1)))}, only {len(given)}")
+    if not (np.isfinite(scale) and scale > 0.0):
+        raise ResultError(f"the scale is {scale}, but must be a number above 0")
+    polygons: list[FloatArray] = []
+    rows: list[dict[str, Any]] = []
+    for number, outline in enumerate(given, 1):
+        pieces = _pieces(outline, scale, decomposed)
+        properties = {**outline.properties, **({"fixed": True} if number in held else {})}
+        if len(pieces) > 1 and {"mass", "inertia", "id"} & set(properties):
+            raise ResultError(f"{outline.place}: a mass, an inertia or an id cannot be divided among its pieces")
+        polygons += pieces
+        rows += [properties] * len(pieces)
+    if not polygons:
+        raise ResultError(f"{path}: there are no bodies to write")
+    columns = {name: _column(name, rows) for name in PROPERTIES if any(name in row for row in rows)}
+    columns.setdefault("fixed", np.zeros(len(rows), dtype=np.int8))
+    if path.exists() and not overwrite:
+        raise ResultError(f"{path}: is there already; --force replaces it")
+    _write(path, polygons, columns)
+    return len(polygons)
+
+
+def _pieces(outline: Outline, scale: float, decomposed: bool) -> list[FloatArray]:
+    """The convex polygons of an outline: itself, unless it is concave."""
+    try:
+        points = tidy(outline.points * scale)
+        wrong = concave_vertices(points)
+        if not wrong:
+            return [points]
+        insist_on_simple(points)
+        if not decomposed:
+            x, y = points[wrong[0]] / scale
+            raise OutlineError(f"it is concave at the vertex ({x:g}, {y:g}); --decompose makes several bodies of it")
+        pieces = decompose(points)
+    except OutlineError as error:
+        raise ResultError(f"{outline.place}: the outline cannot be a body: {error}") from error
+    warnings.warn(f"{outline.place}: the outline is concave and becomes {len(pieces)} separate bodies, which can move "
+                  "apart", ConcaveOutline, stacklevel=4)
+    return pieces
+
+
+def _column(name: str, rows: list[dict[str, Any]]) -> Any:
+    """A data set of a bodies file; a body without a value has the default of the file format."""
+    if name == "id" and not all("id" in row for row in rows):
+        raise ResultError("some polygons have an id and some have none")
+    if name == "density" and not all("density" in row for row in rows):
+        raise ResultError("some polygons have a density and some have none")
+    width = WIDE.get(name, 1)
+    values = []
+    for row in rows:
+        try:
+            value = np.array(row.get(name, np.zeros(width)), dtype=float).reshape(width)
+        except (TypeError, ValueError) as error:
+            raise ResultError(f"the {name} of a polygon is {row[name]!r}, not {width} number(s)") from error
+        values.append(value)
+    column = np.array(values)
+    if name in ("fixed", "id"):
+        return column[:, 0].astype(np.int8 if name == "fixed" else np.int64)
+    return column if width > 1 else column[:, 0]
+
+
+def _write(path: Path, polygons: list[FloatArray], columns: dict[str, Any]) -> None:
+    vertex, start = join(polygons)
+    unfinished = path.with_name(f".{path.name}.unfinished")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with h5py.File(unfinished, "w") as file:
+            file["vertex"], file["vertex_start"] = vertex, start
+            for name, values in columns.items():
+                file[name] = values
+        os.replace(unfinished, path)
+    except OSError as error:
+        unfinished.unlink(missing_ok=True)
+        raise ResultError(f"{path}: cannot be written ({error})") from error

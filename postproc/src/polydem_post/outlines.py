@@ -1,0 +1,182 @@
+"""Polygons in files of other programs: WKT, GeoJSON, plain text; and geometries of shapely."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .polygons import FloatArray
+from .result_file import ResultError
+
+#: Properties of a body that GeoJSON may give, besides its outline
+PROPERTIES = ("fixed", "velocity", "angular_velocity", "density", "mass", "inertia", "id")
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_RING = re.compile(r"\(([^()]*)\)")
+
+
+@dataclass(frozen=True)
+class Outline:
+    """An outline as it is in a file: any order of vertices, perhaps closed, perhaps concave."""
+
+    points: FloatArray
+    #: Where it is: file and line, or number of the feature
+    place: str
+    #: Values of PROPERTIES that the file gives
+    properties: dict[str, Any] = field(default_factory=dict)
+
+
+def read_outlines(path: Path, form: str = "") -> list[Outline]:
+    """All outlines of a file; the format follows from the end of its name unless it is given."""
+    form = form or FORMAT_OF_SUFFIX.get(path.suffix.lower(), "")
+    if form not in READERS:
+        raise ResultError(f"{path}: what the file holds does not follow from its name; give --from "
+                          f"{', '.join(READERS)}")
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ResultError(f"{path}: cannot be read ({error})") from error
+    outlines = list(READERS[form](text, str(path)))
+    if not outlines:
+        raise ResultError(f"{path}: holds no polygons")
+    return outlines
+
+
+def shapely_outlines(geometries: Any) -> list[Outline]:
+    """Outlines of polygons and multipolygons of shapely, one geometry or several."""
+    several = geometries if isinstance(geometries, Iterable) else [geometries]
+    return [outline for k, geometry in enumerate(several, 1) for outline in _of_shapely(geometry, f"geometry {k}")]
+
+
+def _of_shapely(geometry: Any, place: str) -> Iterator[Outline]:
+    if geometry.geom_type in ("MultiPolygon", "GeometryCollection"):
+        for part in geometry.geoms:
+            yield from _of_shapely(part, place)
+    elif geometry.geom_type == "Polygon":
+        rings = [np.asarray(ring.coords, dtype=float) for ring in (geometry.exterior, *geometry.interiors)]
+        yield _from_rings(rings, place)
+    else:
+        raise ResultError(f"{place}: is a {geometry.geom_type}, not a polygon")
+
+
+def _from_rings(rings: list[Any], place: str, properties: dict[str, Any] | None = None) -> Outline:
+    """The outline of a polygon; the last point of a ring repeats the first one."""
+    if len(rings) != 1:
+        raise ResultError(f"{place}: the polygon has {len(rings) - 1} hole(s)" if rings
+                          else f"{place}: the polygon is empty")
+    try:
+        points = np.array([point[:2] for point in rings[0]], dtype=float)
+        if points.ndim != 2 or points.shape[1] != 2:
+            raise ValueError
+    except (TypeError, ValueError, IndexError) as error:
+        raise ResultError(f"{place}: the vertices are not pairs of numbers") from error
+    return Outline(points[:-1] if len(points) > 1 and (points[0] == points[-1]).all() else points, place,
+                   properties or {})
+
+
+def _read_wkt(text: str, name: str) -> Iterator[Outline]:
+    """One geometry per line; empty lines and lines that begin with # are comments."""
+    for number, line in enumerate(text.splitlines(), 1):
+        place = f"{name}:{number}"
+        words = re.sub(r"^SRID=\d+;", "", line.strip(), flags=re.IGNORECASE)
+        if not words or words.startswith("#"):
+            continue
+        kind = re.match(r"(MULTIPOLYGON|POLYGON)\s*(?:Z|M|ZM)?\s*(\(.*\))$", words, re.IGNORECASE)
+        if not kind:
+            raise ResultError(f"{place}: is no POLYGON or MULTIPOLYGON of WKT: {words[:60]!r}")
+        inner = kind[2][1:-1].strip()
+        groups = _groups(inner, place) if kind[1].upper() == "MULTIPOLYGON" else [inner]
+        for group in groups:
+            rings = []
+            for ring in _RING.findall(group):
+                points = [point.split() for point in ring.split(",")]
+                if not all(len(point) >= 2 and all(re.fullmatch(_NUMBER, each) for each in point) for point in points):
+                    raise ResultError(f"{place}: a vertex is not a pair of numbers: ({ring[:60]})")
+                rings.append([[float(each) for each in point] for point in points])
+            if re.sub(r"[\s,]", "", _RING.sub("", group)) or not rings:
+                raise ResultError(f"{place}: the brackets of the geometry do not fit")
+            yield _from_rings(rings, place)
+
+
+def _groups(text: str, place: str) -> list[str]:
+    """What stands in the outer brackets of a text."""
+    found, depth, begin = [], 0, 0
+    for k, sign in enumerate(text):
+        if sign == "(":
+            begin = k + 1 if depth == 0 else begin
+            depth += 1
+        elif sign == ")":
+            depth -= 1
+            if depth == 0:
+                found.append(text[begin:k])
+    if depth != 0:
+        raise ResultError(f"{place}: the brackets of the geometry do not fit")
+    return found
+
+
+def _read_geojson(text: str, name: str) -> Iterator[Outline]:
+    """Polygons and multipolygons; of the properties of a feature those of PROPERTIES. Coordinates are metres."""
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError as error:
+        raise ResultError(f"{name}:{error.lineno}: is no JSON ({error.msg})") from error
+    features = content.get("features", []) if isinstance(content, dict) and "features" in content else [content]
+    for number, feature in enumerate(features, 1):
+        place = f"{name}: feature {number}" if len(features) > 1 else name
+        if not isinstance(feature, dict):
+            raise ResultError(f"{place}: is no object of GeoJSON")
+        is_feature = feature.get("type") == "Feature"
+        properties = (feature.get("properties") or {}) if is_feature else {}
+        chosen = {key: properties[key] for key in PROPERTIES if properties.get(key) is not None}
+        yield from _of_geojson(feature.get("geometry") if is_feature else feature, place, chosen)
+
+
+def _of_geojson(geometry: Any, place: str, properties: dict[str, Any]) -> Iterator[Outline]:
+    kind = geometry.get("type") if isinstance(geometry, dict) else None
+    if kind == "GeometryCollection":
+        for part in geometry.get("geometries", []):
+            yield from _of_geojson(part, place, properties)
+    elif kind in ("Polygon", "MultiPolygon"):
+        coordinates = geometry.get("coordinates")
+        polygons = [coordinates] if kind == "Polygon" else coordinates
+        if not isinstance(polygons, list) or not all(isinstance(rings, list) for rings in polygons):
+            raise ResultError(f"{place}: the polygon has no lists of coordinates")
+        for rings in polygons:
+            yield _from_rings(rings, place, properties)
+    else:
+        raise ResultError(f"{place}: is a {kind}, not a Polygon or MultiPolygon")
+
+
+def _read_text(text: str, name: str) -> Iterator[Outline]:
+    """One vertex per line, x and y; an empty line ends an outline; a line `fixed` makes its body fixed."""
+    points: list[list[float]] = []
+    properties: dict[str, Any] = {}
+    first = 0
+    for number, line in enumerate([*text.splitlines(), ""], 1):
+        words = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
+        if not words and (points or properties) and not line.strip():
+            yield _from_rings([points] if points else [], f"{name}:{first}", properties)
+            points, properties = [], {}
+        elif words:
+            first = first if points or properties else number
+            if words == ["fixed"]:
+                properties["fixed"] = True
+            elif len(words) == 2 and all(re.fullmatch(_NUMBER, word) for word in words):
+                points.append([float(word) for word in words])
+            else:
+                raise ResultError(f"{name}:{number}: is no vertex like '0.1 0.2' nor the word fixed: {line[:60]!r}")
+
+
+#: Format -> its reader
+READERS: dict[str, Callable[[str, str], Iterator[Outline]]] = {
+    "wkt": _read_wkt, "geojson": _read_geojson, "text": _read_text}
+
+#: End of a file name -> format
+FORMAT_OF_SUFFIX = {".wkt": "wkt", ".geojson": "geojson", ".json": "geojson", ".txt": "text", ".dat": "text",
+                    ".xy": "text"}

@@ -1,0 +1,179 @@
+"""Polygons of other programs as the bodies of a run."""
+
+import json
+import os
+import subprocess
+
+import h5py
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from polydem_post import ResultError
+from polydem_post.__main__ import main
+from polydem_post.bodies_file import ConcaveOutline, import_bodies, import_shapely, write_bodies
+from polydem_post.convex import concave_vertices, decompose
+from polydem_post.polygons import area_of, join, moments
+
+PROGRAM = os.environ["POLYDEM_PROGRAM"]
+SQUARE = [(0.0, 0.0), (0.01, 0.0), (0.01, 0.01), (0.0, 0.01)]
+FLOOR = [(-0.05, -0.01), (0.05, -0.01), (0.05, 0.0), (-0.05, 0.0)]
+# An L, a star with five points, and a comb with four teeth.
+L_SHAPE = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
+STAR = [(np.cos(k * np.pi / 5) * (2 - k % 2), np.sin(k * np.pi / 5) * (2 - k % 2)) for k in range(10)]
+STAR[1::2] = [(0.4 * x, 0.4 * y) for x, y in STAR[1::2]]
+COMB = [(0, 0), (7, 0), (7, 3), (6, 3), (6, 1), (5, 1), (5, 3), (4, 3), (4, 1), (3, 1), (3, 3), (2, 3), (2, 1), (1, 1),
+        (1, 3), (0, 3)]
+
+
+def wkt(points):
+    return "POLYGON ((" + ", ".join(f"{x!r} {y!r}" for x, y in [*points, points[0]]) + "))"
+
+
+def geojson(points, **properties):
+    ring = [list(point) for point in [*points, points[0]]]
+    return {"type": "Feature", "properties": properties, "geometry": {"type": "Polygon", "coordinates": [ring]}}
+
+
+def text(points, *words):
+    return "\n".join([*words, *(f"{float(x)!r} {float(y)!r}" for x, y in points)])
+
+
+def contents(path):
+    with h5py.File(path) as file:
+        return {name: file[name][()] for name in file}
+
+
+@pytest.fixture(params=["wkt", "geojson", "text"])
+def source(request, tmp_path):
+    """A square above a fixed floor, in every format."""
+    if request.param == "wkt":
+        path = tmp_path / "two.wkt"
+        path.write_text(f"# comment\n{wkt(SQUARE)}\n\nSRID=4326;{wkt(FLOOR[::-1]).lower()}\n")
+    elif request.param == "geojson":
+        path = tmp_path / "two.geojson"
+        path.write_text(json.dumps({"type": "FeatureCollection", "features": [geojson(SQUARE), geojson(FLOOR)]}))
+    else:
+        path = tmp_path / "two.txt"
+        path.write_text(f"# x y\n{text(SQUARE)}\n\n\n{text(FLOOR)}".replace(" ", ", "))
+    return path
+
+
+def test_the_program_takes_the_bodies(source, tmp_path, capsys):
+    output = tmp_path / "bodies.h5"
+    assert main(["import", str(source), "-o", str(output), "--fixed", "2"]) == 0
+    assert f"{output}: 2 bodies; in the namelist: &scene name = 'file'" in capsys.readouterr().out
+    found = contents(output)
+    assert_array_equal(found["vertex_start"], [0, 4, 8])
+    assert_array_equal(found["vertex"], SQUARE + FLOOR)
+    assert_array_equal(found["fixed"], [0, 1])
+    (tmp_path / "scene.nml").write_text(f"&scene\n name = 'file'\n bodies_file = '{output}'\n/\n"
+                                        "&integrate\n duration = 0.001\n/\n")
+    check = subprocess.run([PROGRAM, "check", "scene.nml"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert check.returncode == 0, check.stdout + check.stderr
+
+
+def test_scales_give_metres(tmp_path):
+    (tmp_path / "one.xy").write_text(text([(1e3 * x, 1e3 * y) for x, y in SQUARE]))
+    import_bodies(tmp_path / "one.xy", tmp_path / "out.h5", scale=1e-3)
+    assert_allclose(contents(tmp_path / "out.h5")["vertex"], SQUARE)
+
+
+def test_geojson_gives_properties(tmp_path):
+    features = [geojson(SQUARE, velocity=[0.5, -1], density=1000, name="a", id=7),
+                geojson(FLOOR, fixed=True, density=2000, id=3)]
+    (tmp_path / "two.json").write_text(json.dumps({"features": features}))
+    import_bodies(tmp_path / "two.json", tmp_path / "out.h5")
+    found = contents(tmp_path / "out.h5")
+    assert set(found) == {"vertex", "vertex_start", "fixed", "velocity", "density", "id"}
+    assert_array_equal(found["velocity"], [[0.5, -1], [0, 0]])
+    assert_array_equal(found["density"], [1000, 2000])
+    assert_array_equal(found["id"], [7, 3])
+
+
+def test_plain_text_has_fixed_bodies(tmp_path):
+    (tmp_path / "two.txt").write_text(f"{text(SQUARE)}\n\n{text(FLOOR, 'fixed')}\n")
+    import_bodies(tmp_path / "two.txt", tmp_path / "out.h5")
+    assert_array_equal(contents(tmp_path / "out.h5")["fixed"], [0, 1])
+
+
+def test_multipolygons_are_several_bodies(tmp_path):
+    rings = wkt(SQUARE)[8:], wkt(FLOOR)[8:]
+    (tmp_path / "many.wkt").write_text(f"MULTIPOLYGON ({rings[0]}, {rings[1]})")
+    assert import_bodies(tmp_path / "many.wkt", tmp_path / "out.h5") == 2
+
+
+def test_geometries_of_shapely(tmp_path):
+    shapely = pytest.importorskip("shapely", reason="shapely is not installed: pip install shapely")
+    both = shapely.MultiPolygon([shapely.Polygon(SQUARE), shapely.Polygon(FLOOR)])
+    assert import_shapely(both, tmp_path / "out.h5", fixed=[2]) == 2
+    assert_allclose(contents(tmp_path / "out.h5")["vertex"], SQUARE + FLOOR)
+    assert import_shapely([shapely.Point(0, 0).buffer(1.0), *both.geoms], tmp_path / "more.h5") == 3
+    with pytest.raises(ResultError, match="geometry 1: is a LineString, not a polygon"):
+        import_shapely(shapely.LineString(SQUARE), tmp_path / "line.h5")
+    with pytest.raises(ResultError, match="geometry 1: the polygon has 1 hole"):
+        import_shapely(shapely.Polygon(FLOOR, [[(0, -2e-3), (1e-3, -2e-3), (0, -4e-3)]]), tmp_path / "hole.h5")
+
+
+@pytest.mark.parametrize("shape, fewest", [(L_SHAPE, 2), (STAR, 6), (COMB, 5)])
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_concave_outlines_become_convex_pieces(shape, fewest, turn):
+    turned = np.array(shape) @ np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    pieces = decompose(turned)
+    assert all(not concave_vertices(piece) and area_of(piece) > 0.0 for piece in pieces)
+    assert_allclose(sum(map(area_of, pieces)), area_of(turned), rtol=1e-12)
+    area, centre, _ = moments(*join(pieces))
+    assert_allclose(area @ centre / area.sum(), moments(*join([turned]))[1][0], atol=1e-12)
+    # A decomposition needs at least half as many cuts as there are reflex vertices.
+    assert fewest <= len(pieces) <= len(concave_vertices(turned)) + 1
+
+
+def test_a_concave_outline_is_named_or_decomposed(tmp_path, capsys):
+    path, output = tmp_path / "l.wkt", tmp_path / "out.h5"
+    path.write_text(f"{wkt(SQUARE)}\n{wkt(L_SHAPE)}\n")
+    assert main(["import", str(path), "-o", str(output)]) == 2
+    assert f"{path}:2: the outline cannot be a body: it is concave at the vertex (1, 1); --decompose makes several" \
+        in capsys.readouterr().err
+    assert not output.exists()
+    with pytest.warns(ConcaveOutline, match=r"l.wkt:2: the outline is concave and becomes 2 separate bodies"):
+        assert import_bodies(path, output, decomposed=True, fixed=[2]) == 3
+    assert_array_equal(contents(output)["fixed"], [0, 1, 1])
+
+
+@pytest.mark.parametrize("name, content, message", [
+    ("a.wkt", "POINT (1 2)", "a.wkt:1: is no POLYGON or MULTIPOLYGON of WKT: 'POINT (1 2)'"),
+    ("a.wkt", "POLYGON ((0 0, 1 0, x 1))", "a.wkt:1: a vertex is not a pair of numbers"),
+    ("a.wkt", "\nPOLYGON ((0 0, 1 0, 1 1)", "a.wkt:2: the brackets of the geometry do not fit"),
+    ("a.wkt", "POLYGON ((0 0, 9 0, 9 9, 0 9), (1 1, 2 1, 2 2))", "a.wkt:1: the polygon has 1 hole"),
+    ("a.wkt", "", "a.wkt: holds no polygons"),
+    ("a.json", "{", "a.json:1: is no JSON"),
+    ("a.json", '{"type": "Point", "coordinates": [0, 0]}', "a.json: is a Point, not a Polygon or MultiPolygon"),
+    ("a.json", '{"type": "Polygon", "coordinates": [[[0], [1, 0], [1, 1]]]}', "the vertices are not pairs of numbers"),
+    ("a.txt", "0 0\n1 0\n1 one\n", "a.txt:3: is no vertex like '0.1 0.2' nor the word fixed: '1 one'"),
+    ("a.txt", "0 0\n1 0\n", "a.txt:1: the outline cannot be a body: it has 2 different vertices"),
+    ("a.txt", "\n0 0\n1 0\n2 0\n", "a.txt:2: the outline cannot be a body: it has 2 different vertices"),
+    ("a.txt", "0 0\n1 1\n1 0\n0 1\n", "a.txt:1: the outline cannot be a body"),
+    ("a.txt", text([STAR[k] for k in (0, 4, 8, 2, 6)]), "its edges 1 and 3 cross"),
+    ("a.txt", "0 0\n1 0\n1 1e999\n", "a coordinate is not a finite number"),
+    ("a.dxf", "0 0", "what the file holds does not follow from its name; give --from wkt, geojson, text"),
+])
+def test_errors_name_the_place(tmp_path, capsys, name, content, message):
+    (tmp_path / name).write_text(content)
+    assert main(["import", str(tmp_path / name), "-o", str(tmp_path / "out.h5")]) == 2
+    assert message in capsys.readouterr().err
+    assert not (tmp_path / "out.h5").exists()
+
+
+def test_nothing_is_replaced_unless_asked(tmp_path, capsys):
+    (tmp_path / "one.txt").write_text(text(SQUARE))
+    (tmp_path / "out.h5").write_text("mine")
+    command = ["import", str(tmp_path / "one.txt"), "-o", str(tmp_path / "out.h5")]
+    assert main(command) == 2
+    assert "is there already; --force replaces it" in capsys.readouterr().err
+    assert (tmp_path / "out.h5").read_text() == "mine"
+    assert main([*command, "--force"]) == 0
+    assert main([*command, "--force", "--fixed", "2"]) == 2
+    assert "there is no outline 2, only 1" in capsys.readouterr().err
+
+
+def test_arrays_become_bodies(tmp_path):
+    assert write_bodies([np.array(SQUARE), FLOOR], tmp_path / "out.h5", fixed=[2]) == 2
