@@ -104,9 +104,10 @@ contains
          if (s%damping == 'rate' .and. s%damping_from_touch) &
             call law%add(damping_onset_t(name='from first touch', stage=stage_on_damping), s)
          if (s%tilt_damping > 0.0_wp) call law%add(tilt_damping_t(name='damping of tilts'), s)
-         if (s%friction == 'cundall_strack' .and. s%friction_coefficient > 0.0_wp) &
-            call law%add(cundall_strack_t(name='Cundall-Strack friction'), s)
-         if (s%friction == 'exact') call law%add(exact_friction_t(name='exact friction'), s)
+         if (s%friction_coefficient > 0.0_wp) then
+            if (s%friction == 'cundall_strack') call law%add(cundall_strack_t(name='Cundall-Strack friction'), s)
+            if (s%friction == 'exact') call law%add(exact_friction_t(name='exact friction'), s)
+         end if
       end associate
       call law%collect_needs()
    end subroutine choose_parts
