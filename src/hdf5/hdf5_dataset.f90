@@ -29,8 +29,10 @@ module polydem_hdf5_dataset
    !> Accepted types: integers of any width, or booleans of h5py
    integer, parameter :: holds_integers = 2
 
-   !> Approximate size of a chunk of an extendible data set [B]
+   !> Maximum size of a chunk of an extendible data set, unless one row is larger [B]
    integer(hsize_t), parameter :: chunk_bytes = 32768_hsize_t
+   !> Number of chunks for the expected number of rows. At most one of them is partly filled.
+   integer(hsize_t), parameter :: expected_chunks = 5_hsize_t
 
 contains
 
@@ -204,6 +206,8 @@ contains
       call h5tget_size_f(kind_in_file, bytes, status)
       chunk(:n - 1) = max(1_hsize_t, row)
       chunk(n) = max(1_hsize_t, chunk_bytes/(product(chunk(:n - 1))*int(bytes, hsize_t)))
+      if (location%expected_rows > 0_lp) chunk(n) = min(chunk(n), (int(location%expected_rows, hsize_t) + &
+                                                                   expected_chunks - 1_hsize_t)/expected_chunks)
       call h5screate_simple_f(n, extent, space, status, limit)
       if (status >= 0) call h5pcreate_f(h5p_dataset_create_f, properties, status)
       if (status >= 0) call h5pset_chunk_f(properties, n, chunk, status)

@@ -1,8 +1,10 @@
 !> Handle of an HDF5 file: create, open, flush, query and close. Extended types read and write its contents.
 module polydem_hdf5_handle
+   use, intrinsic :: iso_c_binding, only: c_bool, c_int, c_int64_t
    use hdf5, only: h5f_acc_rdonly_f, h5f_acc_rdwr_f, h5f_acc_trunc_f, h5f_scope_global_f, h5fclose_f, h5fcreate_f, &
-      h5fflush_f, h5fis_hdf5_f, h5fopen_f, h5p_file_access_f, h5p_file_create_f, h5pclose_f, h5pcreate_f, &
-      h5pset_userblock_f, hid_t, hsize_t
+      h5fflush_f, h5fis_hdf5_f, h5fopen_f, h5f_libver_v18_f, h5p_file_access_f, h5p_file_create_f, h5pclose_f, &
+      h5pcreate_f, h5pset_istore_k_f, h5pset_libver_bounds_f, h5pset_link_phase_change_f, h5pset_userblock_f, hid_t, &
+      hsize_t
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_system, only: check_access, disk_hint, exists, is_folder
    use polydem_hdf5_access, only: enable_parallel_access, barrier, abort_all
@@ -38,6 +40,22 @@ module polydem_hdf5_handle
       procedure, private :: check
    end type hdf5_handle_t
 
+   !> Half the number of chunks in a node of the index of a data set. A node takes 32 bytes or more per chunk even if it
+   !> is empty; the default is 32.
+   integer, parameter :: chunk_index_k = 3
+   !> Maximum number of links in a group that are stored in its header, without an index
+   integer, parameter :: compact_links = 64
+
+   interface
+      !> HDF5 function H5Fset_dset_no_attrs_hint, which is missing from its Fortran interface: no room for attributes is
+      !> reserved in the header of a data set. The header grows if attributes are added.
+      integer(c_int) function set_small_headers(file, is_small) bind(C, name='H5Fset_dset_no_attrs_hint')
+         import :: c_bool, c_int, c_int64_t
+         integer(c_int64_t), value :: file
+         logical(c_bool), value :: is_small
+      end function set_small_headers
+   end interface
+
    !> Hint for messages about existing files that cannot be opened
    character(len=*), parameter :: locking_hint = &
       '; another program may be writing it; on a network file system try HDF5_USE_FILE_LOCKING=FALSE'
@@ -56,7 +74,7 @@ contains
       !> Size of the user block, the first bytes of the file, which HDF5 does not use [B]: 0, 512 or a larger power of
       !> 2; 0 if absent
       integer(ip), intent(in), optional :: user_block
-      integer(hid_t) :: properties
+      integer(hid_t) :: properties, access
       integer :: status, ignored
 
       call start_library(error)
@@ -67,8 +85,14 @@ contains
       if (present(compressed)) self%compressed = compressed
       call h5pcreate_f(h5p_file_create_f, properties, status)
       if (status >= 0 .and. present(user_block)) call h5pset_userblock_f(properties, int(user_block, hsize_t), status)
-      if (status >= 0) call h5fcreate_f(path, h5f_acc_trunc_f, self%id, status, creation_prp=properties)
+      if (status >= 0) call h5pset_istore_k_f(properties, chunk_index_k, status)
+      if (status >= 0) call h5pset_link_phase_change_f(properties, compact_links, compact_links - 1, status)
+      if (status >= 0) call h5pcreate_f(h5p_file_access_f, access, status)
+      if (status >= 0) call h5pset_libver_bounds_f(access, h5f_libver_v18_f, h5f_libver_v18_f, status)
+      if (status >= 0) call h5fcreate_f(path, h5f_acc_trunc_f, self%id, status, properties, access)
       call h5pclose_f(properties, ignored)
+      call h5pclose_f(access, ignored)
+      if (status >= 0) status = int(set_small_headers(int(self%id, c_int64_t), .true._c_bool))
       if (status >= 0) return
       self%id = -1_hid_t
       call raise(error, io_error, path//': cannot be created; check that the folder exists, '// &
@@ -94,9 +118,11 @@ contains
       self%path = path
       self%together = .true.
       call h5pcreate_f(h5p_file_access_f, properties, status)
+      if (status >= 0) call h5pset_libver_bounds_f(properties, h5f_libver_v18_f, h5f_libver_v18_f, status)
       if (status >= 0) call enable_parallel_access(properties, path, status)
       if (status >= 0) call h5fopen_f(path, h5f_acc_rdwr_f, self%id, status, access_prp=properties)
       call h5pclose_f(properties, ignored)
+      if (status >= 0) status = int(set_small_headers(int(self%id, c_int64_t), .true._c_bool))
       call self%check(status, 'cannot be opened by all ranks; all ranks must see the same folder'//locking_hint, error)
    end subroutine join
 

@@ -3,6 +3,7 @@ module polydem_hdf5_location
    use hdf5, only: hid_t
    use polydem_errors, only: error_t, io_error, raise
    use polydem_hdf5_access, only: abort_all
+   use polydem_kinds, only: lp
    implicit none
    private
    public :: dataset_location_t, check_status
@@ -19,6 +20,8 @@ module polydem_hdf5_location
       logical :: compressed = .false.
       !> Whether all ranks of the run write the file in parallel
       logical :: together = .false.
+      !> Number of rows that a new extendible data set will probably get; 0: unknown
+      integer(lp) :: expected_rows = 0_lp
    end type dataset_location_t
 
 contains

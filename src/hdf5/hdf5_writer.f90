@@ -28,7 +28,11 @@ module polydem_hdf5_writer
 
    !> An HDF5 file for writing
    type, extends(hdf5_handle_t) :: hdf5_writer_t
+      private
+      !> Expected number of rows of a new extendible data set, for one_row and many_rows; 0: unknown
+      integer(lp) :: expected(2) = 0_lp
    contains
+      procedure :: expect_rows
       !> Write a new data set, or append rows to an extendible one: write(name, values, error, unit, meaning, part,
       !> rows). `part` is for lists and tables of numbers, `rows` for numbers.
       generic :: write => write_real, write_reals, write_real_table, write_integer, write_integers, &
@@ -43,6 +47,17 @@ module polydem_hdf5_writer
    end type hdf5_writer_t
 
 contains
+
+   !> Set how many rows extendible data sets will probably get. Their chunks are then so small that a small file stays
+   !> small. More rows are possible.
+   subroutine expect_rows(self, single, many)
+      class(hdf5_writer_t), intent(inout) :: self
+      !> Rows of data sets that grow by one row at a time, and of those that grow by many; 0: unknown
+      integer(lp), intent(in) :: single, many
+
+      self%expected(one_row) = single
+      self%expected(many_rows) = many
+   end subroutine expect_rows
 
    !> Write contiguous values as a new data set or as rows of an extendible one. A new data set gets its attributes.
    subroutine put(self, name, type, shape, address, error, unit, meaning, part, rows)
@@ -66,6 +81,7 @@ contains
       if (present(rows)) then
          is_new = .not. self%has(name)
          if (rows == one_row) extent = [extent, 1_hsize_t]
+         location%expected_rows = self%expected(rows)
          call append_rows_to(location, type, slab_of(location, extent, address, max(1, size(shape)), part), error)
       else
          call write_dataset(location, type, slab_of(location, extent, address, size(shape), part), error)

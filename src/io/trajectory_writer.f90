@@ -196,6 +196,8 @@ contains
       call open_on_all_ranks(self%comm, self%file, path, room_for(bodies), error)
       if (allocated(error)) return
       self%is_open = .true.
+      ! Chunks of contacts are then small enough for loose grains, and large enough for dense packings.
+      call self%file%expect_rows(int(self%capacity, lp), int(self%capacity, lp)*int(bodies%n_all, lp)/2_lp)
       call write_bodies(self%file, self%comm, bodies, error)
    end subroutine open_segment
 

@@ -15,9 +15,9 @@ from pathlib import Path
 SKIPPED = 77
 
 #: Sizes of the disk [kB]: from no room for the log to room for two segments and a part of the third
-SIZES = (8, 16, 32, 64, 128, 256, 512, 768, 800, 1024, 2048)
+SIZES = (8, 16, 24, 32, 48, 64, 80, 96, 128, 160, 192)
 
-#: Makes segments of some 800 kB
+#: Makes segments of some 60 kB
 OVERRIDES = ("output.frame_interval=1e-4", "output.frames_per_segment=50", "integrate.duration=0.05")
 
 
