@@ -10,6 +10,7 @@ module polydem_result_info
    use polydem_log_tables, only: write_header
    use polydem_oversubscription, only: oversubscription_text
    use polydem_provenance, only: collect_provenance, provenance_t
+   use polydem_result_summary, only: write_summary
    use polydem_result_files, only: open_suffix, profile_name, segment_path
    use polydem_strings, only: printable, to_text
    implicit none
@@ -67,9 +68,12 @@ contains
       type(log_t), intent(inout) :: log
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: number
-      logical :: is_empty
+      logical :: is_empty, has_summary
 
       is_empty = .not. exists(path//'/'//profile_name)
+      has_summary = exists(segment_path(path, 1_ip))
+      if (has_summary .or. .not. is_empty) call write_summary(path, log, error)
+      if (allocated(error)) return
       if (.not. is_empty) call describe_file(path//'/'//profile_name, log, error)
       number = 1_ip
       do

@@ -13,7 +13,17 @@ import sys
 import tempfile
 import time
 
-from continued_run import assert_whole, closed_segments, frames_of, run, start, totals_of, write_scene
+from continued_run import (
+    N_FRAMES,
+    assert_whole,
+    closed_segments,
+    frames_of,
+    run,
+    start,
+    summary_of,
+    totals_of,
+    write_scene,
+)
 
 #: Exit codes of a run, as inputs/getting_started.md lists them
 FAILED, BAD_INPUT, NO_FILE, EARLY = 1, 2, 3, 75
@@ -85,7 +95,13 @@ def a_signal_ends_a_run_with_a_checkpoint(case):
         step = re.search(f"interrupted by {number.name} at step (\\d+) of 1200; add --continue to resume", message)
         assert step and step.group(0) in output, (output, message)
         assert not [name for name in os.listdir(folder) if name.endswith((".open", ".unfinished", ".lock"))]
+        assert f"interrupted by {number.name}" in summary_of(case.program, folder)["state"]
         assert f"step {step.group(1)}\n" in case.finish(folder)
+        told = summary_of(case.program, folder)
+        assert told["state"] == "finished" and told["bodies"] == "64", told
+        assert told["frames"].startswith(f"{N_FRAMES} in ") and told["time span"].endswith(" s to 1.20000E-02 s"), told
+        size = sum(os.path.getsize(os.path.join(folder, name)) for name in os.listdir(folder))
+        assert told["size"] == f"{size // 1024 + 1} KiB", (told, size)
 
 
 def a_second_signal_ends_it_at_once(case):

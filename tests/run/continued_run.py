@@ -48,8 +48,8 @@ def run(program, folder, *options):
 
 def totals_of(output):
     """Lines that must agree between equal runs: state hash, work, residuals, counts of pairs, contacts and warnings."""
-    totals = re.findall(r"^(?:state hash|work |residuals|warnings: ).*$|^(?:steps|pairs|contacts)\b.* \d+$", output,
-                       re.MULTILINE)
+    totals = re.findall(r"^(?:state hash|work |residuals|warnings: ).*$|^(?:steps|pairs|contacts)\b.* \d+  [a-z ]+$",
+                        output, re.MULTILINE)
     assert len(totals) == 12, output
     return totals
 
@@ -69,6 +69,13 @@ def frames_of(program, folder):
     told = subprocess.run([program, "info", folder], capture_output=True, text=True, check=True).stdout
     found = re.findall(r"frames +(\d+) of 64 bodies, from (\S+) s to (\S+) s", told)
     return [(int(n), float(first), float(last)) for n, first, last in found]
+
+
+def summary_of(program, folder):
+    """Summary of a result by `info`: the lines below its folder, by their first words."""
+    told = subprocess.run([program, "info", folder], capture_output=True, text=True, check=True).stdout
+    lines = re.match(rf"{re.escape(folder)}\n((?:   .*\n)+)", told)[1].splitlines()
+    return {line[3:19].strip(): line[19:] for line in lines}
 
 
 def assert_whole(program, folder):
