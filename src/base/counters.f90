@@ -6,10 +6,16 @@ module polydem_counters
    use polydem_kinds, only: lp
    implicit none
    private
-   public :: counters_t, counter_name_length
+   public :: counters_t, counter_name_length, at_end, at_start, over_steps, greatest_step
 
    !> Maximum length of the name of a counter
    integer, parameter :: counter_name_length = 32
+
+   !> What a value belongs to: the state at the end or at the start, the sum over all steps, or their greatest value
+   character(len=*), parameter :: at_end = 'at end', at_start = 'at the start', over_steps = 'summed over steps', &
+      greatest_step = 'greatest of a step'
+   !> Length of the longest of these texts
+   integer, parameter :: scope_length = 18
 
    !> A list of names and values, in the order in which they were set
    type :: counters_t
@@ -17,6 +23,8 @@ module polydem_counters
       character(len=counter_name_length), allocatable :: name(:)
       !> Values
       integer(lp), allocatable :: value(:)
+      !> What each value belongs to
+      character(len=scope_length), allocatable :: scope(:)
    contains
       procedure :: set
       procedure :: get
@@ -25,25 +33,32 @@ module polydem_counters
 contains
 
    !> Set a counter. A new name is appended.
-   subroutine set(self, name, value)
+   subroutine set(self, name, value, scope)
       class(counters_t), intent(inout) :: self
       !> Name of the counter, at most counter_name_length characters
       character(len=*), intent(in) :: name
       !> Value of the counter
       integer(lp), intent(in) :: value
+      !> What the value belongs to: at_end (if absent), at_start, over_steps or greatest_step
+      character(len=*), intent(in), optional :: scope
       character(len=counter_name_length) :: padded
+      character(len=scope_length) :: belongs_to
       integer :: k
 
-      if (.not. allocated(self%name)) allocate (self%name(0), self%value(0))
+      if (.not. allocated(self%name)) allocate (self%name(0), self%value(0), self%scope(0))
       padded = name
+      belongs_to = at_end
+      if (present(scope)) belongs_to = scope
       do k = 1, size(self%name)
          if (self%name(k) == padded) then
             self%value(k) = value
+            self%scope(k) = belongs_to
             return
          end if
       end do
       self%name = [self%name, padded]
       self%value = [self%value, value]
+      self%scope = [self%scope, belongs_to]
    end subroutine set
 
    !> Value of a counter; zero if it was never set

@@ -2,7 +2,7 @@
 !> halo exchange of every step is counted separately from redistributions.
 module polydem_communication_counters
    use polydem_communicator, only: communicator_t
-   use polydem_counters, only: counters_t
+   use polydem_counters, only: at_start, counters_t, over_steps
    use polydem_domain, only: domain_t
    use polydem_kinds, only: ip, lp
    implicit none
@@ -32,23 +32,23 @@ contains
       call comm%all_reduce_sum(sums)
       call comm%all_reduce_max(most)
       call counters%set('ranks', int(comm%size, lp))
-      call counters%set('redistributions', domain%redistributions)
-      call counters%set('partitions of space', domain%divisions)
+      call counters%set('redistributions', domain%redistributions, over_steps)
+      call counters%set('partitions of space', domain%divisions, over_steps)
       call counters%set('rectangles', int(domain%rank_bounds%n_rectangles(), lp))
-      call counters%set('migrations', sums(4))
-      call counters%set('migrations at the start', sums(5))
-      call counters%set('halo bodies, summed over steps', sums(3))
-      call counters%set('messages', sums(1))
-      call counters%set('bytes in messages', sums(2))
-      call counters%set('messages at the start', sums(8))
-      call counters%set('bytes at the start', sums(9))
-      call counters%set('halo messages', sums(6))
-      call counters%set('halo bytes', sums(7))
+      call counters%set('migrations', sums(4), over_steps)
+      call counters%set('migrations at the start', sums(5), at_start)
+      call counters%set('halo bodies, summed over steps', sums(3), over_steps)
+      call counters%set('messages', sums(1), over_steps)
+      call counters%set('bytes in messages', sums(2), over_steps)
+      call counters%set('messages at the start', sums(8), at_start)
+      call counters%set('bytes at the start', sums(9), at_start)
+      call counters%set('halo messages', sums(6), over_steps)
+      call counters%set('halo bytes', sums(7), over_steps)
       call counters%set('maximum per rank: bodies', most(1))
       call counters%set('maximum per rank: pairs', most(2))
-      call counters%set('maximum per rank: halo bodies', most(3))
-      call counters%set('maximum per rank: messages', most(4))
-      call counters%set('maximum per rank: bytes', most(5))
+      call counters%set('maximum per rank: halo bodies', most(3), over_steps)
+      call counters%set('maximum per rank: messages', most(4), over_steps)
+      call counters%set('maximum per rank: bytes', most(5), over_steps)
    end subroutine report_communication
 
 end module polydem_communication_counters

@@ -32,7 +32,7 @@ module polydem_exact_friction
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
-   use polydem_counters, only: counters_t
+   use polydem_counters, only: counters_t, greatest_step, over_steps
    use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_friction_network, only: build_network, free_velocities, friction_network_t, within
    use polydem_kinds, only: ip, lp, wp
@@ -155,11 +155,12 @@ contains
       !> Counters of the run
       type(counters_t), intent(inout) :: counters
 
-      call counters%set('friction steps', self%n_solved)
-      call counters%set('friction sweeps', self%programme%n_sweeps)
-      call counters%set('friction searches', self%programme%n_searches)
-      call counters%set('friction iterations', self%programme%n_iterations)
-      call counters%set('friction residual, 1e-15', nint(min(self%greatest_residual/residual_unit, 1.0e18_wp), lp))
+      call counters%set('friction steps', self%n_solved, over_steps)
+      call counters%set('friction sweeps', self%programme%n_sweeps, over_steps)
+      call counters%set('friction searches', self%programme%n_searches, over_steps)
+      call counters%set('friction iterations', self%programme%n_iterations, over_steps)
+      call counters%set('friction residual, 1e-15', nint(min(self%greatest_residual/residual_unit, 1.0e18_wp), lp), &
+                        greatest_step)
    end subroutine report
 
 end module polydem_exact_friction

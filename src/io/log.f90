@@ -93,7 +93,7 @@ contains
 
    !> Write the line of an interval, with the step rate since the last interval line and the remaining time at this
    !> rate.
-   subroutine write_interval(self, step, n_steps, time, dt, kinetic, potential, contacts)
+   subroutine write_interval(self, step, n_steps, time, dt, contacts, energies)
       class(log_t), intent(inout) :: self
       !> Current step
       integer(lp), intent(in) :: step
@@ -103,13 +103,12 @@ contains
       real(wp), intent(in) :: time
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Kinetic energy [J/m]
-      real(wp), intent(in) :: kinetic
-      !> Gravitational potential energy [J/m]
-      real(wp), intent(in) :: potential
       !> Number of contacts
       integer(ip), intent(in) :: contacts
+      !> Kinetic energy and potential energy of gravity [J/m]; absent if the run does not compute them
+      real(wp), intent(in), optional :: energies(2)
       character(len=line_width) :: line
+      character(len=12) :: energy_texts(2)
       character(len=12) :: rate_text
       real(dp) :: rate, now
 
@@ -126,7 +125,9 @@ contains
          rate = real(step - self%last_step, dp)/(now - self%last_seconds)
          write (rate_text, '(f12.1)') min(rate, 9.9e8_dp)
       end if
-      write (line, '(i10,es12.4,es12.3,2es12.4,i12,a12,a10,f10.1,a)') step, time, dt, kinetic, potential, &
+      energy_texts = repeat(' ', 11)//'-'
+      if (present(energies)) write (energy_texts, '(es12.4)') energies
+      write (line, '(i10,es12.4,es12.3,2a12,i12,a12,a10,f10.1,a)') step, time, dt, energy_texts, &
          contacts, adjustr(rate_text), time_to_go(n_steps - step, rate), percent(step, n_steps), '%'
       call self%write_line(trim(line))
       self%has_heading = .true.

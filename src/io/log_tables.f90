@@ -100,7 +100,7 @@ contains
       end do
    end subroutine write_ranks
 
-   !> Write one counter per line.
+   !> Write one counter per line, and what it belongs to.
    subroutine write_counters(log, counters)
       !> Log
       type(log_t), intent(inout) :: log
@@ -112,7 +112,7 @@ contains
       if (.not. allocated(counters%name)) return
       call log%write_line('')
       do k = 1, size(counters%name)
-         write (line, '(a,i20)') counters%name(k), counters%value(k)
+         write (line, '(a,i20,2x,a)') counters%name(k), counters%value(k), counters%scope(k)
          call log%write_line(trim(line))
       end do
    end subroutine write_counters

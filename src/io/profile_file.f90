@@ -79,6 +79,7 @@ contains
       if (allocated(counters%name)) then
          call file%write('/counters/name', counters%name, error, '1', 'name of each counter')
          call file%write('/counters/value', counters%value, error, '1', 'value of each counter')
+         call file%write('/counters/scope', counters%scope, error, '1', 'what the value of each counter belongs to')
       end if
       call file%write('/state_hash', hexadecimal(state_hash), error, '1', &
                       'hash of the bits of identifiers, positions, angles and velocities at the end')

@@ -2,7 +2,7 @@
 !> boxes overlap.
 module polydem_neighbours
    use polydem_boxes, only: boxes_t
-   use polydem_counters, only: counters_t
+   use polydem_counters, only: counters_t, over_steps
    use polydem_errors, only: error_t
    use polydem_finder, only: finder_t
    use polydem_finder_factory, only: new_finder
@@ -144,7 +144,7 @@ contains
       type(counters_t), intent(inout) :: counters
 
       call counters%set('pairs', int(self%pairs%n, lp))
-      call counters%set('pair contradictions', self%pairs%contradictions)
+      call counters%set('pair contradictions', self%pairs%contradictions, over_steps)
       call self%finder%survey()
       call self%finder%work%report(counters)
    end subroutine report

@@ -6,7 +6,7 @@
 !> threads wait for one another.
 module polydem_finder_statistics
    use polydem_clock, only: wall_seconds
-   use polydem_counters, only: counters_t
+   use polydem_counters, only: at_end, counters_t, over_steps
    use polydem_kinds, only: dp, lp
    implicit none
    private
@@ -126,10 +126,14 @@ contains
       class(finder_statistics_t), intent(in) :: self
       !> List to set them in
       type(counters_t), intent(inout) :: counters
+      character(len=len(over_steps)) :: scope
       integer :: k
 
       do k = 1, n_counts
-         if (self%value(k) /= 0_lp) call counters%set('finder '//trim(count_names(k)), self%value(k))
+         if (self%value(k) == 0_lp) cycle
+         scope = at_end
+         if (k <= n_sums) scope = over_steps
+         call counters%set('finder '//trim(count_names(k)), self%value(k), trim(scope))
       end do
    end subroutine report
 

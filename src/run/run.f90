@@ -76,10 +76,10 @@ module polydem_run
       type(folder_lock_t) :: lock
       !> Whether another run has taken over the result folder; the same on all ranks
       logical :: has_lost_folder = .false.
-      !> Steps between frames; 0: no interval
-      integer(lp) :: frame_steps = 0_lp
-      !> Steps between lines of the log
-      integer(lp) :: log_steps = 0_lp
+      !> Steps between frames, not always a whole number; 0: no interval
+      real(dp) :: frame_steps = 0.0_dp
+      !> Steps between lines of the log, not always a whole number
+      real(dp) :: log_steps = 0.0_dp
       !> Monitor
       type(monitor_t) :: monitor
       !> Step of the last frame; negative if there is none

@@ -25,7 +25,7 @@ module polydem_run_output
    public :: choose_intervals, choose_tables, count_frames, end_step, finish
 
    !> Number of lines of the log if the settings give no interval
-   integer(lp), parameter :: default_lines = 20_lp
+   real(dp), parameter :: default_lines = 20.0_dp
 
 contains
 
@@ -39,15 +39,19 @@ contains
       integer(ip) :: n_contacts
 
       associate (s => run%simulation)
-         frame_due = s%step == s%n_steps .or. is_due(s%step, run%frame_steps)
+         frame_due = is_due(s%step, s%n_steps, run%frame_steps)
          line_due = is_line_due(run, s%step)
          call check_step(run%monitor, s, line_due, run%log, error)
          if (allocated(error)) return
          if (frame_due .or. line_due) call update_balance(run)
          if (line_due) then
             call count_contacts(s, n_contacts)
-            call run%log%write_interval(s%step, s%n_steps, time_of(s), s%dt, run%balance%kinetic, &
-                                        run%balance%potential, n_contacts)
+            if (s%settings%output%energy_balance) then
+               call run%log%write_interval(s%step, s%n_steps, time_of(s), s%dt, n_contacts, &
+                                           [run%balance%kinetic, run%balance%potential])
+            else
+               call run%log%write_interval(s%step, s%n_steps, time_of(s), s%dt, n_contacts)
+            end if
          end if
          if (frame_due) call write_frame(run, error)
          call run%log%show_progress(s%step, s%n_steps)
@@ -70,7 +74,7 @@ contains
       type(run_t), intent(in) :: run
       integer(lp), intent(in) :: step
 
-      is_line_due = step == run%simulation%n_steps .or. is_due(step, run%log_steps)
+      is_line_due = is_due(step, run%simulation%n_steps, run%log_steps)
    end function is_line_due
 
    !> Evaluate the energy and momentum balance of this step if output.energy_balance is on; collective.
@@ -185,14 +189,19 @@ contains
    subroutine choose_intervals(run)
       !> The run; `frame_steps` and `log_steps` are set
       type(run_t), intent(inout) :: run
+      real(dp) :: deviation
 
       associate (s => run%simulation, output => run%simulation%settings%output)
          run%frame_steps = in_steps(output%frame_interval, s%dt)
          run%log_steps = in_steps(output%log_interval, s%dt)
-         if (run%log_steps == 0_lp) run%log_steps = max(1_lp, s%n_steps/default_lines)
-         if (abs(real(run%frame_steps, wp)*s%dt - output%frame_interval) > 1.0e-2_wp*output%frame_interval) then
-            call run%log%write_line('frames     every '//to_text(run%frame_steps)//' steps, '// &
-                                    to_text(real(run%frame_steps, wp)*s%dt)//' s')
+         if (.not. run%log_steps > 0.0_dp) run%log_steps = max(1.0_dp, real(s%n_steps, dp)/default_lines)
+         deviation = abs(run%frame_steps - anint(run%frame_steps))
+         if (real(output%frame_interval, dp) < real(s%dt, dp)*(1.0_dp - 1.0e-6_dp) .and. run%frame_steps > 0.0_dp) then
+            call run%log%write_line('frames     every step, since frame_interval is less than dt')
+         else if (deviation > 1.0e-6_dp*run%frame_steps) then
+            call run%log%write_line('frames     at the step nearest to each multiple of '// &
+                                    to_text(output%frame_interval)//' s, '//to_text(real(run%frame_steps, wp))// &
+                                    ' steps')
          end if
       end associate
    end subroutine choose_intervals
@@ -201,30 +210,44 @@ contains
    pure integer(lp) function count_frames(simulation)
       !> The simulation
       type(simulation_t), intent(in) :: simulation
-      integer(lp) :: interval
+      real(dp) :: interval
 
       associate (n => simulation%n_steps)
          interval = in_steps(simulation%settings%output%frame_interval, simulation%dt)
-         if (interval == 0_lp) interval = n
          ! The first and the last step always have a frame.
-         count_frames = 1_lp + (n + interval - 1_lp)/interval
+         count_frames = 2_lp
+         if (interval > 0.0_dp) count_frames = 1_lp + max(1_lp, ceiling(last_multiple(n)/interval, lp))
       end associate
    end function count_frames
 
    !> An interval in steps, at least one; 0: no interval
-   pure integer(lp) function in_steps(interval, dt)
+   pure real(dp) function in_steps(interval, dt)
       real(wp), intent(in) :: interval, dt
 
-      in_steps = 0_lp
-      if (interval > 0.0_wp) in_steps = max(1_lp, nint(min(interval/dt, 1.0e15_wp), lp))
+      in_steps = 0.0_dp
+      if (interval > 0.0_wp) in_steps = max(1.0_dp, min(real(interval, dp)/real(dt, dp), 1.0e15_dp))
    end function in_steps
 
-   !> Whether a step is a multiple of the interval; step 0 always is
-   pure logical function is_due(step, interval)
-      integer(lp), intent(in) :: step, interval
+   !> Whether a step is the first one, the last one, or the nearest to a multiple of the interval. It deviates from the
+   !> multiple by half a step at most. A multiple within half a step of the end belongs to the last step.
+   pure logical function is_due(step, n_steps, interval)
+      !> The step, and the last step
+      integer(lp), intent(in) :: step, n_steps
+      !> Steps between two multiples, at least one; 0: none
+      real(dp), intent(in) :: interval
+      real(dp) :: multiple
 
-      is_due = step == 0_lp
-      if (interval > 0_lp) is_due = mod(step, interval) == 0_lp
+      is_due = step == 0_lp .or. step == n_steps
+      if (is_due .or. .not. interval > 0.0_dp) return
+      multiple = anint(real(step, dp)/interval)*interval
+      is_due = nint(multiple, lp) == step .and. multiple < last_multiple(n_steps)
    end function is_due
+
+   !> Multiples of an interval from here on belong to the last step. Rounding does not separate a multiple from the end.
+   pure real(dp) function last_multiple(n_steps)
+      integer(lp), intent(in) :: n_steps
+
+      last_multiple = real(n_steps, dp)*(1.0_dp - 1.0e-9_dp) - 0.5_dp
+   end function last_multiple
 
 end module polydem_run_output

@@ -1,7 +1,7 @@
 !> Exact counters of a simulation, summed over all ranks.
 module polydem_simulation_counters
    use polydem_communication_counters, only: report_communication
-   use polydem_counters, only: counters_t
+   use polydem_counters, only: counters_t, over_steps
    use polydem_kinds, only: ip, lp
    use polydem_ownership, only: owns_pair
    use polydem_simulation, only: simulation_t, sum_pairs, sum_contacts, sum_began, sum_ended, sum_degenerate
@@ -42,11 +42,11 @@ contains
       call counters%set('steps', self%step)
       call counters%set('bodies', int(self%bodies%n_all, lp))
       call counters%set('boxes', counts(1))
-      call counters%set('pairs', self%sums(sum_pairs))
-      call counters%set('pairs began', self%sums(sum_began))
-      call counters%set('pairs ended', self%sums(sum_ended))
-      call counters%set('contacts', self%sums(sum_contacts))
-      call counters%set('contacts without direction', self%sums(sum_degenerate))
+      call counters%set('pairs', self%sums(sum_pairs), over_steps)
+      call counters%set('pairs began', self%sums(sum_began), over_steps)
+      call counters%set('pairs ended', self%sums(sum_ended), over_steps)
+      call counters%set('contacts', self%sums(sum_contacts), over_steps)
+      call counters%set('contacts without direction', self%sums(sum_degenerate), over_steps)
       call self%neighbours%report(counters)
       call counters%set('pairs', counts(2))
       if (allocated(self%law%constraint)) call self%law%constraint%report(counters)

@@ -7,8 +7,8 @@ import h5py
 import numpy as np
 
 #: Data that are no results: where they come from, times, memory
-IGNORED = re.compile(r"\w+/provenance/.*|profile/(profile/.*|status)|steps/steps/(stage|phase)(_name)?|"
-                     r"sample/steps/(elapsed|processor|(phase|stage)(_name)?)|"
+IGNORED = re.compile(r"\w+/provenance/.*|profile/(profile/.*|status|counters/scope)|"
+                     r"steps/steps/(stage|phase)(_name)?|sample/steps/(elapsed|processor|(phase|stage)(_name)?)|"
                      r"sample/case/(trace|load|clock_cost|time_utc)")
 #: Counters that a restart continues
 CONTINUED = {f"counter profile {name}" for name in ("steps", "contacts", "bodies")}

@@ -83,7 +83,7 @@ def state_hash(output):
 
 def count(output, name):
     """A count that a run prints at its end."""
-    return int(re.search(rf"^{name} +(\d+)$", output, re.MULTILINE).group(1))
+    return int(re.search(rf"^{name} +(\d+) ", output, re.MULTILINE).group(1))
 
 
 def complaints(text):
