@@ -188,11 +188,15 @@ class Words(Toy):
     def test_the_help_of_verify_names_every_benchmark(self):
         path = os.path.join(os.path.dirname(LAUNCHER), "tests/verification/benchmarks.f90")
         with open(path, encoding="utf-8") as file:
-            listed = re.search(r":: benchmark_names\(\*\) = \[[^:]*::([^\]]*)\]", file.read())[1]
-        said = self.call("help", "verify")[1]
-        last, others = re.search(r"The benchmarks are B1 to B(\d+), (.*) and exact\.", said).groups()
-        names = [f"B{number}" for number in range(1, int(last) + 1)] + others.split(", ")
-        self.assertEqual(sorted(re.findall(r"'([^']+)'", listed)), sorted(names))
+            text = file.read()
+        listed, long = (re.findall(r"'([^']+)'", re.search(rf":: {name}\(\*\) = \[[^:]*::([^\]]*)\]", text)[1])
+                        for name in ("benchmark_names", "long_names"))
+        said = re.search(r"\nBenchmarks, .*:\n((?:  .*\n)+)", self.call("help", "verify")[1])[1].splitlines()
+        names = [word for line in said for word in line[:24].replace("*", " ").replace(",", " ").split()]
+        self.assertEqual(sorted([*listed, "exact"]), sorted(names))
+        self.assertEqual(sorted(long), sorted(line.split()[0] for line in said if "*" in line[:24]))
+        for line in said:
+            self.assertRegex(line, r"^  [B0-9., *]{24}[a-z].* \(.*\)$|^  exact {19}[a-z].*\)$")
 
     def test_wrong_verbs_and_options_give_2(self):
         self.assertEqual(self.call()[0], 2)

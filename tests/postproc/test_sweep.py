@@ -201,6 +201,19 @@ def test_wrong_rows_are_told_with_their_lines_and_nothing_is_made(toy, tmp_path,
     assert sorted(path.name for path in tmp_path.iterdir()) == ["base.nml", "polydem", "table.csv"]
 
 
+def test_all_errors_of_a_table_and_of_lists_are_told_at_once(tmp_path, capsys):
+    table = tmp_path / "table.csv"
+    table.write_text("name,seed,scene.seed\na/b,1,1\nc,1\nc,1,2\nC,1,3\n", encoding="utf-8")
+    words = ["make", str(table), "none.nml", "output.folder=a,b", "scene.seed=", "--output", str(tmp_path / "sweep")]
+    assert main(["sweep", "--program", "none", *words]) == 2
+    said = capsys.readouterr().err
+    for line, part in enumerate(["none.nml: there is no such file", ":1: 'seed' is not an entry", ":3: has 2 values",
+                                 ":2: 'a/b' cannot be a name", ":5: the name C is given twice",
+                                 "output.folder cannot vary", "scene.seed=: a value is missing"]):
+        assert part in said.splitlines()[line]
+    assert len(said.splitlines()) == 7
+
+
 def test_does_not_mix_with_what_is_there(sweep_of):
     sweep_of(("a", "finish", ""))
     with pytest.raises(ResultError, match="is there already"):

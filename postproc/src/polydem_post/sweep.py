@@ -126,20 +126,22 @@ def read_table(path: Path) -> tuple[list[str], list[Row]]:
     if not lines:
         raise ResultError(f"{path}: is empty; its first line must name the columns, as in name,scene.seed")
     first, header = lines[0]
-    _check_header(f"{path}:{first}", header)
-    place_of_name = header.index(NAME)
+    problems = _problems_of_header(f"{path}:{first}", header)
+    place_of_name = header.index(NAME) if NAME in header else 0
     columns = [word for word in header if word != NAME]
     rows = []
     for number, words in lines[1:]:
         place = f"{path}:{number}"
         if len(words) != len(header):
-            raise ResultError(f"{place}: has {len(words)} values, but the table has {len(header)} columns; a value "
-                              'with commas stands in double quotes: "0, -9.81"')
-        values = tuple(word for k, word in enumerate(words) if k != place_of_name)
-        rows.append(Row(words[place_of_name], values, place))
-    check_names(rows)
-    if not rows:
-        raise ResultError(f"{path}: has no rows below its heading")
+            problems.append(f"{place}: has {len(words)} values, but the table has {len(header)} columns; a value "
+                            'with commas stands in double quotes: "0, -9.81"')
+        elif NAME in header:
+            values = tuple(word for k, word in enumerate(words) if k != place_of_name)
+            rows.append(Row(words[place_of_name], values, place))
+    problems += problems_of_names(rows)
+    if not lines[1:]:
+        problems.append(f"{path}: has no rows below its heading")
+    raise_all(problems)
     return columns, rows
 
 
@@ -163,32 +165,44 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
     return lines
 
 
-def _check_header(place: str, header: list[str]) -> None:
+def raise_all(problems: list[str]) -> None:
+    """Raise an error with one line for each problem, if there are any; of many only the first are listed."""
+    problems = list(dict.fromkeys(problems))
+    if problems:
+        more = [f"and {len(problems) - MOST_TOLD} more"] if len(problems) > MOST_TOLD else []
+        raise ResultError("\n".join(problems[:MOST_TOLD] + more))
+
+
+def _problems_of_header(place: str, header: list[str]) -> list[str]:
+    problems = []
     if NAME not in header:
-        raise ResultError(f"{place}: the table needs a column {NAME}, apart from those of entries like scene.seed")
-    for word in header:
+        problems.append(f"{place}: the table needs a column {NAME}, apart from those of entries like scene.seed")
+    for word in dict.fromkeys(header):
         if header.count(word) > 1:
-            raise ResultError(f"{place}: the column {word!r} is there twice")
+            problems.append(f"{place}: the column {word!r} is there twice")
         if word != NAME:
-            _check_entry(place, word)
+            problems += _problems_of_entry(place, word)
+    return problems
 
 
-def _check_entry(place: str, entry: str) -> None:
+def _problems_of_entry(place: str, entry: str) -> list[str]:
     if not ENTRY.fullmatch(entry):
-        raise ResultError(f"{place}: {entry!r} is not an entry of the namelist, group.key as in scene.seed")
+        return [f"{place}: {entry!r} is not an entry of the namelist, group.key as in scene.seed"]
     if entry.lower() == OWN_ENTRY:
-        raise ResultError(f"{place}: {OWN_ENTRY} cannot vary, since the sweep gives every run its own folder")
+        return [f"{place}: {OWN_ENTRY} cannot vary, since the sweep gives every run its own folder"]
+    return []
 
 
-def check_names(rows: list[Row]) -> None:
+def problems_of_names(rows: list[Row]) -> list[str]:
     """Names must be fit for folders, and different also where letters have no size."""
-    seen = {}
+    seen, problems = {}, []
     for row in rows:
         if not SAFE_NAME.fullmatch(row.name):
-            raise ResultError(f"{row.place}: {row.name!r} cannot be a name: letters, digits and . _ + - up to 100")
+            problems.append(f"{row.place}: {row.name!r} cannot be a name: letters, digits and . _ + - up to 100")
         other = seen.setdefault(row.name.lower(), row)
         if other is not row:
-            raise ResultError(f"{row.place}: the name {row.name} is given twice (first in {other.place})")
+            problems.append(f"{row.place}: the name {row.name} is given twice (first in {other.place})")
+    return problems
 
 
 def expand(columns: list[str], rows: list[Row], lists: list[str]) -> tuple[list[str], list[Row]]:
@@ -197,17 +211,18 @@ def expand(columns: list[str], rows: list[Row], lists: list[str]) -> tuple[list[
     Between values that have commas stand semicolons: forces.gravity=0,-9.81;0,-1.62. The names of the runs tell the
     values that differ; where they cannot, runs are numbered.
     """
-    entries, choices = [], []
+    entries, choices, problems = [], [], []
     for text in lists:
         match = LISTED_ENTRY.fullmatch(text)
         entry, values = match.group(1), match.group(2)
-        _check_entry(text, entry)
+        problems += _problems_of_entry(text, entry)
         if entry in columns + entries:
-            raise ResultError(f"{text}: {entry} is given twice")
+            problems.append(f"{text}: {entry} is given twice")
         entries.append(entry)
         choices.append([value.strip() for value in values.split(";" if ";" in values else ",") if value.strip()])
         if not choices[-1]:
-            raise ResultError(f"{text}: a value is missing, as in scene.seed=1,2,3")
+            problems.append(f"{text}: a value is missing, as in scene.seed=1,2,3")
+    raise_all(problems)
     product = []
     for row in rows or [Row("", (), " ".join(lists))]:
         for combination in itertools.product(*choices):
@@ -227,14 +242,23 @@ def expand(columns: list[str], rows: list[Row], lists: list[str]) -> tuple[list[
 def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = None, lists: list[str] | None = None,
                cores: int = 1) -> Sweep:
     """Check every row of the table, times the lists, and lay out the folders of the runs."""
-    columns, rows = read_table(table) if table else ([], [])
-    if lists:
-        columns, rows = expand(columns, rows, lists)
-    if not rows:
-        raise ResultError("a sweep needs a table, or lists of values like scene.seed=1,2,3")
+    problems, columns, rows = [], [], []
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        raise ResultError(f"{folder}: is there already; choose another folder")
-    check_names(rows)
+        problems.append(f"{folder}: is there already; choose another folder")
+    if not base.is_file():
+        problems.append(f"{base}: there is no such file")
+    try:
+        columns, rows = read_table(table) if table else ([], [])
+    except ResultError as error:
+        problems += str(error).splitlines()
+    try:
+        columns, rows = expand(columns, rows, lists or []) if lists else (columns, rows)
+    except ResultError as error:
+        problems += str(error).splitlines()
+    if not table and not lists:
+        problems.append("a sweep needs a table, or lists of values like scene.seed=1,2,3")
+    raise_all(problems)
+    raise_all(problems_of_names(rows))
     overrides = [[f"{column}={value}" for column, value in zip(columns, row.values) if value] for row in rows]
     _check_rows(base, program, rows, overrides, cores)
     new = folder.with_name(folder.name + ".unfinished")
@@ -272,7 +296,4 @@ def _check_rows(base: Path, program: Path, rows: list[Row], overrides: list[list
 
     with ThreadPoolExecutor(max(1, cores)) as pool:
         problems = [f"{row.place}: {text}" for row, text in zip(rows, pool.map(problem, overrides)) if text]
-    problems = list(dict.fromkeys(problems))
-    if problems:
-        more = [f"and {len(problems) - MOST_TOLD} more"] if len(problems) > MOST_TOLD else []
-        raise ResultError("\n".join(problems[:MOST_TOLD] + more))
+    raise_all(problems)
