@@ -1,7 +1,10 @@
 """Tables and figures of a whole report."""
 
 import csv
+import os
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from matplotlib.image import imread
@@ -9,12 +12,19 @@ from polydem_post import bench_tables, complexity, paper_tables
 from polydem_post.__main__ import main
 from polydem_post.bench import read_bench
 from polydem_post.bench_figures import bench_drawings
+from polydem_post.figure_style import LOOKS
+from polydem_post.own_figures import own_drawings
 from polydem_post.paper_figures import paper_drawings
 from polydem_post.slope_tables import slopes
 from polydem_post.targets import targets
-from synthetic_bench import Machine, truths, write_drums, write_hard_scenes
+from synthetic_bench import Machine, input_of, truths, write_drums, write_hard_scenes, write_sample
 
 FIGURES = (
+    "all_scenes",
+    "own_over_size",
+    "local_exponents",
+    "fine_grained",
+    "fine_grained_limits",
     "figure_01_idle_swaps",
     "figure_08_13_machines",
     "figure_09_total",
@@ -27,6 +37,11 @@ FIGURES = (
     "work_over_size",
 )
 TABLES = (
+    "reasons",
+    "skipped",
+    "local_exponents",
+    "fine_grained",
+    "fine_grained_limits",
     "table_1",
     "table_2",
     "table_3",
@@ -154,17 +169,18 @@ def test_the_best_finder_of_a_scene_is_marked(bench):
 
 def test_the_figure_of_total_times_tells_fitted_slopes_and_the_papers(bench):
     drawing = next(each for each in paper_drawings(bench) if each.name == "figure_09_total")
-    left, right = drawing.figure.axes
-    texts = [text.get_text() for text in left.get_legend().get_texts()]
-    (text,) = [text for text in texts if text.startswith("quadtree: slope ") and text.endswith("; paper 0.994")]
+    left, _, below = sorted(drawing.figure.axes, key=lambda axis: axis.get_legend() is not None)
+    texts = [text.get_text() for text in below.get_legend().get_texts()]
+    (text,) = [text for text in texts if text.startswith("quadtree: exponent ") and text.endswith("; paper 0.994")]
     assert float(text.split()[2]) == pytest.approx(1.0, abs=0.02)
     assert (left.get_xlabel(), left.get_ylabel()) == ("boxes", "time per step [ms]")
-    assert "paper: about 0.9" in [text.get_text() for text in right.get_legend().get_texts()]
+    assert "paper: about 0.9" in texts
 
 
 def test_threads_are_compared_in_one_figure(bench):
     drawing = next(each for each in bench_drawings(bench) if each.name == "speed_up")
-    labels = [text.get_text() for text in drawing.figure.axes[0].get_legend().get_texts()]
+    (legend,) = [axis.get_legend() for axis in drawing.figure.axes if axis.get_legend()]
+    labels = [text.get_text() for text in legend.get_texts()]
     assert {"sweep, partitioned lists", "quadtree, search", "linked cells, scan"} <= set(labels)
 
 
@@ -180,6 +196,33 @@ def test_the_smallest_bench_gives_a_report_too(tmp_path):
     write_drums(tmp_path / "a", {"verlet": truths()["quadtree"]}, sizes=(1000,), repeats=1)
     assert main(["tables", str(tmp_path / "a")]) == 0
     assert "not measured" in (tmp_path / "a" / "report" / "claims.md").read_text(encoding="utf-8")
+
+
+def test_scenes_of_ones_own_have_a_figure_of_time_over_size_and_what_is_missing_is_said(tmp_path):
+    for boxes in (500, 2000):
+        for finder in ("quadtree", "verlet"):
+            for repeat in range(3):
+                write_sample(tmp_path / "a", f"mine_{boxes}", finder, truths()["quadtree"], boxes, repeat=repeat,
+                             made_by=input_of("other", boxes))
+    assert main(["tables", str(tmp_path / "a")]) == 0
+    report = tmp_path / "a" / "report"
+    assert {path.stem for path in (report / "figures").glob("*.png")} == {"own_over_size", "all_scenes"}
+    (drawing,) = [each for each in own_drawings(read_bench([tmp_path / "a"])) if each.name == "own_over_size"]
+    (axis,) = [each for each in drawing.figure.axes if each.get_xlabel()]
+    assert (axis.get_xlabel(), axis.get_title(), len(axis.containers)) == ("boxes", "mine", 2)
+    text = (report / "tables" / "skipped.csv").read_text(encoding="utf-8")
+    assert "figure_09_total,figure,rotating drums" in text and "\nC1,claim," in text
+
+
+def test_no_two_finders_look_alike():
+    text = (Path(os.environ["POLYDEM_SOURCE_DIR"]) / "src" / "config" / "entries.txt").read_text(encoding="utf-8")
+    lists = dict(re.findall(r"^list (\w+) = (.*)$", text, re.MULTILINE))
+    words = " ".join(lists.values()).split()
+    finders = [word for word in words if word.startswith(("quadtree", "sort_and", "linked", "verlet", "two_level")) or
+               word.endswith(("_sweep", "_tree", "_quadtree", "_grid", "all_pairs"))]
+    assert len(set(finders)) >= 14 and set(finders) <= set(LOOKS), set(finders) - set(LOOKS)
+    assert len({marker for _, marker, _ in LOOKS.values()}) == len(LOOKS)
+    assert len({(colour, line) for colour, _, line in LOOKS.values()}) == len(LOOKS)
 
 
 def test_a_missing_folder_ends_with_code_2(capsys):

@@ -84,3 +84,21 @@ def test_students_quantile_agrees_with_tables():
 )
 def test_numbers_are_written_with_three_digits(value, text):
     assert statistics.number(value) == text
+
+
+def test_the_interval_of_a_slope_knows_that_a_power_law_does_not_fit():
+    sizes = np.array([2.5e3, 5e3, 7.5e3, 1e4, 1.25e4])
+
+    def measured(random):
+        above = random.lognormal(0.0, 0.1, len(sizes))  # what caches do to a size is the same in all repeats
+        return statistics.slope(sizes, [a * size * random.lognormal(0.0, 0.01, 7) for a, size in zip(above, sizes)])
+
+    covered, _ = coverage(measured, 1.0)
+    assert covered >= 0.93
+
+
+def test_a_law_that_bends_has_a_growing_exponent():
+    sizes = np.array([1e3, 1e4, 1e5])
+    assert statistics.curvature(sizes, sizes**1.3) == pytest.approx(0.0, abs=1e-9)
+    assert statistics.curvature(sizes, np.exp(0.05 * np.log(sizes) ** 2)) == pytest.approx(0.1 * np.log(10.0))
+    assert np.isnan(statistics.curvature(sizes[:2], sizes[:2]))

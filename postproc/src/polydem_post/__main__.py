@@ -11,6 +11,7 @@ from dataclasses import fields, replace
 from pathlib import Path
 
 from . import __version__
+from .comparison_verb import add_paper
 from .data_verbs import add_data_verbs
 from .emit import printable
 from .picture_verbs import add_picture_verbs
@@ -104,6 +105,7 @@ def _parser() -> argparse.ArgumentParser:
     _add_sweep(verbs)
     _add_scale(verbs)
     add_data_verbs(verbs)
+    add_paper(verbs, _program)
     return parser
 
 

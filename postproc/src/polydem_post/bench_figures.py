@@ -5,7 +5,7 @@ from __future__ import annotations
 import matplotlib
 import numpy as np
 
-from . import cache, series
+from . import cache, paper, series
 from .bench import Bench
 from .bench_tables import visits_per_search
 from .figure_style import (
@@ -14,13 +14,13 @@ from .figure_style import (
     Drawing,
     draw_estimates,
     over_size,
-    panels,
     panels_with_legend,
     readable_decades,
     shared_legend,
     style_of,
 )
-from .statistics import typical
+from .series import SWEEP, TREE
+from .statistics import slope, typical
 
 #: Finders in the figure of threads, and what they stand for
 PARALLEL = {
@@ -35,24 +35,24 @@ def bench_drawings(bench: Bench) -> list[Drawing]:
     """Those of the figures that the samples can give."""
     here = bench.on()
     with matplotlib.rc_context(SETTINGS):
-        drawn = [all_finders(here), threads(here), misses(bench), work(here)]
+        drawn = [all_finders(here), local(here), threads(here), misses(bench), work(here)]
     return [drawing for drawing in drawn if drawing]
 
 
 def all_finders(bench: Bench) -> Drawing | None:
     """Time per box over size."""
-    figure, (axis,), below = panels_with_legend(1, 6.4, 3.8, rows=6)
+    figure, (axis,), below = panels_with_legend(1, 6.4, 3.8, rows=8)
     for finder in _finders(bench):
         cases = [case for case in series.over_size(bench, finder) if case.time()]
         if not cases:
             continue
         law = series.law(cases)
-        slope = "" if law is None else f": slope {law.exponent.text()}"
+        told = "" if law is None else f": slope {law.exponent.text()}"
         draw_estimates(
             axis,
             [case.boxes for case in cases],
             [typical(case.time()) for case in cases],
-            label=finder + slope,
+            label=finder + told,
             **style_of(finder),
         )
     if not axis.has_data():
@@ -67,12 +67,40 @@ def all_finders(bench: Bench) -> Drawing | None:
     )
 
 
+def local(bench: Bench) -> Drawing | None:
+    """Exponents between neighbouring sizes, of the list and of the structure alone."""
+    figure, axes, below = panels_with_legend(2, 4.2, 3.2, rows=2)
+    for axis, quantity, said in ((axes[0], series.total_time, paper.TOTAL_SLOPE),
+                                 (axes[1], series.structure_time, paper.UPDATE_SLOPE)):
+        for finder in (TREE, SWEEP):
+            points = series.steps_over_size(series.over_size(bench, finder), quantity)
+            if len(points) < 3:
+                continue
+            pairs = list(zip(points, points[1:]))
+            draw_estimates(axis, [np.sqrt(a[0] * b[0]) for a, b in pairs],
+                           [slope([a[0], b[0]], [a[1], b[1]]) for a, b in pairs], label=finder, **style_of(finder))
+            axis.plot(paper.SIZES, (said[finder],) * 2, label=f"{finder}, paper", color=style_of(finder)["color"],
+                      linestyle=(0, (1, 1.5)), linewidth=1.4)
+    if not axes[0].has_data():
+        return None
+    for axis, label in zip(axes, ("exponent of the time of the list", "exponent of the time of the structure")):
+        over_size(axis, label, logarithmic=False)
+    shared_legend(below, axes, columns=4)
+    return Drawing(
+        "local_exponents",
+        figure,
+        "Exponents of the time per step between neighbouring numbers of boxes, one thread, with 95 % intervals, at the "
+        "geometric mean of both numbers; dotted: the exponent that the paper gives for its own sizes. A power law "
+        "would be a horizontal line.",
+    )
+
+
 def threads(bench: Bench) -> Drawing | None:
     """The failing parallel sweep and what works, on the largest drum that was run on several threads."""
     scene = _threaded_scene(bench)
     if scene is None:
         return None
-    figure, (axis,) = panels(width=5.0, height=3.8)
+    figure, (axis,), below = panels_with_legend(1, 5.0, 3.4, rows=3)
     most = 1
     for finder, name in PARALLEL.items():
         cases = bench.select(scene=scene, finder=finder, mode="replay")
@@ -87,7 +115,7 @@ def threads(bench: Bench) -> Drawing | None:
     axis.axhline(1.0, color="0.75", linewidth=0.8, linestyle="--", zorder=0)
     axis.set(xlabel="threads", ylabel="speed-up against one thread", xticks=counts if most <= 16 else counts[::8])
     axis.set_ylim(0.0, axis.get_ylim()[1] * 1.1)
-    axis.legend(fontsize=8, loc="upper left")
+    shared_legend(below, [axis], columns=2)
     cores = bench.cases[0].provenance.get("processors", "?")
     return Drawing(
         "speed_up",
@@ -141,26 +169,42 @@ def misses(bench: Bench) -> Drawing | None:
 
 def work(bench: Bench) -> Drawing | None:
     """Candidates per box and nodes per search, over size."""
-    figure, (left, right), below = panels_with_legend(2, 4.2, 3.2, rows=3)
-    for finder in _finders(bench):
-        cases = series.over_size(bench, finder)
-        candidates = [(c.boxes, c.count("candidates") / c.boxes) for c in cases if c.count("candidates") > 0.0]
-        visits = [(c.boxes, visits_per_search(c)) for c in cases if visits_per_search(c) > 0.0]
-        for axis, points in ((left, candidates), (right, visits)):
-            if points and finder != "all_pairs":
-                axis.plot(*np.array(points).T, linewidth=1.1, label=finder, **style_of(finder))
+    figure, (left, right), below = panels_with_legend(2, 4.2, 3.2, rows=4)
+    for axis, points_of in ((left, _candidates), (right, _visits)):
+        for finders, points in _alike({finder: points_of(series.over_size(bench, finder))
+                                       for finder in _finders(bench) if finder != "all_pairs"}):
+            axis.plot(*np.array(points).T, linewidth=1.1, label=", ".join(finders), **style_of(finders[0]))
     if not left.has_data() and not right.has_data():
         return None
     for axis, label in ((left, "candidates per box"), (right, "nodes or cells per search")):
         over_size(axis, label)
         readable_decades(axis.yaxis)
-    shared_legend(below, [left, right], columns=4)
+    shared_legend(below, [left, right], columns=2)
     return Drawing(
         "work_over_size",
         figure,
         "Left: possible pairs that a finder keeps from step to step. Right: nodes or cells that it looks at when the "
         "neighbours of one box are searched. Exact counts, means over the steps but the first.",
     )
+
+
+def _candidates(cases: list) -> tuple:
+    """(boxes, possible pairs per box)"""
+    return tuple((c.boxes, c.count("candidates") / c.boxes) for c in cases if c.count("candidates") > 0.0)
+
+
+def _visits(cases: list) -> tuple:
+    """(boxes, nodes or cells per search)"""
+    return tuple((c.boxes, visits_per_search(c)) for c in cases if visits_per_search(c) > 0.0)
+
+
+def _alike(points: dict) -> list:
+    """[(finders, points)]: finders whose points are the same share a curve, since one would hide the other."""
+    found: dict[tuple, list] = {}
+    for finder, values in points.items():
+        if values:
+            found.setdefault(values, []).append(finder)
+    return [(finders, values) for values, finders in found.items()]
 
 
 def _finders(bench: Bench) -> list:

@@ -50,7 +50,8 @@ def _most_threads(bench: Bench, finder: str, most: int | None = None):
     cases = [
         case
         for case in series.cases_of(bench, "drum", finder=finder, mode="replay")
-        if 1 < case.threads <= min(most or case.threads, int(case.provenance.get("processors", case.threads)))
+        if series.parameter(case, "scene.motion_rate") == paper.RATE
+        and 1 < case.threads <= min(most or case.threads, int(case.provenance.get("processors", case.threads)))
     ]
     needed(cases, f"./polydem bench on a drum with '{finder}' on one and on several threads")
     return max(cases, key=lambda case: (case.threads, case.boxes))

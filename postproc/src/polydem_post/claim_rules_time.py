@@ -38,21 +38,23 @@ def _pairs(bench: Bench, upper: str = TREE, lower: str = SWEEP, mode: str = "rep
     "C1",
     "Both algorithms are O(N) per step",
     "slopes 0.992 (sweep), 0.994 (tree)",
-    "both slopes within 1.00 +- 0.05, intervals included; if not, "
-    "the exponents of the counted operations say whether work or memory grows",
-    "figure_09_total, finders_over_size",
+    "both slopes over the paper's own sizes within 1.00 +- 0.05, intervals (which know how well a power law fits) "
+    "included; larger sizes are told apart; if not, the exponents of the counted operations say whether work or memory "
+    "grows",
+    "figure_09_total, finders_over_size, local_exponents",
 )
 def linear(bench: Bench) -> Finding:
     found, parts, reasons = [], [], []
     for finder in (SWEEP, TREE):
-        law = _law(bench, finder)
+        law = needed(series.law_of_paper(_series(bench, finder)), DRUMS + f"'{finder}', sizes between those of the "
+                     "paper")
         parts.append(law.exponent.within(0.95, 1.05))
         found.append(f"{law.exponent.text()} ({finder})")
+        beyond = series.law_beyond(_series(bench, finder))
+        if beyond:
+            found[-1] += f", {beyond.sizes[0]:.0f} to {beyond.sizes[-1]:.0f} boxes {beyond.exponent.text()}"
         if parts[-1] is not True:
             reasons.append(_growth_of_work(bench, finder))
-        upto = series.law(_series(bench, finder), largest=1.2e5)
-        if upto and len(upto.sizes) < len(law.sizes):
-            found[-1] += f", up to {upto.sizes[-1]:.0f} boxes {upto.exponent.text()}"
     return Finding(of_parts(parts), "; ".join(found), " ".join(reasons))
 
 
@@ -99,10 +101,9 @@ def update_ratio(bench: Bench) -> Finding:
     both = needed([pair for pair in _pairs(bench) if all(map(series.structure_time, pair))], DRUMS + "with phases")
     ratio = series.pooled_ratio(both, series.structure_time)
     parts, slopes = [ratio.within(0.05, 0.2)], []
-    low, high = 0.9 * paper.SIZES[0], 1.1 * paper.SIZES[1]
     for finder in (SWEEP, TREE):
-        near = [case for case in _series(bench, finder) if low <= case.boxes <= high]
-        law, whole = series.law(near, series.structure_time), _law(bench, finder, series.structure_time)
+        law = series.law_of_paper(_series(bench, finder), series.structure_time)
+        whole = _law(bench, finder, series.structure_time)
         if law is None:
             raise Missing(DRUMS + f"'{finder}', sizes between those of the paper")
         slopes.append(f"{finder} {law.exponent.text()} (all sizes {whole.exponent.text()})")
@@ -150,7 +151,7 @@ def inlining(bench: Bench) -> Finding:
     if not small or not large:
         raise Missing(DRUMS + "'quadtree', 'quadtree_called' with sizes below 5000 and beyond 10000")
     parts = [every(ratio.above(1.0) for ratio in small), every(ratio.below(1.0) for ratio in large)]
-    slopes = [series.law(_series(bench, finder)) for finder in (TREE, "quadtree_called")]
+    slopes = [series.law_of_paper(_series(bench, finder)) for finder in (TREE, "quadtree_called")]
     fitted = "; ".join(f"slope {law.exponent.text()} ({name})" for law, name in zip(slopes, ("inlined", "not")) if law)
     ratios = ", ".join(f"{a.boxes}: {series.ratio(a, b).text()}" for a, b in both)
     return Finding(

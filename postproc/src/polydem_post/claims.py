@@ -6,7 +6,7 @@ altogether, else undecided: a verdict does not hang on noise. Counts are exact a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .bench import Bench
 from .emit import Table
@@ -17,6 +17,9 @@ CONTRADICTED = "contradicted"
 UNDECIDED = "undecided"
 NOT_TESTABLE = "not testable here"
 NOT_MEASURED = "not measured"
+
+#: Undecided by the quick comparison; the full one measures more
+UNDECIDED_QUICK = "undecided (quick)"
 
 
 class Missing(Exception):
@@ -116,6 +119,31 @@ def verdict_table(judged: list) -> Table:
     return table
 
 
+def reasons_table(judged: list) -> Table:
+    """Behind every verdict its rule and the reason."""
+    table = Table("reasons", "Rules and reasons behind the verdicts", ("claim", "rule", "reason"), texts=3)
+    for each, finding in judged:
+        table.add(each.id, each.threshold, finding.reason or "-")
+    return table
+
+
+def counts_table(judged: list) -> Table:
+    """How many claims have each verdict."""
+    table = Table("verdicts", "Claims by verdict", ("verdict", "number", "claims"), texts=1)
+    for verdict in dict.fromkeys(finding.verdict for _, finding in judged):
+        named = [each.id for each, finding in judged if finding.verdict == verdict]
+        table.add(verdict, len(named), ", ".join(named))
+    return table
+
+
+def of_quick(judged: list) -> list:
+    """The same verdicts where few repeats were taken: what they leave open is undecided for now."""
+    return [
+        (each, replace(finding, verdict=UNDECIDED_QUICK) if finding.verdict in (UNDECIDED, NOT_MEASURED) else finding)
+        for each, finding in judged
+    ]
+
+
 def _left_out(bench: Bench) -> str:
     """Which scenes no rule about kinds of scenes has counted; ends the sentence."""
     from .scene_kinds import UNKNOWN
@@ -125,9 +153,9 @@ def _left_out(bench: Bench) -> str:
     return f"; of {', '.join(unknown)} it is not recorded, so they count for no kind." if unknown else "."
 
 
-def claims_document(bench: Bench) -> str:
+def claims_document(bench: Bench, judged: list | None = None) -> str:
     """claims.md: the verdicts, then for each claim its rule and its reasons."""
-    judged = judge_all(bench)
+    judged = judged or judge_all(bench)
     main = bench.on()
     lines = [
         "# The claims of the paper, and what these samples say",

@@ -17,19 +17,24 @@ from .trajectory import ResultError
 #: Forms in which every figure is written, and what keeps the time of writing out of each
 FORMS = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}
 
-#: Finder -> colour (Okabe & Ito 2008, told apart by the colour-blind) and marker
+#: Finder -> colour (Okabe & Ito 2008, told apart by the colour-blind), marker and line; no two have the same marker,
+#: and lines differ in print without colours
 LOOKS = {
-    "quadtree": ("#0072B2", "o"),
-    "sort_and_sweep": ("#D55E00", "s"),
-    "quadtree_called": ("#56B4E9", "v"),
-    "pruned_quadtree": ("#CC79A7", "^"),
-    "partitioned_sweep": ("#B8860B", "D"),
-    "unsorted_sweep": ("#8B4513", "<"),
-    "linked_cells": ("#009E73", "P"),
-    "verlet": ("#000000", "X"),
-    "hierarchical_grid": ("#6A3D9A", "p"),
-    "binary_tree": ("#7F7F7F", ">"),
-    "all_pairs": ("#B0B0B0", "*"),
+    "quadtree": ("#0072B2", "o", "-"),
+    "sort_and_sweep": ("#D55E00", "s", "-"),
+    "quadtree_called": ("#56B4E9", "v", "--"),
+    "quadtree_o2": ("#004A73", "$2$", ":"),
+    "filtered_quadtree": ("#3B7DD8", "H", "-."),
+    "pruned_quadtree": ("#CC79A7", "^", "--"),
+    "partitioned_sweep": ("#B8860B", "D", "--"),
+    "unsorted_sweep": ("#8B4513", "<", "-."),
+    "sort_and_sweep_o2": ("#A23B00", "$S$", ":"),
+    "linked_cells": ("#009E73", "P", "-"),
+    "verlet": ("#000000", "X", "-"),
+    "two_level": ("#7A1F5C", "d", "-."),
+    "hierarchical_grid": ("#6A3D9A", "p", "--"),
+    "binary_tree": ("#7F7F7F", ">", ":"),
+    "all_pairs": ("#9A9A9A", "*", "-"),
 }
 
 #: The paper's numbers are drawn thus
@@ -66,12 +71,19 @@ def panels(count: int = 1, width: float = 4.6, height: float = 3.4) -> tuple:
 
 def panels_with_legend(count: int, width: float, height: float, rows: int) -> tuple:
     """A figure with panels side by side, and below them an empty one for a legend of so many rows that all share."""
-    figure = Figure(figsize=(width * count, height + 0.22 * rows), layout="constrained")
+    figure, (row,), below = grid_with_legend(1, count, width, height, rows)
+    return figure, row, below
+
+
+def grid_with_legend(rows_of_panels: int, columns: int, width: float, height: float, rows: int) -> tuple:
+    """Rows of panels, and below them an empty one for a legend of so many rows that all share."""
+    figure = Figure(figsize=(width * columns, height * rows_of_panels + 0.22 * rows), layout="constrained")
     FigureCanvasAgg(figure)
-    grid = figure.add_gridspec(2, count, height_ratios=[height, 0.22 * rows])
-    below = figure.add_subplot(grid[1, :])
+    grid = figure.add_gridspec(rows_of_panels + 1, columns, height_ratios=[height] * rows_of_panels + [0.22 * rows])
+    below = figure.add_subplot(grid[rows_of_panels, :])
     below.axis("off")
-    return figure, [figure.add_subplot(grid[0, k]) for k in range(count)], below
+    panels_of_rows = [[figure.add_subplot(grid[r, k]) for k in range(columns)] for r in range(rows_of_panels)]
+    return figure, panels_of_rows, below
 
 
 def shared_legend(below, axes, columns: int) -> None:
@@ -84,9 +96,9 @@ def shared_legend(below, axes, columns: int) -> None:
 
 
 def style_of(finder: str) -> dict:
-    """Colour and marker of a finder."""
-    colour, marker = LOOKS.get(finder, ("0.3", "h"))
-    return {"color": colour, "marker": marker, "markersize": 4.5}
+    """Colour, marker and line of a finder."""
+    colour, marker, line = LOOKS.get(finder, ("0.3", "h", "-"))
+    return {"color": colour, "marker": marker, "markersize": 4.5, "linestyle": line}
 
 
 def over_size(axis, label: str, logarithmic: bool = True) -> None:
@@ -122,12 +134,14 @@ def draw_estimates(axis, x, estimates: list, **style) -> None:
     low = np.array([estimate.low if np.isfinite(estimate.low) else estimate.value for estimate in estimates])
     high = np.array([estimate.high if np.isfinite(estimate.high) else estimate.value for estimate in estimates])
     spread = np.maximum(np.stack([y - low, high - y]), 0.0)
-    axis.errorbar(x, y, yerr=spread, elinewidth=0.9, capsize=2.0, **{"linewidth": 1.1, **style})
+    bars = axis.errorbar(x, y, yerr=spread, elinewidth=0.9, capsize=2.0, **{"linewidth": 1.1, **style})
+    for bar in bars.lines[2]:
+        bar.set_linestyle("-")  # intervals are no curves
 
 
 def draw_law(axis, law: series.Law, **style) -> None:
     """A fitted power law over the sizes that it was fitted to."""
-    axis.plot(law.sizes, law.at(law.sizes), linewidth=1.1, zorder=1, **style)
+    axis.plot(law.sizes, law.at(law.sizes), **{"linewidth": 1.1, "zorder": 1, **style})
 
 
 def mark_caches(axis, sizes: list) -> None:

@@ -54,6 +54,9 @@ COMPILED_GAIN = (8.0, 18.0)
 #: Smallest and largest drum of the paper [boxes]
 SIZES = (2522, 12651)
 
+#: Rate of rotation of the paper's drum [revolutions/s]
+RATE = 0.25
+
 #: Boxes -> processor time per step of (tree, sweep) [ms] when the authors' published MATLAB example runs in GNU Octave
 #: 7.3: an interpreter without just-in-time compilation, on a shared virtual machine of two cores, 15 to 60 steps of a
 #: drum in prescribed rotation. It is neither MATLAB nor the authors' code for the paper: an indication, no more.

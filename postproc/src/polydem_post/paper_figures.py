@@ -7,7 +7,19 @@ import numpy as np
 
 from . import paper, series
 from .bench import Bench
-from .figure_style import PAPER, SETTINGS, Drawing, draw_estimates, draw_law, mark_caches, over_size, panels, style_of
+from .figure_style import (
+    PAPER,
+    SETTINGS,
+    Drawing,
+    draw_estimates,
+    draw_law,
+    mark_caches,
+    over_size,
+    panels,
+    panels_with_legend,
+    shared_legend,
+    style_of,
+)
 from .series import SWEEP, TREE
 from .statistics import median, of_one_bench, typical
 
@@ -47,12 +59,12 @@ def idle_swaps(bench: Bench) -> Drawing | None:
 
 def machines(bench: Bench) -> Drawing | None:
     """Figs. 8 and 13: the same run on several machines."""
-    figure, (axis,) = panels()
+    figure, (axis,), below = panels_with_legend(1, 5.2, 3.3, rows=2)
     drawn = 0
     for k, machine in enumerate(bench.named("machine")):
         cases = series.over_size(bench.on(machine), TREE)
         if cases:
-            colour, marker = list(looks_of_machines())[k % 6]
+            colour, marker, line = list(looks_of_machines())[k % 6]
             draw_estimates(
                 axis,
                 [case.boxes for case in cases],
@@ -60,13 +72,14 @@ def machines(bench: Bench) -> Drawing | None:
                 label=machine,
                 color=colour,
                 marker=marker,
+                linestyle=line,
                 markersize=4.5,
             )
             drawn += 1
     if drawn == 0:
         return None
-    axis.legend(fontsize=8)
     over_size(axis, TIME)
+    shared_legend(below, [axis], columns=2)
     alone = " Only one machine is in these samples: give the folders of others too, to compare." if drawn == 1 else ""
     return Drawing(
         "figure_08_13_machines",
@@ -78,8 +91,9 @@ def machines(bench: Bench) -> Drawing | None:
 
 
 def looks_of_machines():
-    """Colours and markers for machines."""
-    return zip(("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000", "#56B4E9"), "osP^Xv")
+    """Colours, markers and lines for machines."""
+    return zip(("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#000000", "#56B4E9"), "osP^Xv",
+               ("-", "--", "-.", ":", "-", "--"))
 
 
 def total(bench: Bench) -> Drawing | None:
@@ -113,19 +127,19 @@ def _two_finders(bench: Bench, quantity, name: str, what: str, slopes: dict, rat
     cases = {finder: [c for c in series.over_size(bench, finder) if quantity(c)] for finder in (TREE, SWEEP)}
     if not any(cases.values()):
         return None
-    figure, (left, right) = panels(2, width=4.2)
+    figure, (left, right), below = panels_with_legend(2, 4.2, 3.2, rows=4)
     for finder, found in cases.items():
-        law = series.law(found, quantity)
-        label = finder if law is None else f"{finder}: slope {law.exponent.text()}; paper {slopes[finder]:g}"
+        laws = [law for law in (series.law_of_paper(found, quantity), series.law_beyond(found, quantity)) if law]
+        told = [f"{finder}: exponent {laws[0].exponent.text()}; paper {slopes[finder]:g}"] if laws else [finder]
         draw_estimates(
-            left, [c.boxes for c in found], _per_step(found, quantity), label=label, linestyle="none",
-            **style_of(finder),
+            left, [c.boxes for c in found], _per_step(found, quantity), label=told[0],
+            **{**style_of(finder), "linestyle": "none"},
         )
-        if law is not None:
-            draw_law(left, law, color=style_of(finder)["color"])
-            slope = slopes[finder]
-            middle = np.exp(np.mean(np.log(law.sizes)))
-            left.plot(law.sizes, law.at(middle) * (law.sizes / middle) ** slope, zorder=0, **PAPER)
+        for law, line in zip(laws, ("-", "--")):
+            label = f"{finder}, larger sizes: {law.exponent.text()}" if line == "--" else None
+            draw_law(left, law, color=style_of(finder)["color"], linestyle=line, label=label)
+        if laws:
+            _draw_paper_slope(left, laws[0], slopes[finder])
     both = series.pairs_of(cases[TREE], cases[SWEEP])
     draw_estimates(
         right,
@@ -134,23 +148,27 @@ def _two_finders(bench: Bench, quantity, name: str, what: str, slopes: dict, rat
         color="black",
         marker="o",
         markersize=4.5,
-        label="these samples",
+        label="tree / sweep, these samples",
     )
     right.plot(paper.SIZES, (ratio, ratio), label=f"paper: about {ratio_text}", **PAPER)
     over_size(left, TIME)
     over_size(right, "tree / sweep", logarithmic=False)
     right.set_ylim(bottom=0.0)
-    for axis in (left, right):
-        low, high = axis.get_ylim()
-        axis.set_ylim(low, high * (3.0 if axis is left else 1.25))
-        axis.legend(fontsize=8, loc="upper left")
+    shared_legend(below, [left, right], columns=2)
     return Drawing(
         name,
         figure,
         what + " per step against the number of boxes, one thread, with fitted power laws (95 % "
-        "intervals) and, dotted, the slopes that the paper gives, through the middle of our line; right: ratio of "
-        "the two. Fixed boxes count. The making of the boxes is not in.",
+        "intervals): solid through the sizes of the paper, dashed through larger ones; dotted: the slopes that the "
+        "paper gives, through the middle of our solid lines; right: ratio of the two. Fixed boxes count. The making of "
+        "the boxes is not in.",
     )
+
+
+def _draw_paper_slope(axis, law: series.Law, slope: float) -> None:
+    """The paper's exponent through the middle of our law."""
+    middle = np.exp(np.mean(np.log(law.sizes)))
+    axis.plot(law.sizes, law.at(middle) * (law.sizes / middle) ** slope, zorder=0, **PAPER)
 
 
 def inlining(bench: Bench) -> Drawing | None:
@@ -158,10 +176,10 @@ def inlining(bench: Bench) -> Drawing | None:
     cases = {finder: series.over_size(bench, finder) for finder in (TREE, "quadtree_called")}
     if not all(cases.values()):
         return None
-    figure, (left, right) = panels(2, width=4.2)
+    figure, (left, right), below = panels_with_legend(2, 4.2, 3.2, rows=2)
     for finder, found in cases.items():
-        law = series.law(found)
-        slope = "" if law is None else f": slope {law.exponent.text()}; paper {paper.INLINING_SLOPE[finder]:g}"
+        law = series.law_of_paper(found)
+        slope = "" if law is None else f": exponent {law.exponent.text()}; paper {paper.INLINING_SLOPE[finder]:g}"
         name = "inlined" if finder == TREE else "not inlined"
         draw_estimates(
             left,
@@ -188,15 +206,15 @@ def inlining(bench: Bench) -> Drawing | None:
         right.annotate(text, (boxes, 1.01), xycoords=("data", "axes fraction"), fontsize=8, ha=side, color="0.35")
     over_size(left, "time per box and step [ns]", logarithmic=False)
     over_size(right, "inlined / not inlined", logarithmic=False)
-    left.set_ylim(0.0, left.get_ylim()[1] * 1.3)
+    left.set_ylim(bottom=0.0)
     mark_caches(left, outgrown(cases[TREE]))
-    left.legend(fontsize=8, loc="upper left", frameon=True, framealpha=1.0, edgecolor="none")
+    shared_legend(below, [left], columns=2)
     return Drawing(
         "figure_11_inlining",
         figure,
         "Fig. 11: the quadtree from one source, compiled with and without inlining. Dashed: the number of boxes at "
         "which what the finder holds (and the boxes) outgrows a level of the caches of this machine. Dotted: the "
-        "numbers of boxes that the paper names.",
+        "numbers of boxes that the paper names. Exponents: of the time per step over the sizes of the paper.",
     )
 
 
@@ -220,7 +238,7 @@ def interpreted(bench: Bench) -> Drawing | None:
     cases = [case for case in cases if case.boxes <= 2 * max(paper.OCTAVE)]
     if not cases:
         return None
-    figure, (axis,) = panels()
+    figure, (axis,), below = panels_with_legend(1, 5.2, 3.3, rows=3)
     sizes = sorted(paper.OCTAVE)
     axis.plot(
         sizes,
@@ -242,8 +260,7 @@ def interpreted(bench: Bench) -> Drawing | None:
         label="8 to 18 times polydem (gain of the paper)",
     )
     over_size(axis, TIME)
-    axis.set_ylim(top=axis.get_ylim()[1] * 8.0)
-    axis.legend(fontsize=8, loc="upper left")
+    shared_legend(below, [axis], columns=1)
     return Drawing(
         "figure_12_interpreted",
         figure,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from .emit import FORMATS, SUFFIXES
 from .precision_samples import ORIGIN
 from .precision_tables import all_tables
+from .report_files import write_figures, write_tables
 from .trajectory import ResultError
 from .work_precision import read_study
 
@@ -19,17 +19,12 @@ def write_precision_report(folder: Path, figures: bool = True) -> list[Path]:
     study = read_study(folder)
     output = Path(folder) / "report"
     tables, origin = all_tables(study), origin_of(folder)
-    written = []
     try:
-        for name in ("tables", "figures"):
-            (output / name).mkdir(parents=True, exist_ok=True)
-        for table in tables:
-            table.origin = origin
-            for form in FORMATS:
-                written.append(output / "tables" / (table.name + SUFFIXES[form]))
-                written[-1].write_text(table.document(form), encoding="utf-8")
+        written = write_tables(tables, output / "tables", origin)
         if figures:
-            written += _write_figures(study, output / "figures")
+            from .precision_figures import precision_drawings  # matplotlib takes long to load
+
+            written += write_figures(precision_drawings(study), output / "figures")
         page = output / "workprecision.md"
         shown = [table for table in tables if table.name.removeprefix("workprecision_") in ON_THE_PAGE]
         documents = "\n".join(table.document("markdown") for table in shown)
@@ -46,13 +41,3 @@ def origin_of(folder: Path) -> str:
     except OSError:
         lines = []
     return f"Samples of {'; '.join(lines) or 'a revision that is not recorded'}."
-
-
-def _write_figures(study, folder: Path) -> list[Path]:
-    from .figure_style import save_drawing  # matplotlib takes long to load and tables do not need it
-    from .precision_figures import precision_drawings
-
-    drawings = precision_drawings(study)
-    captions = folder / "captions.md"
-    captions.write_text("\n\n".join(f"**{each.name}** {each.caption}" for each in drawings) + "\n", encoding="utf-8")
-    return [path for each in drawings for path in save_drawing(each, folder)] + [captions]

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import statistics
+from . import paper, statistics
 from .bench import Bench, Case
 from .scene_kinds import family_of, kind_of, number_in
 
@@ -135,19 +135,44 @@ class Law:
     exponent: statistics.Estimate
     factor: float
 
+    @property
+    def residuals(self) -> np.ndarray:
+        """By how much the medians lie above the law, as a part of it."""
+        return self.medians / self.at(self.sizes) - 1.0
+
     def at(self, sizes) -> np.ndarray:
         """The law at some sizes."""
         return self.factor * np.asarray(sizes, dtype=float) ** self.exponent.value
 
 
-def law(cases: list, quantity=total_time, largest: float = np.inf) -> Law | None:
-    """Time per step [ms] against the number of boxes; nothing if there are fewer than three sizes."""
+def steps_over_size(cases: list, quantity=total_time, least: float = 0.0, largest: float = np.inf) -> list:
+    """[(boxes, times per step of the repeats [ms])] between two sizes, these included."""
     measured = [
         (case.boxes, [1e-6 * case.boxes * value for value in statistics.of_one_bench(quantity(case))])
         for case in cases
-        if case.boxes <= largest
+        if least <= case.boxes <= largest
     ]
-    measured = [(boxes, values) for boxes, values in measured if values and min(values) > 0.0]
+    return [(boxes, values) for boxes, values in measured if values and min(values) > 0.0]
+
+
+def of_paper(cases: list) -> list:
+    """The cases of the paper's own sizes."""
+    return [case for case in cases if 0.9 * paper.SIZES[0] <= case.boxes <= 1.1 * paper.SIZES[1]]
+
+
+def law_of_paper(cases: list, quantity=total_time) -> Law | None:
+    """The law through the paper's own sizes alone."""
+    return law(cases, quantity, 0.9 * paper.SIZES[0], 1.1 * paper.SIZES[1])
+
+
+def law_beyond(cases: list, quantity=total_time) -> Law | None:
+    """The law through the sizes from the largest one of the paper on."""
+    return law(cases, quantity, 0.9 * paper.SIZES[1])
+
+
+def law(cases: list, quantity=total_time, least: float = 0.0, largest: float = np.inf) -> Law | None:
+    """Time per step [ms] against the number of boxes; nothing if there are fewer than three sizes."""
+    measured = steps_over_size(cases, quantity, least, largest)
     if len(measured) < 3:
         return None
     sizes = np.array([boxes for boxes, _ in measured], dtype=float)

@@ -11,7 +11,7 @@ inside, False if its whole interval is outside, and None, undecided, if the inte
 if there is none since something was measured once only. So noise can pass no rule and fail none.
 
 The intervals tell how much a measurement would change if it were repeated on this machine. They know nothing of
-other machines, and that of a slope nothing of how well a power law fits.
+other machines. That of a slope also knows how well the power law fits.
 """
 
 from __future__ import annotations
@@ -176,17 +176,44 @@ def ratio_of_means(uppers: list, lowers: list) -> Estimate:
 def slope(sizes, repeats) -> Estimate:
     """Exponent of a power law, by least squares through the logarithms of the medians over size.
 
-    `repeats` holds, for each size, the values of its repeats; repeats of different sizes are drawn independently.
+    `repeats` holds, for each size, the values of its repeats; repeats of different sizes are drawn independently. The
+    interval knows how well the law fits: what the medians scatter about it beyond what their repeats explain widens
+    the interval, with Student's quantile for the degrees of freedom that the sizes leave.
     """
     kept = [(size, np.asarray(values, dtype=float)) for size, values in zip(sizes, repeats) if len(values) > 0]
     if len({size for size, _ in kept}) < 2:
         return NOTHING
     x = np.log([size for size, _ in kept])
     weight = (x - x.mean()) / np.sum((x - x.mean()) ** 2)
-    drawn = np.stack([np.median(values[_draws(len(values), k)], axis=1) for k, (_, values) in enumerate(kept)])
-    value = float(weight @ np.log([np.median(values) for _, values in kept]))
+    drawn = np.log(np.stack([np.median(values[_draws(len(values), k)], axis=1)
+                             for k, (_, values) in enumerate(kept)]))
+    y = np.log([np.median(values) for _, values in kept])
+    value = float(weight @ y)
     fewest = min((values for _, values in kept), key=len)
-    return _estimate(value, weight @ np.log(drawn), fewest, least=math.nan, tail=0.5 * (1.0 - CONFIDENCE))
+    found = _estimate(value, weight @ drawn, fewest, least=math.nan, tail=0.5 * (1.0 - CONFIDENCE))
+    misfit = _misfit(x, y, value, float(np.mean(np.var(drawn, axis=1)))) * float(np.sqrt(weight @ weight))
+    below, above = (math.hypot(end - value, misfit) for end in (found.low, found.high))
+    return Estimate(value, value - below, value + above, math.nan, len(fewest))
+
+
+def _misfit(x: np.ndarray, y: np.ndarray, exponent: float, explained: float) -> float:
+    """Half width by which points that a law does not fit widen intervals, for a weight of 1.
+
+    `explained` is the variance of the points that their repeats explain.
+    """
+    freedom = len(x) - 2
+    if freedom < 1:
+        return 0.0
+    residuals = y - y.mean() - exponent * (x - x.mean())
+    excess = max(0.0, float(residuals @ residuals) / freedom - explained)
+    return -_student(0.5 * (1.0 - CONFIDENCE), freedom) * math.sqrt(excess) if excess > 1e-24 else 0.0
+
+
+def curvature(sizes, medians) -> float:
+    """By how much the exponent grows while the size grows tenfold, from a parabola through the logarithms."""
+    if len(sizes) < 3:
+        return math.nan
+    return float(2.0 * math.log(10.0) * np.polyfit(np.log(sizes), np.log(medians), 2)[0])
 
 
 def intercept(sizes, medians, exponent: float) -> float:

@@ -1,0 +1,74 @@
+"""The verb `paper`: says what it will do, makes what is missing, writes the report."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import time
+from pathlib import Path
+
+from .comparison_plan import QUICK_LIMIT, ROOT, make_plan
+from .trajectory import ResultError
+
+
+def add_paper(verbs, program) -> None:
+    """Add the parser of the verb; `program` reads an argument like double=PATH."""
+    paper = verbs.add_parser("paper")
+    paper.set_defaults(action=run_paper)
+    mode = paper.add_mutually_exclusive_group()
+    mode.add_argument("--quick", action="store_true")
+    mode.add_argument("--full", action="store_true")
+    paper.add_argument("--dry-run", action="store_true")
+    paper.add_argument("--report-only", action="store_true")
+    paper.add_argument("--output", type=Path, default=Path("results/paper"), metavar="DIR")
+    paper.add_argument("--program", type=program, action="append", default=[], metavar="PREC=PATH")
+    paper.add_argument("--verifier", type=Path)
+    paper.add_argument("--overlaps", type=Path)
+    paper.add_argument("--spent", type=float, metavar="S")
+    paper.add_argument("--plan", type=Path, metavar="FILE")
+
+
+def run_paper(options: argparse.Namespace) -> int:
+    """Do what the options say; the exit code."""
+    from .comparison_report import write_comparison  # needs much that other verbs do not
+    from .comparison_run import INTERRUPTED, Comparison, Tools
+
+    began = time.monotonic() - (options.spent or 0.0)
+    mode = "full" if options.full else "quick"
+    tools = Tools({name: path.resolve() for name, path in options.program},
+                  *(path and path.resolve() for path in (options.verifier, options.overlaps)))
+    if "double" not in tools.programs:
+        raise ResultError("--program double=PATH is missing: call ./polydem paper, which knows it")
+    output, plan = options.output.resolve(), options.plan and options.plan.resolve()
+    os.chdir(ROOT)  # namelists name their files from here
+    folder = Path(os.path.relpath(output, ROOT)) / mode
+    if any(letter.isspace() or letter == "'" for letter in str(folder)):
+        raise ResultError(f"{folder}: namelists cannot name a folder with blanks or quotes; choose another --output")
+    cores = len(os.sched_getaffinity(0))
+    pieces = make_plan(mode, folder, cores, plan)
+    deadline = began + QUICK_LIMIT if mode == "quick" else None
+    dry = options.dry_run or options.report_only
+    comparison = Comparison(folder, mode, pieces, tools, deadline, _say, dry)
+    comparison.open()
+    if not options.report_only:
+        signal.signal(signal.SIGTERM, _interrupt)
+        comparison.announce()
+        if options.dry_run:
+            return 0
+        try:
+            comparison.run()
+        except KeyboardInterrupt:
+            _say("interrupted; the same command goes on where it was")
+            return INTERRUPTED
+    page = write_comparison(comparison, output)
+    _say(f"{page}: written {time.monotonic() - began:.0f} s after the start")
+    return 0
+
+
+def _interrupt(*_) -> None:
+    raise KeyboardInterrupt
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)

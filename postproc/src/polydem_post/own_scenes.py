@@ -1,0 +1,66 @@
+"""Scenes of a bench that the paper does not have, and what could not be made of the samples, with the reason."""
+
+from __future__ import annotations
+
+from . import series
+from .bench import Bench, Case
+from .claims import NOT_MEASURED
+from .emit import Table
+from .scene_kinds import family_of
+
+#: Figure -> what the samples must have for it
+NEEDED = {
+    "figure_01_idle_swaps": "rotating drums with sort_and_sweep, one thread",
+    "figure_08_13_machines": "rotating drums with quadtree, one thread",
+    "figure_09_total": "rotating drums with quadtree or sort_and_sweep, one thread",
+    "figure_10_update": "rotating drums with quadtree or sort_and_sweep, one thread",
+    "figure_11_inlining": "rotating drums with quadtree and quadtree_called, one thread",
+    "figure_12_interpreted": "rotating drums up to 25000 boxes with quadtree, one thread",
+    "finders_over_size": "rotating drums, one thread",
+    "local_exponents": "rotating drums of at least three sizes with quadtree or sort_and_sweep, one thread",
+    "speed_up": "a finder on several threads and on one",
+    "cache_misses": "counts of ./polydem cache",
+    "work_over_size": "counts of rotating drums, one thread",
+    "fine_grained": "quadtree and partitioned_sweep on one scene with one thread and with several",
+    "fine_grained_limits": "quadtree and partitioned_sweep on one scene with one thread and with several",
+    "own_over_size": "scenes that are no drums, one thread",
+    "all_scenes": "any scene, one thread",
+}
+
+
+def families(bench: Bench) -> list[list[Case]]:
+    """Cases on one thread but those of drums, by what their scenes have in common but for their size; most first."""
+    found: dict[tuple, list] = {}
+    for case in bench.select(threads=1, mode="replay"):
+        if case.time() and series.kind(case) != "drum":
+            found.setdefault(family_of(case.settings), []).append(case)
+    return sorted(found.values(), key=lambda cases: -len({case.boxes for case in cases}))
+
+
+def family_name(cases: list[Case]) -> str:
+    """What the names of the scenes of a family begin with."""
+    names = sorted({case.scene for case in cases})
+    if len(names) == 1:
+        return names[0]
+    first, last = names[0], names[-1]
+    shared = next((first[:k] for k in range(len(first), 0, -1) if last.startswith(first[:k])), "")
+    return shared.rstrip("_-0123456789.") or ", ".join(names[:3])
+
+
+def skipped(bench: Bench, judged: list, drawn: list) -> Table:
+    """What is not in this report, and why."""
+    table = Table("skipped", "What these samples do not give", ("what", "kind", "it needs"), texts=3)
+    there = {drawing.name for drawing in drawn}
+    for name, needed in NEEDED.items():
+        if name not in there:
+            table.add(name, "figure", needed)
+    for each, finding in judged:
+        if finding.verdict.startswith(NOT_MEASURED):
+            table.add(each.id, "claim", finding.reason.removeprefix("run: "))
+    here = bench.on()
+    cases = {(case.scene, case.finder) for case in here.select()}
+    for scene in here.named("scene"):
+        absent = [finder for finder in here.named("finder") if (scene, finder) not in cases]
+        if absent:
+            table.add(scene, "scene", f"samples of {', '.join(absent)}")
+    return table
