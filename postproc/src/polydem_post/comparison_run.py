@@ -158,7 +158,7 @@ class Comparison:
                 folder = Path(place) / "trial"
                 namelist = write(Path(place) / "trial.nml", TRIAL.format(folder=folder))
                 log = Path(place) / "trial.txt"
-                if self._call([str(self.tools.program), "bench", str(namelist)], log, ROOT) != 0:
+                if self._call([str(self.tools.program), "bench", str(namelist)], log, ROOT, OMP_NUM_THREADS="1") != 0:
                     raise ResultError(f"the calibration failed: {log.read_text(encoding='utf-8')[-500:]}")
                 self.state["rates"] = vars(measured_rates(folder))
             self._write()
@@ -264,12 +264,12 @@ class Comparison:
                  "--full", "--table", "results/verify", "--behind"]
         return [([str(self.tools.verifier)], place, (0, 1)), (exact, place, (0, 1))]
 
-    def _call(self, command: list, log: Path, place: Path) -> int | None:
+    def _call(self, command: list, log: Path, place: Path, **variables) -> int | None:
         """Exit code of a command whose output goes to a file; None if the time was over. Shows its last line."""
         words = [str(Path(command[0]).resolve()) if "/" in command[0] else command[0], *command[1:]]
         with log.open("w", encoding="utf-8") as file:
             process = subprocess.Popen(words, cwd=place, stdout=file, stderr=subprocess.STDOUT,
-                                       stdin=subprocess.DEVNULL, env=environment())
+                                       stdin=subprocess.DEVNULL, env={**environment(), **variables})
             try:
                 while process.poll() is None:
                     left = self._left()
@@ -330,8 +330,7 @@ def measured_rates(folder: Path) -> Rates:
     boxes, bodies = bench.cases[0].boxes, int(bench.cases[0].facts["bodies"])
     if not stages or "all_pairs" not in times:
         raise ResultError(f"{folder}: the calibration has no times")
-    threads = len(os.sched_getaffinity(0))
-    return Rates(1e-6 * threads * sum(map(float, stages)) / bodies, 2e-9 * times["all_pairs"] / boxes,
+    return Rates(1e-6 * sum(map(float, stages)) / bodies, 2e-9 * times["all_pairs"] / boxes,
                  1e-9 * max(times["quadtree"], times["sort_and_sweep"]))
 
 
