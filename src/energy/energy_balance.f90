@@ -120,7 +120,7 @@ contains
       real(wp) :: total(n_totals)
 
       call allocate_channels(sums, bodies%n)
-      call accumulate_bodies(sums, 0.5_wp, gravity, bodies, forces, bodies%free)
+      call accumulate_bodies(sums, 0.5_wp, gravity, bodies, forces, 1_ip, bodies%n)
       call add_walls(bodies, walls, 0.5_wp, sums%power_sum, sums%wall_sum)
       sums%is_current = .true.
       total = totals(sums, comm, gravity, bodies, forces, walls)
@@ -142,12 +142,12 @@ contains
       !> Contacts with fixed bodies
       type(contacts_t), intent(in) :: walls
 
-      call accumulate_bodies(sums, 1.0_wp, gravity, bodies, forces, bodies%free)
+      call accumulate_bodies(sums, 1.0_wp, gravity, bodies, forces, 1_ip, bodies%n)
       call accumulate_walls(sums, bodies, walls)
    end subroutine accumulate_step
 
    !> Accumulate the rates of some bodies, times a weight. Several threads may call it for different bodies.
-   pure subroutine accumulate_bodies(sums, weight, gravity, bodies, forces, slots)
+   pure subroutine accumulate_bodies(sums, weight, gravity, bodies, forces, first, last)
       !> Running sums; only those of these bodies change
       type(energy_balance_t), intent(inout) :: sums
       !> Factor of the rates: 1 for a step
@@ -158,15 +158,14 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Sums of the contact forces on each body
       type(force_sums_t), intent(in) :: forces
-      !> Slots of some free bodies
-      integer(ip), intent(in) :: slots(:)
-      integer(ip) :: k
+      !> First and last slot; only the free bodies of this rank count
+      integer(ip), intent(in) :: first, last
+      integer(ip) :: s
 
-      do k = 1_ip, size(slots, kind=ip)
-         associate (s => slots(k))
-            sums%torque(s) = sums%torque(s) + weight*torque_of(gravity, bodies, s)
-            call add_powers(bodies, forces, weight, s, sums%power_sum(:, s))
-         end associate
+      do s = first, last
+         if (bodies%fixed(s) .or. bodies%in_halo(s)) cycle
+         sums%torque(s) = sums%torque(s) + weight*torque_of(gravity, bodies, s)
+         call add_powers(bodies, forces, weight, s, sums%power_sum(:, s))
       end do
    end subroutine accumulate_bodies
 
@@ -318,7 +317,7 @@ contains
       now = sums
       energy = forces%value(sum_energy, :)
       if (sums%is_current) then
-         call accumulate_bodies(now, -0.5_wp, gravity, bodies, forces, bodies%free)
+         call accumulate_bodies(now, -0.5_wp, gravity, bodies, forces, 1_ip, bodies%n)
          call add_walls(bodies, walls, -0.5_wp, now%power_sum, now%wall_sum, energy)
       end if
       if (.not. walls%energy_is_quadratic) energy = 0.0_wp

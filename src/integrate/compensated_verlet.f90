@@ -45,18 +45,17 @@ contains
    end subroutine start
 
    !> Move to the end of the step and predict the velocities there.
-   subroutine predict(self, dt, slots, bodies)
+   subroutine predict(self, dt, first, last, bodies)
       class(compensated_verlet_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Slots of some free bodies
-      integer(ip), intent(in) :: slots(:)
+      !> First and last slot of a run of free bodies
+      integer(ip), intent(in) :: first, last
       !> Bodies; position, angle and velocities of these change
       type(bodies_t), intent(inout) :: bodies
-      integer(ip) :: k, s
+      integer(ip) :: s
 
-      do k = 1_ip, size(slots, kind=ip)
-         s = slots(k)
+      do s = first, last
          call move(dt, bodies%acceleration(1, s), bodies%position(1, s), bodies%velocity(1, s), self%half(1, s), &
                    self%lost_place(1, s), self%lost_speed(1, s))
          call move(dt, bodies%acceleration(2, s), bodies%position(2, s), bodies%velocity(2, s), self%half(2, s), &
@@ -67,20 +66,19 @@ contains
    end subroutine predict
 
    !> Final velocities and accelerations from the forces at the end of the step.
-   subroutine correct(self, dt, slots, bodies)
+   subroutine correct(self, dt, first, last, bodies)
       class(compensated_verlet_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Slots of some free bodies
-      integer(ip), intent(in) :: slots(:)
+      !> First and last slot of a run of free bodies
+      integer(ip), intent(in) :: first, last
       !> Bodies; velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
-      integer(ip) :: k, s
+      integer(ip) :: s
       real(wp) :: h
 
       h = 0.5_wp*dt
-      do k = 1_ip, size(slots, kind=ip)
-         s = slots(k)
+      do s = first, last
          bodies%acceleration(1, s) = bodies%force(1, s)*bodies%inverse_mass(s)
          bodies%acceleration(2, s) = bodies%force(2, s)*bodies%inverse_mass(s)
          bodies%angular_acceleration(s) = bodies%torque(s)*bodies%inverse_inertia(s)

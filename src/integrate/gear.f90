@@ -52,18 +52,17 @@ contains
    end subroutine start
 
    !> Predict by a Taylor expansion to the end of the step.
-   subroutine predict(self, dt, slots, bodies)
+   subroutine predict(self, dt, first, last, bodies)
       class(gear_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Slots of some free bodies
-      integer(ip), intent(in) :: slots(:)
+      !> First and last slot of a run of free bodies
+      integer(ip), intent(in) :: first, last
       !> Bodies; position, angle, velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
-      integer(ip) :: k, s
+      integer(ip) :: s
 
-      do k = 1_ip, size(slots, kind=ip)
-         s = slots(k)
+      do s = first, last
          call expand(dt, bodies%position(1, s), bodies%velocity(1, s), bodies%acceleration(1, s), self%higher(:, 1, s))
          call expand(dt, bodies%position(2, s), bodies%velocity(2, s), bodies%acceleration(2, s), self%higher(:, 2, s))
          call expand(dt, bodies%angle(s), bodies%angular_velocity(s), bodies%angular_acceleration(s), &
@@ -72,18 +71,17 @@ contains
    end subroutine predict
 
    !> Correct all derivatives by the difference between computed and predicted acceleration.
-   subroutine correct(self, dt, slots, bodies)
+   subroutine correct(self, dt, first, last, bodies)
       class(gear_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Slots of some free bodies
-      integer(ip), intent(in) :: slots(:)
+      !> First and last slot of a run of free bodies
+      integer(ip), intent(in) :: first, last
       !> Bodies; position, angle, velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
-      integer(ip) :: k, s
+      integer(ip) :: s
 
-      do k = 1_ip, size(slots, kind=ip)
-         s = slots(k)
+      do s = first, last
          call adjust(self%c0, dt, bodies%force(1, s)*bodies%inverse_mass(s), bodies%position(1, s), &
                      bodies%velocity(1, s), bodies%acceleration(1, s), self%higher(:, 1, s))
          call adjust(self%c0, dt, bodies%force(2, s)*bodies%inverse_mass(s), bodies%position(2, s), &

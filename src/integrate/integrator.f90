@@ -39,14 +39,14 @@ module polydem_integrator
          type(bodies_t), intent(in) :: bodies
       end subroutine start
 
-      !> Predict or correct some of the bodies. Several threads may call it for different bodies.
-      subroutine advance(self, dt, slots, bodies)
+      !> Predict or correct a run of bodies. Several threads may call it for different runs.
+      subroutine advance(self, dt, first, last, bodies)
          import :: bodies_t, integrator_t, ip, wp
          class(integrator_t), intent(inout) :: self
          !> Time step [s]
          real(wp), intent(in) :: dt
-         !> Slots of some free bodies
-         integer(ip), intent(in) :: slots(:)
+         !> First and last slot of a run of free bodies
+         integer(ip), intent(in) :: first, last
          !> Bodies; only these change
          type(bodies_t), intent(inout) :: bodies
       end subroutine advance

@@ -37,20 +37,19 @@ contains
    end subroutine start
 
    !> Move the bodies to the end of the step and predict the velocities there.
-   subroutine predict(self, dt, slots, bodies)
+   subroutine predict(self, dt, first, last, bodies)
       class(velocity_verlet_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Slots of some free bodies
-      integer(ip), intent(in) :: slots(:)
+      !> First and last slot of a run of free bodies
+      integer(ip), intent(in) :: first, last
       !> Bodies; position, angle and velocities of these change
       type(bodies_t), intent(inout) :: bodies
-      integer(ip) :: k, s
+      integer(ip) :: s
       real(wp) :: h, half(3)
 
       h = 0.5_wp*dt
-      do k = 1_ip, size(slots, kind=ip)
-         s = slots(k)
+      do s = first, last
          half(1) = bodies%velocity(1, s) + h*bodies%acceleration(1, s)
          half(2) = bodies%velocity(2, s) + h*bodies%acceleration(2, s)
          half(3) = bodies%angular_velocity(s) + h*bodies%angular_acceleration(s)
@@ -65,20 +64,19 @@ contains
    end subroutine predict
 
    !> Compute final velocities and accelerations from the forces at the end of the step.
-   subroutine correct(self, dt, slots, bodies)
+   subroutine correct(self, dt, first, last, bodies)
       class(velocity_verlet_t), intent(inout) :: self
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Slots of some free bodies
-      integer(ip), intent(in) :: slots(:)
+      !> First and last slot of a run of free bodies
+      integer(ip), intent(in) :: first, last
       !> Bodies; velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
-      integer(ip) :: k, s
+      integer(ip) :: s
       real(wp) :: h
 
       h = 0.5_wp*dt
-      do k = 1_ip, size(slots, kind=ip)
-         s = slots(k)
+      do s = first, last
          bodies%acceleration(1, s) = bodies%force(1, s)*bodies%inverse_mass(s)
          bodies%acceleration(2, s) = bodies%force(2, s)*bodies%inverse_mass(s)
          bodies%angular_acceleration(s) = bodies%torque(s)*bodies%inverse_inertia(s)

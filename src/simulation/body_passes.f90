@@ -22,21 +22,27 @@ contains
       type(simulation_t), intent(inout) :: self
       !> Names a body with an invalid pose
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: low, high, n
+      integer(ip) :: low, high, first, last, k
       logical :: good
 
-      n = size(self%bodies%free, kind=ip)
       good = .true.
-      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(self, n) private(low, high) &
-      !$omp    reduction(.and.:good)
-      do low = 1_ip, n, block_size
-         high = min(low + block_size - 1_ip, n)
-         call self%integrator%predict(self%dt, self%bodies%free(low:high), self%bodies)
-         good = good .and. have_valid_poses(self%bodies, self%bodies%free(low:high))
+      !$omp parallel do if (self%bodies%n > min_parallel_size) schedule(static) default(none) shared(self) &
+      !$omp    private(low, high, first, last) reduction(.and.:good)
+      do low = 1_ip, self%bodies%n, block_size
+         high = min(low + block_size - 1_ip, self%bodies%n)
+         last = low - 1_ip
+         do
+            call find_run(self%bodies, last + 1_ip, high, first, last)
+            if (first > high) exit
+            call self%integrator%predict(self%dt, first, last, self%bodies)
+            good = good .and. have_valid_poses(self%bodies, first, last)
+         end do
       end do
       !$omp end parallel do
       call move_walls(self, time_of(self))
-      good = good .and. have_valid_poses(self%bodies, moving_walls(self))
+      do k = size(self%bodies%free, kind=ip) + 1_ip, size(self%guard%moving, kind=ip)
+         good = good .and. have_valid_poses(self%bodies, self%guard%moving(k), self%guard%moving(k))
+      end do
       if (.not. good) call check_poses(self%guard, self%bodies, self%step, error)
    end subroutine predict_bodies
 
@@ -47,54 +53,50 @@ contains
       type(simulation_t), intent(inout) :: self
       !> Names a body that moves too far
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: low, high, n, slots(block_size)
+      integer(ip) :: low, high, first, last, k
       logical :: good
 
       good = .true.
       !$omp parallel do if (self%bodies%n > min_parallel_size) schedule(static) default(none) shared(self) &
-      !$omp    private(low, high, n, slots) reduction(.and.:good)
+      !$omp    private(low, high, first, last) reduction(.and.:good)
       do low = 1_ip, self%bodies%n, block_size
          high = min(low + block_size - 1_ip, self%bodies%n)
          call total_forces(self%settings%forces%gravity, self%force_sums, low, high, self%bodies)
-         call list_free(self%bodies, low, high, n, slots)
-         call self%integrator%correct(self%dt, slots(1:n), self%bodies)
+         last = low - 1_ip
+         do
+            call find_run(self%bodies, last + 1_ip, high, first, last)
+            if (first > high) exit
+            call self%integrator%correct(self%dt, first, last, self%bodies)
+            good = good .and. move_within_limit(self%guard, self%bodies, first, last, self%dt)
+         end do
          if (self%settings%output%energy_balance) &
             call accumulate_bodies(self%energy_balance, 1.0_wp, self%settings%forces%gravity, self%bodies, &
-                                   self%force_sums, slots(1:n))
-         good = good .and. move_within_limit(self%guard, self%bodies, slots(1:n), self%dt)
+                                   self%force_sums, low, high)
       end do
       !$omp end parallel do
       if (self%settings%output%energy_balance) call accumulate_walls(self%energy_balance, self%bodies, self%walls)
-      good = good .and. move_within_limit(self%guard, self%bodies, moving_walls(self), self%dt)
+      do k = size(self%bodies%free, kind=ip) + 1_ip, size(self%guard%moving, kind=ip)
+         good = good .and. move_within_limit(self%guard, self%bodies, self%guard%moving(k), self%guard%moving(k), &
+                                             self%dt)
+      end do
       if (.not. good) call check_motion(self%guard, self%bodies, self%step, self%dt, error)
    end subroutine complete_step
 
-   !> Slots of the bodies with prescribed motion
-   pure function moving_walls(self) result(slots)
-      type(simulation_t), intent(in) :: self
-      integer(ip), allocatable :: slots(:)
-
-      slots = self%guard%moving(size(self%bodies%free) + 1:)
-   end function moving_walls
-
-   !> List the free bodies of some slots.
-   pure subroutine list_free(bodies, low, high, n, slots)
+   !> Find the next run of free bodies that this rank moves.
+   pure subroutine find_run(bodies, low, high, first, last)
       type(bodies_t), intent(in) :: bodies
-      !> First and last slot
+      !> First and last slot to search
       integer(ip), intent(in) :: low, high
-      !> Number of free bodies that this rank moves
-      integer(ip), intent(out) :: n
-      !> Their slots
-      integer(ip), intent(out) :: slots(block_size)
-      integer(ip) :: s
+      !> First and last slot of the run; `first` is greater than `high` if there is none
+      integer(ip), intent(out) :: first, last
 
-      n = 0_ip
-      do s = low, high
-         if (bodies%fixed(s) .or. bodies%in_halo(s)) cycle
-         n = n + 1_ip
-         slots(n) = s
+      do first = low, high
+         if (.not. (bodies%fixed(first) .or. bodies%in_halo(first))) exit
       end do
-   end subroutine list_free
+      do last = first, high - 1_ip
+         if (bodies%fixed(last + 1_ip) .or. bodies%in_halo(last + 1_ip)) exit
+      end do
+   end subroutine find_run
 
    !> Move the bodies with prescribed motion to their poses at a given time.
    subroutine move_walls(self, time)

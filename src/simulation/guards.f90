@@ -56,17 +56,17 @@ contains
       end do
    end subroutine new_motion_guard
 
-   !> Whether all of some bodies have valid poses
-   pure logical function have_valid_poses(bodies, slots)
+   !> Whether all bodies of a run have valid poses
+   pure logical function have_valid_poses(bodies, first, last)
       !> Bodies in the middle of a step
       type(bodies_t), intent(in) :: bodies
-      !> Slots of the bodies
-      integer(ip), intent(in) :: slots(:)
-      integer(ip) :: k
+      !> First and last slot
+      integer(ip), intent(in) :: first, last
+      integer(ip) :: s
 
       have_valid_poses = .true.
-      do k = 1_ip, size(slots, kind=ip)
-         have_valid_poses = have_valid_poses .and. has_valid_pose(bodies, slots(k))
+      do s = first, last
+         have_valid_poses = have_valid_poses .and. has_valid_pose(bodies, s)
       end do
    end function have_valid_poses
 
@@ -104,21 +104,21 @@ contains
                        .and. abs(bodies%angle(s)) <= far
    end function has_valid_pose
 
-   !> Whether the states of all of some bodies are finite and none moves too far in a step
-   pure logical function move_within_limit(guard, bodies, slots, dt)
+   !> Whether the states of all bodies of a run are finite and none moves too far in a step
+   pure logical function move_within_limit(guard, bodies, first, last, dt)
       !> The guard
       type(motion_guard_t), intent(in) :: guard
       !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies
-      !> Slots of the bodies
-      integer(ip), intent(in) :: slots(:)
+      !> First and last slot
+      integer(ip), intent(in) :: first, last
       !> Time step [s]
       real(wp), intent(in) :: dt
-      integer(ip) :: k
+      integer(ip) :: s
 
       move_within_limit = .true.
-      do k = 1_ip, size(slots, kind=ip)
-         move_within_limit = move_within_limit .and. moves_within_limit(guard, bodies, slots(k), dt)
+      do s = first, last
+         move_within_limit = move_within_limit .and. moves_within_limit(guard, bodies, s, dt)
       end do
    end function move_within_limit
 
