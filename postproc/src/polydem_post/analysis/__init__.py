@@ -1,0 +1,31 @@
+"""Measures of granular matter: each function states its definition, its averaging volume and its source.
+
+Functions of one time take a `Frame`, those of several times a `Trajectory` or any sequence of frames. All lengths,
+forces and times are in SI units with unit depth. Only free bodies count unless a function says otherwise.
+"""
+
+from .fields import Fields, Kernel, coarse_grain, gaussian, lucy
+from .flow import FlowRate, flow_rate, mass_beyond
+from .fraction import solid_fraction
+from .mixing import lacey_index
+from .motion import Displacements, mean_squared_displacement
+from .network import (
+    Anisotropy,
+    Distribution,
+    anisotropy,
+    coordination_number,
+    fabric_tensor,
+    force_distribution,
+    rattlers,
+)
+from .profiles import Profile, profile
+from .stress import Stress, body_stress, stress_tensor
+from .surface import Surface, free_surface
+from .windows import Window, rectangle
+
+__all__ = [
+    "Anisotropy", "Displacements", "Distribution", "Fields", "FlowRate", "Kernel", "Profile", "Stress", "Surface",
+    "Window", "anisotropy", "body_stress", "coarse_grain", "coordination_number", "fabric_tensor", "flow_rate",
+    "force_distribution", "free_surface", "gaussian", "lacey_index", "lucy", "mass_beyond", "mean_squared_displacement",
+    "profile", "rattlers", "rectangle", "solid_fraction", "stress_tensor",
+]

@@ -1,0 +1,57 @@
+"""Motion of bodies over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..frames import Frame
+from ..polygons import FloatArray, IntArray
+from ..result_file import ResultError
+
+#: Differences of intervals that count as equal, relative to the interval
+EQUAL = 0.01
+
+
+@dataclass(frozen=True)
+class Displacements:
+    """Mean squared displacements over lags."""
+
+    #: Lag [s], (lags); the first is 0
+    lag: FloatArray
+    #: Mean squared displacement [m2], (lags)
+    square: FloatArray
+    #: Number of displacements behind each mean, (lags)
+    count: IntArray
+
+
+def mean_squared_displacement(frames: Iterable[Frame], chosen: Any = None, *, relative: bool = False) -> Displacements:
+    """Mean squared displacement <|r(t + lag) - r(t)|^2> over the free bodies and all times t of the frames.
+
+    `chosen` selects bodies by index or truth value instead. With `relative` the displacement of the mean position of
+    these bodies is subtracted. Frames must be equally spaced in time (within one per cent). Source: A. Einstein, Ann.
+    Phys. 322 (1905) 549; averaging over time origins as in M.P. Allen & D.J. Tildesley, Computer Simulation of Liquids
+    (2017), Sec. 8.5. All positions are in memory: 16 bytes per frame and body.
+    """
+    times, places = [], []
+    for frame in frames:
+        times.append(frame.time)
+        places.append(frame.position[frame.free if chosen is None else chosen])
+    if not places or len({place.shape for place in places}) != 1 or len(places[0]) == 0:
+        raise ResultError("the frames have no bodies to follow, or not the same ones")
+    interval = np.diff(times)
+    if len(times) > 1 and np.abs(interval - np.median(interval)).max() > EQUAL * np.median(interval):
+        raise ResultError("the frames are not equally spaced in time; choose some, as in run[:-1]")
+    position = np.array(places)
+    if relative:
+        position = position - position.mean(axis=1, keepdims=True)
+    square, count = [], []
+    for lag in range(len(times)):
+        moved = position[lag:] - position[: len(times) - lag]
+        square.append(float(np.mean(np.sum(moved**2, axis=2))))
+        count.append(moved.shape[0] * moved.shape[1])
+    step = float(np.mean(interval)) if len(times) > 1 else 0.0
+    return Displacements(np.linspace(0.0, step * (len(times) - 1), len(times)), np.array(square), np.array(count))

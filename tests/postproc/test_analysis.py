@@ -1,0 +1,409 @@
+"""Measures of granular matter on configurations with known answers."""
+
+import inspect
+
+import numpy as np
+import polydem_post.analysis as analysis
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from polydem_post import Frame, ResultError
+from polydem_post.analysis import (
+    anisotropy,
+    body_stress,
+    coarse_grain,
+    coordination_number,
+    fabric_tensor,
+    flow_rate,
+    force_distribution,
+    free_surface,
+    gaussian,
+    lacey_index,
+    lucy,
+    mass_beyond,
+    mean_squared_displacement,
+    profile,
+    rattlers,
+    rectangle,
+    solid_fraction,
+    stress_tensor,
+)
+
+SQUARE = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
+
+
+def squares(centres, **options):
+    """Unit squares."""
+    return Frame.from_polygons([SQUARE + np.array(centre) for centre in centres], **options)
+
+
+def turned(points, angle):
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.asarray(points) @ np.array([[cosine, sine], [-sine, cosine]])
+
+
+def star(directions, forces):
+    """A body in the middle with contacts in some directions, and the forces on it [N/m]."""
+    directions = np.asarray(directions)
+    frame = squares([(0, 0), *(3.0 * directions)])
+    n = len(directions)
+    return frame.with_contacts(np.ones(n, int), np.arange(2, n + 2), forces, 1.5 * directions)
+
+
+# --- solid fraction ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 4])
+def test_solid_fraction_of_clipped_squares(angle):
+    # A square of area 1 in a corner of the window: a quarter is inside; another is wholly inside.
+    frame = Frame.from_polygons([turned(SQUARE, angle), turned(SQUARE + np.array([2.0, 2.0]), angle)])
+    window = turned(rectangle(0.0, 0.0, 4.0, 5.0), angle)
+    assert solid_fraction(frame, window) == pytest.approx(1.25 / 20.0, rel=1e-12)
+
+
+def test_solid_fraction_of_a_tiling_is_one():
+    frame = squares([(x, y) for x in range(6) for y in range(6)])
+    assert solid_fraction(frame, (0.3, 0.1, 4.7, 5.2)) == pytest.approx(1.0, rel=1e-12)
+    triangle = np.array([(0.2, 0.1), (5.1, 0.7), (2.2, 4.9)])
+    assert solid_fraction(frame, triangle) == pytest.approx(1.0, rel=1e-12)
+
+
+def test_solid_fraction_counts_overlaps_twice_or_once():
+    frame = squares([(0, 0), (0.5, 0)], fixed=[True, False])
+    window = (-1, -1, 1.5, 1)
+    assert solid_fraction(frame, window) == pytest.approx(2.0 / 5.0)
+    assert solid_fraction(frame, window, fixed=False) == pytest.approx(1.0 / 5.0)
+    pytest.importorskip("shapely")
+    assert solid_fraction(frame, window, union=True) == pytest.approx(1.5 / 5.0)
+
+
+@pytest.mark.parametrize("window, message", [
+    ((1, 0, 0, 1), "least x, least y"), ([(0, 0), (2, 0), (1, 0.5), (1, 2)], "not convex"),
+    ([(0, 0), (1, 1)], "different vertices")])
+def test_bad_windows_are_errors(window, message):
+    with pytest.raises(ResultError, match=message):
+        solid_fraction(squares([(0, 0)]), window)
+
+
+# --- network -------------------------------------------------------------------------------------------------------
+
+
+def test_coordination_of_a_square_lattice():
+    # A lattice of 4 x 4: 24 contacts, each with two free bodies.
+    centres = [(x, y) for y in range(4) for x in range(4)]
+    pairs = [(k + 1, k + 2) for k in range(16) if k % 4 < 3] + [(k + 1, k + 5) for k in range(12)]
+    first, second = np.array(pairs).T
+    frame = squares(centres).with_contacts(first, second, np.zeros((24, 2)), np.zeros((24, 2)))
+    assert coordination_number(frame) == pytest.approx(2 * 24 / 16)
+    assert not rattlers(frame).any()
+    # Of three contacts per body at least only the inner bodies and those on the sides have enough, so all go in turn.
+    assert rattlers(frame, 3).sum() == 16
+    assert np.isnan(coordination_number(frame, with_rattlers=False, least=3))
+
+
+def test_coordination_counts_contacts_with_fixed_bodies_once():
+    # A triangle of bodies on a floor, a chain of two that hangs on it, and one alone.
+    frame = squares([(0, 0), (1, 0), (2, 0), (3, 0), (4, 0), (5, 0), (0, -1)], fixed=[False] * 6 + [True])
+    frame = frame.with_contacts([1, 2, 1, 3, 4, 1], [2, 3, 3, 4, 5, 7], np.zeros((6, 2)), np.zeros((6, 2)))
+    assert coordination_number(frame) == pytest.approx((2 * 5 + 1) / 6)
+    assert_array_equal(np.flatnonzero(rattlers(frame)), [3, 4, 5])
+    assert coordination_number(frame, with_rattlers=False) == pytest.approx((2 * 3 + 1) / 3)
+
+
+def test_distribution_of_forces_is_normalised():
+    angles = np.linspace(0, 2 * np.pi, 400, endpoint=False)
+    size = -np.log((np.arange(400) + 0.5) / 400)  # quantiles of an exponential distribution with mean 1
+    directions = np.column_stack([np.cos(angles), np.sin(angles)])
+    frame = star(directions, -7.0 * size[:, None] * directions)
+    found = force_distribution(frame, bins=np.linspace(0, 8, 17))
+    assert found.mean == pytest.approx(7.0 * size.mean()) and found.count == 400
+    assert np.sum(found.density * np.diff(found.edges)) == pytest.approx(1.0)
+    expected = (np.exp(-found.edges[:-1] * found.mean / 7.0) - np.exp(-found.edges[1:] * found.mean / 7.0))
+    assert_allclose(found.density * np.diff(found.edges), expected, atol=1.5 / 400)
+    assert found.centres[0] == 0.25
+    with pytest.raises(ResultError, match="has a tangential force"):
+        force_distribution(star([[1, 0]], [[-1.0, 0.0]]), "tangential")
+
+
+def test_fabric_of_four_contacts():
+    frame = star([(1, 0), (-1, 0), (1, 0), (0, 1)], [[-1, 0], [1, 0], [-1, 0], [0, -1]])
+    assert_allclose(fabric_tensor(frame), [[0.75, 0], [0, 0.25]], atol=1e-15)
+    assert_allclose(fabric_tensor(frame, [0, 3]), [[0.5, 0], [0, 0.5]], atol=1e-15)
+    found = anisotropy(frame)
+    assert_allclose([found.contacts, found.normal, found.tangential, found.angle], [1.0, 0.0, 0.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize("a_n, a_t, phase", [(0.0, 0.0, 0.0), (0.6, 0.0, 0.4), (0.5, 0.3, -0.7), (0.0, 0.4, 1.2)])
+def test_anisotropies_of_forces_given_by_their_fourier_series(a_n, a_t, phase):
+    # Equally spaced directions (a_c = 0) with f_n = 1 + a_n cos 2(theta - phase), f_t = -a_t sin 2(theta - phase).
+    angles = 2 * np.pi * np.arange(64) / 64
+    normal = np.column_stack([np.cos(angles), np.sin(angles)])
+    tangent = np.column_stack([-np.sin(angles), np.cos(angles)])
+    pushed = (1 + a_n * np.cos(2 * (angles - phase)))[:, None] * normal
+    pushed -= (a_t * np.sin(2 * (angles - phase)))[:, None] * tangent
+    found = anisotropy(star(normal, -10.0 * pushed))
+    assert_allclose([found.contacts, found.normal, found.tangential], [0.0, a_n, a_t], atol=1e-12)
+
+
+def test_the_anisotropy_of_contacts_given_by_its_fourier_series():
+    angle = np.linspace(0, 2 * np.pi, 40001)
+    share = (angle + 0.5 * 0.6 * np.sin(2 * (angle - 0.3)) + 0.3 * np.sin(0.6)) / (2 * np.pi)
+    angles = np.interp((np.arange(500) + 0.5) / 500, share, angle)
+    normal = np.column_stack([np.cos(angles), np.sin(angles)])
+    found = anisotropy(star(normal, -normal))
+    assert found.contacts == pytest.approx(0.6, abs=1e-3)
+    assert found.angle == pytest.approx(0.3, abs=1e-3)
+    assert (found.normal, found.tangential) == pytest.approx((0.0, 0.0), abs=1e-12)
+
+
+# --- stress --------------------------------------------------------------------------------------------------------
+
+
+def chain(force=6.0, n=8):
+    """Unit squares side by side under a force along x."""
+    k = np.arange(n - 1)
+    return squares([(x, 0) for x in range(n)]).with_contacts(
+        k + 1, k + 2, np.tile([-force, 0.0], (n - 1, 1)), np.column_stack([k + 0.5, 0 * k]))
+
+
+@pytest.mark.parametrize("window", [(0.0, -0.5, 7.0, 0.5), (1.3, -0.5, 5.9, 0.5), (2.2, -0.5, 2.7, 0.5)])
+def test_stress_of_a_chain_is_force_over_height(window):
+    stress = stress_tensor(chain(), window)
+    assert_allclose(stress.contact, [[6.0, 0], [0, 0]], atol=1e-12)
+    assert_allclose(stress.kinetic, 0.0)
+    assert (stress.pressure, stress.deviator, stress.angle) == pytest.approx((3.0, 3.0, 0.0))
+
+
+def test_stress_is_a_tensor():
+    frame = star([(1, 0), (0, 1), (-1, 0), (0, -1)], [[-5, 1], [1, -2], [5, -1], [-1, 2]])
+    turn = 0.4
+    rotation = turned(np.eye(2), turn).T
+    window = rectangle(-3, -3, 3, 3)
+    other = Frame.from_polygons([turned(outline, turn) for outline in frame.vertices]).with_contacts(
+        frame.contacts.first, frame.contacts.second, turned(frame.contacts.force, turn),
+        turned(frame.contacts.point, turn))
+    straight, rotated = stress_tensor(frame, window), stress_tensor(other, turned(window, turn))
+    assert_allclose(rotated.total, rotation @ straight.total @ rotation.T, atol=1e-12)
+    assert rotated.angle == pytest.approx(straight.angle + turn)
+
+
+def test_kinetic_stress_of_opposite_velocities():
+    velocity = [(3.0, 0.0), (-1.0, 0.0), (1.0, 2.0), (1.0, -2.0)]
+    frame = squares([(0, 0), (2, 0), (0, 2), (2, 2)], velocity=velocity, density=10.0).with_contacts([], [], [], [])
+    stress = stress_tensor(frame, (-1, -1, 4, 4))
+    assert_allclose(stress.kinetic, [[10 * 8 / 25, 0], [0, 10 * 8 / 25]])
+    assert_allclose(stress.contact, 0.0)
+
+
+def test_stress_of_a_column_at_rest_is_the_weight_above(heap_column):
+    frame, width, weight = heap_column
+    # From the middle of block 3 to that of block 8 the interfaces carry 7, 6, 5, 4, 3 blocks (of ten, from below).
+    middle = [frame.position[k, 1] for k in (2, 7)]
+    x = frame.position[2, 0]
+    stress = stress_tensor(frame, (x - 0.5 * width, middle[0], x + 0.5 * width, middle[1]))
+    mean = np.average([7, 6, 5, 4, 3], weights=np.diff(frame.position[2:8, 1]))
+    assert stress.contact[1, 1] == pytest.approx(weight * mean / width, rel=1e-9)
+    assert abs(stress.contact[0, 0]) < 1e-6 * stress.contact[1, 1]
+    own = body_stress(frame)[4]  # the fifth block carries five blocks, and rests with six on the fourth
+    assert own[1, 1] * frame.area[4] == pytest.approx(0.5 * width * weight * (5 + 6), rel=1e-4)
+
+
+@pytest.fixture(scope="module")
+def heap_column(tmp_path_factory):
+    """Ten blocks on each other at rest: frame, width of a block and its weight."""
+    import os
+    import subprocess
+
+    from polydem_post import Trajectory
+
+    folder = tmp_path_factory.mktemp("stack")
+    (folder / "stack.nml").write_text("&scene\n name = 'stack'\n bodies = 10\n width = 0.01\n height = 0.01\n/\n"
+                                      "&integrate\n duration = 0.01\n/\n&output\n contacts = .true.\n/\n")
+    subprocess.run([os.environ["POLYDEM_PROGRAM"], "run", "stack.nml"], cwd=folder, check=True, capture_output=True)
+    run = Trajectory(folder / "results" / "stack")
+    return run[-1], 0.01, run[-1].mass[0] * -run.settings.forces.gravity[1]
+
+
+def test_stress_inside_a_pressed_body():
+    # Pressed by 4 N/m along x and 2 N/m along y: the mean stress is force over the length of a side.
+    frame = star([(1, 0), (-1, 0), (0, 1), (0, -1)], [[-4, 0], [4, 0], [0, -2], [0, 2]])
+    frame = squares([(0, 0), (1, 0), (-1, 0), (0, 1), (0, -1)]).with_contacts(
+        [1, 1, 1, 1], [2, 3, 4, 5], frame.contacts.force, [[0.5, 0], [-0.5, 0], [0, 0.5], [0, -0.5]])
+    assert_allclose(body_stress(frame)[0], [[4, 0], [0, 2]], atol=1e-12)
+
+
+# --- fields --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kernel", [lucy(1.3), gaussian(0.6)], ids=lambda kernel: kernel.name)
+def test_kernels_have_the_integral_one(kernel):
+    r = (np.arange(200000) + 0.5) * kernel.range / 200000
+    assert np.sum(kernel.value(r) * 2 * np.pi * r) * kernel.range / 200000 == pytest.approx(1.0, rel=1e-8)
+    assert kernel.value(np.array([1.0001 * kernel.range])) == 0.0
+
+
+@pytest.mark.parametrize("kernel", [lucy(1.3), gaussian(0.4)], ids=lambda kernel: kernel.name)
+def test_coarse_graining_conserves_mass_momentum_and_stress(kernel):
+    random = np.random.default_rng(5)
+    frame = squares(random.uniform(0, 9, (12, 2)), velocity=random.normal(0, 1, (12, 2)))
+    force = random.normal(0, 1, (6, 2))
+    frame = frame.with_contacts(np.arange(1, 7), np.arange(7, 13), force, np.zeros((6, 2)))
+    fields = coarse_grain(frame, kernel, 0.21)
+    assert fields.density.sum() * fields.cell == pytest.approx(frame.mass.sum(), rel=1e-12)
+    assert_allclose(fields.momentum.sum(axis=(0, 1)) * fields.cell, frame.mass @ frame.velocity, rtol=1e-10)
+    whole = np.einsum("ci,cj->ij", force, frame.contacts.branch)
+    assert_allclose(fields.contact_stress.sum(axis=(0, 1)) * fields.cell, whole, rtol=1e-10)
+    # Kinetic energy is divided between the mean flow and the fluctuations.
+    mean = np.nansum(0.5 * fields.density * np.sum(fields.velocity**2, axis=2)) * fields.cell
+    inner = 0.5 * np.trace(fields.kinetic_stress, axis1=2, axis2=3).sum() * fields.cell
+    assert mean + inner == pytest.approx(0.5 * frame.mass @ np.sum(frame.velocity**2, axis=1), rel=1e-10)
+    assert inner > 0.0
+
+
+def test_the_field_of_one_body_is_the_kernel():
+    frame = squares([(0.03, -0.02)], velocity=[(2.0, 1.0)], density=3.0).with_contacts([], [], [], [])
+    kernel = lucy(2.0)
+    fields = coarse_grain(frame, kernel, 0.05)
+    away = np.hypot(fields.x[None, :] - 0.03, fields.y[:, None] + 0.02)
+    assert_allclose(fields.density, 3.0 * kernel.value(away), atol=2e-3 * 3.0 * kernel.value(np.zeros(1))[0])
+    inside = fields.density > 1e-6
+    assert_allclose(fields.velocity[inside], np.broadcast_to([2.0, 1.0], fields.velocity[inside].shape))
+    assert_allclose(fields.kinetic_stress, 0.0, atol=1e-12)
+
+
+def test_the_fields_of_a_tiling_are_uniform():
+    centres = [(x, y) for x in range(16) for y in range(16)]
+    velocity = [(0.5 * y, 0.0) for x, y in centres]
+    frame = squares(centres, density=7.0, velocity=velocity).with_contacts([], [], [], [])
+    fields = coarse_grain(frame, lucy(4.0), 0.25, window=(6, 6, 10, 10))
+    assert fields.density.shape == (16, 16)
+    assert_allclose(fields.density, 7.0, rtol=2e-3)
+    assert_allclose(fields.velocity[..., 0], np.broadcast_to(0.5 * fields.y[:, None], (16, 16)), rtol=5e-3)
+
+
+def test_the_contact_field_of_a_chain_is_its_force_per_height():
+    # In the middle of a long chain the stress integrated across it is the force, whatever the kernel.
+    for kernel in (lucy(1.1), gaussian(0.5)):
+        fields = coarse_grain(chain(n=12), kernel, 0.1)
+        column = np.argmin(np.abs(fields.x - 5.5))
+        assert fields.contact_stress[:, column, 0, 0].sum() * 0.1 == pytest.approx(6.0, rel=1e-2)
+        assert_allclose(fields.contact_stress[..., 1, :], 0.0, atol=1e-12)
+
+
+def test_fields_without_contacts():
+    frame = squares([(0, 0)])
+    assert np.isnan(coarse_grain(frame, lucy(1.0), 0.2, contacts=False).contact_stress).all()
+    with pytest.raises(ResultError, match="made without contacts"):
+        coarse_grain(frame, lucy(1.0), 0.2)
+    with pytest.raises(ResultError, match="at most the range of the kernel"):
+        coarse_grain(frame, lucy(1.0), 2.0, contacts=False)
+
+
+# --- surface, profiles, flow, mixing, motion -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degrees", [-32.0, 0.0, 24.5])
+def test_the_angle_of_a_tilted_surface(degrees):
+    slope = np.tan(np.radians(degrees))
+    slabs = [np.array([(x, -9), (x + 1, -9), (x + 1, slope * (x + 1)), (x, slope * x)]) for x in range(-5, 5)]
+    wall = np.array([(-9, -9), (-7, -9), (-7, 30), (-9, 30)])
+    high_wall = np.array([(-1, 20), (1, 20), (1, 21), (-1, 21)])
+    frame = Frame.from_polygons([*slabs, wall, high_wall], fixed=[False] * 10 + [True, True])
+    surface = free_surface(frame, -4.5, 4.2, 37)
+    assert surface.angle == pytest.approx(degrees, abs=1e-9)
+    assert surface.deviation < 1e-12
+    assert_allclose(surface.points[:, 1], slope * surface.points[:, 0], atol=1e-12)
+
+
+def test_the_surface_of_steps_is_their_mean_slope():
+    frame = squares([(x, 0.5 * x) for x in range(41)])
+    surface = free_surface(frame, -0.5, 40.5, 41 * 7)
+    assert np.tan(np.radians(surface.angle)) == pytest.approx(0.5, rel=1e-3)
+    with pytest.raises(ResultError, match="no free bodies between"):
+        free_surface(frame, 60, 70)
+
+
+def test_the_profile_of_a_shear_flow():
+    strips = [np.array([(0, 0.1 * k), (3, 0.1 * k), (3, 0.1 * k + 0.1), (0, 0.1 * k + 0.1)]) for k in range(40)]
+    heights = 0.1 * np.arange(40) + 0.05
+    frame = Frame.from_polygons(strips, velocity=np.column_stack([2.0 * heights, 0 * heights]), density=5.0)
+    found = profile(frame, "velocity", [0.0, 1.0, 1.55, 4.0])
+    # The middle strip of the second edge is halved: exact means follow from areas.
+    expected = [2.0 * heights[:10].mean(), (2 * (heights[10:15].sum() + 0.5 * heights[15])) / 5.5,
+                (2 * (heights[16:].sum() + 0.5 * heights[15])) / 24.5]
+    assert_allclose(found.mean[:, 0], expected, rtol=1e-12)
+    assert_allclose(found.weight, 3.0 * np.array([1.0, 0.55, 2.45]), rtol=1e-12)
+    assert_allclose(found.centres, [0.5, 1.275, 2.775])
+    mass = profile(frame, heights, [0.0, 2.0, 4.0], weight="mass", between=(1.0, 2.0))
+    assert_allclose(mass.weight, [10.0, 10.0], rtol=1e-12)
+    along = profile(frame, "velocity", [-1.0, 0.0, 1.5], axis="x")
+    assert np.isnan(along.mean[0]).all() and along.weight[0] == 0.0
+    assert along.mean[1, 0] == pytest.approx(4.0)
+
+
+def falling(n_frames=5):
+    """Squares that fall at 1 m/s in two columns, x = 0 and x = 5, one frame per second; a fixed one falls, too."""
+    places = np.array([(0, y) for y in range(6)] + [(5, y) for y in range(3)] + [(0.2, 2.5)], dtype=float)
+    held = [False] * 9 + [True]
+    return [squares(places - np.array([0.0, 1.0 * k]), fixed=held, density=2.0, time=1.0 * k) for k in range(n_frames)]
+
+
+def test_flow_through_a_line():
+    flow = flow_rate(falling(), (-1, -0.5), (1, -0.5))
+    assert_array_equal(flow.bodies, [1, 1, 1, 1])
+    assert_allclose(flow.rate, 2.0)
+    assert flow.mean == pytest.approx(2.0)
+    assert_array_equal(flow_rate(falling(), (1, -0.5), (-1, -0.5)).bodies, [-1, -1, -1, -1])
+    assert_array_equal(flow_rate(falling(), (-1, -0.5), (9, -0.5)).bodies, [2, 2, 2, 1])
+    # What passes is what is beyond the line afterwards.
+    frames = falling()
+    beyond = [mass_beyond(frame, (0, -0.5), (0, -1)) for frame in frames]
+    assert_allclose(np.diff(beyond), flow_rate(frames, (-1, -0.5), (9, -0.5)).mass)
+    assert mass_beyond(frames[0], (0, 0.2), (0, -1)) == pytest.approx(2 * 2 * 0.7)
+
+
+def test_mixing_of_separate_and_of_mixed_kinds():
+    places = np.array([(x + 0.5, y + 0.5) for y in range(16) for x in range(16)])
+    frame = squares(places)
+    halves = places[:, 0] < 8
+    assert lacey_index(frame, halves, 4.0) == pytest.approx(0.0, abs=1e-12)
+    board = (places.sum(axis=1) % 2) < 1
+    # Every cell has the mean share: the variance vanishes, below that of a random mixture.
+    assert lacey_index(frame, board, 4.0) == pytest.approx(1.0 / (1.0 - 16 / 256))
+    random = np.random.default_rng(1)
+    mixed = [lacey_index(frame, random.permutation(halves), 4.0) for _ in range(400)]
+    assert np.mean(mixed) == pytest.approx(1.0, abs=0.01)
+    with pytest.raises(ResultError, match="both kinds"):
+        lacey_index(frame, np.ones(256, bool), 4.0)
+    with pytest.raises(ResultError, match="choose larger cells"):
+        lacey_index(frame, halves, 0.5)
+
+
+def test_mean_squared_displacement_of_flight_and_of_oscillation():
+    frames = [squares([(3.0 * t, 4.0 * t), (5.0, 0.0)], fixed=[False, True], time=t) for t in 0.5 * np.arange(6)]
+    found = mean_squared_displacement(frames)
+    assert_allclose(found.lag, 0.5 * np.arange(6))
+    assert_allclose(found.square, (5.0 * found.lag) ** 2, atol=1e-24)
+    assert_array_equal(found.count, [6, 5, 4, 3, 2, 1])
+    assert_allclose(mean_squared_displacement(frames, [0], relative=True).square, 0.0, atol=1e-24)
+    # One period of x = cos t: <(x(t + lag) - x(t))^2> over all t of whole periods is 1 - cos(lag) ... but for the ends.
+    n = 24
+    times = 2 * np.pi * np.arange(3 * n) / n
+    swing = mean_squared_displacement([squares([(np.cos(t), 0.0)], time=t) for t in times])
+    assert_allclose(swing.square[n], 0.0, atol=1e-24)
+    assert swing.square[n // 2] == pytest.approx(4 * np.mean(np.cos(times[: 3 * n - n // 2]) ** 2))
+    with pytest.raises(ResultError, match="not equally spaced"):
+        mean_squared_displacement([*frames, squares([(0, 0), (1, 0)], fixed=[False, True], time=2.6)])
+
+
+# --- documentation -------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", [name for name in analysis.__all__ if name != "Window"])
+def test_every_measure_says_what_it_is(name):
+    entry = getattr(analysis, name)
+    text = inspect.getdoc(entry)
+    assert text and not text.startswith(f"{name}(")
+    if name in ("solid_fraction", "fabric_tensor", "anisotropy", "stress_tensor", "body_stress", "coarse_grain", "lucy",
+                "free_surface", "flow_rate", "lacey_index", "mean_squared_displacement", "force_distribution",
+                "rattlers"):
+        assert any(f"({year})" in text for year in range(1900, 2027)) or "1927" in text, "no source"
