@@ -151,7 +151,7 @@ contains
       only_files = .false.
       k = 1
       do while (k <= size(arguments))
-         if (only_files .or. arguments(k)(1:min(1, len(arguments))) /= '-') then
+         if (only_files .or. arguments(k) (1:min(1, len(arguments))) /= '-') then
             call take_word(trim(arguments(k)), command, error)
             k = k + 1
          else if (arguments(k) == '--') then
@@ -207,7 +207,7 @@ contains
       integer :: equals
 
       equals = index(arguments(k)//'=', '=')
-      name = trim(arguments(k)(:equals - 1))
+      name = trim(arguments(k) (:equals - 1))
       if (name == '-h') name = '--help'
       which = option_at(name)
       if (which == 0) then
@@ -221,7 +221,7 @@ contains
             k = k + 1
             if (k <= size(arguments)) value = trim(arguments(k))
          else
-            value = trim(arguments(k)(equals + 1:))
+            value = trim(arguments(k) (equals + 1:))
          end if
          if (value == '') call raise(error, input_error, name//' needs a value: '//name//' '// &
             trim(options(which)%value))

@@ -85,11 +85,11 @@ contains
       type(packed_history_t), intent(inout) :: packed
       integer(lp), allocatable :: sent(:, :), received(:, :)
       real(wp), allocatable :: value_received(:, :)
-      integer(ip), allocatable :: pair(:), rank(:), counts(:), counts_received(:), order(:)
+      integer(ip), allocatable :: pair(:), to_rank(:), counts(:), counts_received(:), order(:)
       integer(ip) :: p, k, m, n, slots(2), to(2)
 
       n = size(packed%key, kind=ip)
-      allocate (pair(2_ip*n), rank(2_ip*n))
+      allocate (pair(2_ip*n), to_rank(2_ip*n))
       m = 0_ip
       do p = 1_ip, n
          slots = slots_of_pair(id, packed%key(p))
@@ -102,10 +102,10 @@ contains
             if (to(k) < 0_ip) cycle
             m = m + 1_ip
             pair(m) = p
-            rank(m) = to(k)
+            to_rank(m) = to(k)
          end do
       end do
-      call sort_by_rank(rank(:m), comm%size, counts, order)
+      call sort_by_rank(to_rank(:m), comm%size, counts, order)
       order = pair(order)
       allocate (sent(2, m))
       sent(1, :) = packed%key(order)

@@ -149,24 +149,24 @@ contains
       integer(ip), allocatable, intent(out) :: slots(:)
       !> Number of bodies for each rank
       integer(ip), allocatable, intent(out) :: counts(:)
-      integer(ip), allocatable :: rank(:), longer(:), order(:)
+      integer(ip), allocatable :: to_rank(:), longer(:), order(:)
       integer(ip) :: needing(comm%size), k, m, n
 
-      allocate (slots(64), rank(64))
+      allocate (slots(64), to_rank(64))
       n = 0_ip
       do k = 1_ip, size(boxes, 2, kind=ip)
          call domain%rank_bounds%needed_by(boxes(:, k), needing, m)
          if (n + m > size(slots)) then
             longer = [slots, spread(0_ip, 1, n + m)]
             call move_alloc(longer, slots)
-            longer = [rank, spread(0_ip, 1, n + m)]
-            call move_alloc(longer, rank)
+            longer = [to_rank, spread(0_ip, 1, n + m)]
+            call move_alloc(longer, to_rank)
          end if
          slots(n + 1_ip:n + m) = bodies%free(k)
-         rank(n + 1_ip:n + m) = needing(:m)
+         to_rank(n + 1_ip:n + m) = needing(:m)
          n = n + m
       end do
-      call sort_by_rank(rank(:n), comm%size, counts, order)
+      call sort_by_rank(to_rank(:n), comm%size, counts, order)
       slots = slots(order)
    end subroutine list_needed
 

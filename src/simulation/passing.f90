@@ -57,7 +57,6 @@ contains
       if (guard%least_depth < huge(1.0_wp)) guard%thickness = thickness_of_bodies(bodies)
    end subroutine new_contact_guard
 
-
    !> Test the contacts of a block, and store their directions.
    subroutine test_block(guard, bodies, block, history, suspect, passing_pair)
       !> The guard

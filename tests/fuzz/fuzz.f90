@@ -86,7 +86,7 @@ contains
       if (words(1) == 'checkpoint') checkpoint = sound_checkpoint()
       n = index(words(1), '_bytes')
       if (n > 0) then
-         call write_sound_file(words(1)(:n - 1), 'sound.h5', random)
+         call write_sound_file(words(1) (:n - 1), 'sound.h5', random)
          call read_text_file('sound.h5', bytes, error)
       end if
       do n = 1, size(namelists)

@@ -102,7 +102,7 @@ contains
       bodies%id = 10_ip*bodies%global_index
       bodies%in_halo = pack(in_halo, here)
       bodies%fixed = [(any(bodies%global_index(s) == fixed_bodies), s=1_ip, bodies%n)]
-      bodies%free = pack([(s, s=1_ip, bodies%n)], .not. bodies%fixed .and. .not. bodies%in_halo)
+      bodies%free = pack([(s, s=1_ip, bodies%n)], mask=.not. (bodies%fixed .or. bodies%in_halo))
       bodies%mass = merge(0.0_wp, 1.0_wp + real(bodies%global_index, wp)/7.0_wp, bodies%fixed)
       bodies%inertia = bodies%mass/3.0_wp
       bodies%angle = some_number(step, bodies%global_index, 1_ip)
