@@ -47,7 +47,7 @@ def check_statements(source, room):
         if os.path.basename(source.path) != "elementary_quadruple.f90":
             for name in INTRINSIC.findall(statement.code):
                 yield statement.line, (f"{name}: the bits of this intrinsic depend on the machine; "
-                                       "see base/elementary_own.f90")
+                                       "see arithmetic/elementary_own.f90")
         if REAL_POWER.search(statement.code):
             yield statement.line, "the bits of a power with a real exponent depend on the machine"
         for message in [*of_any(statement, room), *of_declaration(statement), *of_directive(statement)]:
