@@ -1,7 +1,8 @@
 !> 64-bit hashes of a set of pairs (independent of their order) and of a sequence of integers.
 !>
 !> Arithmetic is modulo 2^64 on signed integers. This file is compiled with -fwrapv, which makes it so: without it, the
-!> compiler may assume that no sum or product overflows. The mixing function is the 64-bit finaliser of MurmurHash3 (A. Appleby, public domain).
+!> compiler may assume that no sum or product overflows. The mixing function is the 64-bit finaliser of MurmurHash3
+!> (A. Appleby, public domain).
 module polydem_hash
    use polydem_kinds, only: ip, lp
    implicit none
