@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, replace
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import Collection, LineCollection, PolyCollection
+from matplotlib.collections import PathCollection
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.lines import Line2D
+from matplotlib.path import Path
 
 from .quantities import QUANTITIES, Quantity, range_of, stress
 from .result_file import ResultError
-from .snapshot import Snapshot, has_contacts, read_snapshot
+from .snapshot import Snapshot, has_contacts, read_snapshot, read_snapshots
 from .trajectory import Trajectory
 from .tree_cells import CellGrid, cell_grid, tree_cells
 
@@ -37,6 +38,9 @@ WIDEST_FORCE = 0.45
 
 #: Share of the forces and stresses that the scale of widths and lengths covers: those of a few impacts are greater
 COVERED_FORCES = 99.0
+
+#: Widths of lines that are told apart
+WIDTHS = 32
 
 #: Width of outlines as a share of the median diameter of the free bodies, and least and greatest width [pt]
 OUTLINE, OUTLINES = 0.05, (0.05, 0.8)
@@ -150,42 +154,48 @@ def settle(trajectory: Trajectory, numbers: list[int], look: Look) -> Look:
         raise ResultError(f"{trajectory.folder}: holds no contacts, which {named[0]} needs; run with "
                           "output.contacts = .true.")
     extent = _Extent()
-    for number in numbers:
-        extent.add(read_snapshot(trajectory, number, look.needs_contacts), look)
+    for snapshot in read_snapshots(trajectory, numbers, look.needs_contacts):
+        extent.add(snapshot, look)
     if "cells" in look.show:
         look = replace(look, grid=cell_grid(read_snapshot(trajectory, 0, False)))
     return extent.settle(look)
 
 
-def draw_bodies(axis: Axes, snapshot: Snapshot, look: Look) -> tuple[PolyCollection, PolyCollection]:
+class Bodies:
+    """Some bodies in axes. Their outlines are views of one array, so moving them costs little."""
+
+    def __init__(self, axis: Axes, snapshot: Snapshot, rows: np.ndarray, **style):
+        start = snapshot.frame.vertex_start
+        self.rows = np.flatnonzero(rows)
+        count = np.diff(start)[self.rows]
+        ends = np.cumsum(count + 1)
+        begins = ends - count - 1
+        # Each outline and one row more, in which a closed path needs a point.
+        self._chosen = np.repeat(start[self.rows] - begins, count + 1) + np.arange(ends[-1] if len(ends) else 0)
+        self._chosen[ends - 1] = start[self.rows]
+        self._vertices = snapshot.corners[self._chosen]
+        paths = [Path(self._vertices[a:b], closed=True) for a, b in zip(begins, ends)]
+        self.artist = PathCollection(paths, **style)
+        axis.add_collection(self.artist, autolim=False)
+
+    def move(self, snapshot: Snapshot, look: Look) -> None:
+        """Move them to where they are in another frame."""
+        self._vertices[:] = snapshot.corners[self._chosen]
+        if self.artist.get_array() is not None:
+            self.artist.set_array(look.quantity.values(snapshot)[self.rows])
+
+
+def draw_bodies(axis: Axes, snapshot: Snapshot, look: Look) -> tuple[Bodies, Bodies]:
     """Draw the fixed and the free bodies."""
-    fixed, free = snapshot.frame.fixed, ~snapshot.frame.fixed
-    walls = PolyCollection(_chosen(snapshot, fixed), facecolor=WALL_COLOUR, edgecolor="none", zorder=1)
-    grains = PolyCollection(_chosen(snapshot, free), edgecolor="black", linewidth=0.2, zorder=2)
+    fixed = snapshot.frame.fixed
+    walls = Bodies(axis, snapshot, fixed, facecolor=WALL_COLOUR, edgecolor="none", zorder=1)
+    grains = Bodies(axis, snapshot, ~fixed, facecolor=PLAIN_COLOUR, edgecolor="black", linewidth=0.2, zorder=2)
     if look.quantity:
-        grains.set(array=look.quantity.values(snapshot)[free], cmap=look.colour_map, norm=look.norm)
-    else:
-        grains.set_facecolor(PLAIN_COLOUR)
-    axis.add_collection(walls, autolim=False)
-    axis.add_collection(grains, autolim=False)
+        grains.artist.set(array=look.quantity.values(snapshot)[grains.rows], cmap=look.colour_map, norm=look.norm)
     return walls, grains
 
 
-def move_bodies(walls: PolyCollection, grains: PolyCollection, snapshot: Snapshot, look: Look) -> None:
-    """Move drawn bodies to where they are in another frame."""
-    fixed, free = snapshot.frame.fixed, ~snapshot.frame.fixed
-    walls.set_verts(_chosen(snapshot, fixed))
-    grains.set_verts(_chosen(snapshot, free))
-    if look.quantity:
-        grains.set_array(look.quantity.values(snapshot)[free])
-
-
-def _chosen(snapshot: Snapshot, rows: np.ndarray) -> list[np.ndarray]:
-    outlines = snapshot.outlines
-    return [outlines[k] for k in np.flatnonzero(rows)]
-
-
-def overlays(axis: Axes, snapshot: Snapshot, look: Look) -> list[Collection]:
+def overlays(axis: Axes, snapshot: Snapshot, look: Look) -> list[PathCollection]:
     """Draw what is laid over the bodies. Widths are in units of the axes, which must have their final size."""
     makers = {"cells": _cells, "boxes": _boxes, "stress": _stresses, "forces": _forces, "contacts": _contacts}
     drawn = [artist for name, make in makers.items() if name in look.show
@@ -202,9 +212,9 @@ def points_per_metre(axis: Axes) -> float:
     return float(inverse[1, 0] - inverse[0, 0]) * 72.0 / axis.figure.dpi
 
 
-def fit_outlines(grains: PolyCollection, snapshot: Snapshot, scale: float) -> None:
+def fit_outlines(grains: Bodies, snapshot: Snapshot, scale: float) -> None:
     """Give the outlines of bodies a width that suits the size in which they are drawn."""
-    grains.set_linewidth(float(np.clip(OUTLINE * _typical_size(snapshot) * scale, *OUTLINES)))
+    grains.artist.set_linewidth(float(np.clip(OUTLINE * _typical_size(snapshot) * scale, *OUTLINES)))
 
 
 def force_width(snapshot: Snapshot, scale: float) -> float:
@@ -218,7 +228,7 @@ def _typical_size(snapshot: Snapshot) -> float:
     return float(np.sqrt(4.0 * np.median(snapshot.area[free]) / np.pi)) if free.any() else 0.0
 
 
-def _forces(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
+def _forces(snapshot: Snapshot, look: Look, scale: float) -> list[PathCollection]:
     """Each contact as lines from the two centres to its point, as wide as its force is large."""
     contacts, frame = snapshot.known_contacts(), snapshot.frame
     if not look.greatest_force or not len(contacts.first):
@@ -227,35 +237,48 @@ def _forces(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
     ends = [np.where(frame.fixed[rows][:, None], contacts.point, frame.position[rows])
             for rows in (contacts.first, contacts.second)]
     widths = np.minimum(contacts.magnitude / look.greatest_force, 1.0) * force_width(snapshot, scale)
-    seen = widths > 0.02
-    lines = np.stack([ends[0], contacts.point, ends[1]], axis=1)[seen]
-    return [LineCollection(lines, linewidths=widths[seen], colors=FORCE_COLOUR, capstyle="round")]
+    lines = np.stack([ends[0], contacts.point, ends[1]], axis=1)
+    # Lines of about the same width are one path, which is drawn much faster.
+    steps = np.ceil(np.clip(widths / widths.max(initial=1e-9), 0.0, 1.0) * WIDTHS).astype(int)
+    used = [step for step in range(1, WIDTHS + 1) if (steps == step).any()]
+    paths = [_strokes(lines[steps == step]) for step in used]
+    means = [float(widths[steps == step].mean()) for step in used]
+    return [PathCollection(paths, linewidths=means, edgecolor=FORCE_COLOUR, facecolor="none", capstyle="round")]
 
 
-def _contacts(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
+def _strokes(lines: np.ndarray) -> Path:
+    """One path of lines of the same number of points, (lines, points, 2)."""
+    codes = np.full(lines.shape[:2], Path.LINETO, dtype=Path.code_type)
+    codes[:, 0] = Path.MOVETO
+    return Path(lines.reshape(-1, 2), codes.ravel())
+
+
+def _lines(lines: np.ndarray, width: float, colour: str) -> PathCollection:
+    return PathCollection([_strokes(lines)], linewidths=[width], edgecolor=colour, facecolor="none")
+
+
+def _contacts(snapshot: Snapshot, look: Look, scale: float) -> list[PathCollection]:
     """The contact points as crosses."""
     point, size = snapshot.known_contacts().point, 0.07 * _typical_size(snapshot)
     lines = [np.stack([point - arm, point + arm], axis=1) for arm in (np.array([size, size]), np.array([size, -size]))]
-    return [LineCollection(np.concatenate(lines), linewidths=np.clip(0.5 * size * scale, 0.3, 1.2),
-                           colors=CONTACT_COLOUR)]
+    return [_lines(np.concatenate(lines), float(np.clip(0.5 * size * scale, 0.3, 1.2)), CONTACT_COLOUR)]
 
 
-def _boxes(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
+def _boxes(snapshot: Snapshot, look: Look, scale: float) -> list[PathCollection]:
     x0, y0, x1, y1 = snapshot.boxes[~snapshot.frame.fixed].T
-    outlines = np.stack([x0, y0, x1, y0, x1, y1, x0, y1], axis=1).reshape(-1, 4, 2)
-    return [PolyCollection(outlines, facecolor="none", edgecolor=BOX_COLOUR, linewidth=0.5)]
+    outlines = np.stack([x0, y0, x1, y0, x1, y1, x0, y1, x0, y0], axis=1).reshape(-1, 5, 2)
+    return [_lines(outlines, 0.5, BOX_COLOUR)]
 
 
-def _cells(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
+def _cells(snapshot: Snapshot, look: Look, scale: float) -> list[PathCollection]:
     if look.grid is None:
         return []
     cells = tree_cells(look.grid, snapshot.boxes)
-    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
-    outlines = cells.low[:, None, :] + cells.side[:, None, None] * corners
-    return [PolyCollection(outlines, facecolor="none", edgecolor=CELL_COLOUR, linewidth=0.5)]
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
+    return [_lines(cells.low[:, None, :] + cells.side[:, None, None] * corners, 0.5, CELL_COLOUR)]
 
 
-def _stresses(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
+def _stresses(snapshot: Snapshot, look: Look, scale: float) -> list[PathCollection]:
     """Each free body's principal stresses as a cross; the longest as long as the bodies are wide."""
     free = ~snapshot.frame.fixed
     if not look.greatest_stress or not free.any():
@@ -266,9 +289,8 @@ def _stresses(snapshot: Snapshot, look: Look, scale: float) -> list[Collection]:
     arm = half[:, :, None] * axes.transpose(0, 2, 1)
     centre = snapshot.frame.position[free][:, None, :]
     lines = np.stack([centre - arm, centre + arm], axis=2)
-    width = np.clip(0.1 * size * scale, 0.4, 2.0)
-    return [LineCollection(lines[values <= 0.0], linewidths=width, colors=COMPRESSED_COLOUR),
-            LineCollection(lines[values > 0.0], linewidths=width, colors=PULLED_COLOUR)]
+    width = float(np.clip(0.1 * size * scale, 0.4, 2.0))
+    return [_lines(lines[values <= 0.0], width, COMPRESSED_COLOUR), _lines(lines[values > 0.0], width, PULLED_COLOUR)]
 
 
 def legend_of(snapshot: Snapshot, look: Look, scale: float) -> list[Line2D]:

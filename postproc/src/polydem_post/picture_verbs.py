@@ -14,6 +14,7 @@ from .trajectory import Trajectory
 def add_picture_verbs(verbs) -> None:
     """Add the parsers of these verbs."""
     _add_plot(verbs)
+    _add_movie(verbs)
 
 
 def _add_plot(verbs) -> None:
@@ -31,6 +32,19 @@ def _add_plot(verbs) -> None:
     plot.add_argument("--contacts", action="store_true")
     plot.add_argument("--size", type=_reals, metavar="W,H")
     plot.add_argument("--dpi", type=float, default=150)
+
+
+def _add_movie(verbs) -> None:
+    movie = verbs.add_parser("movie")
+    movie.set_defaults(action=_movie)
+    movie.add_argument("result", type=Path, metavar="RESULT")
+    movie.add_argument("--output", "-o", type=Path, metavar="FILE")
+    movie.add_argument("--frames", metavar="FIRST:END:STEP")
+    movie.add_argument("--every", type=int, default=1, metavar="N")
+    movie.add_argument("--fps", type=float, default=25, metavar="N")
+    movie.add_argument("--size", type=_reals, metavar="W,H")
+    movie.add_argument("--processes", type=int, metavar="N")
+    _add_look(movie)
 
 
 def _add_look(parser) -> None:
@@ -144,6 +158,27 @@ def _plot(options: argparse.Namespace) -> None:
         path = _picture_path(options, trajectory, group)
         save(figure, path, options.dpi, tight=options.size is None)
         print(path)
+
+
+def _movie(options: argparse.Namespace) -> None:
+    from .movie import check_film, make_movie
+
+    look = look_of(options)
+    if options.output:
+        check_film(options.output)
+    if options.size is not None:
+        _expect(options.size, 2, "--size", "W,H")
+        if not all(160.0 <= side <= 7680.0 for side in options.size):
+            raise ResultError("--size takes a width and a height from 160 to 7680 picture elements")
+    if not 0.1 <= options.fps <= 240.0:
+        raise ResultError("--fps takes a number from 0.1 to 240")
+    if options.every < 1 or (options.processes is not None and options.processes < 1):
+        raise ResultError("--every and --processes take numbers from 1 on")
+    trajectory = open_frames(options.result)
+    numbers = chosen_frames(options.frames or ":", len(trajectory))[:: options.every]
+    path = options.output or trajectory.folder / "movie.mp4"
+    make_movie(trajectory, numbers, path, look, options.fps, options.size, options.processes)
+    print(path)
 
 
 def _picture_path(options: argparse.Namespace, trajectory: Trajectory, numbers: list[int]) -> Path:

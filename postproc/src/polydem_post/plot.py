@@ -63,17 +63,17 @@ def prepare(axis, look: Look, title: str) -> None:
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def add_scale(figure: Figure, axes, grains, look: Look) -> Colorbar | None:
-    """The scale of colours beside the axes, with arrows where bodies lie outside it."""
+def add_scale(figure: Figure, axes, grains, look: Look, extend: str | None = None) -> Colorbar | None:
+    """The scale of colours beside the axes, with arrows where bodies lie outside it, unless they are given."""
     if not look.quantity:
         return None
     low, high = look.colour_range
-    values = np.concatenate([np.asarray(each.get_array()) for each in grains])
+    values = np.concatenate([np.asarray(each.artist.get_array()) for each in grains])
     values = values[np.isfinite(values)]
     below, above = bool((values < low).any()), bool((values > high).any())
-    extend = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
-    bar = figure.colorbar(grains[0], ax=list(axes), label=look.quantity.title, pad=0.02, fraction=0.05, aspect=30,
-                          extend=extend[below, above])
+    arrows = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
+    bar = figure.colorbar(grains[0].artist, ax=list(axes), label=look.quantity.title, pad=0.02, fraction=0.05,
+                          aspect=30, extend=extend or arrows[below, above])
     if look.quantity.count:
         bar.set_ticks(range(0, look.quantity.count, max(look.quantity.count // 10, 1)))
     elif look.quantity.span == "turn" and look.colour_range == (0.0, 2.0 * np.pi):
@@ -85,6 +85,14 @@ def _finish(figure: Figure, axes, snapshots: list[Snapshot], look: Look) -> None
     """Draw bodies, scale and legend; then, as the axes have their size, what is as wide as bodies."""
     grains = [drawing.draw_bodies(axis, snapshot, look)[1] for axis, snapshot in zip(axes, snapshots)]
     add_scale(figure, axes, grains, look)
+    finish_axes(figure, axes, snapshots[0], look)
+    for axis, snapshot, each in zip(axes, snapshots, grains):
+        drawing.fit_outlines(each, snapshot, drawing.points_per_metre(axis))
+        drawing.overlays(axis, snapshot, look)
+
+
+def finish_axes(figure: Figure, axes, snapshot: Snapshot, look: Look) -> None:
+    """Give the axes their final size, with ticks that have room and the legend of overlays."""
     legend = None
     for _ in range(2):  # the legend takes room, which changes the scale
         _lay_out(figure)
@@ -92,15 +100,12 @@ def _finish(figure: Figure, axes, snapshots: list[Snapshot], look: Look) -> None
             _fit_ticks(axis)
         if legend:
             legend.remove()
-        lines = drawing.legend_of(snapshots[0], look, drawing.points_per_metre(axes[0]))
+        lines = drawing.legend_of(snapshot, look, drawing.points_per_metre(axes[0]))
         if not lines:
             break
         legend = figure.legend(handles=lines, loc="outside lower center", ncols=_legend_columns(figure, lines),
                                frameon=False, fontsize=7, handlelength=2.2)
     _lay_out(figure)
-    for axis, snapshot, each in zip(axes, snapshots, grains):
-        drawing.fit_outlines(each, snapshot, drawing.points_per_metre(axis))
-        drawing.overlays(axis, snapshot, look)
 
 
 def _lay_out(figure: Figure) -> None:

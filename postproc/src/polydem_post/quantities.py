@@ -139,7 +139,7 @@ QUANTITIES = {
                      constant=True),
     "mass": Quantity("mass per depth", "kg/m", lambda s: _given(s.mass), "cividis", "data", constant=True),
     "density": Quantity("density", "kg/m3", lambda s: _given(s.mass) / s.area, "cividis", "data", constant=True),
-    "material": Quantity("material", "", lambda s: np.zeros(len(s.frame.id)), "tab10", "class", constant=True),
+    "material": Quantity("material", "", lambda s: s.frame.material.astype(float), "tab10", "class", constant=True),
     "force": Quantity("resultant of the contact forces", "N/m", lambda s: _length(resultant(s)), "YlOrRd",
                       needs_contacts=True),
     "load": Quantity("sum of the contact forces' magnitudes", "N/m", load, "YlOrRd", needs_contacts=True),

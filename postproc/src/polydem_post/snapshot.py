@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -38,11 +39,6 @@ class Snapshot:
     contacts: ContactColumns | None
 
     @property
-    def outlines(self) -> list[np.ndarray]:
-        """Vertices of each body in the world [m]."""
-        return self.frame.vertices
-
-    @property
     def corners(self) -> np.ndarray:
         """Vertices of all bodies in the world [m], (total, 2)."""
         return self.frame.vertex
@@ -72,7 +68,19 @@ class Snapshot:
 
 def read_snapshot(trajectory: Trajectory, number: int, contacts: bool = True) -> Snapshot:
     """Read a frame, with its contacts if they are wanted and there are any."""
-    frame = trajectory.frame(number)
+    return _snapshot(trajectory, trajectory.frame(number), contacts)
+
+
+def read_snapshots(trajectory: Trajectory, numbers: list[int], contacts: bool = True) -> Iterator[Snapshot]:
+    """Read frames in turn, with their contacts if they are wanted and there are any."""
+    for number in numbers:
+        if not -len(trajectory) <= number < len(trajectory):
+            trajectory.frame(number)  # says so
+    for frame in trajectory[list(numbers)]:
+        yield _snapshot(trajectory, frame, contacts)
+
+
+def _snapshot(trajectory: Trajectory, frame: Frame, contacts: bool) -> Snapshot:
     if not contacts or not trajectory.has_contacts:
         return Snapshot(frame, None)
     table = frame.contacts
