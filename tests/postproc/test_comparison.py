@@ -28,7 +28,7 @@ from polydem_post.emit import Table
 from polydem_post.html_page import Page
 from polydem_post.precision_scenes import SCENES
 from polydem_post.published import read_points
-from published_numbers import missing_numbers, paragraphs_of
+from published_numbers import REVISION, disagreements, missing_numbers, paragraphs_of
 
 PROGRAM = Path(os.environ["POLYDEM_PROGRAM"]).resolve()
 VERIFIER = PROGRAM.parents[2] / "tests" / "verification" / "verify"
@@ -163,6 +163,16 @@ def test_another_program_or_machine_makes_all_again_and_a_changed_setting_one_pi
     assert code == 0 and "made by another program or machine" in said and " is there (" not in said, said
     after = samples_of(folder)
     assert set(after) == set(before) and not set(after.items()) & set(before.items())
+
+
+def test_what_is_published_is_one_page_that_its_tables_confirm(output, tmp_path):
+    place = tmp_path / "verdicts"
+    code, said = call(output[0], "--report-only", "--publish", str(place))
+    assert code == 0 and disagreements(place) == [], said
+    assert len(list(place.glob("*.png"))) >= 10 and REVISION.findall((place / "README.md").read_text(encoding="utf-8"))
+    (place / "README.md").write_text("# Another page\n", encoding="utf-8")
+    code, said = call(output[0], "--report-only", "--publish", str(place))
+    assert code == 2 and "is another page" in said
 
 
 def test_a_comparison_that_was_killed_goes_on_where_it_was(tmp_path):

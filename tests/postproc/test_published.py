@@ -2,10 +2,12 @@
 
 import os
 import re
+import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
+from published_numbers import REVISION, disagreements, rows_of
 
 ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])
 
@@ -35,9 +37,6 @@ OTHERS = {
     "tests/verification/reference/README.md",
 }
 
-REVISION = re.compile(r"(?:revision|git|with|polydem [\d.]+ \(revision)[:\s]+([0-9a-f]{7,40})\b", re.IGNORECASE)
-
-
 @pytest.mark.parametrize("page", PAGES)
 def test_a_page_with_measured_tables_names_a_revision_of_this_repository(page):
     found = REVISION.findall((ROOT / page).read_text(encoding="utf-8"))
@@ -56,3 +55,37 @@ def test_no_page_with_tables_is_forgotten():
     pages = [page for page in pages if re.search(r"^\|[ :-]*---", page.read_text(encoding="utf-8"), re.MULTILINE)]
     with_tables = {str(page.relative_to(ROOT)) for page in pages}
     assert with_tables == {page for page in PAGES if page.endswith(".md")} | OTHERS
+
+
+# --- Tables and texts agree -------------------------------------------------------------------------------------------
+
+VERDICTS = ROOT / "postproc" / "verdicts"
+
+
+def test_the_page_of_verdicts_says_what_its_tables_say():
+    assert disagreements(VERDICTS) == []
+
+
+@pytest.mark.parametrize("name, old, new", [
+    ("README.md", "| confirmed |", "| contradicted |"),
+    ("README.md", "*Verdict:* confirmed.", "*Verdict:* undecided."),
+    ("README.md", "](tables/times.csv)", "](tables/other.csv)"),
+    ("tables/claims.csv", ",confirmed,", ",undecided,"),
+    ("tables/reasons.csv", "C2,", "C2,not "),
+    ("tables/revision.txt", "revision ", "revision 0123456, revision "),
+])
+def test_a_page_that_its_tables_contradict_is_found(tmp_path, name, old, new):
+    shutil.copytree(VERDICTS, tmp_path / "verdicts")
+    path = tmp_path / "verdicts" / name
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    assert disagreements(tmp_path / "verdicts") != []
+
+
+def test_the_exponents_in_the_text_on_performance_are_those_of_the_published_table():
+    text = (ROOT / "inputs" / "performance.md").read_text(encoding="utf-8")
+    tree, sweep = re.search(r"give N\^([\d.]+) and N\^([\d.]+)\s*\(\[all exponents\]", text).groups()
+    slopes = {row["finder"]: row for row in rows_of(VERDICTS / "tables" / "slopes.csv") if row["scenes"] == "drum"}
+    for said, finder in ((tree, "quadtree"), (sweep, "sort_and_sweep")):
+        assert float(said) == pytest.approx(float(slopes[finder]["all sizes"].split()[0]) - 1.0, abs=0.006)

@@ -56,9 +56,8 @@ class Contents:
         return next((table for table in self.tables if table.name == name), None)
 
 
-def write_comparison(comparison: Comparison, output: Path) -> Path:
+def write_comparison(comparison: Comparison, contents: Contents, output: Path) -> Path:
     """Write tables/, figures/, claims.md and report.html of what has been made; return the page."""
-    contents = collect(comparison)
     try:
         write_tables(contents.tables, output / "tables", contents.origin)
         write_figures(contents.drawings, output / "figures")

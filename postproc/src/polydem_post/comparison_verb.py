@@ -22,6 +22,7 @@ def add_paper(verbs, program) -> None:
     paper.add_argument("--dry-run", action="store_true")
     paper.add_argument("--report-only", action="store_true")
     paper.add_argument("--output", type=Path, default=Path("results/paper"), metavar="DIR")
+    paper.add_argument("--publish", type=Path, metavar="DIR")
     paper.add_argument("--program", type=program, action="append", default=[], metavar="PREC=PATH")
     paper.add_argument("--verifier", type=Path)
     paper.add_argument("--overlaps", type=Path)
@@ -31,7 +32,8 @@ def add_paper(verbs, program) -> None:
 
 def run_paper(options: argparse.Namespace) -> int:
     """Do what the options say; the exit code."""
-    from .comparison_report import write_comparison  # needs much that other verbs do not
+    from .comparison_publish import publish
+    from .comparison_report import collect, write_comparison  # needs much that other verbs do not
     from .comparison_run import INTERRUPTED, Comparison, Tools
 
     began = time.monotonic() - (options.spent or 0.0)
@@ -40,7 +42,7 @@ def run_paper(options: argparse.Namespace) -> int:
                   *(path and path.resolve() for path in (options.verifier, options.overlaps)))
     if "double" not in tools.programs:
         raise ResultError("--program double=PATH is missing: call ./polydem paper, which knows it")
-    output, plan = options.output.resolve(), options.plan and options.plan.resolve()
+    output, plan, published = (path and path.resolve() for path in (options.output, options.plan, options.publish))
     os.chdir(ROOT)  # namelists name their files from here
     folder = Path(os.path.relpath(output, ROOT)) / mode
     if any(letter.isspace() or letter == "'" for letter in str(folder)):
@@ -61,7 +63,10 @@ def run_paper(options: argparse.Namespace) -> int:
         except KeyboardInterrupt:
             _say("interrupted; the same command goes on where it was")
             return INTERRUPTED
-    page = write_comparison(comparison, output)
+    contents = collect(comparison)
+    page = write_comparison(comparison, contents, output)
+    if published:
+        _say(f"{publish(contents, mode, output, published)}: published")
     _say(f"{page}: written {time.monotonic() - began:.0f} s after the start")
     return 0
 
