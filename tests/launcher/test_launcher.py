@@ -102,6 +102,7 @@ class Toy(unittest.TestCase):
             shutil.copytree(os.path.join(os.path.dirname(LAUNCHER), place), os.path.join(self.folder, place))
         self.write("postproc/pyproject.toml", "")
         self.write(".venv/.made", self.folder + "\n")
+        self.write(".venv/.made_manual", "")
         for name in ("mpirun", "mpifort", "h5pfc"):
             self.write(f"mpi/{name}", MPIRUN)
             os.chmod(os.path.join(self.folder, "mpi", name), 0o755)

@@ -1,0 +1,1 @@
+"""The manual: one searchable site from the Markdown pages of the repository, where they lie."""
