@@ -26,10 +26,11 @@ contains
       !> The overlaps; these lanes are written
       type(overlap_columns_t), intent(inout) :: columns
 
+      if (n == 0_ip) return
       if (isa == isa_avx2) then
-         call evaluate_with_avx2(batch, 1_ip, n, turned, effective, columns)
+         call evaluate_with_avx2(batch, n, turned, effective, columns)
       else
-         call evaluate_with_base(batch, 1_ip, n, turned, effective, columns)
+         call evaluate_with_base(batch, n, turned, effective, columns)
       end if
    end subroutine evaluate_batch
 

@@ -13,7 +13,8 @@
 !> difference of both parts serves as F and D, and an exchange of P and Q changes no bit but signs.
 module polydem_lens_effective_area
    use polydem_kinds, only: ip, wp
-   use polydem_overlap_batch, only: column_length, overlap_batch_t, overlap_columns_t
+   use polydem_lens_work, only: lens_work_t
+   use polydem_overlap_batch, only: column_length, overlap_columns_t
    use polydem_overlap_tolerances, only: least_square, no_length, sure_area
    implicit none
    private
@@ -45,53 +46,50 @@ module polydem_lens_effective_area
 contains
 
    !> Effective area, its gradient, moments, and the centroid of all lenses.
-   pure subroutine integrate_effective_area(from, to, batch, columns)
-      !> First lane
-      integer(ip), intent(in) :: from
-      !> Last lane
-      integer(ip), intent(in) :: to
+   pure subroutine integrate_effective_area(n, lens, columns)
+      !> Number of lanes
+      integer(ip), intent(in) :: n
       !> The batch with crossings
-      type(overlap_batch_t), intent(inout) :: batch
+      type(lens_work_t), intent(inout) :: lens
       !> Overlaps of these lanes
       type(overlap_columns_t), intent(inout) :: columns
       type(work_t) :: work
 
-      call straighten(from, to, batch, work)
-      call find_fan(from, to, work%place(:, :, :, 1), 1.0_wp, work%fan(:, :, 1))
-      call find_fan(from, to, work%place(:, :, :, 2), -1.0_wp, work%fan(:, :, 2))
-      call find_centroid(from, to, work%fan(:, :, 1), work%fan(:, :, 2), work%centroid)
-      call find_second_moments(from, to, work%place(:, :, :, 1), work%centroid, -0.5_wp, work%second(:, :, 1))
-      call find_second_moments(from, to, work%place(:, :, :, 2), work%centroid, 0.5_wp, work%second(:, :, 2))
-      call weigh(from, to, work, batch, columns)
+      call straighten(n, lens, work)
+      call find_fan(n, work%place(:, :, :, 1), 1.0_wp, work%fan(:, :, 1))
+      call find_fan(n, work%place(:, :, :, 2), -1.0_wp, work%fan(:, :, 2))
+      call find_centroid(n, work%fan(:, :, 1), work%fan(:, :, 2), work%centroid)
+      call find_second_moments(n, work%place(:, :, :, 1), work%centroid, -0.5_wp, work%second(:, :, 1))
+      call find_second_moments(n, work%place(:, :, :, 2), work%centroid, 0.5_wp, work%second(:, :, 2))
+      call weigh(n, work, lens, columns)
    end subroutine integrate_effective_area
 
    !> Find the coordinates of the corners along and across the chord.
-   pure subroutine straighten(from, to, batch, work)
-      integer(ip), intent(in) :: from
-      integer(ip), intent(in) :: to
-      type(overlap_batch_t), intent(inout) :: batch
+   pure subroutine straighten(n, lens, work)
+      integer(ip), intent(in) :: n
+      type(lens_work_t), intent(inout) :: lens
       type(work_t), intent(inout) :: work
       real(wp) :: zx, zy, least, along(4), across(4), ax, ay, scale_x, scale_y
       integer(ip) :: i
 
-      do i = from, to
-         zx = batch%crossing(i, 1, 2) - batch%crossing(i, 1, 1)
-         zy = batch%crossing(i, 2, 2) - batch%crossing(i, 2, 1)
-         least = least_square*batch%scale(i, 1)*batch%scale(i, 1)
-         ax = batch%some(i, 1)*((batch%corner(i, 1, 2, 1) + batch%centre(i, 1)) - batch%crossing(i, 1, 1))
-         ay = batch%some(i, 1)*((batch%corner(i, 2, 2, 1) + batch%centre(i, 2)) - batch%crossing(i, 2, 1))
+      do i = 1_ip, n
+         zx = lens%crossing(i, 1, 2) - lens%crossing(i, 1, 1)
+         zy = lens%crossing(i, 2, 2) - lens%crossing(i, 2, 1)
+         least = least_square*lens%radius(i, 1)*lens%radius(i, 1)
+         ax = lens%some(i, 1)*((lens%corner(i, 1, 2, 1) + lens%centre(i, 1)) - lens%crossing(i, 1, 1))
+         ay = lens%some(i, 1)*((lens%corner(i, 2, 2, 1) + lens%centre(i, 2)) - lens%crossing(i, 2, 1))
          along(1) = zx*ax + zy*ay
          across(1) = zx*ay - zy*ax
-         ax = batch%some(i, 1)*((batch%corner(i, 1, 3, 1) + batch%centre(i, 1)) - batch%crossing(i, 1, 1))
-         ay = batch%some(i, 1)*((batch%corner(i, 2, 3, 1) + batch%centre(i, 2)) - batch%crossing(i, 2, 1))
+         ax = lens%some(i, 1)*((lens%corner(i, 1, 3, 1) + lens%centre(i, 1)) - lens%crossing(i, 1, 1))
+         ay = lens%some(i, 1)*((lens%corner(i, 2, 3, 1) + lens%centre(i, 2)) - lens%crossing(i, 2, 1))
          along(2) = zx*ax + zy*ay
          across(2) = zx*ay - zy*ax
-         ax = batch%some(i, 2)*((batch%corner(i, 1, 2, 2) + batch%centre(i, 3)) - batch%crossing(i, 1, 2))
-         ay = batch%some(i, 2)*((batch%corner(i, 2, 2, 2) + batch%centre(i, 4)) - batch%crossing(i, 2, 2))
+         ax = lens%some(i, 2)*((lens%corner(i, 1, 2, 2) + lens%centre(i, 3)) - lens%crossing(i, 1, 2))
+         ay = lens%some(i, 2)*((lens%corner(i, 2, 2, 2) + lens%centre(i, 4)) - lens%crossing(i, 2, 2))
          along(3) = zx*ax + zy*ay
          across(3) = zx*ay - zy*ax
-         ax = batch%some(i, 2)*((batch%corner(i, 1, 3, 2) + batch%centre(i, 3)) - batch%crossing(i, 1, 2))
-         ay = batch%some(i, 2)*((batch%corner(i, 2, 3, 2) + batch%centre(i, 4)) - batch%crossing(i, 2, 2))
+         ax = lens%some(i, 2)*((lens%corner(i, 1, 3, 2) + lens%centre(i, 3)) - lens%crossing(i, 1, 2))
+         ay = lens%some(i, 2)*((lens%corner(i, 2, 3, 2) + lens%centre(i, 4)) - lens%crossing(i, 2, 2))
          along(4) = zx*ax + zy*ay
          across(4) = zx*ay - zy*ax
          work%chord(i, 1) = zx
@@ -100,7 +98,7 @@ contains
          work%unit_area(i) = max(max(max(abs(across(1)), abs(across(2))), max(abs(across(3)), abs(across(4)))), least)
          scale_x = 1.0_wp/work%square(i)
          scale_y = 1.0_wp/work%unit_area(i)
-         batch%certified(i) = min(batch%certified(i), longest - scale_x*max(max(abs(along(1)), abs(along(2))), &
+         lens%certified(i) = min(lens%certified(i), longest - scale_x*max(max(abs(along(1)), abs(along(2))), &
                                                                             max(abs(along(3)), abs(along(4)))))
          work%place(i, 1, 1, 1) = max(-longest, min(longest, along(1)*scale_x))
          work%place(i, 2, 1, 1) = across(1)*scale_y
@@ -114,9 +112,8 @@ contains
    end subroutine straighten
 
    !> Integrate over the part between an arc and the chord, as a fan from the start of the arc.
-   pure subroutine find_fan(from, to, place, end, fan)
-      integer(ip), intent(in) :: from
-      integer(ip), intent(in) :: to
+   pure subroutine find_fan(n, place, end, fan)
+      integer(ip), intent(in) :: n
       real(wp), intent(in) :: place(column_length, 2, 2)
       !> End of the arc along the chord, relative to its start
       real(wp), intent(in) :: end
@@ -124,7 +121,7 @@ contains
       real(wp) :: part(2)
       integer(ip) :: i
 
-      do i = from, to
+      do i = 1_ip, n
          part(1) = place(i, 1, 1)*place(i, 2, 2) - place(i, 2, 1)*place(i, 1, 2)
          part(2) = -end*place(i, 2, 2)
          fan(i, 1) = part(1) + part(2)
@@ -134,16 +131,15 @@ contains
    end subroutine find_fan
 
    !> Find the centroid relative to the middle of the chord.
-   pure subroutine find_centroid(from, to, fan_p, fan_q, centroid)
-      integer(ip), intent(in) :: from
-      integer(ip), intent(in) :: to
+   pure subroutine find_centroid(n, fan_p, fan_q, centroid)
+      integer(ip), intent(in) :: n
       real(wp), intent(in) :: fan_p(column_length, 3)
       real(wp), intent(in) :: fan_q(column_length, 3)
       real(wp), intent(inout) :: centroid(column_length, 2)
       real(wp) :: scale
       integer(ip) :: i
 
-      do i = from, to
+      do i = 1_ip, n
          scale = 1.0_wp/max(fan_p(i, 1) + fan_q(i, 1), sure_area)
          centroid(i, 1) = scale*(0.5_wp*(fan_q(i, 1) - fan_p(i, 1)) + third*(fan_p(i, 2) + fan_q(i, 2)))
          centroid(i, 2) = scale*third*(fan_p(i, 3) + fan_q(i, 3))
@@ -154,9 +150,8 @@ contains
    end subroutine find_centroid
 
    !> Integrate over an arc for the second moments about the centroid.
-   pure subroutine find_second_moments(from, to, place, centroid, start, second)
-      integer(ip), intent(in) :: from
-      integer(ip), intent(in) :: to
+   pure subroutine find_second_moments(n, place, centroid, start, second)
+      integer(ip), intent(in) :: n
       real(wp), intent(in) :: place(column_length, 2, 2)
       real(wp), intent(in) :: centroid(column_length, 2)
       !> Start of the arc, relative to the middle of the chord; the end is opposite
@@ -165,7 +160,7 @@ contains
       real(wp) :: x(4), y(4), part(3)
       integer(ip) :: i
 
-      do i = from, to
+      do i = 1_ip, n
          x(1) = start - centroid(i, 1)
          y(1) = -centroid(i, 2)
          x(2) = (place(i, 1, 1) + start) - centroid(i, 1)
@@ -188,17 +183,16 @@ contains
    end subroutine find_second_moments
 
    !> Compute the results from the moments.
-   pure subroutine weigh(from, to, work, batch, columns)
-      integer(ip), intent(in) :: from
-      integer(ip), intent(in) :: to
+   pure subroutine weigh(n, work, lens, columns)
+      integer(ip), intent(in) :: n
       type(work_t), intent(in) :: work
-      type(overlap_batch_t), intent(inout) :: batch
+      type(lens_work_t), intent(inout) :: lens
       type(overlap_columns_t), intent(inout) :: columns
       real(wp) :: zx, zy, zz, h, cx, cy, mxx, mxy, myy, dxx, dxy, dyy, fx, fy
       real(wp) :: determinant, product, safe, root, unit, on_chord, slope, along, across, turn, gx, gy, area, worst
       integer(ip) :: i
 
-      do i = from, to
+      do i = 1_ip, n
          zx = work%chord(i, 1)
          zy = work%chord(i, 2)
          zz = work%square(i)
@@ -229,23 +223,23 @@ contains
          across = unit*(on_chord - 12.0_wp*(mxx*fy - mxy*fx))
          turn = unit*(zz*((cx*on_chord + slope) + 12.0_wp*(mxx*dxy - mxy*dxx)) &
                       - 12.0_wp*(h*(h/zz))*(myy*dxy - mxy*dyy))
-         gx = (0.5_wp*(batch%crossing(i, 1, 1) + batch%crossing(i, 1, 2)) + cx*zx) - (h/zz)*cy*zy
-         gy = (0.5_wp*(batch%crossing(i, 2, 1) + batch%crossing(i, 2, 2)) + cx*zy) + (h/zz)*cy*zx
+         gx = (0.5_wp*(lens%crossing(i, 1, 1) + lens%crossing(i, 1, 2)) + cx*zx) - (h/zz)*cy*zy
+         gy = (0.5_wp*(lens%crossing(i, 2, 1) + lens%crossing(i, 2, 2)) + cx*zy) + (h/zz)*cy*zx
          columns%area(i) = h*root
          columns%normal(i, 1) = across*zy + along*zx
          columns%normal(i, 2) = along*zy - across*zx
          columns%length(i) = sqrt(columns%normal(i, 1)*columns%normal(i, 1) + columns%normal(i, 2)*columns%normal(i, 2))
-         columns%arm_first(i, 1) = gx - batch%centre(i, 1)
-         columns%arm_first(i, 2) = gy - batch%centre(i, 2)
-         columns%arm_second(i, 1) = gx - batch%centre(i, 3)
-         columns%arm_second(i, 2) = gy - batch%centre(i, 4)
+         columns%arm_first(i, 1) = gx - lens%centre(i, 1)
+         columns%arm_first(i, 2) = gy - lens%centre(i, 2)
+         columns%arm_second(i, 1) = gx - lens%centre(i, 3)
+         columns%arm_second(i, 2) = gy - lens%centre(i, 4)
          columns%moment(i, 1) = turn + cross(columns%arm_first(i, :), columns%normal(i, :))
          columns%moment(i, 2) = turn + cross(columns%arm_second(i, :), columns%normal(i, :))
          worst = min(zz - 4.0_wp*no_length**2*area, &
                      columns%length(i)*columns%length(i) - 4.0_wp*no_length**2*columns%area(i))
          worst = min(worst, min(determinant - least_determinant, determinant - least_ratio*product))
-         worst = min(worst, area - sure_area*batch%scale(i, 1)*batch%scale(i, 1))
-         batch%certified(i) = min(batch%certified(i), worst)
+         worst = min(worst, area - sure_area*lens%radius(i, 1)*lens%radius(i, 1))
+         lens%certified(i) = min(lens%certified(i), worst)
       end do
    end subroutine weigh
 

@@ -23,8 +23,9 @@
 module polydem_lens_kernel
    use polydem_kinds, only: ip, wp
    use polydem_lens_effective_area, only: integrate_effective_area
+   use polydem_lens_work, only: lens_work_t
    use polydem_overlap_batch, only: column_length, overlap_batch_t, overlap_columns_t
-   use polydem_overlap_tolerances, only: far, no_length, sure, sure_area, sure_in_fan
+   use polydem_overlap_tolerances, only: far, no_length, sure_area, sure_at_edge, sure_in_fan
    use polydem_pair_memory, only: lens_bits, most_lens_corners
    implicit none
    private
@@ -36,55 +37,45 @@ module polydem_lens_kernel
 
 contains
 
-   !> Evaluate some lanes.
-   pure subroutine evaluate_batch(batch, from, to, turned, effective, columns)
+   !> Evaluate the first lanes of a batch.
+   pure subroutine evaluate_batch(batch, n, turned, effective, columns)
       !> The batch
       type(overlap_batch_t), intent(inout) :: batch
-      !> First lane
-      integer(ip), intent(in) :: from
-      !> Last lane
-      integer(ip), intent(in) :: to
+      !> Number of lanes
+      integer(ip), intent(in) :: n
       !> Vertices of all polygons, anticlockwise, each relative to its own centre, (2, n) [m]
       real(wp), intent(in), contiguous :: turned(:, :)
       !> Whether to compute the effective area (see `polydem_effective_area`) instead of the area
       logical, intent(in) :: effective
       !> The overlaps; these lanes are written
       type(overlap_columns_t), intent(inout) :: columns
+      type(lens_work_t) :: lens
 
-      call unpack_lenses(from, to, batch)
-      call prepare(from, to, batch)
-      call gather_corners(from, to, batch%vertex, size(turned, 2, kind=ip), turned, batch%corner)
-      call cross_edges(from, to, batch%corner(:, :, :, 1), batch%centre(:, 1:2), batch%corner(:, :, :, 2), &
-                       batch%centre(:, 3:4), batch%scale, batch%on_entering(:, 1), batch%crossing(:, :, 1), &
-                       batch%certified)
-      call cross_edges(from, to, batch%corner(:, :, :, 2), batch%centre(:, 3:4), batch%corner(:, :, :, 1), &
-                       batch%centre(:, 1:2), batch%scale, batch%on_entering(:, 2), batch%crossing(:, :, 2), &
-                       batch%certified)
-      call test_corners(from, to, batch%corner(:, :, :, 1), batch%centre(:, 1:2), batch%corner(:, :, :, 2), &
-                        batch%centre(:, 3:4), batch%radius(:, 1), batch%radius(:, 2), batch%ignored(:, :, 1), &
-                        batch%certified)
-      call test_corners(from, to, batch%corner(:, :, :, 2), batch%centre(:, 3:4), batch%corner(:, :, :, 1), &
-                        batch%centre(:, 1:2), batch%radius(:, 1), batch%radius(:, 1), batch%ignored(:, :, 2), &
-                        batch%certified)
+      call unpack_lenses(n, batch, lens)
+      call prepare(n, batch, lens)
+      call gather_corners(n, lens%vertex, size(turned, 2, kind=ip), turned, lens%corner)
+      call find_crossings(n, lens)
+      call test_corners(n, lens)
       if (effective) then
-         call integrate_effective_area(from, to, batch, columns)
+         call integrate_effective_area(n, lens, columns)
       else
-         call integrate_area(from, to, batch, columns)
+         call integrate_area(n, lens, columns)
       end if
+      batch%certified(:n) = lens%certified(:n)
    end subroutine evaluate_batch
 
    !> Find the vertices of the lenses that are remembered.
    !>
    !> These are whole numbers, and -1 is true, so that the compiler handles several lanes at a time. Where nothing is
    !> remembered that these polygons can have, the first edges are taken.
-   pure subroutine unpack_lenses(from, to, batch)
-      integer(ip), intent(in) :: from
-      integer(ip), intent(in) :: to
-      type(overlap_batch_t), intent(inout) :: batch
+   pure subroutine unpack_lenses(n, batch, lens)
+      integer(ip), intent(in) :: n
+      type(overlap_batch_t), intent(in) :: batch
+      type(lens_work_t), intent(inout) :: lens
       integer(ip), parameter :: mask = 2_ip**lens_bits - 1_ip
       integer(ip) :: i, edge(4), inside_p, inside_q, possible
 
-      do i = from, to
+      do i = 1_ip, n
          edge(1) = iand(batch%memory(i), mask)
          edge(2) = iand(shiftr(batch%memory(i), lens_bits), mask)
          edge(3) = iand(shiftr(batch%memory(i), 2*lens_bits), mask)
@@ -99,17 +90,18 @@ contains
          possible = iand(possible, iand(less(max(edge(1), edge(2)), batch%corners(i, 1)), &
                                         less(max(edge(3), edge(4)), batch%corners(i, 2))))
          possible = iand(possible, less(max(batch%corners(i, 1), batch%corners(i, 2)), most_lens_corners + 1_ip))
-         batch%possible(i) = iand(1_ip, possible)
-         batch%inner(i, 1) = iand(inside_p, possible)
-         batch%inner(i, 2) = iand(inside_q, possible)
-         batch%vertex(i, 1) = batch%start(i, 1) + iand(edge(1), possible)
-         batch%vertex(i, 2) = batch%start(i, 1) + next(iand(edge(1), possible), batch%corners(i, 1))
-         batch%vertex(i, 3) = batch%start(i, 1) + iand(edge(2), possible)
-         batch%vertex(i, 4) = batch%start(i, 1) + next(iand(edge(2), possible), batch%corners(i, 1))
-         batch%vertex(i, 5) = batch%start(i, 2) + iand(edge(3), possible)
-         batch%vertex(i, 6) = batch%start(i, 2) + next(iand(edge(3), possible), batch%corners(i, 2))
-         batch%vertex(i, 7) = batch%start(i, 2) + iand(edge(4), possible)
-         batch%vertex(i, 8) = batch%start(i, 2) + next(iand(edge(4), possible), batch%corners(i, 2))
+         lens%possible(i) = iand(1_ip, possible)
+         lens%inner(i, 1) = iand(inside_p, possible)
+         lens%inner(i, 2) = iand(inside_q, possible)
+         edge = iand(edge, possible)
+         lens%vertex(i, 1) = batch%start(i, 1) + edge(1)
+         lens%vertex(i, 2) = batch%start(i, 1) + next(edge(1), batch%corners(i, 1))
+         lens%vertex(i, 3) = batch%start(i, 1) + edge(2)
+         lens%vertex(i, 4) = batch%start(i, 1) + next(edge(2), batch%corners(i, 1))
+         lens%vertex(i, 5) = batch%start(i, 2) + edge(3)
+         lens%vertex(i, 6) = batch%start(i, 2) + next(edge(3), batch%corners(i, 2))
+         lens%vertex(i, 7) = batch%start(i, 2) + edge(4)
+         lens%vertex(i, 8) = batch%start(i, 2) + next(edge(4), batch%corners(i, 2))
       end do
    end subroutine unpack_lenses
 
@@ -128,184 +120,218 @@ contains
    end function next
 
    !> Prepare the numbers that the tests need.
-   pure subroutine prepare(from, to, batch)
-      integer(ip), intent(in) :: from
-      integer(ip), intent(in) :: to
-      type(overlap_batch_t), intent(inout) :: batch
-      real(wp) :: equal, half, two_p, two_q
+   pure subroutine prepare(n, batch, lens)
+      integer(ip), intent(in) :: n
+      type(overlap_batch_t), intent(in) :: batch
+      type(lens_work_t), intent(inout) :: lens
+      real(wp) :: half
       integer(ip) :: i
 
-      do i = from, to
-         equal = merge(0.0_wp, 1.0_wp, batch%radius(i, 1) < batch%radius(i, 2))
-         half = 0.5_wp*equal
-         batch%centre(i, 1) = -half*batch%offset(i, 1)
-         batch%centre(i, 2) = -half*batch%offset(i, 2)
-         batch%centre(i, 3) = batch%offset(i, 1) + batch%centre(i, 1)
-         batch%centre(i, 4) = batch%offset(i, 2) + batch%centre(i, 2)
-         batch%on_entering(i, 1) = 1.0_wp
-         batch%on_entering(i, 2) = equal
-         batch%scale(i, 1) = batch%radius(i, 1)
-         batch%scale(i, 2) = (1.0_wp - half)*far*batch%radius(i, 1)
-         batch%some(i, 1) = real(min(1_ip, batch%inner(i, 1)), wp)
-         batch%some(i, 2) = real(min(1_ip, batch%inner(i, 2)), wp)
-         two_p = real(shiftr(batch%inner(i, 1), 1), wp)
-         two_q = real(shiftr(batch%inner(i, 2), 1), wp)
-         batch%ignored(i, 1, 1) = huge_number*(1.0_wp - batch%some(i, 1))
-         batch%ignored(i, 2, 1) = huge_number*(1.0_wp - two_q)
-         batch%ignored(i, 1, 2) = huge_number*(1.0_wp - batch%some(i, 2))
-         batch%ignored(i, 2, 2) = huge_number*(1.0_wp - two_p)
-         batch%certified(i) = real(batch%possible(i), wp)
+      do i = 1_ip, n
+         lens%radius(i, 1) = batch%radius(i, 1)
+         lens%radius(i, 2) = batch%radius(i, 2)
+         lens%equal(i) = merge(0.0_wp, 1.0_wp, lens%radius(i, 1) < lens%radius(i, 2))
+         half = 0.5_wp*lens%equal(i)
+         lens%centre(i, 1) = -half*batch%offset(i, 1)
+         lens%centre(i, 2) = -half*batch%offset(i, 2)
+         lens%centre(i, 3) = batch%offset(i, 1) + lens%centre(i, 1)
+         lens%centre(i, 4) = batch%offset(i, 2) + lens%centre(i, 2)
+         lens%some(i, 1) = real(min(1_ip, lens%inner(i, 1)), wp)
+         lens%some(i, 2) = real(min(1_ip, lens%inner(i, 2)), wp)
+         lens%two(i, 1) = real(shiftr(lens%inner(i, 1), 1), wp)
+         lens%two(i, 2) = real(shiftr(lens%inner(i, 2), 1), wp)
+         lens%certified(i) = real(lens%possible(i), wp)
       end do
    end subroutine prepare
 
-   !> Copy the vertices that the lanes name.
-   pure subroutine gather_corners(from, to, vertex, n, turned, corner)
-      integer(ip), intent(in) :: from
-      integer(ip), intent(in) :: to
-      integer(ip), intent(in) :: vertex(column_length, 8)
-      !> Number of vertices
+   !> Copy the vertices that the lanes name, four lanes at a time: it is stores that take the time.
+   pure subroutine gather_corners(n, vertex, n_vertices, turned, corner)
       integer(ip), intent(in) :: n
-      real(wp), intent(in) :: turned(2, n)
+      integer(ip), intent(inout) :: vertex(column_length, 8)
+      integer(ip), intent(in) :: n_vertices
+      real(wp), intent(in) :: turned(2, n_vertices)
       real(wp), intent(inout) :: corner(column_length, 2, 8)
-      integer(ip) :: lane, k
+      integer(ip) :: i, k
 
       do k = 1_ip, 8_ip
-         do lane = from, to
-            corner(lane, 1, k) = turned(1, vertex(lane, k))
-            corner(lane, 2, k) = turned(2, vertex(lane, k))
+         vertex(n + 1_ip:n + 3_ip, k) = vertex(n, k)
+      end do
+      do i = 1_ip, n, 4_ip
+         do k = 1_ip, 8_ip
+            corner(i:i + 3, 1, k) = [turned(1, vertex(i, k)), turned(1, vertex(i + 1, k)), &
+                                     turned(1, vertex(i + 2, k)), turned(1, vertex(i + 3, k))]
+            corner(i:i + 3, 2, k) = [turned(2, vertex(i, k)), turned(2, vertex(i + 1, k)), &
+                                     turned(2, vertex(i + 2, k)), turned(2, vertex(i + 3, k))]
          end do
       end do
    end subroutine gather_corners
 
-   !> Find the crossing where polygon A enters polygon B, and how far the signs that show it exceed their errors.
+   !> Find the crossings, and test whether the edges cross properly and are near.
    !>
-   !> The edge of A begins outside that of B and ends inside, the edge of B begins inside that of A and ends outside.
-   pure subroutine cross_edges(from, to, a, centre_a, b, centre_b, scale, on_entering, crossing, certified)
-      integer(ip), intent(in) :: from
-      integer(ip), intent(in) :: to
-      !> Vertices of A; 1 to 2 is the entering edge
-      real(wp), intent(in) :: a(column_length, 2, 4)
-      real(wp), intent(in) :: centre_a(column_length, 2)
-      !> Vertices of B; 3 to 4 is its edge that leaves A
-      real(wp), intent(in) :: b(column_length, 2, 4)
-      real(wp), intent(in) :: centre_b(column_length, 2)
-      real(wp), intent(in) :: scale(column_length, 2)
-      real(wp), intent(in) :: on_entering(column_length)
-      real(wp), intent(inout) :: crossing(column_length, 2)
-      !> Stays positive if the edges cross properly and are near
-      real(wp), intent(inout) :: certified(column_length)
-      real(wp) :: ex, ey, fx, fy, a1x, a1y, a2x, a2y, b1x, b1y, b2x, b2y, in_f(2), in_e(2), limit_e, limit_f
-      real(wp) :: reach, on_e, on_f, inner, across, share
+   !> At a crossing, the edge of one polygon begins outside that of the other and ends inside, and the edge of the other
+   !> begins inside that of the first and ends outside.
+   pure subroutine find_crossings(n, lens)
+      integer(ip), intent(in) :: n
+      type(lens_work_t), intent(inout) :: lens
+      complex(wp) :: p(4), q(4), e, f
+      real(wp) :: x(2), y(2), in_e(2), in_f(2), of_p, of_q, on_q, on_p, inner, across, share, reach
       integer(ip) :: i
 
-      do i = from, to
-         ex = a(i, 1, 2) - a(i, 1, 1)
-         ey = a(i, 2, 2) - a(i, 2, 1)
-         fx = b(i, 1, 4) - b(i, 1, 3)
-         fy = b(i, 2, 4) - b(i, 2, 3)
-         a1x = a(i, 1, 1) + centre_a(i, 1)
-         a1y = a(i, 2, 1) + centre_a(i, 2)
-         a2x = a(i, 1, 2) + centre_a(i, 1)
-         a2y = a(i, 2, 2) + centre_a(i, 2)
-         b1x = b(i, 1, 3) + centre_b(i, 1)
-         b1y = b(i, 2, 3) + centre_b(i, 2)
-         b2x = b(i, 1, 4) + centre_b(i, 1)
-         b2y = b(i, 2, 4) + centre_b(i, 2)
-         in_f(1) = fx*(a1y - b1y) - fy*(a1x - b1x)
-         in_f(2) = fx*(a2y - b1y) - fy*(a2x - b1x)
-         in_e(1) = ex*(b1y - a1y) - ey*(b1x - a1x)
-         in_e(2) = ex*(b2y - a1y) - ey*(b2x - a1x)
-         limit_e = sure*scale(i, 1)*(abs(ex) + abs(ey))
-         limit_f = sure*scale(i, 1)*(abs(fx) + abs(fy))
-         reach = max(max(max(abs(a1x), abs(a1y)), max(abs(a2x), abs(a2y))), &
-                     max(max(abs(b1x), abs(b1y)), max(abs(b2x), abs(b2y))))
-         certified(i) = min(min(certified(i), scale(i, 2) - reach), &
-                            min(min(-in_f(1), in_f(2)) - limit_f, min(in_e(1), -in_e(2)) - limit_e))
-         on_e = on_entering(i)
-         on_f = 1.0_wp - on_e
-         inner = on_e*in_f(2) + on_f*in_e(1)
-         across = on_e*(in_f(2) - in_f(1)) + on_f*(in_e(1) - in_e(2))
+      do i = 1_ip, n
+         p(1) = placed(lens, i, 1, 1)
+         p(2) = placed(lens, i, 2, 1)
+         p(3) = placed(lens, i, 3, 1)
+         p(4) = placed(lens, i, 4, 1)
+         q(1) = placed(lens, i, 1, 2)
+         q(2) = placed(lens, i, 2, 2)
+         q(3) = placed(lens, i, 3, 2)
+         q(4) = placed(lens, i, 4, 2)
+         ! P enters Q.
+         e = edge(lens, i, 1, 1)
+         f = edge(lens, i, 3, 2)
+         in_f = [cross(f, p(1) - q(3)), cross(f, p(2) - q(3))]
+         in_e = [cross(e, q(3) - p(1)), cross(e, q(4) - p(1))]
+         of_p = min(in_e(1), -in_e(2))
+         of_q = min(-in_f(1), in_f(2))
+         share = in_f(2)/max(in_f(2) - in_f(1), max(abs(in_f(2)), tiny(1.0_wp)))
+         x(1) = real(p(2), wp) - share*real(e, wp)
+         x(2) = aimag(p(2)) - share*aimag(e)
+         ! Q enters P. The crossing is computed on the edge of P or, if the radii are equal, on that of Q.
+         e = edge(lens, i, 3, 1)
+         f = edge(lens, i, 1, 2)
+         in_f = [cross(f, p(3) - q(1)), cross(f, p(4) - q(1))]
+         in_e = [cross(e, q(1) - p(3)), cross(e, q(2) - p(3))]
+         of_p = min(of_p, min(-in_e(1), in_e(2))) - sure_at_edge*lens%radius(i, 1)*lens%radius(i, 1)
+         of_q = min(of_q, min(in_f(1), -in_f(2))) - sure_at_edge*lens%radius(i, 1)*lens%radius(i, 2)
+         on_q = lens%equal(i)
+         on_p = 1.0_wp - on_q
+         inner = on_q*in_e(2) + on_p*in_f(1)
+         across = on_q*(in_e(2) - in_e(1)) + on_p*(in_f(1) - in_f(2))
          share = inner/max(across, max(abs(inner), tiny(1.0_wp)))
-         crossing(i, 1) = (on_e*a2x + on_f*b1x) + share*(on_f*fx - on_e*ex)
-         crossing(i, 2) = (on_e*a2y + on_f*b1y) + share*(on_f*fy - on_e*ey)
+         y(1) = (on_q*real(q(2), wp) + on_p*real(p(3), wp)) + share*(on_p*real(e, wp) - on_q*real(f, wp))
+         y(2) = (on_q*aimag(q(2)) + on_p*aimag(p(3))) + share*(on_p*aimag(e) - on_q*aimag(f))
+         reach = max(max(max(extent(q(1)), extent(q(2))), max(extent(q(3)), extent(q(4)))), &
+                     lens%radius(i, 1) + max(abs(lens%centre(i, 1)), abs(lens%centre(i, 2))))
+         lens%crossing(i, 1, 1) = x(1)
+         lens%crossing(i, 2, 1) = x(2)
+         lens%crossing(i, 1, 2) = y(1)
+         lens%crossing(i, 2, 2) = y(2)
+         lens%certified(i) = min(min(lens%certified(i), min(of_p, of_q)), &
+                                  (1.0_wp - 0.5_wp*on_q)*far*lens%radius(i, 1) - reach)
       end do
-   end subroutine cross_edges
+   end subroutine find_crossings
 
-   !> Test whether the corners of polygon A between the crossings are inside polygon B.
-   pure subroutine test_corners(from, to, a, centre_a, b, centre_b, scale, radius_b, ignored, certified)
-      integer(ip), intent(in) :: from
-      integer(ip), intent(in) :: to
-      !> Vertices of A; 2 and 3 are the corners to test, the same one if there is only one
-      real(wp), intent(in) :: a(column_length, 2, 4)
-      real(wp), intent(in) :: centre_a(column_length, 2)
-      !> Vertices of B; 2 to 3 is an edge if it has two corners inside A
-      real(wp), intent(in) :: b(column_length, 2, 4)
-      real(wp), intent(in) :: centre_b(column_length, 2)
-      !> Radius of P
-      real(wp), intent(in) :: scale(column_length)
-      real(wp), intent(in) :: radius_b(column_length)
-      !> Great if A has no such corners, and great if B does not have two of them inside A
-      real(wp), intent(in) :: ignored(column_length, 2)
-      !> Stays positive if they are inside
-      real(wp), intent(inout) :: certified(column_length)
-      real(wp) :: a2x, a2y, a3x, a3y, armx, army, in_edges, in_middle, in_fan, ex, ey, limit
+   !> A vertex of a polygon
+   pure complex(wp) function placed(lens, lane, k, body)
+      type(lens_work_t), intent(in) :: lens
+      integer(ip), intent(in) :: lane
+      integer, intent(in) :: k, body
+
+      placed = cmplx(lens%corner(lane, 1, k, body) + lens%centre(lane, 2*body - 1), &
+                     lens%corner(lane, 2, k, body) + lens%centre(lane, 2*body), wp)
+   end function placed
+
+   !> A vertex of a polygon relative to its centre
+   pure complex(wp) function from_centre(lens, lane, k, body)
+      type(lens_work_t), intent(in) :: lens
+      integer(ip), intent(in) :: lane
+      integer, intent(in) :: k, body
+
+      from_centre = cmplx(lens%corner(lane, 1, k, body), lens%corner(lane, 2, k, body), wp)
+   end function from_centre
+
+   !> Difference of two successive vertices
+   pure complex(wp) function edge(lens, lane, k, body)
+      type(lens_work_t), intent(in) :: lens
+      integer(ip), intent(in) :: lane
+      integer, intent(in) :: k, body
+
+      edge = from_centre(lens, lane, k + 1, body) - from_centre(lens, lane, k, body)
+   end function edge
+
+   !> Cross product of two vectors
+   pure real(wp) function cross(a, b)
+      complex(wp), intent(in) :: a, b
+
+      cross = real(a, wp)*aimag(b) - aimag(a)*real(b, wp)
+   end function cross
+
+   !> Greater magnitude of both coordinates
+   pure real(wp) function extent(a)
+      complex(wp), intent(in) :: a
+
+      extent = max(abs(real(a, wp)), abs(aimag(a)))
+   end function extent
+
+   !> Test whether the corners between the crossings are inside the other polygon.
+   pure subroutine test_corners(n, lens)
+      integer(ip), intent(in) :: n
+      type(lens_work_t), intent(inout) :: lens
+      complex(wp) :: p(4), q(4), e(3), f(3), g, h
+      real(wp) :: edges, middle, fan
       integer(ip) :: i
 
-      do i = from, to
-         a2x = a(i, 1, 2) + centre_a(i, 1)
-         a2y = a(i, 2, 2) + centre_a(i, 2)
-         a3x = a(i, 1, 3) + centre_a(i, 1)
-         a3y = a(i, 2, 3) + centre_a(i, 2)
-         limit = sure*scale(i)
-         ! The crossings show the first corner inside the edge where B leaves, the last one inside that where B enters.
-         ex = b(i, 1, 2) - b(i, 1, 1)
-         ey = b(i, 2, 2) - b(i, 2, 1)
-         in_edges = ex*(a2y - (b(i, 2, 1) + centre_b(i, 2))) - ey*(a2x - (b(i, 1, 1) + centre_b(i, 1))) &
-                    - limit*(abs(ex) + abs(ey))
-         ex = b(i, 1, 4) - b(i, 1, 3)
-         ey = b(i, 2, 4) - b(i, 2, 3)
-         in_edges = min(in_edges, ex*(a3y - (b(i, 2, 3) + centre_b(i, 2))) - ey*(a3x - (b(i, 1, 3) + centre_b(i, 1))) &
-                        - limit*(abs(ex) + abs(ey)))
-         ex = b(i, 1, 3) - b(i, 1, 2)
-         ey = b(i, 2, 3) - b(i, 2, 2)
-         armx = b(i, 1, 2) + centre_b(i, 1)
-         army = b(i, 2, 2) + centre_b(i, 2)
-         in_middle = min(ex*(a2y - army) - ey*(a2x - armx), ex*(a3y - army) - ey*(a3x - armx)) &
-                     - limit*(abs(ex) + abs(ey))
-         a2x = a2x - centre_b(i, 1)
-         a2y = a2y - centre_b(i, 2)
-         a3x = a3x - centre_b(i, 1)
-         a3y = a3y - centre_b(i, 2)
-         in_fan = min(min(b(i, 1, 1)*a2y - b(i, 2, 1)*a2x, a2x*b(i, 2, 4) - a2y*b(i, 1, 4)), &
-                      min(b(i, 1, 1)*a3y - b(i, 2, 1)*a3x, a3x*b(i, 2, 4) - a3y*b(i, 1, 4))) &
-                  - sure_in_fan*radius_b(i)*radius_b(i)
-         certified(i) = min(certified(i), &
-                            min(min(in_edges, in_fan), in_middle + ignored(i, 2)) + ignored(i, 1))
+      do i = 1_ip, n
+         p(1) = placed(lens, i, 1, 1)
+         p(2) = placed(lens, i, 2, 1)
+         p(3) = placed(lens, i, 3, 1)
+         q(1) = placed(lens, i, 1, 2)
+         q(2) = placed(lens, i, 2, 2)
+         q(3) = placed(lens, i, 3, 2)
+         e = [edge(lens, i, 1, 1), edge(lens, i, 2, 1), edge(lens, i, 3, 1)]
+         f = [edge(lens, i, 1, 2), edge(lens, i, 2, 2), edge(lens, i, 3, 2)]
+         ! The crossings show the first corner inside the edge where the other polygon leaves, the last one inside that
+         ! where it enters.
+         edges = min(cross(f(1), p(2) - q(1)), cross(f(3), p(3) - q(3)))
+         middle = min(cross(f(2), p(2) - q(2)), cross(f(2), p(3) - q(2)))
+         edges = min(edges, middle + ignored(lens%two(i, 2))) - sure_at_edge*lens%radius(i, 1)*lens%radius(i, 2)
+         g = p(2) - cmplx(lens%centre(i, 3), lens%centre(i, 4), wp)
+         h = p(3) - cmplx(lens%centre(i, 3), lens%centre(i, 4), wp)
+         fan = min(min(cross(from_centre(lens, i, 1, 2), g), cross(g, from_centre(lens, i, 4, 2))), &
+                   min(cross(from_centre(lens, i, 1, 2), h), cross(h, from_centre(lens, i, 4, 2)))) &
+               - sure_in_fan*lens%radius(i, 2)*lens%radius(i, 2)
+         lens%certified(i) = min(lens%certified(i), min(edges, fan) + ignored(lens%some(i, 1)))
+         edges = min(cross(e(1), q(2) - p(1)), cross(e(3), q(3) - p(3)))
+         middle = min(cross(e(2), q(2) - p(2)), cross(e(2), q(3) - p(2)))
+         edges = min(edges, middle + ignored(lens%two(i, 1))) - sure_at_edge*lens%radius(i, 1)*lens%radius(i, 1)
+         g = q(2) - cmplx(lens%centre(i, 1), lens%centre(i, 2), wp)
+         h = q(3) - cmplx(lens%centre(i, 1), lens%centre(i, 2), wp)
+         fan = min(min(cross(from_centre(lens, i, 1, 1), g), cross(g, from_centre(lens, i, 4, 1))), &
+                   min(cross(from_centre(lens, i, 1, 1), h), cross(h, from_centre(lens, i, 4, 1)))) &
+               - sure_in_fan*lens%radius(i, 1)*lens%radius(i, 1)
+         lens%certified(i) = min(lens%certified(i), min(edges, fan) + ignored(lens%some(i, 2)))
       end do
    end subroutine test_corners
 
+   !> A great number if a test of corners does not count
+   pure real(wp) function ignored(counts)
+      !> 1 or 0
+      real(wp), intent(in) :: counts
+
+      ignored = huge_number*(1.0_wp - counts)
+   end function ignored
+
    !> Area, its gradient, moments and centroid of all lenses.
-   pure subroutine integrate_area(from, to, batch, columns)
-      integer(ip), intent(in) :: from
-      integer(ip), intent(in) :: to
-      type(overlap_batch_t), intent(inout) :: batch
+   pure subroutine integrate_area(n, lens, columns)
+      integer(ip), intent(in) :: n
+      type(lens_work_t), intent(inout) :: lens
       type(overlap_columns_t), intent(inout) :: columns
       real(wp) :: zx, zy, mx, my, v1x, v1y, v2x, v2y, w1x, w1y, w2x, w2y, part(4), arc_p, arc_q, twice, wx, wy, scale
       integer(ip) :: i
 
-      do i = from, to
-         zx = batch%crossing(i, 1, 2) - batch%crossing(i, 1, 1)
-         zy = batch%crossing(i, 2, 2) - batch%crossing(i, 2, 1)
-         mx = 0.5_wp*(batch%crossing(i, 1, 1) + batch%crossing(i, 1, 2))
-         my = 0.5_wp*(batch%crossing(i, 2, 1) + batch%crossing(i, 2, 2))
-         v1x = batch%some(i, 1)*((batch%corner(i, 1, 2, 1) + batch%centre(i, 1)) - batch%crossing(i, 1, 1))
-         v1y = batch%some(i, 1)*((batch%corner(i, 2, 2, 1) + batch%centre(i, 2)) - batch%crossing(i, 2, 1))
-         v2x = batch%some(i, 1)*((batch%corner(i, 1, 3, 1) + batch%centre(i, 1)) - batch%crossing(i, 1, 1))
-         v2y = batch%some(i, 1)*((batch%corner(i, 2, 3, 1) + batch%centre(i, 2)) - batch%crossing(i, 2, 1))
-         w1x = batch%some(i, 2)*((batch%corner(i, 1, 2, 2) + batch%centre(i, 3)) - batch%crossing(i, 1, 2))
-         w1y = batch%some(i, 2)*((batch%corner(i, 2, 2, 2) + batch%centre(i, 4)) - batch%crossing(i, 2, 2))
-         w2x = batch%some(i, 2)*((batch%corner(i, 1, 3, 2) + batch%centre(i, 3)) - batch%crossing(i, 1, 2))
-         w2y = batch%some(i, 2)*((batch%corner(i, 2, 3, 2) + batch%centre(i, 4)) - batch%crossing(i, 2, 2))
+      do i = 1_ip, n
+         zx = lens%crossing(i, 1, 2) - lens%crossing(i, 1, 1)
+         zy = lens%crossing(i, 2, 2) - lens%crossing(i, 2, 1)
+         mx = 0.5_wp*(lens%crossing(i, 1, 1) + lens%crossing(i, 1, 2))
+         my = 0.5_wp*(lens%crossing(i, 2, 1) + lens%crossing(i, 2, 2))
+         v1x = lens%some(i, 1)*((lens%corner(i, 1, 2, 1) + lens%centre(i, 1)) - lens%crossing(i, 1, 1))
+         v1y = lens%some(i, 1)*((lens%corner(i, 2, 2, 1) + lens%centre(i, 2)) - lens%crossing(i, 2, 1))
+         v2x = lens%some(i, 1)*((lens%corner(i, 1, 3, 1) + lens%centre(i, 1)) - lens%crossing(i, 1, 1))
+         v2y = lens%some(i, 1)*((lens%corner(i, 2, 3, 1) + lens%centre(i, 2)) - lens%crossing(i, 2, 1))
+         w1x = lens%some(i, 2)*((lens%corner(i, 1, 2, 2) + lens%centre(i, 3)) - lens%crossing(i, 1, 2))
+         w1y = lens%some(i, 2)*((lens%corner(i, 2, 2, 2) + lens%centre(i, 4)) - lens%crossing(i, 2, 2))
+         w2x = lens%some(i, 2)*((lens%corner(i, 1, 3, 2) + lens%centre(i, 3)) - lens%crossing(i, 1, 2))
+         w2y = lens%some(i, 2)*((lens%corner(i, 2, 3, 2) + lens%centre(i, 4)) - lens%crossing(i, 2, 2))
          ! Each arc with the chord, as a fan from its first crossing
          part(1) = v1x*v2y - v1y*v2x
          part(2) = v2x*zy - v2y*zx
@@ -316,21 +342,21 @@ contains
          twice = arc_p + arc_q
          wx = (part(1)*(v1x + v2x) + part(2)*(v2x + zx)) + (part(3)*(w1x + w2x) + part(4)*(w2x - zx))
          wy = (part(1)*(v1y + v2y) + part(2)*(v2y + zy)) + (part(3)*(w1y + w2y) + part(4)*(w2y - zy))
-         scale = 1.0_wp/max(twice, sure_area*batch%scale(i, 1)*batch%scale(i, 1))
+         scale = 1.0_wp/max(twice, sure_area*lens%radius(i, 1)*lens%radius(i, 1))
          wx = mx + scale*(0.5_wp*(arc_q - arc_p)*zx + third*wx)
          wy = my + scale*(0.5_wp*(arc_q - arc_p)*zy + third*wy)
          columns%area(i) = 0.5_wp*twice
-         columns%arm_first(i, 1) = wx - batch%centre(i, 1)
-         columns%arm_first(i, 2) = wy - batch%centre(i, 2)
-         columns%arm_second(i, 1) = wx - batch%centre(i, 3)
-         columns%arm_second(i, 2) = wy - batch%centre(i, 4)
+         columns%arm_first(i, 1) = wx - lens%centre(i, 1)
+         columns%arm_first(i, 2) = wy - lens%centre(i, 2)
+         columns%arm_second(i, 1) = wx - lens%centre(i, 3)
+         columns%arm_second(i, 2) = wy - lens%centre(i, 4)
          columns%normal(i, 1) = zy
          columns%normal(i, 2) = -zx
          columns%length(i) = sqrt(zx*zx + zy*zy)
-         columns%moment(i, 1) = -(zx*(mx - batch%centre(i, 1)) + zy*(my - batch%centre(i, 2)))
-         columns%moment(i, 2) = -(zx*(mx - batch%centre(i, 3)) + zy*(my - batch%centre(i, 4)))
-         batch%certified(i) = min(batch%certified(i), &
-                                  min(columns%area(i) - sure_area*batch%scale(i, 1)*batch%scale(i, 1), &
+         columns%moment(i, 1) = -(zx*(mx - lens%centre(i, 1)) + zy*(my - lens%centre(i, 2)))
+         columns%moment(i, 2) = -(zx*(mx - lens%centre(i, 3)) + zy*(my - lens%centre(i, 4)))
+         lens%certified(i) = min(lens%certified(i), &
+                                  min(columns%area(i) - sure_area*lens%radius(i, 1)*lens%radius(i, 1), &
                                       zx*zx + zy*zy - 4.0_wp*no_length**2*columns%area(i)))
       end do
    end subroutine integrate_area

@@ -30,8 +30,7 @@ module polydem_overlap_batch
       real(wp) :: length(lanes)
    end type overlap_columns_t
 
-   !> A batch of pairs, one lane each. Its numbers are not initialised. Last indices (2) are P and Q, (4) x and y of P
-   !> and of Q.
+   !> A batch of pairs, one lane each. Its numbers are not initialised. Last indices (2) are P and Q.
    type :: overlap_batch_t
       !> What is remembered, see `polydem_pair_memory`; any integer
       integer(ip) :: memory(column_length)
@@ -47,29 +46,6 @@ module polydem_overlap_batch
       !> Positive if the result is certified, which a memory without a lens of these polygons never is; the rest may
       !> not be read otherwise
       real(wp) :: certified(column_length)
-
-      !> Work space: places in the array of vertices: start and end of the edge of P that enters Q, of the edge of P
-      !> that leaves it, of the edge of Q that enters P, of the edge of Q that leaves it
-      integer(ip) :: vertex(column_length, 8)
-      !> Work space: 1 if there is such a lens, otherwise 0
-      integer(ip) :: possible(column_length)
-      !> Work space: number of corners inside the other polygon
-      integer(ip) :: inner(column_length, 2)
-      !> Work space: 1 if there are some, otherwise 0
-      real(wp) :: some(column_length, 2)
-      !> Work space: great numbers for tests of corners that do not count, (lane, test, polygon)
-      real(wp) :: ignored(column_length, 2, 2)
-      !> Work space: 1 if a crossing is computed on the entering edge, 0 if on the leaving one: 1 where P enters Q;
-      !> where Q enters P, 1 if the radii are equal, otherwise 0
-      real(wp) :: on_entering(column_length, 2)
-      !> Work space: radius of P, and greatest coordinate of a certified lens [m]
-      real(wp) :: scale(column_length, 2)
-      !> Work space: centres. The origin is that of P or, if the radii are equal, half-way between the centres [m]
-      real(wp) :: centre(column_length, 4)
-      !> Work space: the vertices, (lane, x or y, vertex, P or Q) [m]
-      real(wp) :: corner(column_length, 2, 4, 2)
-      !> Work space: where P enters Q and where Q enters P, (lane, x or y, crossing) [m]
-      real(wp) :: crossing(column_length, 2, 2)
    end type overlap_batch_t
 
 contains

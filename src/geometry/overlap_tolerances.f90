@@ -10,7 +10,8 @@ module polydem_overlap_tolerances
    use polydem_kinds, only: wp
    implicit none
    private
-   public :: far, roundoff, separable_area, sure, sure_in_fan, sure_area, surely_apart, no_length, least_square
+   public :: far, roundoff, separable_area, sure, sure_at_edge, sure_in_fan, sure_area, surely_apart
+   public :: no_length, least_square
 
    !> Coordinates up to this multiple of s count as near. Beyond, line equations are formed without rounding
    real(wp), parameter :: far = 8.0_wp
@@ -22,6 +23,9 @@ module polydem_overlap_tolerances
    real(wp), parameter :: separable_area = 128.0_wp*epsilon(1.0_wp)
    !> Lens: a sign beyond this is certain
    real(wp), parameter :: sure = 24.0_wp*epsilon(1.0_wp)
+   !> Lens: the same in units of s R for every edge of a polygon of radius R, for which |e_x| + |e_y| is at most
+   !> sqrt(2) 2 R
+   real(wp), parameter :: sure_at_edge = 3.0_wp*sure
    !> Lens: the same for the cross product of a corner of a polygon with a point relative to its centre, in units of the
    !> square of its radius R. The point is at most R + sqrt(2) 8 s + s from the centre; the product with a corner of
    !> at most R is off by at most 4 u 13.4 sqrt(2) R**2

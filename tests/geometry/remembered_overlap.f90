@@ -89,16 +89,16 @@ contains
 
       n = size(pair%p, 2, kind=ip)
       m = size(pair%q, 2, kind=ip)
-      call add_lane(batch, 3_ip, memory, [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), radius_of(pair%q))
-      call evaluate_batch(batch, 3_ip, 3_ip, vertices_of(pair), effective, columns)
-      certified = batch%certified(3) > 0.0_wp
+      call add_lane(batch, 1_ip, memory, [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), radius_of(pair%q))
+      call evaluate_batch(batch, 1_ip, vertices_of(pair), effective, columns)
+      certified = batch%certified(1) > 0.0_wp
       if (.not. certified) return
-      overlap%area = columns%area(3)
-      overlap%centroid = columns%arm_first(3, :)
-      overlap%centroid_b = columns%arm_second(3, :)
-      overlap%normal = columns%normal(3, :)
-      overlap%moment_a = columns%moment(3, 1)
-      overlap%moment_b = columns%moment(3, 2)
+      overlap%area = columns%area(1)
+      overlap%centroid = columns%arm_first(1, :)
+      overlap%centroid_b = columns%arm_second(1, :)
+      overlap%normal = columns%normal(1, :)
+      overlap%moment_a = columns%moment(1, 1)
+      overlap%moment_b = columns%moment(1, 2)
    end subroutine certified_lens
 
    !> Whether two overlaps are equal
