@@ -9,7 +9,7 @@ module polydem_pair_memory
    use polydem_kinds, only: ip
    implicit none
    private
-   public :: lens_bits, most_lens_corners, packed_lens, packed_edge, unpack_edge
+   public :: lens_bits, edge_bits, most_lens_corners, packed_lens, packed_edge, unpack_edge
 
    !> Bits of the number of an edge of a lens, and of the number of a separating edge
    integer, parameter :: lens_bits = 7, edge_bits = 15

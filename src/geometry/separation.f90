@@ -2,11 +2,12 @@
 module polydem_separation
    use polydem_exact_cross, only: exact_cross
    use polydem_kinds, only: ip, wp
+   use polydem_overlap_batch, only: column_length, lanes, overlap_batch_t
    use polydem_overlap_tolerances, only: far, surely_apart
-   use polydem_pair_memory, only: packed_edge, unpack_edge
+   use polydem_pair_memory, only: edge_bits, packed_edge, unpack_edge
    implicit none
    private
-   public :: test_separation, test_in_place, remembered_edge
+   public :: test_separation, test_edges, remembered_edge
 
    !> Line of an edge of polygon A, for depths of points of polygon B
    type :: line_t
@@ -26,55 +27,94 @@ module polydem_separation
 
 contains
 
-   !> As `test_separation`, for polygons in an array of vertices.
+   !> Find which remembered edges of a batch still separate the polygons.
    !>
-   !> Nearly always the remembered corner decides. Here that is found without branches until the end.
-   pure subroutine test_in_place(n, turned, vertices, offset, radius_p, memory, apart)
-      !> Number of vertices in the array
+   !> Nearly always the remembered corner decides. That is tested without branches; `test_separation` tests the rest.
+   pure subroutine test_edges(batch, n, n_vertices, turned, apart)
+      !> The batch: an edge is remembered in each lane; its corner is brought up to date
+      type(overlap_batch_t), intent(inout) :: batch
+      !> Number of lanes
       integer(ip), intent(in) :: n
+      !> Number of vertices in the array
+      integer(ip), intent(in) :: n_vertices
       !> Vertices of all polygons, anticlockwise, each relative to its own centre [m]
-      real(wp), intent(in) :: turned(2, n)
-      !> Places of the first and the last vertex of P and of Q
-      integer(ip), intent(in) :: vertices(4)
-      !> Centre of Q minus centre of P [m]
-      real(wp), intent(in) :: offset(2)
-      !> Radius of P, not greater than that of Q [m]
-      real(wp), intent(in) :: radius_p
-      !> What is remembered, a negative number; the corner is brought up to date
-      integer(ip), intent(inout) :: memory
-      !> Whether the polygons are apart
-      logical, intent(out) :: apart
-      integer(ip) :: edge, corner, k(5)
-      real(wp) :: ex, ey, fx, fy, vx, vy, of_p, level
-      logical :: of_q
+      real(wp), intent(in) :: turned(2, n_vertices)
+      !> Whether the polygons of a lane are apart
+      logical, intent(out) :: apart(lanes)
+      real(wp) :: sure(column_length)
+      integer(ip) :: vertex(column_length, 5), i
 
-      call unpack_edge(memory, of_q, edge, corner)
-      associate (a => merge(3_ip, 1_ip, of_q), b => merge(1_ip, 3_ip, of_q))
-         k(1) = vertices(a) + edge
-         k(2) = merge(vertices(a), k(1) + 1_ip, k(1) == vertices(a + 1_ip))
-         k(3) = vertices(b) + corner
-         k(4) = merge(vertices(b + 1_ip), k(3) - 1_ip, k(3) == vertices(b))
-         k(5) = merge(vertices(b), k(3) + 1_ip, k(3) == vertices(b + 1_ip))
-         apart = k(1) <= vertices(a + 1_ip) .and. k(3) <= vertices(b + 1_ip)
-      end associate
-      if (apart) then
-         of_p = merge(0.0_wp, 1.0_wp, of_q)
-         ex = turned(1, k(2)) - turned(1, k(1))
-         ey = turned(2, k(2)) - turned(2, k(1))
-         fx = turned(1, k(1)) + (1.0_wp - of_p)*offset(1)
-         fy = turned(2, k(1)) + (1.0_wp - of_p)*offset(2)
-         vx = turned(1, k(3)) + of_p*offset(1)
-         vy = turned(2, k(3)) + of_p*offset(2)
-         level = -surely_apart*radius_p*(abs(ex) + abs(ey))
-         apart = max(max(abs(fx), abs(fy)), max(abs(vx), abs(vy))) <= far*radius_p &
-                 .and. ex*(vy - fy) - ey*(vx - fx) < level &
-                 .and. surely_deeper([ex, ey], turned(:, k(3)), turned(:, k(4))) &
-                 .and. surely_deeper([ex, ey], turned(:, k(3)), turned(:, k(5)))
-         if (apart) return
-      end if
-      call test_separation(turned(:, vertices(1):vertices(2)), turned(:, vertices(3):vertices(4)), offset, radius_p, &
-                           memory, apart)
-   end subroutine test_in_place
+      call unpack_edges(batch, n, vertex, sure)
+      call test_corners(batch, n, vertex, n_vertices, turned, sure)
+      do i = 1_ip, n
+         apart(i) = sure(i) > 0.0_wp
+         if (apart(i)) cycle
+         associate (from => batch%start(i, :), to => batch%start(i, :) + batch%corners(i, :) - 1_ip)
+            call test_separation(turned(:, from(1):to(1)), turned(:, from(2):to(2)), batch%offset(i, :), &
+                                 batch%radius(i, 1), batch%memory(i), apart(i))
+         end associate
+      end do
+   end subroutine test_edges
+
+   !> Find the vertices of the remembered edges and corners.
+   pure subroutine unpack_edges(batch, n, vertex, sure)
+      type(overlap_batch_t), intent(in) :: batch
+      integer(ip), intent(in) :: n
+      !> Places of start and end of the edge, of the remembered corner, the one before, and the one behind
+      integer(ip), intent(inout) :: vertex(column_length, 5)
+      !> Positive if they exist; otherwise the vertices are others
+      real(wp), intent(inout) :: sure(column_length)
+      integer(ip) :: i, edge, corner, start(2), last(2), of_q, exchange
+
+      do i = 1_ip, n
+         ! As in `unpack_edge`; all bits of `of_q` are set if the edge is one of Q. Then P and Q change places.
+         of_q = -iand(not(batch%memory(i)), 1_ip)
+         edge = ibits(not(batch%memory(i)), 1, edge_bits)
+         corner = ibits(not(batch%memory(i)), 1 + edge_bits, edge_bits)
+         exchange = iand(of_q, ieor(batch%start(i, 1), batch%start(i, 2)))
+         start = ieor(batch%start(i, :), exchange)
+         exchange = iand(of_q, ieor(batch%corners(i, 1), batch%corners(i, 2)))
+         last = ieor(batch%corners(i, :), exchange) - 1_ip
+         sure(i) = merge(1.0_wp, -1.0_wp, edge <= last(1) .and. corner <= last(2))
+         edge = min(edge, last(1))
+         corner = min(corner, last(2))
+         vertex(i, 1) = start(1) + edge
+         vertex(i, 2) = start(1) + merge(0_ip, edge + 1_ip, edge == last(1))
+         vertex(i, 3) = start(2) + corner
+         vertex(i, 4) = start(2) + merge(last(2), corner - 1_ip, corner == 0_ip)
+         vertex(i, 5) = start(2) + merge(0_ip, corner + 1_ip, corner == last(2))
+      end do
+   end subroutine unpack_edges
+
+   !> Test the remembered corners: `sure` stays positive if the corner is near, outside of the edge, and nearer to its
+   !> line than both its neighbours.
+   pure subroutine test_corners(batch, n, vertex, n_vertices, turned, sure)
+      type(overlap_batch_t), intent(in) :: batch
+      integer(ip), intent(in) :: n
+      integer(ip), intent(in) :: vertex(column_length, 5)
+      integer(ip), intent(in) :: n_vertices
+      real(wp), intent(in) :: turned(2, n_vertices)
+      real(wp), intent(inout) :: sure(column_length)
+      real(wp) :: edge(2), from(2), to(2), of_p, of_q, nearer
+      integer(ip) :: i
+
+      do i = 1_ip, n
+         of_q = merge(1.0_wp, 0.0_wp, btest(not(batch%memory(i)), 0))
+         of_p = 1.0_wp - of_q
+         edge(1) = turned(1, vertex(i, 2)) - turned(1, vertex(i, 1))
+         edge(2) = turned(2, vertex(i, 2)) - turned(2, vertex(i, 1))
+         from(1) = turned(1, vertex(i, 1)) + of_q*batch%offset(i, 1)
+         from(2) = turned(2, vertex(i, 1)) + of_q*batch%offset(i, 2)
+         to(1) = turned(1, vertex(i, 3)) + of_p*batch%offset(i, 1)
+         to(2) = turned(2, vertex(i, 3)) + of_p*batch%offset(i, 2)
+         nearer = min(lead(edge, turned(:, vertex(i, 3)), turned(:, vertex(i, 4))), &
+                      lead(edge, turned(:, vertex(i, 3)), turned(:, vertex(i, 5))))
+         sure(i) = min(min(sure(i), nearer), &
+                       min(far*batch%radius(i, 1) - max(max(abs(from(1)), abs(from(2))), max(abs(to(1)), abs(to(2)))), &
+                           -surely_apart*batch%radius(i, 1)*(abs(edge(1)) + abs(edge(2))) &
+                           - (edge(1)*(to(2) - from(2)) - edge(2)*(to(1) - from(1)))))
+      end do
+   end subroutine test_corners
 
    !> Find whether a remembered edge still separates the polygons.
    !>
@@ -149,8 +189,8 @@ contains
       end if
    end function depth_of
 
-   !> Whether one point is deeper than another beyond rounding errors, which are 4 u of each product at most
-   pure logical function surely_deeper(edge, point, other)
+   !> How much deeper one point is than another beyond rounding errors, which are 4 u of each product at most
+   pure real(wp) function lead(edge, point, other)
       real(wp), intent(in) :: edge(2)
       real(wp), intent(in) :: point(2)
       real(wp), intent(in) :: other(2)
@@ -158,8 +198,8 @@ contains
 
       plus = edge(1)*(point(2) - other(2))
       minus = edge(2)*(point(1) - other(1))
-      surely_deeper = plus - minus > 4.0_wp*epsilon(1.0_wp)*(abs(plus) + abs(minus))
-   end function surely_deeper
+      lead = plus - minus - 4.0_wp*epsilon(1.0_wp)*(abs(plus) + abs(minus))
+   end function lead
 
    !> Find whether all corners of polygon B are outside of a line.
    pure subroutine test_line(line, b, corner, apart)
@@ -175,8 +215,8 @@ contains
       v = corner + 1_ip
       apart = depth_of(line, b(:, v)) < line%level
       if (.not. apart) return
-      if (surely_deeper(line%edge, b(:, v), b(:, merge(n, v - 1_ip, v == 1_ip)))) then
-         if (surely_deeper(line%edge, b(:, v), b(:, merge(1_ip, v + 1_ip, v == n)))) return
+      if (lead(line%edge, b(:, v), b(:, merge(n, v - 1_ip, v == 1_ip))) > 0.0_wp) then
+         if (lead(line%edge, b(:, v), b(:, merge(1_ip, v + 1_ip, v == n))) > 0.0_wp) return
       end if
       highest = -huge(1.0_wp)
       do v = 1_ip, n

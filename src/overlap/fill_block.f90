@@ -19,7 +19,7 @@ module polydem_fill_block
    use polydem_kinds, only: ip, wp
    use polydem_overlap_batch, only: overlap_batch_t
    use polydem_overlap_tolerances, only: no_length
-   use polydem_separation, only: test_in_place
+   use polydem_separation, only: test_edges
    implicit none
    private
    public :: fill_block
@@ -80,7 +80,7 @@ contains
          ! As many pairs as there is room for
          from = max(low, next - (block_size - block%n) + 1_ip)
          if (allocated(history%memory)) then
-            call test_edges(bodies, from, next, first, second, history%memory)
+            call forget_edges(bodies, from, next, first, second, history%memory)
             call select_in_range(bodies%n, bodies%radius, from, next, first(from:next), second(from:next), &
                                  history%memory(from:next), block, batch)
          else
@@ -93,31 +93,33 @@ contains
    end subroutine select_pairs
 
    !> Forget the remembered edges that do not separate the polygons any more.
-   subroutine test_edges(bodies, from, to, first, second, memory)
+   subroutine forget_edges(bodies, from, to, first, second, memory)
       type(bodies_t), intent(in) :: bodies
       !> First and last pair, at most `block_size` pairs
       integer(ip), intent(in) :: from, to
       integer(ip), intent(in), contiguous :: first(:), second(:)
       integer(ip), intent(inout), contiguous :: memory(:)
-      integer(ip) :: found(block_size), i, j, k, n, p
-      logical :: apart
+      type(overlap_batch_t) :: batch
+      integer(ip) :: found(block_size), i(block_size), j(block_size), k, n, p
+      logical :: apart(block_size)
 
       n = 0_ip
       do p = from, to
          found(n + 1_ip) = p
          n = n + shiftr(memory(p), bit_size(p) - 1)
       end do
+      if (n == 0_ip) return
       do k = 1_ip, n
-         p = found(k)
-         call choose_roles(bodies%n, bodies%radius, first(p), second(p), i, j)
-         associate (start => bodies%vertex_start)
-            call test_in_place(size(bodies%turned, 2, kind=ip), bodies%turned, &
-                               [start(i), start(i + 1_ip) - 1_ip, start(j), start(j + 1_ip) - 1_ip], &
-                               offset_of(bodies, i, j), bodies%radius(i), memory(p), apart)
-         end associate
-         if (.not. apart) memory(p) = 0_ip
+         call choose_roles(bodies%n, bodies%radius, first(found(k)), second(found(k)), i(k), j(k))
+         batch%memory(k) = memory(found(k))
       end do
-   end subroutine test_edges
+      call copy_shapes(n, i, j, bodies%n, bodies%radius, bodies%vertex_start, batch)
+      call copy_offsets(n, i, j, bodies%n, bodies%position, batch)
+      call test_edges(batch, n, size(bodies%turned, 2, kind=ip), bodies%turned, apart)
+      do k = 1_ip, n
+         memory(found(k)) = merge(batch%memory(k), 0_ip, apart(k))
+      end do
+   end subroutine forget_edges
 
    !> The roles of `is_exchanged`, without a branch: which radius is greater, a processor cannot predict.
    pure subroutine choose_roles(n, radius, low, high, i, j)

@@ -4,9 +4,9 @@ module remembered_overlap
    use polydem_convex_overlap, only: find_overlap, overlap_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_lens_kernel_base, only: evaluate_batch
-   use polydem_overlap_batch, only: add_lane, overlap_batch_t, overlap_columns_t
+   use polydem_overlap_batch, only: add_lane, lanes, overlap_batch_t, overlap_columns_t
    use polydem_random, only: random_t
-   use polydem_separation, only: test_in_place
+   use polydem_separation, only: test_edges
    implicit none
    private
    public :: pair_t, overlap_with_memory, separated_by, certified_lens, same_bits, radius_of
@@ -52,14 +52,18 @@ contains
       integer(ip), intent(inout) :: memory
       !> Whether an edge is remembered, and the polygons are apart
       logical, intent(out) :: apart
+      type(overlap_batch_t) :: batch
+      logical :: lane_apart(lanes)
       integer(ip) :: n, m
 
       apart = .false.
       if (memory >= 0_ip) return
       n = size(pair%p, 2, kind=ip)
       m = size(pair%q, 2, kind=ip)
-      call test_in_place(n + m, vertices_of(pair), [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), memory, &
-                         apart)
+      call add_lane(batch, 1_ip, memory, [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), radius_of(pair%q))
+      call test_edges(batch, 1_ip, n + m, vertices_of(pair), lane_apart)
+      apart = lane_apart(1)
+      memory = batch%memory(1)
    end subroutine separated_by
 
    !> Vertices of both polygons of a pair
