@@ -6,6 +6,7 @@ all of them, and 50 files of flipped bytes for each file.
 """
 
 import csv
+import json
 import os
 import shutil
 import subprocess
@@ -83,6 +84,10 @@ def whole(tmp_path_factory, finished):
     write_csv(folder / "counts.csv", columns_of(Count), [some(Count, shape="drum", ranks="16", partition="bisection",
                                                               margin="0.2")])
     write_csv(folder / "runs.csv", columns_of(RunCount), [some(RunCount)])
+    ring = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
+    (folder / "parts.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [
+        {"type": "Feature", "properties": {"velocity": [1, 2], "density": 3}, "geometry": {
+            "type": "MultiPolygon", "coordinates": [[ring], [[[x + 2, y] for x, y in ring]]]}}]}))
     write_csv(folder / "sweep" / "table.csv", ["name", "scene.seed"], [["a", 1], ["b", 2]])
     for name in "ab":
         run = folder / "sweep" / "runs" / name
@@ -105,6 +110,10 @@ VERBS = {
     "plot a segment": (["plot", "result/trajectory_0001.h5", "--output", "p.png"], ["result/trajectory_0001.h5"]),
     "plot checked": (["plot", "checked", "--frames", "0,3,6", "--output", "p.png"],
                      ["checked/trajectory_0002.h5", "checked/manifest.txt"]),
+    "export": (["export", "result", "--to", "vtkhdf", "-o", "e.vtkhdf", "--force"], ["result/trajectory_0002.h5"]),
+    "export a segment": (["export", "result/trajectory_0001.h5", "--to", "csv", "-o", "e.csv", "--force"],
+                         ["result/trajectory_0001.h5"]),
+    "import": (["import", "parts.geojson", "-o", "b.h5", "--force"], ["parts.geojson"]),
     "table": (["table", "result"], ["result/profile.h5", "result/trajectory_0001.h5"]),
     "table checked": (["table", "checked"], ["checked/profile.h5"]),
     "tables": (["tables", "bench", "--no-figures", "--output", "report"],
