@@ -1,13 +1,15 @@
 !> Kinds of all numbers, and two limits that all stages share. No other module defines a kind.
 module polydem_kinds
-   use, intrinsic :: iso_fortran_env, only: int8, int32, int64, real64
+   use, intrinsic :: iso_fortran_env, only: int8, int32, int64, real32, real64
    use polydem_precision, only: wp, precision_name
    implicit none
    private
-   public :: wp, dp, ip, lp, bp, precision_name, min_parallel_size, far
+   public :: wp, dp, sp, ip, lp, bp, precision_name, min_parallel_size, far
 
    !> Double precision: times of clocks, and all real numbers in files
    integer, parameter :: dp = real64
+   !> Single precision: large arrays of approximate numbers
+   integer, parameter :: sp = real32
    !> Counts and indices of bodies, boxes and pairs
    integer, parameter :: ip = int32
    !> Keys, hashes and counters that can exceed 2^31

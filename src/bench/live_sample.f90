@@ -55,6 +55,7 @@ contains
       simulation%timers = timers_t()
       call new_finder_or_variant(finder, sample%case%finder, error)
       if (allocated(error)) return
+      finder%isa = simulation%isa
       call simulation%neighbours%change_finder(finder, simulation%boxes)
       simulation%neighbours%finder%work%thorough = checked
       call reserve_sample(sample%case%steps, checked, sample)

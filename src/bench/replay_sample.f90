@@ -5,6 +5,7 @@
 !> numbers of pairs and the last list, so the checks do not disturb its timings.
 module polydem_replay_sample
    use polydem_boxes, only: boxes_t
+   use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_errors, only: error_t
    use polydem_finder, only: finder_t
    use polydem_finder_meter, only: finder_meter_t
@@ -46,6 +47,8 @@ contains
       sample%time_utc = utc_now()
       sample%load = load_average()
       call new_finder_or_variant(finder, sample%case%finder, error)
+      if (allocated(error)) return
+      call choose_instruction_set(finder%isa, error)
       if (allocated(error)) return
       call start_neighbours(neighbours, finder, boxes)
       neighbours%finder%work%thorough = checked

@@ -38,7 +38,7 @@ module polydem_neighbours
 contains
 
    !> Make the stage with an empty list and a finder given by its name.
-   subroutine new_neighbours(self, finder_name, boxes, error, skin)
+   subroutine new_neighbours(self, finder_name, boxes, error, skin, isa)
       !> Stage to make
       type(neighbours_t), intent(out) :: self
       !> Name of the finder
@@ -49,10 +49,14 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Skin of a Verlet list [m]; 0 or absent: automatic
       real(wp), intent(in), optional :: skin
+      !> Instruction set of the kernels; `isa_base` if absent
+      integer, intent(in), optional :: isa
       class(finder_t), allocatable :: finder
 
       call new_finder(finder, finder_name, error, skin)
-      if (.not. allocated(error)) call start_neighbours(self, finder, boxes)
+      if (allocated(error)) return
+      if (present(isa)) finder%isa = isa
+      call start_neighbours(self, finder, boxes)
    end subroutine new_neighbours
 
    !> Make the stage with an empty list and a given finder.

@@ -146,6 +146,7 @@ contains
 
       call self%candidates%start(boxes%n)
       self%candidates%filtered = self%filtered
+      self%candidates%filter%isa = self%isa
       call measure_reaches(boxes, reach, least)
       if (self%filtered) call self%candidates%start_filter(boxes%n, 2.0_wp*real(reach, wp))
       allocate (self%padded%before(4, boxes%n), self%greatest_side(boxes%n))

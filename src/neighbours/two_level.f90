@@ -69,6 +69,7 @@ contains
          if (.not. must_begin(self)) call follow_lines(self, boxes)
       else
          call self%list%prepare(boxes)
+         self%filter%isa = self%isa
          call self%filter%start(boxes%n, self%list%side)
       end if
       if (must_begin(self)) call begin_interval(self, boxes)
@@ -199,8 +200,7 @@ contains
       call find_strays(self, n_strays)
       call self%work%add(count_passes, 1_lp)
       call self%work%lap(phase_structure)
-      ! The first list was made without velocities.
-      if (self%list%life == 0_lp .or. self%list%must_search(n_strays)) then
+      if (self%list%is_empty() .or. self%list%must_search(n_strays)) then
          call self%list%search_all(boxes, self%filter, n_wanted, self%changes)
          call self%work%add(count_rebuilds, 1_lp)
          call find_strays(self, n_strays)

@@ -13,6 +13,7 @@
 module polydem_finder
    use polydem_boxes, only: boxes_t
    use polydem_finder_statistics, only: finder_statistics_t
+   use polydem_instruction_set, only: isa_base
    use polydem_pair_changes, only: pair_changes_t
    implicit none
    private
@@ -22,6 +23,8 @@ module polydem_finder
    type, abstract :: finder_t
       !> Finder statistics: counts and seconds so far
       type(finder_statistics_t) :: work
+      !> Instruction set of the kernels; set before the first step
+      integer :: isa = isa_base
    contains
       !> Record the changes of a step
       procedure(find), deferred :: find

@@ -5,18 +5,22 @@
 !> pairs of boxes, and bounds the rounding errors.
 module polydem_box_lines
    use polydem_candidates, only: index_list_t
-   use polydem_kinds, only: ip, wp
+   use polydem_instruction_set, only: isa_avx2, isa_base
+   use polydem_kinds, only: bp, ip, sp, wp
+   use polydem_line_lanes_avx2, only: classify_avx2 => classify, draw_avx2 => draw, find_off_avx2 => find_off, &
+      list_strays_avx2 => list_strays
+   use polydem_line_lanes_base, only: classify, draw, find_off, list_strays
    implicit none
    private
-   public :: box_lines_t
+   public :: box_lines_t, list_differences
 
    !> Share of the deviation at the end of an interval that enters the velocity for the next interval. 1 gives the mean
    !> velocity of the last interval, 3 the best prediction if the acceleration is constant; deviations contain noise
    real(wp), parameter, public :: trust = 1.5_wp
    !> Largest motion of a line in a step in units of the typical side of a box
    real(wp), parameter :: greatest_speed = 4.0_wp
-   !> Number of boxes whose sides are compared with their lines, or with their bounds, at once
-   integer(ip), parameter :: box_block = 16_ip, block_size = 128_ip
+   !> Largest velocity of any line [m per step], in the range of single precision
+   real(wp), parameter :: most_speed = 1.0e37_wp
 
    !> Lines of all boxes in an interval
    type :: box_lines_t
@@ -30,8 +34,13 @@ module polydem_box_lines
       real(wp) :: side = 0.0_wp
       !> Share of the deviations of the last interval that enters the velocities: `trust`, 1 after the first interval
       real(wp) :: share = 1.0_wp
-      !> Lines of each box, (8, box): positions xmin, ymin, xmax, ymax [m] and their velocities [m per step]
-      real(wp), allocatable :: line(:, :)
+      !> Places of the sides xmin, ymin, xmax, ymax at the start of the interval, if they were on their lines, (4, box)
+      !> [m]
+      real(wp), allocatable :: place(:, :)
+      !> Velocities of the sides, (4, box) [m per step]. Every number of single precision is a valid velocity
+      real(sp), allocatable :: speed(:, :)
+      !> Instruction set of the kernels
+      integer :: isa = isa_base
       !> Step of the interval at which the lines of each box were drawn, (box)
       integer(ip), allocatable :: drawn(:)
    contains
@@ -42,6 +51,8 @@ module polydem_box_lines
       procedure :: stays_inside
       procedure :: find_strays
       procedure :: find_off_lines
+      procedure :: classify_pairs
+      procedure :: are_close
    end type box_lines_t
 
 contains
@@ -63,35 +74,22 @@ contains
       !> Bounds of the boxes, (4, box) [m]
       real(wp), intent(in) :: bounds(4, n_boxes)
 
-      call draw(low, high, self%step, self%share, self%side*greatest_speed, n_boxes, bounds, self%drawn, self%line)
+      if (self%isa == isa_avx2) then
+         call draw_avx2(low, high, self%step, self%share, greatest(self), n_boxes, bounds, self%drawn, self%place, &
+                        self%speed)
+      else
+         call draw(low, high, self%step, self%share, greatest(self), n_boxes, bounds, self%drawn, self%place, &
+                   self%speed)
+      end if
       self%drawn(low:high) = 0_ip
    end subroutine draw_lines
 
-   !> Kernel of `draw_lines`
-   pure subroutine draw(low, high, step, share, greatest, n_boxes, bounds, drawn, line)
-      integer(ip), intent(in) :: low, high
-      !> Number of steps since the start of the last interval
-      integer(ip), intent(in) :: step
-      !> Share of the deviations that enters the velocities, and largest velocity
-      real(wp), intent(in) :: share, greatest
-      integer(ip), intent(in) :: n_boxes
-      real(wp), intent(in) :: bounds(4, n_boxes)
-      integer(ip), intent(in) :: drawn(n_boxes)
-      real(wp), intent(inout) :: line(8, n_boxes)
-      real(wp) :: rate
-      integer(ip) :: i
-      integer :: a
+   !> Largest velocity of a line [m per step]
+   pure real(wp) function greatest(self)
+      type(box_lines_t), intent(in) :: self
 
-      do i = low, high
-         rate = 0.0_wp
-         if (step > drawn(i)) rate = share/real(step - drawn(i), wp)
-         do a = 1, 4
-            line(a + 4, i) = line(a + 4, i) + (bounds(a, i) - (line(a, i) + line(a + 4, i)*real(step, wp)))*rate
-            line(a + 4, i) = max(-greatest, min(greatest, line(a + 4, i)))
-            line(a, i) = bounds(a, i)
-         end do
-      end do
-   end subroutine draw
+      greatest = min(self%side*greatest_speed, most_speed)
+   end function greatest
 
    !> Draw new lines through a box that left its lines in this step.
    pure subroutine redraw(self, i, box)
@@ -100,16 +98,16 @@ contains
       integer(ip), intent(in) :: i
       !> Its bounds [m]
       real(wp), intent(in) :: box(4)
-      real(wp) :: step, share, greatest
+      real(wp) :: step, share, most
       integer :: a
 
       step = real(self%step, wp)
       share = trust/max(step - real(self%drawn(i), wp), 1.0_wp)
-      greatest = self%side*greatest_speed
+      most = greatest(self)
       do a = 1, 4
-         self%line(a + 4, i) = max(-greatest, min(greatest, self%line(a + 4, i) + &
-                                                  (box(a) - (self%line(a, i) + self%line(a + 4, i)*step))*share))
-         self%line(a, i) = box(a) - self%line(a + 4, i)*step
+         self%speed(a, i) = real(max(-most, min(most, real(self%speed(a, i), wp) + (box(a) - &
+                                 (self%place(a, i) + real(self%speed(a, i), wp)*step))*share)), sp)
+         self%place(a, i) = box(a) - real(self%speed(a, i), wp)*step
       end do
       self%drawn(i) = self%step
    end subroutine redraw
@@ -123,7 +121,7 @@ contains
       real(wp), intent(in) :: steps
       real(wp) :: reaches(4)
 
-      reaches = self%line(5:8, i)*steps
+      reaches = real(self%speed(:, i), wp)*steps
    end function reaches
 
    !> Whether a box stays inside given bounds until the end of the interval while it is on its lines, and whether its
@@ -134,12 +132,21 @@ contains
       integer(ip), intent(in) :: i
       !> Bounds xmin, ymin, xmax, ymax [m]
       real(wp), intent(in) :: bounds(4)
-      real(wp) :: room(1)
+      integer(ip) :: n, stray(2)
 
-      call find_room(1_ip, real(self%drawn(i), wp), real(self%length, wp), self%tolerance, self%line(:, i), bounds, &
-                     room)
-      stays_inside = room(1) >= 0.0_wp
+      call list_strays(1_ip, 1_ip, [real(self%drawn(i), wp), real(self%length, wp)], tube(self), 1_ip, bounds, &
+                       self%place(:, i), self%speed(:, i), n, stray)
+      stays_inside = n == 0_ip
    end function stays_inside
+
+   !> Half width of the tubes around the lines in which the boxes on their lines are, and L as in the head of
+   !> `polydem_line_filter`, with 1024 u = 512 epsilon [m]
+   pure function tube(self)
+      type(box_lines_t), intent(in) :: self
+      real(wp) :: tube(2)
+
+      tube = self%tolerance*[1.0_wp + 2.0_wp**(-5), 2.0_wp**(-9)/epsilon(1.0_wp)]
+   end function tube
 
    !> List the boxes low to high that do not stay inside given bounds in an interval that begins.
    pure subroutine find_strays(self, low, high, n_boxes, bounds, strays)
@@ -150,44 +157,19 @@ contains
       integer(ip), intent(in) :: n_boxes
       !> Bounds xmin, ymin, xmax, ymax of each box, (4, box) [m]
       real(wp), intent(in) :: bounds(4, n_boxes)
-      !> List to which the boxes are appended
+      !> List of the boxes
       type(index_list_t), intent(inout) :: strays
-      real(wp) :: room(block_size)
-      integer(ip) :: from, to, i
 
-      do from = low, high, block_size
-         to = min(from + block_size - 1_ip, high)
-         call find_room(to - from + 1_ip, 0.0_wp, real(self%length, wp), self%tolerance, self%line(:, from:to), &
-                        bounds(:, from:to), room)
-         do i = from, to
-            if (.not. room(i - from + 1_ip) >= 0.0_wp) call strays%push(i)
-         end do
-      end do
+      strays%n = 0_ip
+      call strays%reserve(high - low + 2_ip)
+      if (self%isa == isa_avx2) then
+         call list_strays_avx2(low, high, [0.0_wp, real(self%length, wp)], tube(self), n_boxes, bounds, &
+                               self%place, self%speed, strays%n, strays%at)
+      else
+         call list_strays(low, high, [0.0_wp, real(self%length, wp)], tube(self), n_boxes, bounds, &
+                          self%place, self%speed, strays%n, strays%at)
+      end if
    end subroutine find_strays
-
-   !> Least distances between the tubes around the lines of boxes and given bounds, from one step to another; not above
-   !> zero if lines may not be used
-   pure subroutine find_room(n, from, to, tolerance, line, bounds, room)
-      integer(ip), intent(in) :: n
-      real(wp), intent(in) :: from, to, tolerance
-      real(wp), intent(in) :: line(8, n), bounds(4, n)
-      real(wp), intent(out) :: room(n)
-      real(wp) :: width, limit, reach(4), first(4), last(4)
-      integer(ip) :: i
-
-      width = (1.0_wp + 2.0_wp**(-5))*tolerance
-      ! L as in the head of this module, with 1024 u = 512 epsilon
-      limit = tolerance*(2.0_wp**(-9)/epsilon(1.0_wp))
-      do i = 1_ip, n
-         first = line(1:4, i) + line(5:8, i)*from
-         last = line(1:4, i) + line(5:8, i)*to
-         reach = limit - (abs(line(1:4, i)) + abs(line(5:8, i)*to))
-         first(1:2) = min(first(1:2), last(1:2)) - (bounds(1:2, i) + width)
-         first(3:4) = (bounds(3:4, i) - width) - max(first(3:4), last(3:4))
-         first = min(first, reach)
-         room(i) = min(min(first(1), first(2)), min(first(3), first(4)))
-      end do
-   end subroutine find_room
 
    !> List the boxes low to high of which a side is not on its line in this step.
    pure subroutine find_off_lines(self, low, high, n_boxes, bounds, off)
@@ -198,34 +180,67 @@ contains
       integer(ip), intent(in) :: n_boxes
       !> Bounds of the boxes, (4, box) [m]
       real(wp), intent(in) :: bounds(4, n_boxes)
-      !> List to which the boxes are appended
+      !> List of the boxes
       type(index_list_t), intent(inout) :: off
 
-      call compare_with_lines(low, high, real(self%step, wp), self%tolerance, n_boxes, bounds, self%line, off)
+      off%n = 0_ip
+      call off%reserve(high - low + 2_ip)
+      if (self%isa == isa_avx2) then
+         call find_off_avx2(low, high, real(self%step, wp), self%tolerance, n_boxes, bounds, self%place, self%speed, &
+                            off%n, off%at)
+      else
+         call find_off(low, high, real(self%step, wp), self%tolerance, n_boxes, bounds, self%place, self%speed, &
+                       off%n, off%at)
+      end if
    end subroutine find_off_lines
 
-   !> Kernel of `find_off_lines`; the loop over a block has no branches
-   pure subroutine compare_with_lines(low, high, step, tolerance, n_boxes, bounds, line, off)
-      integer(ip), intent(in) :: low, high, n_boxes
-      real(wp), intent(in) :: step, tolerance
-      real(wp), intent(in) :: bounds(4, n_boxes), line(8, n_boxes)
-      type(index_list_t), intent(inout) :: off
-      real(wp) :: most(4)
-      integer(ip) :: from, to, i
+   !> Classify pairs from a step to the end of the interval.
+   pure subroutine classify_pairs(self, n, box, from, kind)
+      class(box_lines_t), intent(in) :: self
+      !> Number of pairs, at most `pair_block` of `polydem_line_lanes`
+      integer(ip), intent(in) :: n
+      !> Boxes of each pair, (2, n)
+      integer(ip), intent(in) :: box(2, n)
+      !> First step
+      integer(ip), intent(in) :: from
+      !> Class of each pair
+      integer(bp), intent(out) :: kind(n)
+      real(wp) :: steps(2)
 
-      do from = low, high, box_block
-         to = min(from + box_block - 1_ip, high)
-         most = 0.0_wp
-         !GCC$ unroll 4
-         do i = from, to
-            most = max(most, abs(bounds(:, i) - (line(1:4, i) + line(5:8, i)*step)))
-         end do
-         if (max(max(most(1), most(2)), max(most(3), most(4))) <= tolerance) cycle
-         do i = from, to
-            if (all(abs(bounds(:, i) - (line(1:4, i) + line(5:8, i)*step)) <= tolerance)) cycle
-            call off%push(i)
-         end do
+      steps = [real(from, wp), real(self%length, wp)]
+      if (self%isa == isa_avx2) then
+         call classify_avx2(n, box, steps, self%gap_margin(), size(self%place, 2, ip), self%place, self%speed, kind)
+      else
+         call classify(n, box, steps, self%gap_margin(), size(self%place, 2, ip), self%place, self%speed, kind)
+      end if
+   end subroutine classify_pairs
+
+   !> List the elements in which two lists of classes differ, without branches.
+   pure subroutine list_differences(n, kind, state, n_listed, listed)
+      !> Number of elements
+      integer(ip), intent(in) :: n
+      !> The lists
+      integer(bp), intent(in) :: kind(n), state(n)
+      !> Number of differences, and where they are
+      integer(ip), intent(out) :: n_listed, listed(n + 1_ip)
+      integer(ip) :: k
+
+      n_listed = 0_ip
+      do k = 1_ip, n
+         listed(n_listed + 1_ip) = k
+         n_listed = n_listed + merge(1_ip, 0_ip, kind(k) /= state(k))
       end do
-   end subroutine compare_with_lines
+   end subroutine list_differences
+
+   !> Whether the largest gap of two boxes is close to zero at the start of an interval
+   pure logical function are_close(self, i, j)
+      class(box_lines_t), intent(in) :: self
+      !> Boxes
+      integer(ip), intent(in) :: i, j
+
+      are_close = abs(max(max(self%place(1, i) - self%place(3, j), self%place(2, i) - self%place(4, j)), &
+                          max(self%place(1, j) - self%place(3, i), self%place(2, j) - self%place(4, i)))) <= &
+         self%gap_margin()
+   end function are_close
 
 end module polydem_box_lines

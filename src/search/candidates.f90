@@ -45,6 +45,7 @@ module polydem_candidates
       integer(ip), allocatable :: at(:)
    contains
       procedure :: push
+      procedure :: reserve => reserve_entries
    end type index_list_t
 
 contains
@@ -288,6 +289,21 @@ contains
       call move_alloc(previous, self%previous)
       call move_alloc(overlap, self%overlap)
    end subroutine reserve
+
+   !> Make room for n entries.
+   pure subroutine reserve_entries(self, n)
+      class(index_list_t), intent(inout) :: self
+      !> Number of entries
+      integer(ip), intent(in) :: n
+      integer(ip), allocatable :: longer(:)
+
+      if (allocated(self%at)) then
+         if (size(self%at) >= n) return
+      end if
+      allocate (longer(n + n/4_ip + 64_ip))
+      if (self%n > 0_ip) longer(1:self%n) = self%at(1:self%n)
+      call move_alloc(longer, self%at)
+   end subroutine reserve_entries
 
    !> Append an entry.
    pure subroutine push(self, entry)

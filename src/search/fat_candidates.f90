@@ -44,16 +44,23 @@ module polydem_fat_candidates
       real(dp) :: surplus = 0.0_dp
       !> Cost of single searches since then [comparisons]
       real(dp), private :: singles = 0.0_dp
+      !> Whether there was a search for all boxes
+      logical, private :: searched = .false.
       !> Margin of the fat boxes [m]
       real(wp), private :: margin = 0.0_wp
       !> Number of fixed boxes; every single search compares all of them
       integer(ip), private :: n_fixed = 0_ip
       !> Number of candidates in the rows
       integer(ip), private :: n_listed = 0_ip
-      !> First link of each box, (box), 0: none. The link 2(k - 1) + s is box s of candidate k. Boxes are linked to the
-      !> candidates in which they are the higher box, and to those behind the rows
+      !> Place in `of_higher` of the first candidate in which each box is the higher one, and behind the last box,
+      !> (boxes + 2); the last element is work space
+      integer(ip), allocatable, private :: first_of_higher(:)
+      !> Candidates of the rows in the order of their higher box
+      integer(ip), allocatable, private :: of_higher(:)
+      !> First link of each box to the candidates behind the rows, (box), 0: none. The link 2(k - 1) + s is box s of
+      !> candidate k behind the rows
       integer(ip), allocatable, private :: first_link(:)
-      !> Next link of the same box, (2, candidate), 0: none
+      !> Next link of the same box, (2, candidate behind the rows), 0: none
       integer(ip), allocatable, private :: next_link(:, :)
       !> Boxes that moved
       type(index_list_t), private :: moved
@@ -67,6 +74,7 @@ module polydem_fat_candidates
       type(index_list_t), private :: near, known
    contains
       procedure :: prepare
+      procedure :: is_empty
       procedure :: must_search
       procedure :: search_all
       procedure :: search_single
@@ -94,8 +102,16 @@ contains
       allocate (self%fat(4, boxes%n), source=0.0_wp)
       allocate (self%first_link(boxes%n), self%met_by(boxes%n), source=0_ip)
       allocate (self%is_moved(boxes%n), source=0_bp)
-      allocate (self%next_link(2, 0))
+      allocate (self%next_link(2, 0), self%of_higher(0))
+      allocate (self%first_of_higher(boxes%n + 2_ip), source=1_ip)
    end subroutine prepare
+
+   !> Whether there was no search yet
+   pure logical function is_empty(self)
+      class(fat_candidates_t), intent(in) :: self
+
+      is_empty = .not. self%searched
+   end function is_empty
 
    !> Whether single searches cost as much as a search for all boxes, or the margin is much too wide
    pure logical function must_search(self, n_strays)
@@ -146,6 +162,7 @@ contains
       do k = 1_ip, extras%n, 2_ip
          call carry_extra(self, extras%at(k), extras%at(k + 1_ip), boxes%body, changes(1))
       end do
+      self%searched = .true.
       call link_rows(self)
    end subroutine search_all
 
@@ -212,21 +229,36 @@ contains
       end do
    end subroutine fatten
 
-   !> Link each box to the rows in which it is the higher box.
+   !> List the candidates of the rows by their higher box, by counting. No candidate is behind the rows.
    pure subroutine link_rows(self)
       type(fat_candidates_t), intent(inout) :: self
-      integer(ip) :: k, j
+      integer(ip) :: k, j, n
 
-      call reserve_links(self, self%n)
+      n = size(self%first_link, kind=ip)
+      if (size(self%of_higher) < self%n_listed) then
+         deallocate (self%of_higher)
+         allocate (self%of_higher(self%n_listed + self%n_listed/4_ip + 64_ip))
+      end if
       self%first_link = 0_ip
-      do k = 1_ip, self%n
-         j = self%box(2, k)
-         self%next_link(2, k) = self%first_link(j)
-         self%first_link(j) = 2_ip*k
-      end do
+      associate (first => self%first_of_higher)
+         first = 0_ip
+         do k = 1_ip, self%n_listed
+            first(self%box(2, k) + 2_ip) = first(self%box(2, k) + 2_ip) + 1_ip
+         end do
+         first(1:2) = 1_ip
+         do j = 1_ip, n
+            first(j + 2_ip) = first(j + 1_ip) + first(j + 2_ip)
+         end do
+         ! first(j + 1) is the next free place of box j, and at the end the first place of the next box.
+         do k = 1_ip, self%n_listed
+            j = self%box(2, k) + 1_ip
+            self%of_higher(first(j)) = k
+            first(j) = first(j) + 1_ip
+         end do
+      end associate
    end subroutine link_rows
 
-   !> Make room for the links of n candidates.
+   !> Make room for the links of n candidates behind the rows.
    pure subroutine reserve_links(self, n)
       type(fat_candidates_t), intent(inout) :: self
       integer(ip), intent(in) :: n
@@ -297,17 +329,24 @@ contains
       integer(ip), intent(in) :: i
       !> Numbers of its candidates
       type(index_list_t), intent(inout) :: list
-      integer(ip) :: ends(2), link, k
+      integer(ip) :: ends(2), low, high, link, k, n
 
-      list%n = 0_ip
       ends = self%row(i)
-      do k = ends(1), ends(2)
-         call list%push(k)
+      low = self%first_of_higher(i)
+      high = self%first_of_higher(i + 1_ip) - 1_ip
+      n = ends(2) - ends(1) + 1_ip
+      call list%reserve(n + high - low + 1_ip)
+      do k = 1_ip, n
+         list%at(k) = ends(1) + k - 1_ip
       end do
+      do k = low, high
+         list%at(n + k - low + 1_ip) = self%of_higher(k)
+      end do
+      list%n = n + high - low + 1_ip
       link = self%first_link(i)
       do while (link /= 0_ip)
          k = shiftr(link + 1_ip, 1)
-         call list%push(k)
+         call list%push(self%n_listed + k)
          link = self%next_link(2_ip - iand(link, 1_ip), k)
       end do
    end subroutine candidates_of
@@ -326,11 +365,11 @@ contains
       overlap = overlapping(boxes%bounds(:, i), boxes%bounds(:, j))
       if (overlap) call changes%record(boxes%body(i), boxes%body(j), 1_ip)
       call self%append(min(i, j), max(i, j), overlap)
-      k = self%n
+      k = self%n - self%n_listed
       call reserve_links(self, k)
       do s = 1_ip, 2_ip
-         self%next_link(s, k) = self%first_link(self%box(s, k))
-         self%first_link(self%box(s, k)) = 2_ip*(k - 1_ip) + s
+         self%next_link(s, k) = self%first_link(self%box(s, self%n))
+         self%first_link(self%box(s, self%n)) = 2_ip*(k - 1_ip) + s
       end do
    end subroutine add_candidate
 
@@ -342,7 +381,7 @@ contains
       if (.not. allocated(self%fat)) return
       bytes = self%candidate_rows_t%bytes() + self%grids%bytes() + size(self%is_moved, kind=lp) + &
          (int(storage_size(self%fat), lp)*size(self%fat, kind=lp) + int(storage_size(self%first_link), lp)* &
-          (2_lp*size(self%first_link, kind=lp) + size(self%next_link, kind=lp)))/8_lp
+          (3_lp*size(self%first_link, kind=lp) + size(self%next_link, kind=lp) + size(self%of_higher, kind=lp)))/8_lp
    end function bytes_of_all
 
 end module polydem_fat_candidates

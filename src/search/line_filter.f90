@@ -30,10 +30,10 @@
 !> are reproducible. Both are set where two costs are equal (`adapt`).
 module polydem_line_filter
    use polydem_active_pairs, only: active_pairs_t
-   use polydem_box_lines, only: box_lines_t, trust
+   use polydem_box_lines, only: box_lines_t, list_differences, trust
    use polydem_candidates, only: candidates_t, index_list_t
-   use polydem_kinds, only: bp, dp, ip, lp, wp
-   use polydem_line_gaps, only: active, class_of, classify_pairs, is_close, overlapping, pair_block
+   use polydem_kinds, only: bp, dp, ip, lp, sp, wp
+   use polydem_line_lanes_base, only: active, overlapping, pair_block
    use polydem_pair_changes, only: pair_changes_t
    implicit none
    private
@@ -59,7 +59,7 @@ module polydem_line_filter
       !> Number of times that each box left its lines in this interval, `often` if it is off, (box)
       integer(bp), allocatable, private :: left(:)
       !> Place of each candidate in `active`, 0 if it is not active, (candidate)
-      integer(ip), allocatable, private :: place(:)
+      integer(ip), allocatable, private :: active_at(:)
       !> Length of the intervals before rounding to whole steps
       real(dp), private :: exact_length = first_length
       !> Number of active candidates at the start of the interval
@@ -97,10 +97,11 @@ contains
       !> Typical side of a box [m]
       real(wp), intent(in) :: side
 
-      allocate (self%line(8, n_boxes), source=0.0_wp)
+      allocate (self%place(4, n_boxes), source=0.0_wp)
+      allocate (self%speed(4, n_boxes), source=0.0_sp)
       allocate (self%drawn(n_boxes), source=0_ip)
       allocate (self%left(n_boxes), source=0_bp)
-      allocate (self%place(0))
+      allocate (self%active_at(0))
       self%side = side
       self%tolerance = first_tolerance*side
       call self%active%reserve(64_ip)
@@ -188,41 +189,32 @@ contains
       type(active_pairs_t), intent(inout) :: found
       !> Changes of candidates that are not active; appended
       type(pair_changes_t), intent(inout) :: changes
-      integer(ip) :: from, to, k, m
-      integer(bp) :: kinds(pair_block), differ
+      integer(ip) :: listed(pair_block + 1_ip), from, to, m, n, k
+      integer(bp) :: kind(pair_block)
 
       found%n = 0_ip
       found%n_close = 0_ip
       found%n_sure = 0_ip
       do from = low, high, pair_block
          to = min(from + pair_block - 1_ip, high)
-         call classify_pairs(to - from + 1_ip, candidates%box(:, from:to), real(self%length, wp), self%gap_margin(), &
-                             size(self%line, 2, ip), self%line, kinds)
+         call self%classify_pairs(to - from + 1_ip, candidates%box(:, from:to), 0_ip, kind)
+         found%n_sure = found%n_sure + count(kind(1:to - from + 1_ip) == overlapping, kind=ip)
          call found%reserve(found%n + pair_block)
-         found%n_sure = found%n_sure + count(kinds(1:to - from + 1_ip) == overlapping, kind=ip)
-         differ = 0_bp
-         do k = from, to
-            differ = ior(differ, merge(ieor(kinds(k - from + 1_ip), candidates%overlap(k)), 0_bp, &
-                                       kinds(k - from + 1_ip) /= active))
-         end do
-         m = found%n
-         do k = from, to
-            if (kinds(k - from + 1_ip) /= active) cycle
-            m = m + 1_ip
-            found%box(1, m) = candidates%box(1, k)
-            found%box(2, m) = candidates%box(2, k)
-            found%overlap(m) = candidates%overlap(k)
-            found%owner(m) = k
-            if (is_close(self%line(:, found%box(1, m)), self%line(:, found%box(2, m)), self%gap_margin())) &
-               found%n_close = found%n_close + 1_ip
-         end do
-         found%n = m
-         if (differ == 0_bp) cycle
-         do k = from, to
-            if (kinds(k - from + 1_ip) == active .or. kinds(k - from + 1_ip) == candidates%overlap(k)) cycle
-            candidates%overlap(k) = kinds(k - from + 1_ip)
-            call changes%record(body(candidates%box(1, k)), body(candidates%box(2, k)), &
-                                2_ip*int(candidates%overlap(k), ip) - 1_ip)
+         call list_differences(to - from + 1_ip, kind, candidates%overlap(from:to), n, listed)
+         do m = 1_ip, n
+            k = from + listed(m) - 1_ip
+            if (kind(listed(m)) /= active) then
+               candidates%overlap(k) = kind(listed(m))
+               call changes%record(body(candidates%box(1, k)), body(candidates%box(2, k)), &
+                                   2_ip*int(candidates%overlap(k), ip) - 1_ip)
+               cycle
+            end if
+            found%n = found%n + 1_ip
+            found%box(1, found%n) = candidates%box(1, k)
+            found%box(2, found%n) = candidates%box(2, k)
+            found%overlap(found%n) = candidates%overlap(k)
+            found%owner(found%n) = k
+            if (self%are_close(candidates%box(1, k), candidates%box(2, k))) found%n_close = found%n_close + 1_ip
          end do
       end do
    end subroutine classify
@@ -237,11 +229,11 @@ contains
       integer(ip) :: k, n
       integer :: w
 
-      if (size(self%place) < n_candidates) then
-         deallocate (self%place)
-         allocate (self%place(n_candidates + n_candidates/4_ip + 64_ip))
+      if (size(self%active_at) < n_candidates) then
+         deallocate (self%active_at)
+         allocate (self%active_at(n_candidates + n_candidates/4_ip + 64_ip))
       end if
-      self%place = 0_ip
+      self%active_at = 0_ip
       call self%active%reserve(sum(found%n))
       n = 0_ip
       do w = 1, size(found)
@@ -250,7 +242,7 @@ contains
             self%active%box(:, n) = found(w)%box(:, k)
             self%active%overlap(n) = found(w)%overlap(k)
             self%active%owner(n) = found(w)%owner(k)
-            self%place(found(w)%owner(k)) = n
+            self%active_at(found(w)%owner(k)) = n
          end do
       end do
       self%active%n = n
@@ -304,19 +296,32 @@ contains
       type(index_list_t), intent(in) :: own
       !> All candidates; the states of those that are not active are valid
       class(candidates_t), intent(in) :: candidates
-      integer(ip) :: n, k
+      integer(ip) :: unsure(pair_block), box(2, pair_block), listed(pair_block + 1_ip), next, n, n_listed, m, k
+      integer(bp) :: state(pair_block), kind(pair_block)
 
-      do n = 1_ip, own%n
-         k = own%at(n)
-         if (k <= size(self%place)) then
-            if (self%place(k) /= 0_ip) cycle
-         end if
+      if (own%n > 0_ip) call reserve_places(self, candidates%n)
+      next = 1_ip
+      do while (next <= own%n)
+         n = 0_ip
+         do while (next <= own%n .and. n < pair_block)
+            k = own%at(next)
+            next = next + 1_ip
+            if (self%active_at(k) /= 0_ip) cycle
+            n = n + 1_ip
+            unsure(n) = k
+            box(1, n) = candidates%box(1, k)
+            box(2, n) = candidates%box(2, k)
+            state(n) = candidates%overlap(k)
+         end do
+         kind = active
          if (.not. self%is_off(i)) then
-            self%n_reviewed = self%n_reviewed + 1_lp
-            if (class_of(self%line(:, candidates%box(1, k)), self%line(:, candidates%box(2, k)), real(self%step, wp), &
-                         real(self%length, wp), self%gap_margin()) == candidates%overlap(k)) cycle
+            self%n_reviewed = self%n_reviewed + int(n, lp)
+            call self%classify_pairs(n, box, self%step, kind)
          end if
-         call self%activate(k, candidates)
+         call list_differences(n, kind, state, n_listed, listed)
+         do m = 1_ip, n_listed
+            call self%activate(unsure(listed(m)), candidates)
+         end do
       end do
    end subroutine review
 
@@ -329,9 +334,9 @@ contains
       class(candidates_t), intent(in) :: candidates
 
       call reserve_places(self, k)
-      if (self%place(k) /= 0_ip) return
+      if (self%active_at(k) /= 0_ip) return
       call self%active%append(k, candidates)
-      self%place(k) = self%active%n
+      self%active_at(k) = self%active%n
    end subroutine activate
 
    !> Take a candidate out of the active ones before it is removed; the last candidate gets its number.
@@ -342,15 +347,15 @@ contains
       integer(ip) :: p
 
       call reserve_places(self, last)
-      p = self%place(k)
+      p = self%active_at(k)
       if (p /= 0_ip) then
          call self%active%remove(p)
-         self%place(self%active%owner(p)) = p
+         self%active_at(self%active%owner(p)) = p
       end if
-      self%place(k) = self%place(last)
-      if (k == last) self%place(k) = 0_ip
-      if (self%place(k) /= 0_ip) self%active%owner(self%place(k)) = k
-      self%place(last) = 0_ip
+      self%active_at(k) = self%active_at(last)
+      if (k == last) self%active_at(k) = 0_ip
+      if (self%active_at(k) /= 0_ip) self%active%owner(self%active_at(k)) = k
+      self%active_at(last) = 0_ip
    end subroutine forget
 
    !> Make room for the places of n candidates; new ones are not active.
@@ -359,10 +364,10 @@ contains
       integer(ip), intent(in) :: n
       integer(ip), allocatable :: longer(:)
 
-      if (n <= size(self%place)) return
+      if (n <= size(self%active_at)) return
       allocate (longer(n + n/4_ip + 64_ip), source=0_ip)
-      longer(1:size(self%place)) = self%place
-      call move_alloc(longer, self%place)
+      longer(1:size(self%active_at)) = self%active_at
+      call move_alloc(longer, self%active_at)
    end subroutine reserve_places
 
    !> Work in this interval on candidates that were separate when it began [comparisons]
@@ -384,11 +389,11 @@ contains
       class(line_filter_t), intent(in) :: self
 
       bytes = 0_lp
-      if (.not. allocated(self%line)) return
-      bytes = (int(storage_size(self%line), lp)*size(self%line, kind=lp) + &
-               int(storage_size(self%place), lp)*(size(self%place, kind=lp) + 3_lp*size(self%active%owner, kind=lp)) + &
-               int(storage_size(self%left), lp)*(size(self%left, kind=lp) + &
-               size(self%active%overlap, kind=lp)))/8_lp
+      if (.not. allocated(self%place)) return
+      bytes = (int(storage_size(self%place) + storage_size(self%speed), lp)*size(self%place, kind=lp) + &
+               int(storage_size(self%active_at), lp)*(size(self%active_at, kind=lp) + &
+                                                      3_lp*size(self%active%owner, kind=lp)) + &
+               int(storage_size(self%left), lp)*(size(self%left, kind=lp) + size(self%active%overlap, kind=lp)))/8_lp
    end function bytes
 
 end module polydem_line_filter

@@ -104,7 +104,8 @@ contains
       ! The history of a redistribution is empty here.
       if (allocated(self%received_history)) deallocate (self%received_history)
       if (generation /= self%generation) call new_neighbours(neighbours, self%settings%neighbours%finder, self%boxes, &
-                                                             error, self%settings%neighbours%skin)
+                                                             error, self%settings%neighbours%skin, &
+                                                             self%isa)
       if (allocated(error)) return
       generation = self%generation
       call neighbours%update(self%boxes)

@@ -1,0 +1,203 @@
+!> Passes over all boxes or over many candidates: a kernel, compiled for several instruction sets
+!> (`cmake/polydem_kernel.cmake`). `polydem_line_filter` explains what they compute.
+!>
+!> The four bounds of a box fill one register of AVX2. Lists are written without branches: an entry is always written,
+!> and counted only if it belongs there. All comparisons are false for NaN, so a box that is nowhere is off its lines.
+module polydem_line_lanes
+   use polydem_kinds, only: bp, ip, sp, wp
+   implicit none
+   private
+   public :: pair_block, separate, overlapping, active, find_off, list_strays, draw, classify
+
+   !> Classes of candidates; the sure ones are also their states in `polydem_candidates`
+   integer(bp), parameter :: separate = 0_bp, overlapping = 1_bp, active = 2_bp
+   !> Number of boxes that are compared with their lines at once, of their sides, and of sums that count these
+   integer(ip), parameter :: box_block = 16_ip, n_sides = 4_ip*box_block, n_sums = 8_ip
+   !> Largest number of pairs that are classified at once, and of boxes whose room is found at once
+   integer(ip), parameter :: pair_block = 128_ip
+
+contains
+
+   !> List the boxes of which a side is farther from its line than the tolerance.
+   pure subroutine find_off(low, high, step, tolerance, n_boxes, bounds, place, speed, n_off, off)
+      !> First and last box
+      integer(ip), intent(in) :: low, high
+      !> Number of steps since the start of the interval
+      real(wp), intent(in) :: step
+      !> Tolerance [m]
+      real(wp), intent(in) :: tolerance
+      !> Number of boxes
+      integer(ip), intent(in) :: n_boxes
+      !> Bounds of the boxes [m]
+      real(wp), intent(in) :: bounds(4_ip*n_boxes)
+      !> Places of the lines at the start of the interval [m]
+      real(wp), intent(in) :: place(4_ip*n_boxes)
+      !> Velocities of the lines [m per step]
+      real(sp), intent(in) :: speed(4_ip*n_boxes)
+      !> Number of boxes in the list
+      integer(ip), intent(out) :: n_off
+      !> The list
+      integer(ip), intent(out) :: off(high - low + 2_ip)
+      real(wp) :: on(n_sides), sums(n_sums)
+      integer(ip) :: from, to, sides, i, k, l
+
+      n_off = 0_ip
+      do from = low, high, box_block
+         to = min(from + box_block - 1_ip, high)
+         sides = 4_ip*(from - 1_ip)
+         if (to - from == box_block - 1_ip) then
+            sums = 0.0_wp
+            do k = 0_ip, n_sides - n_sums, n_sums
+               do l = 1_ip, n_sums
+                  on(k + l) = merge(1.0_wp, 0.0_wp, abs(bounds(sides + k + l) - (place(sides + k + l) + &
+                                    real(speed(sides + k + l), wp)*step)) <= tolerance)
+                  sums(l) = sums(l) + on(k + l)
+               end do
+            end do
+            if (((sums(1) + sums(2)) + (sums(3) + sums(4))) + ((sums(5) + sums(6)) + (sums(7) + sums(8))) > &
+                real(n_sides, wp) - 0.5_wp) cycle
+         else
+            do k = 1_ip, 4_ip*(to - from + 1_ip)
+               on(k) = merge(1.0_wp, 0.0_wp, abs(bounds(sides + k) - (place(sides + k) + &
+                             real(speed(sides + k), wp)*step)) <= tolerance)
+            end do
+         end if
+         do i = from, to
+            k = 4_ip*(i - from)
+            off(n_off + 1_ip) = i
+            n_off = n_off + merge(0_ip, 1_ip, (on(k + 1_ip) + on(k + 2_ip)) + (on(k + 3_ip) + on(k + 4_ip)) > 3.5_wp)
+         end do
+      end do
+   end subroutine find_off
+
+   !> List the boxes whose tubes, of a given half width around their lines, leave given bounds between two steps, or
+   !> whose lines go beyond a limit.
+   pure subroutine list_strays(low_box, high_box, steps, widths, n_boxes, bounds, place, speed, n_strays, strays)
+      !> First and last box
+      integer(ip), intent(in) :: low_box, high_box
+      !> First and last step
+      real(wp), intent(in) :: steps(2)
+      !> Half width of the tubes, and limit of coordinates [m]
+      real(wp), intent(in) :: widths(2)
+      !> Number of boxes
+      integer(ip), intent(in) :: n_boxes
+      !> Bounds xmin, ymin, xmax, ymax, (4, box) [m]
+      real(wp), intent(in) :: bounds(4, n_boxes)
+      !> Places of the lines at the start of the interval [m]
+      real(wp), intent(in) :: place(4, n_boxes)
+      !> Velocities of the lines [m per step]
+      real(sp), intent(in) :: speed(4, n_boxes)
+      !> Number of boxes in the list
+      integer(ip), intent(out) :: n_strays
+      !> The list
+      integer(ip), intent(out) :: strays(high_box - low_box + 2_ip)
+      real(wp) :: low, high, low_end, high_end, far_low, far_high, room(2, pair_block)
+      integer(ip) :: from, to, i, k, a
+
+      n_strays = 0_ip
+      do from = low_box, high_box, pair_block
+         to = min(from + pair_block - 1_ip, high_box)
+         do i = from, to
+            k = i - from + 1_ip
+            do a = 1_ip, 2_ip
+               low = place(a, i) + real(speed(a, i), wp)*steps(1)
+               low_end = place(a, i) + real(speed(a, i), wp)*steps(2)
+               high = place(a + 2_ip, i) + real(speed(a + 2_ip, i), wp)*steps(1)
+               high_end = place(a + 2_ip, i) + real(speed(a + 2_ip, i), wp)*steps(2)
+               far_low = abs(place(a, i)) + abs(real(speed(a, i), wp)*steps(2))
+               far_high = abs(place(a + 2_ip, i)) + abs(real(speed(a + 2_ip, i), wp)*steps(2))
+               room(a, k) = min(widths(2) - max(far_low, far_high), min( &
+                                min(low, low_end) - (bounds(a, i) + widths(1)), &
+                                (bounds(a + 2_ip, i) - widths(1)) - max(high, high_end)))
+            end do
+         end do
+         do k = 1_ip, to - from + 1_ip
+            strays(n_strays + 1_ip) = from + k - 1_ip
+            n_strays = n_strays + merge(0_ip, 1_ip, min(room(1, k), room(2, k)) >= 0.0_wp)
+         end do
+      end do
+   end subroutine list_strays
+
+   !> Draw new lines through boxes. The deviations from the old lines correct the velocities.
+   pure subroutine draw(low, high, step, share, greatest, n_boxes, bounds, drawn, place, speed)
+      !> First and last box
+      integer(ip), intent(in) :: low, high
+      !> Number of steps since the start of the last interval
+      integer(ip), intent(in) :: step
+      !> Share of the deviations that enters the velocities, and largest velocity [m per step]
+      real(wp), intent(in) :: share, greatest
+      !> Number of boxes
+      integer(ip), intent(in) :: n_boxes
+      !> Bounds of the boxes, (4, box) [m]
+      real(wp), intent(in) :: bounds(4, n_boxes)
+      !> Step of the last interval at which the lines of each box were drawn
+      integer(ip), intent(in) :: drawn(n_boxes)
+      !> Places of the lines at the start of the interval [m]
+      real(wp), intent(inout) :: place(4, n_boxes)
+      !> Velocities of the lines [m per step]
+      real(sp), intent(inout) :: speed(4, n_boxes)
+      real(wp) :: rate, now
+      integer(ip) :: i, a
+
+      now = real(step, wp)
+      do i = low, high
+         rate = share*merge(1.0_wp, 0.0_wp, step > drawn(i))/max(1.0_wp, now - real(drawn(i), wp))
+         do a = 1_ip, 4_ip
+            speed(a, i) = real(max(-greatest, min(greatest, real(speed(a, i), wp) + &
+                               (bounds(a, i) - (place(a, i) + real(speed(a, i), wp)*now))*rate)), sp)
+            place(a, i) = bounds(a, i)
+         end do
+      end do
+   end subroutine draw
+
+   !> Classify pairs between two steps.
+   pure subroutine classify(n, box, steps, margin, n_boxes, place, speed, kind)
+      !> Number of pairs, at most `pair_block`
+      integer(ip), intent(in) :: n
+      !> Boxes of each pair, (2, n)
+      integer(ip), intent(in) :: box(2, n)
+      !> First and last step
+      real(wp), intent(in) :: steps(2)
+      !> Margin of gaps [m]
+      real(wp), intent(in) :: margin
+      !> Number of boxes
+      integer(ip), intent(in) :: n_boxes
+      !> Places of the lines at the start of the interval [m]
+      real(wp), intent(in) :: place(4, n_boxes)
+      !> Velocities of the lines [m per step]
+      real(sp), intent(in) :: speed(4, n_boxes)
+      !> Class of each pair: `separate`, `overlapping` or `active`
+      integer(bp), intent(out) :: kind(n)
+      real(wp) :: left, right, below, above, left_speed, right_speed, below_speed, above_speed, from, to
+      real(wp) :: greatest(pair_block), least(pair_block)
+      integer(ip) :: k, i, j
+
+      from = steps(1)
+      to = steps(2)
+      do k = 1_ip, n
+         i = box(1, k)
+         j = box(2, k)
+         left = place(1, i) - place(3, j)
+         below = place(2, i) - place(4, j)
+         right = place(1, j) - place(3, i)
+         above = place(2, j) - place(4, i)
+         left_speed = real(speed(1, i), wp) - real(speed(3, j), wp)
+         below_speed = real(speed(2, i), wp) - real(speed(4, j), wp)
+         right_speed = real(speed(1, j), wp) - real(speed(3, i), wp)
+         above_speed = real(speed(2, j), wp) - real(speed(4, i), wp)
+         greatest(k) = max(max(max(left + left_speed*from, left + left_speed*to), &
+                               max(below + below_speed*from, below + below_speed*to)), &
+                           max(max(right + right_speed*from, right + right_speed*to), &
+                               max(above + above_speed*from, above + above_speed*to)))
+         least(k) = max(max(min(left + left_speed*from, left + left_speed*to), &
+                            min(below + below_speed*from, below + below_speed*to)), &
+                        max(min(right + right_speed*from, right + right_speed*to), &
+                            min(above + above_speed*from, above + above_speed*to)))
+      end do
+      do k = 1_ip, n
+         kind(k) = merge(overlapping, active, greatest(k) < -margin)
+         kind(k) = merge(separate, kind(k), least(k) > margin)
+      end do
+   end subroutine classify
+
+end module polydem_line_lanes
