@@ -162,6 +162,7 @@ contains
 
       call bench%log%write_line(to_text(int(bench%n_taken, ip))//' samples taken, '// &
          to_text(int(bench%n_found, ip))//' found in '//bench%folder//', '//elapsed_text(bench))
+      call bench%log%write_line('tables and figures: ./polydem tables '//bench%folder)
    end subroutine write_end
 
    !> Time since the start of the bench

@@ -1,6 +1,7 @@
 """The whole comparison in one command, on scenes that take seconds: what it makes, reuses, resumes and refuses."""
 
 import base64
+import csv
 import json
 import os
 import re
@@ -24,6 +25,7 @@ from polydem_post.comparison_plan import (
     make_plan,
     threads_up_to,
 )
+from polydem_post.comparison_run import Comparison, Tools
 from polydem_post.emit import Table
 from polydem_post.html_page import Page
 from polydem_post.precision_scenes import SCENES
@@ -135,6 +137,13 @@ def test_every_claim_has_a_verdict_and_the_quick_one_may_be_undecided(output):
     assert "undecided (quick)" in text and "not measured" not in text
 
 
+def test_the_cost_of_waiting_is_measured(output):
+    with (output[0] / "tables" / "waiting.csv").open(newline="", encoding="utf-8") as file:
+        (row,) = csv.DictReader(file)
+    assert row["threads"] == "2"
+    assert float(row["barrier"]) > 0.02 and float(row["start and join threads"]) > 0.1  # us
+
+
 def test_what_is_there_is_not_made_again(output):
     folder, _ = output
     before = samples_of(folder)
@@ -212,6 +221,13 @@ def test_a_bad_plan_is_an_error_that_names_the_file(tmp_path, text):
         assert code == 2
     else:
         assert code == 2 and ("plan.json" in said or "no_such_file.nml" in said), said
+
+
+def test_pieces_run_in_the_same_environment_of_python(tmp_path):
+    comparison = Comparison(tmp_path, "quick", [], Tools({"double": PROGRAM}))
+    log = tmp_path / "log.txt"
+    assert comparison._call([sys.executable, "-c", "import sys; print(sys.prefix)"], log, tmp_path) == 0
+    assert log.read_text(encoding="utf-8").strip() == sys.prefix
 
 
 # --- The plan ---------------------------------------------------------------------------------------------------------

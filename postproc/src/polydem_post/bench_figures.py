@@ -22,6 +22,9 @@ from .figure_style import (
 from .series import SWEEP, TREE
 from .statistics import slope, typical
 
+#: Curves within this part of each other are drawn as one
+CLOSE = 0.05
+
 #: Finders in the figure of threads, and what they stand for
 PARALLEL = {
     "partitioned_sweep": "sweep, partitioned lists",
@@ -184,7 +187,8 @@ def work(bench: Bench) -> Drawing | None:
         "work_over_size",
         figure,
         "Left: possible pairs that a finder keeps from step to step. Right: nodes or cells that it looks at when the "
-        "neighbours of one box are searched. Exact counts, means over the steps but the first.",
+        "neighbours of one box are searched. Finders whose counts differ by less than "
+        "5 % share a curve. Exact counts, means over the steps but the first.",
     )
 
 
@@ -199,12 +203,22 @@ def _visits(cases: list) -> tuple:
 
 
 def _alike(points: dict) -> list:
-    """[(finders, points)]: finders whose points are the same share a curve, since one would hide the other."""
-    found: dict[tuple, list] = {}
+    """[(finders, points)]: finders whose points are nearly the same share a curve, since one would hide the other."""
+    found: list[tuple] = []
     for finder, values in points.items():
-        if values:
-            found.setdefault(values, []).append(finder)
-    return [(finders, values) for values, finders in found.items()]
+        same = next((finders for finders, others in found if _are_close(values, others)), None)
+        if same:
+            same.append(finder)
+        elif values:
+            found.append(([finder], values))
+    return found
+
+
+def _are_close(one: tuple, other: tuple) -> bool:
+    """Whether two curves have the same sizes and values that a drawing cannot tell apart."""
+    return [x for x, _ in one] == [x for x, _ in other] and all(
+        abs(a - b) <= CLOSE * b for (_, a), (_, b) in zip(one, other)
+    )
 
 
 def _finders(bench: Bench) -> list:

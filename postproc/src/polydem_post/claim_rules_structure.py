@@ -8,6 +8,7 @@ from . import complexity, paper, series
 from .bench import Bench
 from .bench_tables import visits_per_search
 from .claims import CONFIRMED, CONTRADICTED, Finding, Missing, claim, needed, of_parts, said
+from .fine_grained import contests
 from .series import SWEEP, TREE
 from .statistics import number
 
@@ -20,7 +21,7 @@ from .statistics import number
     "sort_and_sweep on one "
     "thread; sort_and_sweep (two threads) and quadtree at least 1.2 times as fast as themselves on one; intervals "
     "included",
-    "speed_up",
+    "speed_up, fine_grained, fine_grained_limits",
 )
 def parallel(bench: Bench) -> Finding:
     here, parts, found = bench.on(), [], []
@@ -41,8 +42,19 @@ def parallel(bench: Bench) -> Finding:
         crossed = f", {number(crossings / case.boxes)} crossings per box" if crossings > 0.0 else ""
         found.append(f"{finder} on {case.threads} threads: {gain.text()}{against}{crossed}")
     return Finding(
-        of_parts(parts), "; ".join(found), f"As said: {said(partitioned=parts[0], per_axis=parts[1], tree=parts[2])}."
+        of_parts(parts), "; ".join(found),
+        f"As said: {said(partitioned=parts[0], per_axis=parts[1], tree=parts[2])}.{_limits(here)}",
     )
+
+
+def _limits(bench: Bench) -> str:
+    """With how many threads the partitioned sweep loses to the tree, as measured and by the model."""
+    told = []
+    for contest in contests(bench):
+        seen, model = contest.seen_to_lose_at(), contest.loses_at()
+        predicted = f"from {model}" if model else "not" if contest.has_model else "-"
+        told.append(f"{contest.one.scene} {f'from {seen}' if seen else 'not'} (model: {predicted})")
+    return f" Threads with which the partitioned sweep loses to the tree: {', '.join(told)}." if told else ""
 
 
 def _most_threads(bench: Bench, finder: str, most: int | None = None):

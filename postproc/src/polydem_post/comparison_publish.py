@@ -59,4 +59,3 @@ def written(contents: Contents, mode: str) -> str:
     lines += [f"| [{table.name}.csv]({TABLES}/{table.name}.csv) | {table.title} |"
               for table in sorted(contents.tables, key=lambda each: each.name)]
     return "\n".join(lines) + "\n"
-

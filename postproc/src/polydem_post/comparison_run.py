@@ -266,7 +266,7 @@ class Comparison:
 
     def _call(self, command: list, log: Path, place: Path, **variables) -> int | None:
         """Exit code of a command whose output goes to a file; None if the time was over. Shows its last line."""
-        words = [str(Path(command[0]).resolve()) if "/" in command[0] else command[0], *command[1:]]
+        words = [os.path.abspath(command[0]), *command[1:]]  # a link to Python in .venv must stay one
         with log.open("w", encoding="utf-8") as file:
             process = subprocess.Popen(words, cwd=place, stdout=file, stderr=subprocess.STDOUT,
                                        stdin=subprocess.DEVNULL, env={**environment(), **variables})

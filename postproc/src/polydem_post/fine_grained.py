@@ -125,6 +125,11 @@ class Contest:
         """Work of one part in one pass, from one thread [s]."""
         return split_of(self.one).shared / threads / self.passes(threads)
 
+    @property
+    def has_model(self) -> bool:
+        """Whether the samples say what waiting costs."""
+        return bool(np.isfinite(self.model(PARTITIONED, self.threads[-1])))
+
     def loses_at(self) -> int | None:
         """Least number of threads with which the model says that the sweep takes as long as the tree."""
         return next((n for n in range(1, MOST_THREADS + 1)
@@ -221,8 +226,7 @@ def limits_table(found: list[Contest]) -> Table:
     )
     for contest in found:
         model, seen, most = contest.loses_at(), contest.seen_to_lose_at(), contest.threads[-1]
-        if not np.isfinite(contest.model(PARTITIONED, most)):
-            model = "-"
+        model = model if contest.has_model else "-"
         table.add(contest.one.scene, contest.one.boxes, number(contest.exchanges), model or f"not to {MOST_THREADS}",
                   seen or f"not to {most}", most, agreement(contest), contest.best_threads() or "-")
     table.note = (
@@ -234,7 +238,7 @@ def limits_table(found: list[Contest]) -> Table:
 
 def agreement(contest: Contest) -> str:
     """Whether the model names the winner that was measured: 3 of 3, 1 undecided."""
-    if not np.isfinite(contest.model(PARTITIONED, contest.threads[-1])):
+    if not contest.has_model:
         return "-"
     right, open_ones = 0, 0
     for n in contest.threads:

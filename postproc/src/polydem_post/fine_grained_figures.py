@@ -6,7 +6,7 @@ import matplotlib
 import numpy as np
 
 from .bench import Bench
-from .figure_style import SETTINGS, Drawing, draw_estimates, grid_with_legend, shared_legend
+from .figure_style import SETTINGS, Drawing, draw_estimates, grid_with_legend, readable_decades, shared_legend
 from .fine_grained import MOST_THREADS, PARTITIONED, Contest, contests
 from .series import TREE
 from .statistics import Estimate
@@ -85,15 +85,17 @@ def scaled(estimate: Estimate, factor: float) -> Estimate:
 def _label(axes: list, scenes: list[Contest]) -> None:
     (failed, working), (waits, wins) = axes
     most = max(contest.threads[-1] for contest in scenes)
-    limits = [axis.get_ylim() for axis in (failed, working)]
+    drawn = [contest.measured(finder, n).value * 1e9 / contest.one.boxes
+             for contest in scenes for n in contest.threads for finder in (PARTITIONED, TREE)]
     for axis, title in ((failed, "fails: one sort by all threads"), (working, "works: traversal of the tree")):
         axis.set(yscale="log", title=title, ylabel="time per box and step [ns]")
-        axis.set_ylim(max(1e-3, 0.8 * min(low for low, _ in limits)), 1.1 * max(high for _, high in limits))
+        axis.set_ylim(0.3 * min(drawn), 10.0 * max(drawn))
+        readable_decades(axis.yaxis)
         axis.title.set_fontsize(9)
     waits.set(yscale="log", ylabel="per pass [us]: waiting, work")
-    wins.set(ylabel="sweep / tree")
+    wins.set(yscale="log", ylabel="sweep / tree")
+    readable_decades(wins.yaxis)
     wins.axhline(1.0, color="0.6", linewidth=0.8, zorder=0)
-    wins.set_ylim(bottom=0.0)
     for row in axes:
         for axis in row:
             axis.set(xscale="log", xlabel="threads")

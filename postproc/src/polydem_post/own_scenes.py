@@ -44,7 +44,8 @@ def family_name(cases: list[Case]) -> str:
         return names[0]
     first, last = names[0], names[-1]
     shared = next((first[:k] for k in range(len(first), 0, -1) if last.startswith(first[:k])), "")
-    return shared.rstrip("_-0123456789.") or ", ".join(names[:3])
+    whole_words = shared[: 1 + max(shared.rfind("_"), shared.rfind("-"))]
+    return whole_words.rstrip("_-") or ", ".join(names[:3])
 
 
 def skipped(bench: Bench, judged: list, drawn: list) -> Table:
