@@ -5,6 +5,7 @@ usage: test_cmake.py SOURCES BUILD CMAKE      sources, a built folder, the progr
 
 import json
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -100,6 +101,22 @@ class Install(Scene):
         code, output, message = call(program, "check", self.folder / "share/polydem/inputs/stack.nml", cwd=self.folder)
         self.assertEqual(code, 0, output + message)
         self.assertTrue((self.folder / "share/doc/polydem/LICENSE").exists())
+        for place in ("man/man1/polydem.1", "bash-completion/completions/polydem", "zsh/site-functions/_polydem",
+                      "fish/vendor_completions.d/polydem.fish"):
+            self.assertIn("--walltime" if "fish" not in place else "-l walltime",
+                          (self.folder / "share" / place).read_text(encoding="utf-8").replace("\\-", "-"))
+
+    @unittest.skipUnless(shutil.which("dpkg-deb"), "no dpkg-deb: nothing can be packed")
+    def test_a_package_has_the_program_with_its_libraries_as_dependencies(self):
+        code, output, message = call(pathlib.Path(CMAKE).with_name("cpack"), "-G", "DEB", "-B", self.folder, cwd=BUILD)
+        self.assertEqual(code, 0, output + message)
+        [package] = self.folder.glob("polydem_*.deb")
+        needs = call("dpkg-deb", "-f", package, "Depends")[1]
+        for name in ("libgfortran5", "libgomp1", "libhdf5-", "libhdf5-fortran"):
+            self.assertIn(name, needs)
+        self.assertEqual(call("dpkg-deb", "-x", package, self.folder / "root")[0], 0)
+        self.assertEqual(call(self.folder / "root/usr/bin/polydem", "--version")[0], 0)
+        self.assertTrue((self.folder / "root/usr/share/polydem/inputs/first.nml").exists())
 
 
 class Workflows(unittest.TestCase):

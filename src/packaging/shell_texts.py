@@ -1,0 +1,144 @@
+"""Tab completion and man page, made from the help texts of the verbs.
+
+usage: shell_texts.py bash|zsh|fish|man VERSION HELP.txt...
+
+A help text has the call of its verb in its first line, the meaning in its second one, and its options below. What a
+help text names is completed, and nothing else, so completion and man page never differ from the help.
+"""
+
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+#: An option at the start of a line: its names, its value, its meaning
+OPTION = re.compile(r"  (-[-\w]+)(?:, (--[-\w]+))?(?: ([A-Z][^ ]*))?(?:  +| )(\S.*)?$")
+#: Words of a call that are chosen, as in sweep make|run|collect
+CHOICE = re.compile(r"^[\w-]+(?:\|[\w-]+)+$")
+
+EXIT_CODES = (("0", "done"), ("1", "the run failed, for example because a guard stopped it"),
+              ("2", "bad input: namelist, bodies file, trace or command line"),
+              ("3", "a file or folder cannot be read or written, or a checksum is wrong"),
+              ("75", "ended early with a checkpoint; the same command with --continue continues the run"))
+
+
+@dataclass(frozen=True)
+class Verb:
+    """A verb as its help text describes it."""
+
+    name: str
+    call: str
+    meaning: str
+    #: Lines below the meaning
+    lines: tuple
+    #: Options: name, value (empty if it takes none), meaning
+    options: tuple
+    #: Words of which one follows the verb
+    choices: tuple
+
+
+def read_verb(path):
+    """The verb that a help text describes."""
+    call, meaning, *lines = Path(path).read_text(encoding="utf-8").splitlines()
+    options = {}
+    for line in lines:
+        match = OPTION.match(line)
+        if match:
+            for name in filter(None, match.groups()[:2]):
+                options.setdefault(name, (name, match[3] or "", match[4] or ""))
+    words = call.split()
+    choices = next((tuple(word.split("|")) for word in words[1:] if CHOICE.match(word)), ())
+    return Verb(words[0], call, meaning, tuple(lines), tuple(options.values()), choices)
+
+
+def bash_text(verbs):
+    """Completion for bash."""
+    cases = []
+    for verb in verbs:
+        values = [name for name, value, _ in verb.options if value]
+        cases.append(f"    {verb.name})\n      options='{' '.join(name for name, _, _ in verb.options)}'\n"
+                     f"      valued='{' '.join(values)}'\n      choices='{' '.join(verb.choices)}'\n      ;;")
+    names = " ".join([*(verb.name for verb in verbs), "help", "--help", "--version"])
+    return "\n".join([
+        "# Tab completion of polydem for bash", "_polydem() {",
+        "  local word=${COMP_WORDS[COMP_CWORD]} before=${COMP_WORDS[COMP_CWORD - 1]} options='' valued='' choices=''",
+        "  COMPREPLY=()", "  if [ \"$COMP_CWORD\" -eq 1 ]; then",
+        f"    mapfile -t COMPREPLY < <(compgen -W '{names}' -- \"$word\")", "    return", "  fi",
+        "  case ${COMP_WORDS[1]} in", *cases, "    help | --help)",
+        f"      choices='{' '.join(verb.name for verb in verbs)}'", "      ;;", "  esac",
+        "  [[ \" $valued \" != *\" $before \"* ]] || return 0", "  if [[ $word == -* ]]; then",
+        "    mapfile -t COMPREPLY < <(compgen -W \"$options\" -- \"$word\")",
+        "  elif [ \"$COMP_CWORD\" -eq 2 ] && [ -n \"$choices\" ]; then",
+        "    mapfile -t COMPREPLY < <(compgen -W \"$choices\" -- \"$word\")", "  fi", "}",
+        "# Where nothing is suggested, files are.", "complete -o default -F _polydem polydem", ""])
+
+
+def zsh_text(verbs):
+    """Completion for zsh."""
+    def quoted(text):
+        return re.sub(r"([\[\]:\\])", r"\\\1", text).replace("'", "'\\''")
+
+    lines = ["#compdef polydem", "# Tab completion of polydem for zsh", "_polydem() {", "  local -a verbs", "  verbs=("]
+    lines += [f"    '{verb.name}:{quoted(verb.meaning)}'" for verb in verbs]
+    lines += ["    'help:print the options of a verb'", "  )", "  if (( CURRENT == 2 )); then",
+              "    _describe 'verb' verbs", "    return", "  fi", "  local verb=$words[2]", "  shift words",
+              "  (( CURRENT -= 1 ))", "  case $verb in"]
+    for verb in verbs:
+        specs = [f"'*{name}[{quoted(meaning)}]{f':{quoted(value)}:_files' if value else ''}'"
+                 for name, value, meaning in verb.options]
+        first = f"'1:step:({' '.join(verb.choices)})' " if verb.choices else ""
+        lines.append(f"    {verb.name}) _arguments {' '.join(specs)} {first}'*:file:_files' ;;")
+    lines += ["    help) _describe 'verb' verbs ;;", "  esac", "}",
+              'if [ "$funcstack[1]" = _polydem ]; then _polydem "$@"; else compdef _polydem polydem; fi', ""]
+    return "\n".join(lines)
+
+
+def fish_text(verbs):
+    """Completion for fish."""
+    def quoted(text):
+        return "'" + text.replace("\\", "\\\\").replace("'", "\\'") + "'"
+
+    lines = ["# Tab completion of polydem for fish"]
+    for verb in verbs:
+        lines.append(f"complete -c polydem -n __fish_use_subcommand -f -a {verb.name} -d {quoted(verb.meaning)}")
+        seen = f"-n '__fish_seen_subcommand_from {verb.name}'"
+        lines += [f"complete -c polydem {seen} -a {choice}" for choice in verb.choices]
+        for name, value, meaning in verb.options:
+            short = "-s" if len(name) == 2 else "-o"
+            form = f"-l {name[2:]}" if name.startswith("--") else f"{short} {name[1:]}"
+            lines.append(f"complete -c polydem {seen} {form}{' -r' if value else ''} -d {quoted(meaning)}")
+    return "\n".join([*lines, ""])
+
+
+def man_text(verbs, version):
+    """Man page in the macros `man`."""
+    def escaped(text):
+        text = text.replace("\\", "\\e").replace("-", "\\-").replace("'", "\\(aq").replace("`", "\\(ga")
+        return f"\\&{text}" if text.startswith(".") else text
+
+    lines = [f'.TH POLYDEM 1 "" "polydem {version}" "User Commands"', ".SH NAME",
+             "polydem \\- discrete elements for convex polygons in two dimensions", ".SH SYNOPSIS",
+             ".B polydem", ".I VERB", "[\\fIARGUMENTS\\fR]", ".SH DESCRIPTION",
+             "polydem simulates granular matter made of convex polygons, and compares algorithms of neighbour search.",
+             "A namelist describes a simulation; results are folders of HDF5 files.", ".SH VERBS"]
+    for verb in verbs:
+        lines += [f'.SS "{escaped(verb.call)}"', escaped(verb.meaning), ".nf"]
+        lines += [escaped(line) if line else ".sp" for line in verb.lines] + [".fi"]
+    lines += [".SH EXIT STATUS"]
+    for code, meaning in EXIT_CODES:
+        lines += [".TP", f".B {code}", escaped(meaning)]
+    return "\n".join([*lines, ""])
+
+
+def main():
+    """Print the text that the command line asks for."""
+    kind, version, *files = sys.argv[1:]
+    verbs = [read_verb(path) for path in files]
+    texts = {"bash": bash_text, "zsh": zsh_text, "fish": fish_text, "man": lambda found: man_text(found, version)}
+    if kind not in texts:
+        sys.exit(f"there is no text {kind}, but {', '.join(texts)}")
+    sys.stdout.write(texts[kind](verbs))
+
+
+if __name__ == "__main__":
+    main()
