@@ -31,6 +31,7 @@ OTHERS = {
     "inputs/getting_started.md",
     "src/README.md",
     "src/algorithms.md",
+    "src/theory.md",
     "tests/README.md",
     "tests/faults.md",
     "tests/hard_cases.md",

@@ -25,7 +25,7 @@ FETCHED, WORKER = "https://unpkg.com/iframe-worker/shim", "offline_worker.js"
 MARK = ".made_by_polydem_manual"
 
 STYLE = """\
-.md-typeset p.equation { overflow-x: auto; margin: 1em 0; }
+.md-typeset p.equation { overflow: auto hidden; margin: 1em 0; padding: 0.3em 0; }
 .md-typeset math { font-size: 1.1em; }
 .md-typeset small { opacity: 0.7; }
 .md-grid { max-width: 76rem; }
