@@ -8,7 +8,7 @@ import pytest
 
 ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])
 FOLDERS = ("src", "tests", "inputs", "postproc")
-PAGES = [ROOT / "README.md", *sorted(page for name in FOLDERS for page in (ROOT / name).rglob("*.md")
+PAGES = [*sorted(ROOT.glob("*.md")), *sorted(page for name in FOLDERS for page in (ROOT / name).rglob("*.md")
                                      if not any(part.startswith(".") for part in page.relative_to(ROOT).parts))]
 MOST_LINES = 60
 LINK = re.compile(r"\]\(([^)\s]+)\)")
