@@ -24,10 +24,13 @@ module polydem_fill_block
    private
    public :: fill_block
 
+   !> Number of pairs whose remembered edges are tested at a time
+   integer(ip), parameter :: ahead = 2_ip*block_size
+
 contains
 
    !> Fill a block with contacts of pairs in descending order.
-   subroutine fill_block(bodies, first, second, effective, isa, low, next, history, block)
+   subroutine fill_block(bodies, first, second, effective, isa, low, next, tested, history, block)
       !> Bodies with rotated polygons
       type(bodies_t), intent(in) :: bodies
       !> Lower and higher slot of each pair
@@ -40,6 +43,8 @@ contains
       integer(ip), intent(in) :: low
       !> First pair to examine, at least `low`; afterwards the next one, less than `low` if there is none
       integer(ip), intent(inout) :: next
+      !> From this pair on, remembered edges have been tested; greater than `next` at the start
+      integer(ip), intent(inout) :: tested
       !> Contact history of the pairs: `memory` is updated, and the other columns are cleared for pairs whose polygons
       !> do not overlap; any column may be absent
       type(contact_history_t), intent(inout) :: history
@@ -49,7 +54,7 @@ contains
       logical :: exists(block_size)
       integer(ip) :: c
 
-      call select_pairs(bodies, first, second, low, next, history, block, batch)
+      call select_pairs(bodies, first, second, low, next, tested, history, block, batch)
       call copy_shapes(block%n, block%first, block%second, bodies%n, bodies%radius, bodies%vertex_start, batch)
       call copy_offsets(block%n, block%first, block%second, bodies%n, bodies%position, batch)
       call evaluate_batch(batch, block%n, bodies%turned, effective, isa, block%overlap_columns_t)
@@ -65,100 +70,104 @@ contains
    end subroutine fill_block
 
    !> Select the next pairs that may be contacts: those that no remembered edge separates.
-   subroutine select_pairs(bodies, first, second, low, next, history, block, batch)
+   subroutine select_pairs(bodies, first, second, low, next, tested, history, block, batch)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in), contiguous :: first(:), second(:)
       integer(ip), intent(in) :: low
-      integer(ip), intent(inout) :: next
+      integer(ip), intent(inout) :: next, tested
       type(contact_history_t), intent(inout) :: history
       type(contact_block_t), intent(inout) :: block
       type(overlap_batch_t), intent(inout) :: batch
-      integer(ip) :: from, nothing(block_size)
+      integer(ip) :: nothing(ahead)
 
       block%n = 0_ip
       do while (next >= low .and. block%n < block_size)
-         ! As many pairs as there is room for
-         from = max(low, next - (block_size - block%n) + 1_ip)
+         if (next < tested) then
+            tested = max(low, next - ahead + 1_ip)
+            if (allocated(history%memory)) call forget_edges(bodies, tested, next, first, second, history%memory)
+         end if
          if (allocated(history%memory)) then
-            call forget_edges(bodies, from, next, first, second, history%memory)
-            call select_in_range(bodies%n, bodies%radius, from, next, first(from:next), second(from:next), &
-                                 history%memory(from:next), block, batch)
+            call select_in_range(tested, next, history%memory(tested:next), block, batch)
          else
             nothing = 0_ip
-            call select_in_range(bodies%n, bodies%radius, from, next, first(from:next), second(from:next), &
-                                 nothing(:next - from + 1_ip), block, batch)
+            call select_in_range(tested, next, nothing(:next - tested + 1_ip), block, batch)
          end if
-         next = from - 1_ip
       end do
+      call choose_roles(bodies%n, bodies%radius, block%n, block%pair, first, second, block%first, block%second)
    end subroutine select_pairs
 
    !> Forget the remembered edges that do not separate the polygons any more.
    subroutine forget_edges(bodies, from, to, first, second, memory)
       type(bodies_t), intent(in) :: bodies
-      !> First and last pair, at most `block_size` pairs
+      !> First and last pair, at most `ahead` pairs
       integer(ip), intent(in) :: from, to
       integer(ip), intent(in), contiguous :: first(:), second(:)
       integer(ip), intent(inout), contiguous :: memory(:)
       type(overlap_batch_t) :: batch
-      integer(ip) :: found(block_size), i(block_size), j(block_size), k, n, p
+      integer(ip) :: found(ahead), i(block_size), j(block_size), k, n, n_found, p, done
       logical :: apart(block_size)
 
-      n = 0_ip
+      n_found = 0_ip
       do p = from, to
-         found(n + 1_ip) = p
-         n = n + shiftr(memory(p), bit_size(p) - 1)
+         found(n_found + 1_ip) = p
+         n_found = n_found + shiftr(memory(p), bit_size(p) - 1)
       end do
-      if (n == 0_ip) return
-      do k = 1_ip, n
-         call choose_roles(bodies%n, bodies%radius, first(found(k)), second(found(k)), i(k), j(k))
-         batch%memory(k) = memory(found(k))
-      end do
-      call copy_shapes(n, i, j, bodies%n, bodies%radius, bodies%vertex_start, batch)
-      call copy_offsets(n, i, j, bodies%n, bodies%position, batch)
-      call test_edges(batch, n, size(bodies%turned, 2, kind=ip), bodies%turned, apart)
-      do k = 1_ip, n
-         memory(found(k)) = merge(batch%memory(k), 0_ip, apart(k))
+      do done = 0_ip, n_found - 1_ip, block_size
+         n = min(block_size, n_found - done)
+         call choose_roles(bodies%n, bodies%radius, n, found(done + 1:done + n), first, second, i, j)
+         do k = 1_ip, n
+            batch%memory(k) = memory(found(done + k))
+         end do
+         call copy_shapes(n, i, j, bodies%n, bodies%radius, bodies%vertex_start, batch)
+         call copy_offsets(n, i, j, bodies%n, bodies%position, batch)
+         call test_edges(batch, n, size(bodies%turned, 2, kind=ip), bodies%turned, apart)
+         do k = 1_ip, n
+            memory(found(done + k)) = merge(batch%memory(k), 0_ip, apart(k))
+         end do
       end do
    end subroutine forget_edges
 
    !> The roles of `is_exchanged`, without a branch: which radius is greater, a processor cannot predict.
-   pure subroutine choose_roles(n, radius, low, high, i, j)
+   pure subroutine choose_roles(n, radius, n_pairs, pair, first, second, i, j)
       !> Number of bodies
       integer(ip), intent(in) :: n
       real(wp), intent(in) :: radius(n)
-      !> Slots of a pair
-      integer(ip), intent(in) :: low, high
-      !> The same, P first
-      integer(ip), intent(out) :: i, j
-      integer(ip) :: exchange
+      integer(ip), intent(in) :: n_pairs
+      !> Pairs
+      integer(ip), intent(in) :: pair(n_pairs)
+      integer(ip), intent(in), contiguous :: first(:), second(:)
+      !> Slots of P and of Q
+      integer(ip), intent(inout) :: i(block_size), j(block_size)
+      integer(ip) :: exchange, c
 
-      exchange = iand(ieor(low, high), -merge(1_ip, 0_ip, radius(high) < radius(low)))
-      i = ieor(low, exchange)
-      j = ieor(high, exchange)
+      do c = 1_ip, n_pairs
+         i(c) = first(pair(c))
+         j(c) = second(pair(c))
+         exchange = iand(ieor(i(c), j(c)), -merge(1_ip, 0_ip, radius(j(c)) < radius(i(c))))
+         i(c) = ieor(i(c), exchange)
+         j(c) = ieor(j(c), exchange)
+      end do
    end subroutine choose_roles
 
-   !> Add the pairs of a range without remembered edge to a block, in descending order.
-   pure subroutine select_in_range(n, radius, from, to, first, second, memory, block, batch)
-      !> Number of bodies
-      integer(ip), intent(in) :: n
-      real(wp), intent(in) :: radius(n)
-      !> First and last pair of the range, for which there is room
-      integer(ip), intent(in) :: from, to
-      integer(ip), intent(in) :: first(from:to), second(from:to), memory(from:to)
+   !> Add pairs without remembered edge to a block, in descending order, until it is full.
+   pure subroutine select_in_range(low, next, memory, block, batch)
+      !> Last pair to examine
+      integer(ip), intent(in) :: low
+      !> First pair to examine; afterwards the next one
+      integer(ip), intent(inout) :: next
+      integer(ip), intent(in) :: memory(low:next)
       type(contact_block_t), intent(inout) :: block
       type(overlap_batch_t), intent(inout) :: batch
-      integer(ip) :: b, c, p
+      integer(ip) :: c, p
 
       c = block%n
-      do p = to, from, -1_ip
+      do p = next, low, -1_ip
+         if (c == block_size) exit
          block%pair(c + 1_ip) = p
          batch%memory(c + 1_ip) = memory(p)
          c = c + shiftr(not(memory(p)), bit_size(p) - 1)
       end do
-      do b = block%n + 1_ip, c
-         p = block%pair(b)
-         call choose_roles(n, radius, first(p), second(p), block%first(b), block%second(b))
-      end do
+      next = p
       block%n = c
    end subroutine select_in_range
 

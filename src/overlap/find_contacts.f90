@@ -61,11 +61,12 @@ contains
       type(contact_history_t), intent(inout) :: history
       type(contact_rows_t), intent(inout) :: rows
       type(contact_block_t) :: block
-      integer(ip) :: next
+      integer(ip) :: next, tested
 
       next = ends(2)
+      tested = next + 1_ip
       do while (next > ends(1))
-         call fill_block(bodies, first, second, effective, isa_base, ends(1) + 1_ip, next, history, block)
+         call fill_block(bodies, first, second, effective, isa_base, ends(1) + 1_ip, next, tested, history, block)
          call append_rows(block, rows, with_forces=.false.)
       end do
    end subroutine find_in_range

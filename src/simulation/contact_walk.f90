@@ -107,11 +107,12 @@ contains
       type(contact_block_t) :: block
       type(contact_terms_t) :: terms
       real(dp) :: clock(3)
-      integer(ip) :: next, n_blocks
+      integer(ip) :: next, tested, n_blocks
       logical :: timed
 
       call start_results(self%contacts, results)
       next = ends(2)
+      tested = next + 1_ip
       n_blocks = 0_ip
       do while (next > ends(1))
          timed = mod(n_blocks, timed_blocks) == 0_ip
@@ -119,7 +120,7 @@ contains
          if (timed) clock(1) = wall_seconds()
          associate (pairs => self%neighbours%pairs)
             call fill_block(self%bodies, pairs%first, pairs%second, self%law%needs_effective_area, self%isa, &
-                            ends(1) + 1_ip, next, self%history, block)
+                            ends(1) + 1_ip, next, tested, self%history, block)
          end associate
          if (timed) clock(2) = wall_seconds()
          call self%law%apply(self%bodies, dt, block, self%history)
