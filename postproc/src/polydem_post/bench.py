@@ -166,7 +166,7 @@ class Bench:
         """Only the cases of one machine and one build: the first machine, and the build that it has most samples of."""
         machine = machine or next(iter(self.named("machine")), None)
         here = [case for case in self.cases if case.machine == machine]
-        samples = Counter()
+        samples: Counter = Counter()
         for case in here:
             samples[case.build] += len(case.samples)
         build = build or next((name for name, _ in samples.most_common(1)), None)
@@ -198,7 +198,7 @@ def read_bench(folders) -> Bench:
             raise ResultError(f"{folder}: holds no samples of a bench (samples/*.h5); make them with ./polydem bench")
         samples += [read_sample(path) for path in paths]
     labels = _machine_labels(samples)
-    cases = {}
+    cases: dict = {}
     for sample in sorted(samples, key=lambda s: (folders.index(s.path.parent.parent), s.repeat)):
         facts = sample.case
         key = (

@@ -130,7 +130,7 @@ def threads(bench: Bench) -> Drawing | None:
 
 def _threaded_scene(bench: Bench) -> str | None:
     """The drum with most parallel finders on several threads, of those the largest; else any such scene."""
-    counts = {}
+    counts: dict = {}
     for case in bench.select(mode="replay"):
         if case.threads > 1 and case.finder in PARALLEL:
             drum = series.kind(case) == "drum"

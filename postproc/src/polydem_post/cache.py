@@ -51,7 +51,7 @@ class Record:
 
 def read_records(folders) -> list[Record]:
     """The records of some bench folders, in order of size; of the same count the first."""
-    records = {}
+    records: dict = {}
     for folder in folders:
         path = Path(folder) / FILE
         if not path.exists():

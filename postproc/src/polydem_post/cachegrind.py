@@ -98,7 +98,9 @@ def simulate(command: list[str], model: Model | None, functions: re.Pattern, bra
 
 def count_events(text: str, functions: re.Pattern) -> dict:
     """Event -> number, summed over the functions whose names match, in a file that cachegrind wrote."""
-    events, totals, counts = [], defaultdict(int), False
+    events: list[str] = []
+    totals: defaultdict = defaultdict(int)
+    counts = False
     for line in text.splitlines():
         if line.startswith("events:"):
             events = line.split()[1:]

@@ -6,6 +6,7 @@ altogether, else undecided: a verdict does not hang on noise. Counts are exact a
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from .bench import Bench
@@ -50,7 +51,7 @@ class Claim:
     #: Tables and figures that show more
     where: str
     #: Rule: Bench -> Finding; raises Missing
-    rule: object
+    rule: Callable[[Bench], Finding]
 
     def judge(self, bench: Bench) -> Finding:
         """The verdict on the claim."""

@@ -248,8 +248,8 @@ def share_of_step(samples: list, model: Model) -> Estimate:
         for name in (model.name, model.off)
     )
     ratio = median_of_ratios({key: on[key] for key in on if key > 0}, off)
-    scaled = (100.0 * (value - 1.0) for value in (ratio.value, ratio.low, ratio.high, ratio.least))
-    return Estimate(*scaled, ratio.repeats)
+    value, low, high, least = (100.0 * (each - 1.0) for each in (ratio.value, ratio.low, ratio.high, ratio.least))
+    return Estimate(value, low, high, least, ratio.repeats)
 
 
 def share_of_instructions(samples: list, model: Model) -> float:

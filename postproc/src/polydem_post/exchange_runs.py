@@ -131,7 +131,7 @@ def read_run(folder) -> RunCount:
         margin = float(entries.get("margin", MARGIN))
     except ValueError as error:
         raise ResultError(f"{folder}: its margin of decomposition is no number: {entries['margin'][:40]!r}") from error
-    partition = entries.get("partition", entries.get("cut", "bisection"))
+    partition = str(entries.get("partition", entries.get("cut", "bisection")))
     run = RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], partition=partition, margin=margin,
                    pairs=counters["pairs"], state_hash=result.state_hash,
                    revision=str(result.provenance.get("revision", NOT_RECORDED)), **counts)
@@ -170,9 +170,9 @@ def _insist_on_counts(place, run: RunCount) -> None:
 
 def runs_tables(runs: list[RunCount]) -> list[Table]:
     """What steps tell, and what handing bodies out tells."""
-    heading = ("partition", "margin", "bodies", "ranks", "ghosts per body", "most ghosts", "pairs per ghost",
-               "messages",
-               "of one rank", "bytes", "of one rank", "bodies, most/mean", "pairs, most/mean", "steps", "hash")
+    heading: tuple[str, ...] = (
+        "partition", "margin", "bodies", "ranks", "ghosts per body", "most ghosts", "pairs per ghost", "messages",
+        "of one rank", "bytes", "of one rank", "bodies, most/mean", "pairs, most/mean", "steps", "hash")
     steps = Table("runs", "Exact counts of runs, means of a step", heading, texts=1)
     heading = ("partition", "margin", "bodies", "ranks", "steps", "redistributions", "divisions", "migrations",
                "messages",

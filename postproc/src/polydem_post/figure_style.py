@@ -88,7 +88,7 @@ def grid_with_legend(rows_of_panels: int, columns: int, width: float, height: fl
 
 def shared_legend(below, axes, columns: int) -> None:
     """Every label once, in the empty panel."""
-    entries = {}
+    entries: dict = {}
     for axis in axes:
         for handle, label in zip(*axis.get_legend_handles_labels()):
             entries.setdefault(label, handle)

@@ -194,7 +194,7 @@ def _slice_hashes(table: np.ndarray, lengths: list) -> list[int]:
     work, shifted = np.empty_like(state), np.empty_like(state)
     in_order = bool(np.all(np.diff(order) == 1))
     n = len(state)
-    lanes = (state, work, shifted, shift)
+    lanes: tuple[np.ndarray, ...] = (state, work, shifted, shift)
     for first in range(0, sorted_lengths[0], _BLOCK):
         columns = table[: len(lengths), first : min(first + _BLOCK, sorted_lengths[0])]
         block = np.ascontiguousarray((columns if in_order else columns[order]).T)

@@ -144,7 +144,7 @@ def _two_finders(bench: Bench, quantity, name: str, what: str, slopes: dict, rat
     draw_estimates(
         right,
         [tree.boxes for tree, _ in both],
-        [series.ratio(*pair, quantity) for pair in both],
+        [series.ratio(tree, sweep, quantity) for tree, sweep in both],
         color="black",
         marker="o",
         markersize=4.5,

@@ -32,8 +32,8 @@ def machines(bench: Bench) -> Table:
         ("machine", "clock [GHz]", *(name for name, _ in FACTS), "load"),
     )
     for name, clock, cores, memory, caches in paper.MACHINES:
-        told = {"cores": cores, "caches": caches, "memory": memory}
-        table.add(f"{name}, paper", clock, *(told.get(fact, "-") for fact, _ in FACTS), "-")
+        known = {"cores": cores, "caches": caches, "memory": memory}
+        table.add(f"{name}, paper", clock, *(known.get(fact, "-") for fact, _ in FACTS), "-")
     for machine in bench.named("machine"):
         facts = bench.provenance(machine)
         loads = [

@@ -177,7 +177,7 @@ def _ratios(study: WorkPrecision, error: float) -> dict:
     """(numerics, precision) -> ratios of its time to the fastest, where it reaches the error; where it was asked."""
     measured = {(curve.scene, curve.model, curve.numerics, curve.precision) for curve in study.curves}
     never = [key for key in study.stopped() if key not in measured]
-    found = {(numerics, precision): ([], [0]) for numerics in NUMERICS for precision in PRECISIONS}
+    found: dict = {(numerics, precision): ([], [0]) for numerics in NUMERICS for precision in PRECISIONS}
     for scene in _converging(study):
         for model in study.models_of(scene):
             curves = study.curves_of(scene, model)

@@ -195,7 +195,8 @@ def _problems_of_entry(place: str, entry: str) -> list[str]:
 
 def problems_of_names(rows: list[Row]) -> list[str]:
     """Names must be fit for folders, and different also where letters have no size."""
-    seen, problems = {}, []
+    seen: dict = {}
+    problems: list[str] = []
     for row in rows:
         if not SAFE_NAME.fullmatch(row.name):
             problems.append(f"{row.place}: {row.name!r} cannot be a name: letters, digits and . _ + - up to 100")
@@ -211,9 +212,14 @@ def expand(columns: list[str], rows: list[Row], lists: list[str]) -> tuple[list[
     Between values that have commas stand semicolons: forces.gravity=0,-9.81;0,-1.62. The names of the runs tell the
     values that differ; where they cannot, runs are numbered.
     """
-    entries, choices, problems = [], [], []
+    entries: list[str] = []
+    choices: list[list[str]] = []
+    problems: list[str] = []
     for text in lists:
         match = LISTED_ENTRY.fullmatch(text)
+        if match is None:
+            problems.append(f"{text} is not like scene.seed=1,2,3")
+            continue
         entry, values = match.group(1), match.group(2)
         problems += _problems_of_entry(text, entry)
         if entry in columns + entries:
@@ -242,7 +248,9 @@ def expand(columns: list[str], rows: list[Row], lists: list[str]) -> tuple[list[
 def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = None, lists: list[str] | None = None,
                cores: int = 1) -> Sweep:
     """Check every row of the table, times the lists, and lay out the folders of the runs."""
-    problems, columns, rows = [], [], []
+    problems: list[str] = []
+    columns: list = []
+    rows: list = []
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         problems.append(f"{folder}: is there already; choose another folder")
     if not base.is_file():

@@ -299,10 +299,12 @@ class _Slot:
 
     def has_ended(self) -> bool:
         """Whether the run is over."""
-        return self.process.poll() is not None
+        return self.process is None or self.process.poll() is not None
 
     def end(self) -> Run:
         """Book the attempt, and give the run back."""
+        if self.process is None or self.record is None or self.run is None:
+            raise RuntimeError("an attempt ends that was not started")
         writer = csv.writer(self.record, lineterminator="\n")
         if self.record.tell() == 0:
             writer.writerow(["started", "seconds", "exit_code", "threads"])

@@ -84,7 +84,8 @@ class Curve:
         kept = [(dt, error) for dt, error in kept if error > MARGIN * floor and math.isfinite(error)]
         if len(kept) < 3:
             return math.nan
-        return float(np.polyfit(*np.log(np.array(kept)).T, 1)[0])
+        steps, errors = np.log(np.array(kept)).T
+        return float(np.polyfit(steps, errors, 1)[0])
 
 
 @dataclass(frozen=True)
@@ -124,7 +125,7 @@ class WorkPrecision:
 
     def left_out(self) -> list[Sample]:
         """One sample for each scene, model and numerics that the program refused."""
-        found = {}
+        found: dict = {}
         for sample in self.samples:
             if sample.status == "refused":
                 found.setdefault((sample.scene, sample.model, sample.numerics), sample)
@@ -162,7 +163,8 @@ class WorkPrecision:
             point = self._point(choice, repeats)
             if point is not None:
                 points.setdefault((choice.scene, choice.model, choice.numerics, choice.precision), []).append(point)
-        return [Curve(*key, tuple(sorted(found, key=lambda p: -p.dt))) for key, found in points.items()]
+        return [Curve(scene, model, numerics, precision, tuple(sorted(found, key=lambda p: -p.dt)))
+                for (scene, model, numerics, precision), found in points.items()]
 
     def _point(self, choice: Choice, repeats: list) -> Point | None:
         measured = next((sample.values for sample in repeats if sample.result), None)
