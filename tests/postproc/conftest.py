@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 
 import pytest
 from polydem_post import Trajectory
@@ -63,6 +64,15 @@ def exported(heap_with_contacts, tmp_path_factory):
         if form != "gsd":
             export_result(heap_with_contacts, form, folder / f"heap{suffix}")
     return folder
+
+
+@pytest.fixture(scope="session")
+def view(small_drum, tmp_path_factory):
+    """The page of the viewer of this run."""
+    path = tmp_path_factory.mktemp("view") / "view.html"
+    command = [sys.executable, "-m", "polydem_post", "view", str(small_drum), "-o", str(path)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    return path
 
 
 @pytest.fixture

@@ -12,6 +12,9 @@ from pathlib import Path
 #: Exit code of tests that are skipped (tests/postproc/CMakeLists.txt)
 SKIPPED = 77
 
+#: Exit code of pytest when it collects no tests, as in a module that is skipped for want of a browser
+NONE_COLLECTED = 5
+
 NEEDED = "import h5py, matplotlib, numpy, pytest"
 
 
@@ -36,8 +39,9 @@ def main() -> int:
     environment["POLYDEM_WRITE_SAMPLE"] = str(write_sample)
     environment["POLYDEM_PROGRAM"] = str(program)
     environment["POLYDEM_SOURCE_DIR"] = str(root)
-    command = [str(python), "-m", "pytest", "-q", "-p", "no:cacheprovider", str(tests), *options]
-    return subprocess.run(command, env=environment, check=False).returncode
+    command = [str(python), "-m", "pytest", "-q", "-rs", "-p", "no:cacheprovider", str(tests), *options]
+    code = subprocess.run(command, env=environment, check=False).returncode
+    return SKIPPED if code == NONE_COLLECTED else code
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ def add_picture_verbs(verbs) -> None:
     """Add the parsers of these verbs."""
     _add_plot(verbs)
     _add_movie(verbs)
+    _add_view(verbs)
 
 
 def _add_plot(verbs) -> None:
@@ -45,6 +46,17 @@ def _add_movie(verbs) -> None:
     movie.add_argument("--size", type=_reals, metavar="W,H")
     movie.add_argument("--processes", type=int, metavar="N")
     _add_look(movie)
+
+
+def _add_view(verbs) -> None:
+    view = verbs.add_parser("view")
+    view.set_defaults(action=_view)
+    view.add_argument("result", type=Path, metavar="RESULT")
+    view.add_argument("--output", "-o", type=Path, metavar="FILE")
+    view.add_argument("--frames", metavar="FIRST:END:STEP")
+    view.add_argument("--every", type=int, default=1, metavar="N")
+    view.add_argument("--colour", "--color", metavar="QUANTITY", default="speed")
+    view.add_argument("--no-contacts", action="store_true")
 
 
 def _add_look(parser) -> None:
@@ -178,6 +190,23 @@ def _movie(options: argparse.Namespace) -> None:
     numbers = chosen_frames(options.frames or ":", len(trajectory))[:: options.every]
     path = options.output or trajectory.folder / "movie.mp4"
     make_movie(trajectory, numbers, path, look, options.fps, options.size, options.processes)
+    print(path)
+
+
+def _view(options: argparse.Namespace) -> None:
+    from .quantities import QUANTITIES
+    from .view import write_view
+
+    if options.colour != "none" and options.colour not in QUANTITIES:
+        raise ResultError(f"there is no colour {options.colour}; there are {', '.join(QUANTITIES)} and none")
+    if options.every < 1:
+        raise ResultError("--every takes a number from 1 on")
+    if options.output and options.output.suffix.lower() not in (".html", ".htm"):
+        raise ResultError(f"{options.output}: cannot be written: the name must end with .html")
+    trajectory = open_frames(options.result)
+    numbers = chosen_frames(options.frames or ":", len(trajectory))[:: options.every]
+    path = options.output or trajectory.folder / "view.html"
+    write_view(trajectory, numbers, path, not options.no_contacts, options.colour)
     print(path)
 
 

@@ -1,0 +1,64 @@
+"""The viewer: one HTML file that plays a run in a browser, without a network."""
+
+from __future__ import annotations
+
+import html
+import json
+import os
+import sys
+from pathlib import Path
+
+from .result_file import ResultError
+from .trajectory import Trajectory
+from .view_data import Packed, pack_run
+
+#: Sources of the page, and its scripts in the order in which they are joined
+SOURCES = Path(__file__).parent / "viewer"
+SCRIPTS = ("decode.js", "run.js", "columns.js", "tree.js", "overlays.js", "painter.js", "curves.js", "page.js")
+
+
+def write_view(trajectory: Trajectory, numbers: list[int], path: Path, contacts: bool = True,
+               colour: str = "speed") -> Packed:
+    """Write the page of these frames."""
+    done = [0]
+
+    def progress() -> None:
+        done[0] += 1
+        if sys.stderr.isatty():
+            print(f"\rframe {done[0]} of {len(numbers)}", end="\r" if done[0] == len(numbers) else "",
+                  file=sys.stderr, flush=True)
+
+    packed = pack_run(trajectory, numbers, contacts, progress)
+    if colour != "none" and colour not in packed.facts["quantities"]:
+        raise ResultError(f"there is no colour {colour} in this page; there are "
+                          f"{', '.join(packed.facts['quantities'])} and none")
+    packed.facts["colour"] = colour
+    part = path.with_name(f".{path.name}.part")
+    try:
+        with part.open("w", encoding="utf-8") as file:
+            for piece in page(packed):
+                file.write(piece)
+        os.replace(part, path)
+    except OSError as error:
+        raise ResultError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        part.unlink(missing_ok=True)
+    return packed
+
+
+def page(packed: Packed):
+    """The pieces of the page: style, data and scripts in their places."""
+    text = (SOURCES / "page.html").read_text(encoding="utf-8")
+    text = text.replace("{name}", html.escape(packed.facts["name"]))
+    before, rest = text.split("{style}")
+    middle, rest = rest.split("{data}")
+    end, after = rest.split("{scripts}")
+    yield before + (SOURCES / "style.css").read_text(encoding="utf-8") + middle
+    facts = json.dumps(packed.facts, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+    yield f'<script type="application/json" id="facts">{facts}</script>\n'
+    for name, block in packed.blocks.items():
+        yield f'<script type="text/plain" id="block-{name}">{block}</script>\n'
+    yield end
+    for name in SCRIPTS:
+        yield f"<script>\n{(SOURCES / name).read_text(encoding='utf-8')}</script>\n"
+    yield after

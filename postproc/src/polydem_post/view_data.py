@@ -1,0 +1,187 @@
+"""The data of a run as the viewer holds them: rounded to stated quanta, differences between frames, deflated."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .drawing import OVERLAYS
+from .quantities import QUANTITIES, range_of
+from .snapshot import Snapshot, read_snapshots
+from .trajectory import Trajectory
+from .tree_cells import cell_grid
+
+#: Quantum of positions as a share of the median diameter, of angles [rad], and of velocities as a share of the greatest
+POSITION_SHARE, ANGLE_QUANTUM, VELOCITY_SHARE = 1e-3, 2.0**-10, 1.0 / 2047.0
+
+#: Steps of the magnitude of a force (its square root is rounded), of its direction, and of the arm of a contact
+FORCE_STEPS, DIRECTION_STEPS, ARM_STEPS = 255, 256, 127
+
+#: Deflate level: higher ones gain little
+LEVEL = 6
+
+
+@dataclass
+class Packed:
+    """What goes into the page: facts, and blocks of bytes."""
+
+    facts: dict = field(default_factory=dict)
+    blocks: dict = field(default_factory=dict)
+
+    def add(self, name: str, data: np.ndarray) -> None:
+        """Deflate a block; numbers are in the order of bytes of all usual processors."""
+        little = data.astype(data.dtype.newbyteorder("<"), copy=False)
+        self.blocks[name] = base64.b64encode(zlib.compress(little.tobytes(), LEVEL)).decode("ascii")
+
+    def add_series(self, name: str, values: np.ndarray, quantum: float) -> None:
+        """Add one number per frame and body, rounded to a multiple of the quantum: differences in planes of bytes."""
+        whole = np.rint(values / quantum).astype(np.int64)
+        change = np.diff(whole, axis=0, prepend=np.zeros((1, whole.shape[1]), dtype=np.int64))
+        folded = np.where(change >= 0, 2 * change, -2 * change - 1).astype(np.uint64).ravel()
+        planes = max(1, (int(folded.max(initial=0)).bit_length() + 7) // 8)
+        if planes > 6:
+            raise OverflowError(f"{name} spans more than the viewer can hold")
+        data = np.stack([(folded >> np.uint64(8 * k)) & np.uint64(255) for k in range(planes)]).astype(np.uint8)
+        self.add(name, data)
+        self.facts["series"][name] = {"quantum": quantum, "planes": planes}
+
+
+class _Contacts:
+    """The contacts of all frames, each with one row in the list of all pairs of the run."""
+
+    def __init__(self) -> None:
+        self.keys: list[np.ndarray] = []
+        self.arms: list[np.ndarray] = []
+        self.forces: list[np.ndarray] = []
+        self.bodies = 0
+
+    def add(self, snapshot: Snapshot) -> None:
+        """Append those of a frame. The arm goes from a free body, the first if both are."""
+        contacts, frame = snapshot.known_contacts(), snapshot.frame
+        self.bodies = len(frame.id)
+        order = np.lexsort((contacts.second, contacts.first))
+        first, second = contacts.first[order], contacts.second[order]
+        base = np.where(frame.fixed[first], second, first)
+        self.keys.append(first.astype(np.int64) * self.bodies + second)
+        self.arms.append((contacts.point[order] - frame.position[base]).astype(np.float32))
+        self.forces.append(contacts.force[order].astype(np.float32))
+
+    def pack(self, packed: Packed, reach: float) -> None:
+        """Write the list of pairs, which of them each frame has, and arms and forces of these."""
+        pairs = np.unique(np.concatenate(self.keys))
+        present = np.zeros((len(self.keys), len(pairs)), dtype=bool)
+        for row, keys in zip(present, self.keys):
+            row[np.searchsorted(pairs, keys)] = True
+        changed = present.copy()
+        changed[1:] ^= present[:-1]
+        arms, forces = np.concatenate(self.arms), np.concatenate(self.forces)
+        size = np.hypot(forces[:, 0], forces[:, 1])
+        greatest = float(size.max(initial=0.0)) or 1.0
+        direction = np.rint(np.arctan2(forces[:, 1], forces[:, 0]) * (DIRECTION_STEPS / (2.0 * np.pi)))
+        packed.add("pair_first", (pairs // self.bodies).astype(np.uint32))
+        packed.add("pair_second", (pairs % self.bodies).astype(np.uint32))
+        packed.add("present", np.packbits(changed, axis=1, bitorder="little"))
+        packed.add("arm_x", np.clip(np.rint(arms[:, 0] * (ARM_STEPS / reach)), -127, 127).astype(np.int8))
+        packed.add("arm_y", np.clip(np.rint(arms[:, 1] * (ARM_STEPS / reach)), -127, 127).astype(np.int8))
+        packed.add("force", np.rint(np.sqrt(size / greatest) * FORCE_STEPS).astype(np.uint8))
+        packed.add("direction", (direction.astype(np.int64) % DIRECTION_STEPS).astype(np.uint8))
+        covered = float(np.percentile(size, 99.0)) if len(size) else 0.0
+        packed.facts["contacts"] = {"count": [len(keys) for keys in self.keys], "pairs": len(pairs), "reach": reach,
+                                    "greatest": greatest, "covered": covered or greatest}
+
+
+def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, progress=None) -> Packed:
+    """Read frames and pack them."""
+    contacts = contacts and trajectory.has_contacts
+    packed = Packed({"series": {}})
+    columns: dict[str, list] = {name: [] for name in ("x", "y", "angle", "vx", "vy", "spin")}
+    values: dict[str, list] = {name: [] for name, each in QUANTITIES.items() if contacts or not each.needs_contacts}
+    table, first, low, high = _Contacts(), None, np.full(2, np.inf), np.full(2, -np.inf)
+    for snapshot in read_snapshots(trajectory, numbers, contacts):
+        frame = snapshot.frame
+        if first is None:
+            first = snapshot
+            _pack_bodies(packed, snapshot)
+        for name, column in zip(columns, (*frame.position.T, frame.angle, *frame.velocity.T, frame.angular_velocity)):
+            columns[name].append(column)
+        for name, collected in values.items():
+            if not (QUANTITIES[name].constant and collected):
+                collected.append(QUANTITIES[name].values(snapshot)[~frame.fixed].astype(np.float32))
+        low, high = np.minimum(low, snapshot.corners.min(axis=0)), np.maximum(high, snapshot.corners.max(axis=0))
+        if contacts:
+            table.add(snapshot)
+        if progress:
+            progress()
+    reach = _pack_columns(packed, columns, first)
+    if contacts:
+        table.pack(packed, reach)
+    _describe(packed, trajectory, numbers, values)
+    margin = 0.02 * max(high - low)
+    packed.facts["limits"] = [*(low - margin), *(high + margin)]
+    return packed
+
+
+def _pack_bodies(packed: Packed, snapshot: Snapshot) -> None:
+    """What does not change."""
+    frame = snapshot.frame
+    packed.add("shape", frame.shape.astype(np.float32))
+    packed.add("start", frame.vertex_start.astype(np.uint32))
+    packed.add("id", frame.id.astype(np.int32))
+    packed.add("fixed", frame.fixed.astype(np.uint8))
+    packed.add("mass", np.where(np.isfinite(frame.mass), frame.mass, np.nan).astype(np.float32))
+    packed.add("material", frame.material.astype(np.int32))
+    grid = cell_grid(snapshot)
+    in_tree = np.zeros(len(frame.id), dtype=np.uint8)
+    if grid is not None:
+        in_tree[grid.bodies] = 1
+        packed.facts["grid"] = {"finest": grid.finest, "origin": list(grid.origin)}
+    packed.add("in_tree", in_tree)
+    packed.facts["bodies"] = len(frame.id)
+
+
+def _pack_columns(packed: Packed, columns: dict, first: Snapshot) -> float:
+    """Positions, angles and velocities; returns the greatest radius of the free bodies."""
+    free = ~first.frame.fixed
+    chosen = free if free.any() else np.ones(len(free), dtype=bool)
+    diameter = float(np.median(first.frame.diameter[chosen]))
+    quanta = {"x": POSITION_SHARE * diameter, "y": POSITION_SHARE * diameter, "angle": ANGLE_QUANTUM}
+    for name, collected in columns.items():
+        series = np.array(collected)
+        quantum = quanta.get(name) or (float(np.abs(series).max(initial=0.0)) * VELOCITY_SHARE or 1.0)
+        packed.add_series(name, series, quantum)
+        collected.clear()
+    packed.facts["diameter"] = diameter
+    return float(first.frame.radius[chosen].max())
+
+
+def _describe(packed: Packed, trajectory: Trajectory, numbers: list[int], values: dict) -> None:
+    """Times, names, ranges, colours and curves."""
+    import matplotlib
+
+    facts = packed.facts
+    facts["times"] = [float(time) for time in trajectory.times[numbers]]
+    facts["frames"] = [int(number) % len(trajectory) for number in numbers]
+    facts["name"] = trajectory.folder.resolve().name
+    facts["overlays"] = {name: OVERLAYS[name] for name in ("forces", "contacts", "boxes", "cells")
+                         if "contacts" in facts or name in ("boxes", "cells")}
+    facts["quantities"], maps = {}, {}
+    for name, collected in values.items():
+        quantity = QUANTITIES[name]
+        facts["quantities"][name] = {"title": quantity.title, "unit": quantity.unit, "map": quantity.colours,
+                                     "range": range_of(quantity, np.concatenate(collected)), "count": quantity.count}
+        colours = matplotlib.colormaps[quantity.colours]
+        table = colours(np.linspace(0.0, 1.0, 256)) if not quantity.count else colours(
+            np.minimum(np.arange(256) * quantity.count // 256, colours.N - 1))
+        maps[quantity.colours] = base64.b64encode((255.0 * table[:, :3] + 0.5).astype(np.uint8).tobytes()).decode()
+    facts["maps"] = maps
+    units = trajectory.balance_units
+    facts["curves"] = {name: {"unit": units.get(name, ""), "values": [_number(value) for value in series[numbers]]}
+                       for name, series in trajectory.energy_balance.items()}
+
+
+def _number(value: float):
+    """A number that JSON can hold."""
+    return float(f"{value:.7g}") if np.isfinite(value) else None

@@ -1,0 +1,71 @@
+"""The page of the viewer as a file: its data are those of the run, rounded as stated."""
+
+import base64
+import json
+import re
+import zlib
+from pathlib import Path
+
+import numpy as np
+import polydem_post
+import pytest
+from polydem_post import Trajectory
+from polydem_post.__main__ import main
+from polydem_post.view import SCRIPTS, SOURCES
+
+
+@pytest.fixture(scope="module")
+def run(small_drum):
+    return Trajectory(small_drum)
+
+
+def test_the_page_is_one_file_that_needs_no_network(view):
+    text = view.read_text(encoding="utf-8")
+    assert not re.search(r"(src|href)\s*=\s*[\"'](?!data:)|https?://|import\s*\(|fetch\s*\(|XMLHttp|@import", text)
+    assert all((SOURCES / name).read_text(encoding="utf-8") in text for name in SCRIPTS)
+    assert [path for path in view.parent.iterdir() if path != view] == []
+
+
+def test_all_scripts_of_the_folder_are_in_the_page_and_in_the_package():
+    assert {path.name for path in SOURCES.glob("*.js")} == set(SCRIPTS)
+    project = Path(polydem_post.__file__).parents[2] / "pyproject.toml"
+    assert '"viewer/*"' in project.read_text(encoding="utf-8")
+
+
+def block(text, name, kind):
+    data = re.search(rf'id="block-{name}">([^<]*)<', text)[1]
+    return np.frombuffer(zlib.decompress(base64.b64decode(data)), dtype=kind)
+
+
+def test_positions_and_angles_are_rounded_as_stated(view, run):
+    text = view.read_text(encoding="utf-8")
+    facts = json.loads(re.search(r'id="facts">(.*?)</script>', text)[1])
+    for name, true in (("x", [run[k].position[:, 0] for k in range(len(run))]),
+                       ("angle", [run[k].angle for k in range(len(run))]),
+                       ("spin", [run[k].angular_velocity for k in range(len(run))])):
+        fact = facts["series"][name]
+        planes = block(text, name, np.uint8).astype(np.int64).reshape(fact["planes"], len(run), -1)
+        folded = sum(planes[k] << (8 * k) for k in range(fact["planes"]))
+        change = np.where(folded % 2 == 0, folded // 2, -(folded + 1) // 2)
+        error = np.abs(np.cumsum(change, axis=0) * fact["quantum"] - true).max()
+        assert error <= 0.5001 * fact["quantum"]
+    free = ~run[0].fixed
+    assert facts["series"]["x"]["quantum"] == pytest.approx(1e-3 * np.median(run[0].diameter[free]))
+
+
+@pytest.mark.parametrize("arguments, message", [
+    (["-o", "v.pdf"], "v.pdf: cannot be written: the name must end with .html"),
+    (["--colour", "sped"], "there is no colour sped"),
+    (["--colour", "load", "--no-contacts"], "there is no colour load in this page"),
+    (["--every", "0"], "--every takes a number from 1 on"),
+    (["-o", "no/such/folder/v.html"], "no/such/folder/v.html: cannot be written (No such file or directory)"),
+])
+def test_wrong_options_are_explained(small_drum, capsys, arguments, message):
+    assert main(["view", str(small_drum), *arguments]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_without_contacts_the_page_is_smaller(small_drum, view, tmp_path):
+    path = tmp_path / "bare.html"
+    assert main(["view", str(small_drum), "-o", str(path), "--no-contacts", "--every", "2"]) == 0
+    assert path.stat().st_size < view.stat().st_size
