@@ -5,6 +5,7 @@ module polydem_command_line
    use polydem_errors, only: error_t, input_error, raise
    use polydem_help_texts, only: help_text
    use polydem_namelist_entries, only: choices_of
+   use polydem_option_values, only: read_count, read_duration
    use polydem_strings, only: join, quoted, split_words, suggestion
    implicit none
    private
@@ -42,6 +43,8 @@ module polydem_command_line
       logical :: checks = .false.
       !> File that a conversion writes; empty: it replaces the namelist file
       character(len=:), allocatable :: output
+      !> How the program was called, for messages: polydem, or ./polydem by the launcher
+      character(len=:), allocatable :: program
       !> Whether help is requested, for the verb or for all verbs
       logical :: help = .false.
       !> Whether the version is requested
@@ -111,12 +114,13 @@ contains
          call get_command_argument(k, length=length)
          longest = max(longest, length)
       end do
-      call parse_arguments(command_argument_count(), longest, command, error)
+      call parse_arguments(command_argument_count(), longest, caller(), command, error)
    end subroutine read_command_line
 
    !> Collect n arguments of at most the given length and parse them.
-   subroutine parse_arguments(n, length, command, error)
+   subroutine parse_arguments(n, length, program, command, error)
       integer, intent(in) :: n, length
+      character(len=*), intent(in) :: program
       type(command_t), intent(out) :: command
       type(error_t), allocatable, intent(inout) :: error
       character(len=length) :: arguments(n)
@@ -125,22 +129,37 @@ contains
       do k = 1, n
          call get_command_argument(k, value=arguments(k))
       end do
-      call parse_command(arguments, command, error)
+      call parse_command(arguments, command, error, program)
    end subroutine parse_arguments
 
+   !> How messages call the program: as the launcher says in POLYDEM_CALL, else polydem
+   function caller() result(program)
+      character(len=:), allocatable :: program
+      character(len=16) :: text
+      integer :: status
+
+      call get_environment_variable('POLYDEM_CALL', text, status=status)
+      program = 'polydem'
+      if (status == 0 .and. text == './polydem') program = trim(text)
+   end function caller
+
    !> Parse the arguments.
-   pure subroutine parse_command(arguments, command, error)
+   pure subroutine parse_command(arguments, command, error, program)
       !> Arguments of the program, blank-padded
       character(len=*), intent(in) :: arguments(:)
       !> The parsed command line
       type(command_t), intent(out) :: command
       !> Names a verb or an option that is unknown, misplaced or incomplete
       type(error_t), allocatable, intent(inout) :: error
+      !> How messages call the program; default: polydem
+      character(len=*), intent(in), optional :: program
       character(len=len(arguments)) :: overrides(size(arguments))
       character(len=:), allocatable :: value
       logical :: only_files, used(size(options))
       integer :: k, n_overrides, which
 
+      command%program = 'polydem'
+      if (present(program)) command%program = program
       command%verb = ''
       command%file = ''
       command%finder = 'two_level'
@@ -185,7 +204,7 @@ contains
       else if (command%verb == '') then
          command%verb = word
          if (all(verbs%name /= word)) call raise(error, input_error, 'unknown verb '//quoted(word)// &
-            suggestion(word, verbs%name)//' (polydem --help explains them)')
+            suggestion(word, verbs%name)//' ('//command%program//' --help explains them)')
       else if (word == '') then
          call raise(error, input_error, 'the name of the file is empty')
       else if (command%file == '') then
@@ -294,45 +313,6 @@ contains
       end select
    end subroutine set_option
 
-   !> Read an integer from 1 to 999999.
-   pure subroutine read_count(name, text, number, error)
-      character(len=*), intent(in) :: name, text
-      integer, intent(inout) :: number
-      type(error_t), allocatable, intent(inout) :: error
-      integer :: read_number
-
-      read_number = 0
-      if (verify(text, '0123456789') == 0 .and. len(text) < 7) read (text, *) read_number
-      if (read_number > 0) then
-         number = read_number
-      else
-         call raise(error, input_error, name//' '//text//': an integer from 1 to 999999 was expected')
-      end if
-   end subroutine read_count
-
-   !> Read a duration HH:MM:SS as seconds.
-   pure subroutine read_duration(name, text, seconds, error)
-      character(len=*), intent(in) :: name, text
-      integer, intent(inout) :: seconds
-      type(error_t), allocatable, intent(inout) :: error
-      integer :: colon, hours, minutes, rest
-      logical :: good
-
-      colon = index(text, ':')
-      good = len(text) == colon + 5 .and. colon > 1 .and. colon <= 6
-      if (good) good = verify(text(:colon - 1)//text(colon + 1:colon + 2)//text(colon + 4:), '0123456789') == 0 &
-         .and. text(colon + 3:colon + 3) == ':'
-      if (good) then
-         read (text(:colon - 1), *) hours
-         read (text(colon + 1:colon + 2), *) minutes
-         read (text(colon + 4:), *) rest
-         good = minutes < 60 .and. rest < 60 .and. hours + minutes + rest > 0
-      end if
-      if (good) seconds = 3600*hours + 60*minutes + rest
-      if (.not. good) call raise(error, input_error, name//' '//text//': hours, minutes and seconds were expected, '// &
-         'as in 23:30:00')
-   end subroutine read_duration
-
    !> Check that the verb and its file are given, and that the verb accepts all options used.
    pure subroutine check_command(command, used, error)
       type(command_t), intent(in) :: command
@@ -342,7 +322,7 @@ contains
 
       if (command%verb == '') then
          if (.not. (command%help .or. command%version)) call raise(error, input_error, &
-            'a verb is missing; polydem --help explains them')
+            'a verb is missing; '//command%program//' --help explains them')
          return
       end if
       do k = 1, size(options)
@@ -356,19 +336,21 @@ contains
          '--continue does not go with --force, which begins anew; give one of them')
       if (command%may_change .and. .not. command%continues) call raise(error, input_error, '--changed needs --continue')
       if (command%help .or. command%version .or. command%file /= '') return
-      if (command%checks) call raise(error, input_error, '--check needs the folder of a result: polydem info '// &
-         '--check RESULT')
+      if (command%checks) call raise(error, input_error, '--check needs the folder of a result: '// &
+         command%program//' info --check RESULT')
       do k = 1, size(verbs)
          if (verbs(k)%name /= command%verb .or. verbs(k)%file_is_optional) cycle
          call raise(error, input_error, &
-            command%verb//' needs a file: polydem '//command%verb//' '//trim(verbs(k)%file))
+                    command%verb//' needs a file: '//command%program//' '//command%verb//' '//trim(verbs(k)%file))
       end do
    end subroutine check_command
 
    !> Help text of a verb, or one line per verb
-   pure function usage(verb) result(text)
+   pure function usage(verb, program) result(text)
       !> A verb, or an empty text for all verbs
       character(len=*), intent(in) :: verb
+      !> How the program is called
+      character(len=*), intent(in) :: program
       character(len=:), allocatable :: text, lines
       character(len=*), parameter :: line_end = new_line('a')
       character(len=28) :: call_text
@@ -376,10 +358,10 @@ contains
 
       if (verb /= '') then
          lines = help_text(verb)
-         text = 'usage: polydem '//lines(:len(lines) - 1)
+         text = 'usage: '//program//' '//lines(:len(lines) - 1)
          return
       end if
-      text = 'usage: polydem VERB [ARGUMENTS]'//line_end//line_end
+      text = 'usage: '//program//' VERB [ARGUMENTS]'//line_end//line_end
       do k = 1, size(verbs)
          lines = help_text(trim(verbs(k)%name))
          first = index(lines, line_end)
@@ -387,7 +369,7 @@ contains
          call_text = '  '//lines(:index(lines, ' [OPTIONS]') - 1)
          text = text//call_text//lines(first + 1:second)
       end do
-      text = text//line_end//'polydem help VERB prints the options of a verb, polydem --version the version.'
+      text = text//line_end//program//' help VERB prints the options of a verb, '//program//' --version the version.'
    end function usage
 
 end module polydem_command_line

@@ -40,7 +40,7 @@ contains
       character(len=:), allocatable :: crowd, report
 
       if (command%help .or. command%version) then
-         if (comm%is_root() .and. command%help) call print_line(usage(command%verb), error)
+         if (comm%is_root() .and. command%help) call print_line(usage(command%verb, command%program), error)
          if (comm%is_root() .and. .not. command%help) call print_line('polydem '//program_version//' (git '// &
                                                                       git_revision//')', error)
          return

@@ -127,7 +127,15 @@ def test_the_help_texts_name_no_other_options():
         assert set(re.findall(r"(?<![\w-])--?[a-zA-Z][\w-]*", help_text(verb))) <= options, verb
 
 
-def test_help_is_the_text_of_the_verb(capsys):
+def test_the_usage_line_says_how_the_tool_was_called(capsys, monkeypatch):
+    monkeypatch.setenv("POLYDEM_CALL", "./polydem")
+    with pytest.raises(SystemExit):
+        main(["plot"])
+    assert capsys.readouterr().err.startswith("usage: ./polydem plot RESULT [OPTIONS]\n./polydem plot: error: ")
+
+
+def test_help_is_the_text_of_the_verb(capsys, monkeypatch):
+    monkeypatch.delenv("POLYDEM_CALL", raising=False)
     for words in parsers():
         with pytest.raises(SystemExit) as end:
             main([*words, "--help"])

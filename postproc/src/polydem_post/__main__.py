@@ -27,6 +27,9 @@ UNFORESEEN, CLOSED_PIPE = 1, 141
 #: Help texts of the verbs
 HELP = Path(__file__).parent / "help"
 
+#: Variable of the environment with the words that call this tool, set by the launcher
+CALLED_AS = "POLYDEM_CALL"
+
 #: Variable of the environment that shows where an unforeseen error happened
 TRACEBACK = "POLYDEM_TRACEBACK"
 
@@ -84,7 +87,7 @@ def help_text(verb: str) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="polydem_post")
+    parser = _Parser(prog=os.environ.get(CALLED_AS) or "polydem_post")
     parser.add_argument("--version", action="version", version=f"polydem_post {__version__}")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
