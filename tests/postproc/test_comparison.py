@@ -12,6 +12,8 @@ import sys
 import time
 from pathlib import Path
 
+import h5py
+import numpy as np
 import pytest
 from polydem_post.bench_file import number_of, read_bench_file
 from polydem_post.comparison_plan import (
@@ -25,11 +27,13 @@ from polydem_post.comparison_plan import (
     make_plan,
     threads_up_to,
 )
+from polydem_post.comparison_publish import publish
 from polydem_post.comparison_run import Comparison, Tools
 from polydem_post.emit import Table
 from polydem_post.html_page import Page
 from polydem_post.precision_scenes import SCENES
 from polydem_post.published import read_points
+from polydem_post.trajectory import ResultError
 from published_numbers import REVISION, disagreements, missing_numbers, paragraphs_of
 
 PROGRAM = Path(os.environ["POLYDEM_PROGRAM"]).resolve()
@@ -147,9 +151,9 @@ def test_the_cost_of_waiting_is_measured(output):
 def test_what_is_there_is_not_made_again(output):
     folder, _ = output
     before = samples_of(folder)
-    code, said = call(folder)
-    assert code == 0, said
-    assert said.count(" is there (") == 4 and samples_of(folder) == before
+    code, said = call(folder, "--dry-run")
+    assert code == 0 and said.count(" is there (") == 4, said
+    assert "about 0 s in all" in said and samples_of(folder) == before
 
 
 def test_another_program_or_machine_makes_all_again_and_a_changed_setting_one_piece(tmp_path):
@@ -174,14 +178,24 @@ def test_another_program_or_machine_makes_all_again_and_a_changed_setting_one_pi
     assert set(after) == set(before) and not set(after.items()) & set(before.items())
 
 
-def test_what_is_published_is_one_page_that_its_tables_confirm(output, tmp_path):
-    place = tmp_path / "verdicts"
-    code, said = call(output[0], "--report-only", "--publish", str(place))
+def test_what_is_published_is_one_page_that_its_tables_confirm_of_other_machines_too(output, tmp_path):
+    place, other = tmp_path / "verdicts", tmp_path / "other"
+    for path in (output[0] / "quick" / "drums" / "samples").glob("*.h5"):
+        copy = other / "quick" / "drums" / "samples" / path.name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, copy)
+        with h5py.File(copy, "a") as file:
+            del file["provenance/processor"]
+            file["provenance/processor"] = np.bytes_("Abacus 7 @ 1.00GHz")
+    code, said = call(output[0], "--report-only", "--other", str(other), "--publish", str(place))
     assert code == 0 and disagreements(place) == [], said
     assert len(list(place.glob("*.png"))) >= 10 and REVISION.findall((place / "README.md").read_text(encoding="utf-8"))
+    assert "\nAbacus 7," in (place / "tables" / "table_1.csv").read_text(encoding="utf-8")
     (place / "README.md").write_text("# Another page\n", encoding="utf-8")
-    code, said = call(output[0], "--report-only", "--publish", str(place))
-    assert code == 2 and "is another page" in said
+    with pytest.raises(ResultError, match="is another page"):
+        publish(None, "quick", output[0], place)
+    code, said = call(output[0], "--report-only", "--other", str(tmp_path / "nowhere"))
+    assert code == 2 and "holds no benches" in said
 
 
 def test_a_comparison_that_was_killed_goes_on_where_it_was(tmp_path):
@@ -210,6 +224,8 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path):
     code, said = call(tmp_path)
     assert code == 2 and "choose another --output" in said
     assert (place / "thesis.tex").read_text(encoding="utf-8") == "years"
+    code, said = call(tmp_path / "nowhere", "--report-only")
+    assert code == 2 and "nothing to report" in said
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"a": {}}', '{"a": {"bench": "no_such_file.nml"}}', '{"a": 3}'])

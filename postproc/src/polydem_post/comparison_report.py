@@ -69,13 +69,18 @@ def write_comparison(comparison: Comparison, contents: Contents, output: Path) -
     return page
 
 
-def collect(comparison: Comparison) -> Contents:
-    """Read what the pieces left, as far as they are there."""
+def collect(comparison: Comparison, others=()) -> Contents:
+    """Read what the pieces left, as far as they are there, and the benches of other machines behind them."""
     folders = [comparison.folder / piece.name for piece in comparison.pieces
                if isinstance(piece.bench, BenchFile) and piece.name not in UNTIMED
                and any((comparison.folder / piece.name / "samples").glob("*.h5"))]
     if not folders:
         raise ResultError(f"{comparison.folder}: no bench has left samples, so there is nothing to report")
+    for other in others:
+        found = sorted(path.parent for path in other.glob("*/*/samples") if path.parent.name not in UNTIMED)
+        if not found:
+            raise ResultError(f"{other}: holds no benches of ./polydem paper (MODE/BENCH/samples)")
+        folders += found
     bench = read_bench(folders)
     judged = judge_all(bench)
     if comparison.mode != "full":

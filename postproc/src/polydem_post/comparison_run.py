@@ -87,9 +87,11 @@ class Comparison:
 
     # --- What is there ------------------------------------------------------------------------------------------------
 
-    def open(self) -> None:
-        """Read the state of an earlier call; remove what another program or machine made, unless nothing may change."""
-        base = base_of(self.tools.program)
+    def open(self, as_it_is: bool = False) -> None:
+        """Read the state of an earlier call; remove what another program or machine made, unless nothing may change.
+
+        As it is: whoever made it, as for a report of what there is.
+        """
         try:
             self.state = json.loads((self.folder / STATE).read_text(encoding="utf-8"))
         except FileNotFoundError:
@@ -99,6 +101,11 @@ class Comparison:
             self.state = {}
         except (OSError, ValueError) as error:
             raise ResultError(f"{self.folder / STATE}: cannot be read ({error})") from error
+        if as_it_is:
+            if not self.state:
+                raise ResultError(f"{self.folder}: there is nothing to report yet")
+            return
+        base = base_of(self.tools.program)
         if self.state.get("base") != base:
             if self.state:
                 self.say("what is there was made by another program or machine and is made again")

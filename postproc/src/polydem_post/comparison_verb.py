@@ -22,6 +22,7 @@ def add_paper(verbs, program) -> None:
     paper.add_argument("--dry-run", action="store_true")
     paper.add_argument("--report-only", action="store_true")
     paper.add_argument("--output", type=Path, default=Path("results/paper"), metavar="DIR")
+    paper.add_argument("--other", type=_folder, action="append", default=[], metavar="DIR")
     paper.add_argument("--publish", type=Path, metavar="DIR")
     paper.add_argument("--program", type=program, action="append", default=[], metavar="PREC=PATH")
     paper.add_argument("--verifier", type=Path)
@@ -52,7 +53,7 @@ def run_paper(options: argparse.Namespace) -> int:
     deadline = began + QUICK_LIMIT if mode == "quick" else None
     dry = options.dry_run or options.report_only
     comparison = Comparison(folder, mode, pieces, tools, deadline, _say, dry)
-    comparison.open()
+    comparison.open(as_it_is=options.report_only)
     if not options.report_only:
         signal.signal(signal.SIGTERM, _interrupt)
         comparison.announce()
@@ -63,12 +64,17 @@ def run_paper(options: argparse.Namespace) -> int:
         except KeyboardInterrupt:
             _say("interrupted; the same command goes on where it was")
             return INTERRUPTED
-    contents = collect(comparison)
+    contents = collect(comparison, options.other)
     page = write_comparison(comparison, contents, output)
     if published:
         _say(f"{publish(contents, mode, output, published)}: published")
     _say(f"{page}: written {time.monotonic() - began:.0f} s after the start")
     return 0
+
+
+def _folder(text: str) -> Path:
+    """A folder, from where the command was called."""
+    return Path(text).resolve()
 
 
 def _interrupt(*_) -> None:
