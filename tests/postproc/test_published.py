@@ -29,8 +29,10 @@ PAGES = [
 OTHERS = {
     "inputs/README.md",
     "inputs/getting_started.md",
+    "inputs/glossary.md",
     "src/README.md",
     "src/algorithms.md",
+    "src/packaging/README.md",
     "src/theory.md",
     "tests/README.md",
     "tests/faults.md",
