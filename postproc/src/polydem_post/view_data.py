@@ -10,6 +10,7 @@ import numpy as np
 
 from .drawing import OVERLAYS
 from .quantities import QUANTITIES, range_of
+from .result_file import ResultError
 from .snapshot import Snapshot, read_snapshots
 from .trajectory import Trajectory
 from .tree_cells import cell_grid
@@ -115,6 +116,8 @@ def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, 
             table.add(snapshot)
         if progress:
             progress()
+    if first is None:
+        raise ResultError(f"{trajectory.folder}: there are no frames to show")
     reach = _pack_columns(packed, columns, first)
     if contacts:
         table.pack(packed, reach)
