@@ -22,13 +22,14 @@ from polydem_post.comparison_plan import (
     QUICK_PRECISION,
     QUICK_SCENES,
     ROOT,
+    Piece,
     Rates,
     estimate,
     make_plan,
     threads_up_to,
 )
 from polydem_post.comparison_publish import publish
-from polydem_post.comparison_run import Comparison, Tools
+from polydem_post.comparison_run import FOR_THE_REPORT, Comparison, Tools
 from polydem_post.emit import Table
 from polydem_post.html_page import Page
 from polydem_post.precision_scenes import SCENES
@@ -244,6 +245,20 @@ def test_pieces_run_in_the_same_environment_of_python(tmp_path):
     log = tmp_path / "log.txt"
     assert comparison._call([sys.executable, "-c", "import sys; print(sys.prefix)"], log, tmp_path) == 0
     assert log.read_text(encoding="utf-8").strip() == sys.prefix
+
+
+def test_a_slow_machine_makes_some_of_every_piece(tmp_path, monkeypatch):
+    pieces = [Piece(name, "verify", name, options=(name,)) for name in ("one", "two", "three")]
+    said, made = [], []
+    comparison = Comparison(tmp_path / "quick", "quick", pieces, Tools({"double": PROGRAM}, VERIFIER),
+                            time.monotonic() + FOR_THE_REPORT + 300.0, said.append)
+    monkeypatch.setattr(comparison, "calibrate", lambda: USUAL)
+    monkeypatch.setattr(comparison, "_make", lambda piece: made.append((piece.name, comparison._left())) or "cut")
+    comparison.open()
+    comparison.run()
+    assert [name for name, _ in made] == ["one", "two", "three"] * 2
+    assert [left for _, left in made[:3]] == pytest.approx([100.0, 150.0, 300.0], abs=20.0)
+    assert {comparison.status(piece) for piece in pieces} == {"cut"}
 
 
 # --- The plan ---------------------------------------------------------------------------------------------------------

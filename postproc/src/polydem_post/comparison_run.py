@@ -191,8 +191,14 @@ class Comparison:
     # --- What is made -------------------------------------------------------------------------------------------------
 
     def run(self) -> None:
-        """Make every piece that is missing; raise KeyboardInterrupt if a signal ends the call."""
-        wanted = [piece for piece in self.pieces if self.status(piece) != "finished"]
+        """Make every piece that is missing, then go on with those that were cut, if time is left.
+
+        A signal that ends the call raises KeyboardInterrupt.
+        """
+        self._make_all([piece for piece in self.pieces if self.status(piece) != "finished"])
+        self._make_all([piece for piece in self.pieces if self.status(piece) == "cut"])
+
+    def _make_all(self, wanted: list) -> None:
         for k, piece in enumerate(wanted):
             self._share_time(wanted[k:])
             left = self._left()
@@ -215,13 +221,12 @@ class Comparison:
             self.say(f"{piece.name}: {status} after {number(time.monotonic() - began, 3)} s")
 
     def _share_time(self, wanted: list) -> None:
-        """Give the first of some pieces its part of the time that is left, so that slow machines see some of all."""
+        """Give the first of some pieces its part of the time that is left, so that a slow machine makes some of all."""
         if self.deadline is None:
             return
         left = self.deadline - FOR_THE_REPORT - time.monotonic()
         needs = [estimate(piece, self.calibrate(), self.cores, self.mode) for piece in wanted]
-        share = 1.0 if sum(needs) <= left else needs[0] / sum(needs)
-        self.piece_deadline = time.monotonic() + left * share
+        self.piece_deadline = time.monotonic() + left * needs[0] / sum(needs)
 
     def _left(self) -> float | None:
         """Seconds that the present piece has left; None if time is not limited."""
