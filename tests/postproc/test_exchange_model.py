@@ -12,10 +12,10 @@ MACHINE = Machine(body=1e-6, latency=1e-6, bandwidth=1e9)
 
 
 def counted(ranks, grains=1000000, strip=1.5, **others):
-    """A count of squares with a strip of ghosts all around."""
-    ghosts = round(4 * strip * math.sqrt(grains / ranks) + 4 * strip**2)
-    plain = Count("drum", grains, ranks, "bisection", 0.2, grains // ranks, ranks * ghosts, ghosts, 5 * ranks, 8,
-                  48 * ranks * ghosts, 48 * ghosts, 2 * ranks)
+    """A count of squares with a strip of halo bodies all around."""
+    halo_bodies = round(4 * strip * math.sqrt(grains / ranks) + 4 * strip**2)
+    plain = Count("drum", grains, ranks, "bisection", 0.2, grains // ranks, ranks * halo_bodies, halo_bodies,
+                  5 * ranks, 8, 48 * ranks * halo_bodies, 48 * halo_bodies, 2 * ranks)
     return replace(plain, **others)
 
 
@@ -34,8 +34,8 @@ def law():
 def test_the_law_finds_the_strip_that_the_counts_were_made_with(law):
     assert law.strip == pytest.approx(1.5, rel=0.01)
     assert law.spread[0] <= law.strip <= law.spread[1]
-    assert (law.messages, law.ghost_bytes, law.rectangles, law.counts) == (8, 48.0, 2.0, 3)
-    assert law.ghosts(10000.0) == pytest.approx(600 + 9, rel=0.01)
+    assert (law.messages, law.halo_bytes, law.rectangles, law.counts) == (8, 48.0, 2.0, 3)
+    assert law.halo_bodies(10000.0) == pytest.approx(600 + 9, rel=0.01)
 
 
 def test_few_ranks_do_not_count_and_are_not_enough():
@@ -52,19 +52,20 @@ def test_one_rank_costs_its_bodies_and_nothing_else(law):
 
 
 def test_every_part_of_the_time_is_what_it_was_made_of(law):
-    machine = replace(MACHINE, ghost=0.25, imbalance=1.2, sums=3, interval=10.0, redistribution=0.5,
+    machine = replace(MACHINE, halo_body=0.25, imbalance=1.2, sums=3, interval=10.0, redistribution=0.5,
                       redistributed_bytes=100.0)
     step = predict(law, machine, 1e6, 64)
-    ghosts = law.ghosts(1e6 / 64)
+    halo_bodies = law.halo_bodies(1e6 / 64)
     assert step.bodies == pytest.approx(1.2 * 1e6 / 64 * 1e-6)
-    assert step.ghosts == pytest.approx(0.25 * ghosts * 1e-6)
-    assert step.neighbours == pytest.approx(8e-6 + ghosts * 48 / 1e9)
+    assert step.halo_bodies == pytest.approx(0.25 * halo_bodies * 1e-6)
+    assert step.neighbours == pytest.approx(8e-6 + halo_bodies * 48 / 1e9)
     assert step.everyone == pytest.approx(3 * 6e-6)
     waits = (13 * 6 + 9 * 8) * 1e-6
-    assert step.redistributing == pytest.approx((waits + (64 * 2 * 32 + 100 * ghosts) / 1e9 + 0.5e-6 * 1e6 / 64) / 10.0)
-    parts = (step.bodies, step.ghosts, step.neighbours, step.everyone, step.redistributing)
+    told = 64 * 2 * 32 + 100 * halo_bodies
+    assert step.redistributing == pytest.approx((waits + told / 1e9 + 0.5e-6 * 1e6 / 64) / 10.0)
+    parts = (step.bodies, step.halo_bodies, step.neighbours, step.everyone, step.redistributing)
     assert step.total == pytest.approx(sum(parts))
-    assert predict(law, machine, 1e6, 2).neighbours == pytest.approx(1e-6 + law.ghosts(5e5) * 48 / 1e9)
+    assert predict(law, machine, 1e6, 2).neighbours == pytest.approx(1e-6 + law.halo_bodies(5e5) * 48 / 1e9)
 
 
 def test_the_time_falls_until_latency_stops_it(law):

@@ -70,7 +70,7 @@ def test_counts_are_means_of_a_step_and_ghosts_do_not_follow_in_the_first(shared
     run = replace(read_run(shared), bodies=40)
     count = run.as_count()
     assert (count.shape, count.margin, count.partition, count.grains, count.ranks) == (SHAPE, MARGIN, "morton", 40, 16)
-    assert (count.ghosts, count.ghosts_most, count.messages, count.bytes) == (100, 10, 60, 4800)
+    assert (count.halo_bodies, count.halo_bodies_most, count.messages, count.bytes) == (100, 10, 60, 4800)
     assert (count.messages_most, count.bytes_most, count.rectangles, count.grains_most) == (5, 480, 70, 3)
 
 
@@ -80,7 +80,7 @@ def test_the_tables_tell_steps_from_redistributions_and_these_from_the_first(sha
     rows = [dict(zip(steps.heading, row)) for row in steps.rows]
     assert [row["ranks"] for row in rows] == ["1", "16"]
     row = next(row for row in rows if row["ranks"] == "16")
-    assert (row["ghosts per body"], row["most ghosts"], row["pairs per ghost"]) == ("2.50", "10", "0.500")
+    assert (row["halo bodies per body"], row["most halo bodies"], row["pairs per halo body"]) == ("2.50", "10", "0.500")
     assert (row["bodies, most/mean"], row["pairs, most/mean"]) == ("1.200", "2.462")
     expected = ("101", "3", "1", "100", "250", "50000", "500", "900", "500", "900000")
     assert [row[4:] for row in redistributing.rows] == [expected]
@@ -88,7 +88,7 @@ def test_the_tables_tell_steps_from_redistributions_and_these_from_the_first(sha
 
 def test_a_run_on_one_rank_has_its_bodies_and_tells_nothing(alone):
     run = read_run(alone)
-    assert (run.ranks, run.most_bodies, run.most_pairs, run.ghosts, run.messages) == (1, run.bodies, 80, 0, 0)
+    assert (run.ranks, run.most_bodies, run.most_pairs, run.halo_bodies, run.messages) == (1, run.bodies, 80, 0, 0)
     assert run.later_redistributions == 0
 
 
@@ -109,6 +109,9 @@ def test_what_is_saved_is_read_again_and_nothing_else_is(shared, alone, tmp_path
     assert read_runs(tmp_path / "runs.csv") == runs
     former = (tmp_path / "runs.csv").read_text(encoding="utf-8")
     former = former.replace(",partition,", ",cut,", 1).replace(",redistributions,", ",settlements,", 1)
+    former = former.replace(",partitions,", ",divisions,", 1).replace(",most_halo_bodies,", ",most_ghosts,", 1)
+    former = former.replace(",halo_bodies,", ",ghosts,", 1)
+    assert ",divisions," in former and ",ghosts," in former and ",most_ghosts," in former
     (tmp_path / "former.csv").write_text(former, encoding="utf-8")
     assert ",cut," in former and ",settlements," in former and read_runs(tmp_path / "former.csv") == runs
     (tmp_path / "other.csv").write_text("shape,grains\nbox,1\n", encoding="utf-8")
@@ -138,7 +141,7 @@ def test_the_command_takes_folders_and_saved_files(shared, alone, tmp_path, caps
     again = capsys.readouterr().out
     assert again.startswith(printed) and again.count("| 4096 |") == 2
     assert "### Time of a step of 100000 bodies" in again and "| run | morton | 0 | 1 |" in again
-    former = ["--cut", "morton", "--settlement", "4", "--settled-bytes", "300"]
+    former = ["--cut", "morton", "--settlement", "4", "--ghost", "0.5", "--settled-bytes", "300"]
     assert main(["scale", saved, "--body", "1e-6", "--bodies", "1e5,1e6", *former]) == 0
     assert capsys.readouterr().out == again
     assert main(["scale", saved, "--body", "1e-6"]) == 2

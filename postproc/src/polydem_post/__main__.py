@@ -185,7 +185,7 @@ def _add_scale(verbs) -> None:
     scale.add_argument("--save", type=Path, metavar="FILE.csv")
     scale.add_argument("--bodies", type=_positives, default=[1e6], metavar="N,...")
     scale.add_argument("--body", type=_positive, metavar="S")
-    for default, *names in ((2e-6, "latency"), (1e9, "bandwidth"), (0.5, "ghost"), (1.1, "imbalance"),
+    for default, *names in ((2e-6, "latency"), (1e9, "bandwidth"), (0.5, "ghost", "halo-body"), (1.1, "imbalance"),
                             (40.0, "interval"), (4.0, "settlement", "redistribution"),
                             (300.0, "settled-bytes", "redistributed-bytes")):
         scale.add_argument(*(f"--{name}" for name in names), type=_positive, default=default, metavar="X",

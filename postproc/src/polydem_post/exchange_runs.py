@@ -1,7 +1,7 @@
 """What the ranks of real runs told each other, from the counters of their results.
 
-Counts are exact on any machine, however many ranks share a processor. What every step tells ghosts is kept apart from
-what is told when bodies are handed out anew, and this from the first time, when rank 0 has all bodies.
+Counts are exact on any machine, however many ranks share a processor. What every step tells halo bodies is kept apart
+from what is told when bodies are handed out anew, and this from the first time, when rank 0 has all bodies.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ SHAPE, MARGIN = "run", 0.0
 #: Counters of a run of several processes, and what they are called here
 COUNTERS = {
     "redistributions": "redistributions",
-    "divisions": "partitions of space",
+    "partitions": "partitions of space",
     "rectangles": "rectangles",
     "migrations": "migrations",
     "first_migrations": "migrations at the start",
-    "ghosts": "halo bodies, summed over steps",
+    "halo_bodies": "halo bodies, summed over steps",
     "messages": "halo messages",
     "bytes": "halo bytes",
     "all_messages": "messages",
@@ -37,7 +37,7 @@ COUNTERS = {
     "first_bytes": "bytes at the start",
     "most_bodies": "maximum per rank: bodies",
     "most_pairs": "maximum per rank: pairs",
-    "most_ghosts": "maximum per rank: halo bodies",
+    "most_halo_bodies": "maximum per rank: halo bodies",
     "most_messages": "maximum per rank: messages",
     "most_bytes": "maximum per rank: bytes",
 }
@@ -49,7 +49,7 @@ NOT_RECORDED = "not recorded"
 
 @dataclass(frozen=True)
 class RunCount:
-    """Exact counts of a run; those of ghosts and messages are summed over steps and, but for `most_...`, over ranks."""
+    """Exact counts of a run; halo bodies and messages are summed over steps and, but for `most_...`, over ranks."""
 
     #: Free bodies, ranks, steps
     bodies: int
@@ -61,14 +61,14 @@ class RunCount:
     margin: float
     #: How often bodies were handed out, the first time included; how often space was divided
     redistributions: int
-    divisions: int
+    partitions: int
     #: Rectangles that cover the bodies of all ranks
     rectangles: int
     #: Bodies that went to another rank, and those of them that did when rank 0 gave out all
     migrations: int
     first_migrations: int
-    #: Ghosts, and the messages and bytes that let them follow
-    ghosts: int
+    #: Halo bodies, and the messages and bytes that let them follow
+    halo_bodies: int
     messages: int
     bytes: int
     #: All messages and bytes, and those until bodies had been handed out for the first time
@@ -78,10 +78,10 @@ class RunCount:
     first_bytes: int
     #: Pairs of all ranks at the end
     pairs: int
-    #: Of the rank that has most: bodies and pairs at the end; ghosts, messages and bytes
+    #: Of the rank that has most: bodies and pairs at the end; halo bodies, messages and bytes
     most_bodies: int
     most_pairs: int
-    most_ghosts: int
+    most_halo_bodies: int
     most_messages: int
     most_bytes: int
     #: Hash of the state at the end
@@ -91,7 +91,7 @@ class RunCount:
 
     @property
     def told_steps(self) -> int:
-        """Steps in which ghosts followed: all but the first, at whose beginning there are none."""
+        """Steps in which halo bodies followed: all but the first, at whose beginning there are none."""
         return max(self.steps - 1, 1)
 
     @property
@@ -105,7 +105,7 @@ class RunCount:
         return Count(
             shape=SHAPE, grains=self.bodies, ranks=self.ranks, partition=self.partition, margin=self.margin,
             grains_most=self.most_bodies,
-            ghosts=round(self.ghosts / steps), ghosts_most=round(self.most_ghosts / steps),
+            halo_bodies=round(self.halo_bodies / steps), halo_bodies_most=round(self.most_halo_bodies / steps),
             messages=round(self.messages / told), messages_most=math.ceil(self.most_messages / told),
             bytes=round(self.bytes / told), bytes_most=round(self.most_bytes / told), rectangles=self.rectangles)
 
@@ -171,30 +171,31 @@ def _insist_on_counts(place, run: RunCount) -> None:
 def runs_tables(runs: list[RunCount]) -> list[Table]:
     """What steps tell, and what handing bodies out tells."""
     heading: tuple[str, ...] = (
-        "partition", "margin", "bodies", "ranks", "ghosts per body", "most ghosts", "pairs per ghost", "messages",
-        "of one rank", "bytes", "of one rank", "bodies, most/mean", "pairs, most/mean", "steps", "hash")
+        "partition", "margin", "bodies", "ranks", "halo bodies per body", "most halo bodies", "pairs per halo body",
+        "messages", "of one rank", "bytes", "of one rank", "bodies, most/mean", "pairs, most/mean", "steps", "hash")
     steps = Table("runs", "Exact counts of runs, means of a step", heading, texts=1)
-    heading = ("partition", "margin", "bodies", "ranks", "steps", "redistributions", "divisions", "migrations",
+    heading = ("partition", "margin", "bodies", "ranks", "steps", "redistributions", "partitions", "migrations",
                "messages",
-               "bytes", "bytes per ghost", "at the start", "messages", "bytes")
+               "bytes", "bytes per halo body", "at the start", "messages", "bytes")
     redistributing = Table("redistributing", "Exact counts of handing bodies out anew", heading, texts=1)
     order = sorted(runs, key=lambda run: (run.bodies, run.margin, run.partition, run.ranks))
     alone = {(run.bodies, run.steps): run.pairs for run in order if run.ranks == 1}
     for run in order:
         count = run.as_count()
         extra = run.pairs - alone.get((run.bodies, run.steps), run.pairs)
-        steps.add(run.partition, f"{run.margin:g}", run.bodies, run.ranks, number(run.ghosts / run.steps / run.bodies),
-                  count.ghosts_most, number(extra / count.ghosts) if extra and count.ghosts else "-", count.messages,
-                  count.messages_most, count.bytes, count.bytes_most,
+        steps.add(run.partition, f"{run.margin:g}", run.bodies, run.ranks,
+                  number(run.halo_bodies / run.steps / run.bodies), count.halo_bodies_most,
+                  number(extra / count.halo_bodies) if extra and count.halo_bodies else "-",
+                  count.messages, count.messages_most, count.bytes, count.bytes_most,
                   number(run.most_bodies * run.ranks / run.bodies, 4),
                   number(run.most_pairs * run.ranks / run.pairs, 4) if run.pairs else "-", run.steps, run.state_hash)
         if run.ranks > 1:
             redistributing.add(run.partition, f"{run.margin:g}", run.bodies, run.ranks, run.steps,
-                               run.redistributions, run.divisions, *_later(run), run.first_migrations,
+                               run.redistributions, run.partitions, *_later(run), run.first_migrations,
                                run.first_messages, run.first_bytes)
-    steps.note = ("Messages and bytes are those that let ghosts follow; margin in m, 0: chosen by the run. Pairs per "
-                  "ghost: how many pairs more than one process all have together at the end. Runs of the same scene "
-                  "and steps have the same hash on any number of ranks.")
+    steps.note = ("Messages and bytes are those that let halo bodies follow; margin in m, 0: chosen by the run. Pairs "
+                  "per halo body: how many pairs more than one process all have together at the end. Runs of the same "
+                  "scene and steps have the same hash on any number of ranks.")
     redistributing.note = ("Redistributions: how often bodies were handed out, the first time included. Migrations (of "
                            "the whole run), messages and bytes (of one time) are those after the first, when rank 0 "
                            "gives out all bodies; that is on the right.")
@@ -204,10 +205,10 @@ def runs_tables(runs: list[RunCount]) -> list[Table]:
 
 
 def _later(run: RunCount) -> tuple:
-    """Migrations; messages, bytes, and bytes per ghost of a redistribution after the first."""
+    """Migrations; messages, bytes, and bytes per halo body of a redistribution after the first."""
     if run.later_redistributions == 0:
         return 0, "-", "-", "-"
     told = (run.all_bytes - run.bytes - run.first_bytes) / run.later_redistributions
     messages = (run.all_messages - run.messages - run.first_messages) / run.later_redistributions
     return (run.migrations - run.first_migrations, round(messages), round(told),
-            number(told * run.steps / run.ghosts) if run.ghosts else "-")
+            number(told * run.steps / run.halo_bodies) if run.halo_bodies else "-")

@@ -37,7 +37,15 @@ ENTRIES = {
 }
 
 #: Columns of tables of counts
-COLUMNS = {"cut": "partition", "settlements": "redistributions"}
+COLUMNS = {
+    "cut": "partition",
+    "settlements": "redistributions",
+    "divisions": "partitions",
+    "ghosts": "halo_bodies",
+    "ghosts_most": "halo_bodies_most",
+    "most_ghosts": "most_halo_bodies",
+    "ghosts_per_grain": "halo_bodies_per_grain",
+}
 
 #: Data sets of the energy balance lie in the first of these groups that a file has
 BALANCE_GROUPS = ("energy_balance", "ledger")
