@@ -27,7 +27,11 @@ MARK = ".made_by_polydem_manual"
 STYLE = """\
 .md-typeset p.equation { overflow: auto hidden; margin: 1em 0; padding: 0.3em 0; }
 .md-typeset math { font-size: 1.1em; }
-.md-typeset small { opacity: 0.7; }
+.md-typeset small, .md-typeset details.tested { opacity: 0.7; font-size: 0.65rem; }
+.md-typeset details.tested { border: none; box-shadow: none; margin: 0; padding: 0; }
+.md-typeset details.tested summary { background: none; font-weight: normal; margin: 0; padding: 0; }
+.md-typeset details.tested summary::before, .md-typeset details.tested summary::after { display: none; }
+.md-typeset pre > code { font-size: 0.75em; }
 .md-grid { max-width: 76rem; }
 """
 
@@ -97,8 +101,7 @@ def _settings(root: Path, folder: Path, output: Path, pages: list[Path], sources
     return {
         "site_name": "polydem", "docs_dir": str(folder), "site_dir": str(output), "use_directory_urls": False,
         "strict": True, "nav": _navigation(root, pages, sources), "extra_css": ["manual.css"],
-        "theme": {"name": "material", "font": False, "features": ["navigation.indexes", "navigation.tabs",
-                                                                  "search.highlight", "content.code.copy"],
+        "theme": {"name": "material", "font": False, "features": ["navigation.tabs", "search.highlight", "content.code.copy"],
                   "palette": [{"scheme": "default", "primary": "blue grey"}]},
         "plugins": ["search", "offline"],
         "markdown_extensions": [

@@ -114,8 +114,11 @@ def _show_remarks(text: str) -> str:
 
 def _small_print(kind: str, words: str) -> str:
     lines = [line.strip() for line in words.strip().splitlines()]
-    shown = "; ".join(f"`{line}`" for line in lines) if kind == "tests run" else " ".join(lines)
-    return f"<small markdown>The {kind}: {shown}</small>\n"
+    if kind == "tests run":
+        commands = "\n".join(lines)
+        return ('<details class="tested" markdown><summary>shortened for the tests</summary>\n\n'
+                f"```sh\n{commands}\n```\n\n</details>\n")
+    return f"<small markdown>The {kind}: {' '.join(lines)}</small>\n"
 
 
 def _write(path: Path, text: str) -> None:
