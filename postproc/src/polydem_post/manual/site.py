@@ -101,7 +101,8 @@ def _settings(root: Path, folder: Path, output: Path, pages: list[Path], sources
     return {
         "site_name": "polydem", "docs_dir": str(folder), "site_dir": str(output), "use_directory_urls": False,
         "strict": True, "nav": _navigation(root, pages, sources), "extra_css": ["manual.css"],
-        "theme": {"name": "material", "font": False, "features": ["navigation.tabs", "search.highlight", "content.code.copy"],
+        "theme": {"name": "material", "font": False,
+                  "features": ["navigation.tabs", "search.highlight", "content.code.copy"],
                   "palette": [{"scheme": "default", "primary": "blue grey"}]},
         "plugins": ["search", "offline"],
         "markdown_extensions": [
