@@ -103,7 +103,6 @@ contains
 
    !> Read and parse the command line of the program.
    subroutine read_command_line(command, error)
-      !> The parsed command line
       type(command_t), intent(out) :: command
       !> Names a verb or an option that is unknown, misplaced or incomplete
       type(error_t), allocatable, intent(inout) :: error
@@ -147,7 +146,6 @@ contains
    pure subroutine parse_command(arguments, command, error, program)
       !> Arguments of the program, blank-padded
       character(len=*), intent(in) :: arguments(:)
-      !> The parsed command line
       type(command_t), intent(out) :: command
       !> Names a verb or an option that is unknown, misplaced or incomplete
       type(error_t), allocatable, intent(inout) :: error

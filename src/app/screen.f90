@@ -13,7 +13,6 @@ contains
    subroutine print_line(text, error)
       !> Lines
       character(len=*), intent(in) :: text
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(line_writer_t) :: screen
 

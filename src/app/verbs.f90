@@ -29,9 +29,7 @@ contains
 
    !> Execute the verb of the command line. Collective.
    subroutine execute(command, comm, error)
-      !> Command line
       type(command_t), intent(in) :: command
-      !> Ranks of the program
       class(communicator_t), intent(inout) :: comm
       !> Allocated if the verb fails
       type(error_t), allocatable, intent(inout) :: error

@@ -45,7 +45,6 @@ contains
 
    !> Take all samples of a scene.
    subroutine measure_scene(bench, scene, n_boxes, error)
-      !> The bench
       type(bench_t), intent(inout) :: bench
       !> Scene to measure
       type(scene_t), intent(in) :: scene
@@ -157,7 +156,6 @@ contains
 
    !> Write how many samples were taken and found.
    subroutine write_end(bench)
-      !> The bench
       type(bench_t), intent(inout) :: bench
 
       call bench%log%write_line(to_text(int(bench%n_taken, ip))//' samples taken, '// &

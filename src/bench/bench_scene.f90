@@ -82,7 +82,6 @@ contains
 
    !> Run a namelist to its end, unless its result exists.
    subroutine provide_result(settings, error)
-      !> Settings of the run
       type(settings_t), intent(in) :: settings
       !> Allocated if the run fails, or if the result belongs to other settings
       type(error_t), allocatable, intent(inout) :: error
@@ -97,7 +96,6 @@ contains
 
    !> Record the trace of a scene, unless it exists.
    subroutine provide_trace(scene, error)
-      !> Scene
       type(scene_t), intent(in) :: scene
       !> Allocated if the run fails, or if the trace belongs to other settings
       type(error_t), allocatable, intent(inout) :: error

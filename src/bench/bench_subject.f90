@@ -39,7 +39,6 @@ contains
 
    !> Load a scene into memory.
    subroutine load_subject(scene, live, steps, subject, error)
-      !> Scene
       type(scene_t), intent(in) :: scene
       !> Whether the bench runs whole time steps
       logical, intent(in) :: live
@@ -120,7 +119,6 @@ contains
       type(subject_t), intent(inout) :: subject
       !> Name of the first finder
       character(len=*), intent(in) :: finder
-      !> Reference lists
       type(reference_t), intent(out) :: reference
       !> Hash of the last state of a live bench; else 0
       integer(lp), intent(out) :: finish
@@ -154,7 +152,6 @@ contains
 
    !> Set the properties of all cases that follow from the reference lists.
    subroutine complete_case(reference, finish, subject)
-      !> Reference lists
       type(reference_t), intent(in) :: reference
       !> Hash of the last state of a live bench; else 0
       integer(lp), intent(in) :: finish
@@ -174,7 +171,6 @@ contains
    subroutine take_sample(subject, reference, sample, error)
       !> Subject of the samples
       type(subject_t), intent(inout) :: subject
-      !> Reference lists
       type(reference_t), intent(inout) :: reference
       !> The sample; its case is set on entry
       type(sample_t), intent(inout) :: sample

@@ -65,7 +65,6 @@ contains
 
    !> Set the list of a step from the finder all_pairs; a known list must agree with it.
    subroutine set_by_all_pairs(reference, step, boxes, oracle, error)
-      !> Reference lists
       type(reference_t), intent(inout) :: reference
       !> Number of the step, from 1
       integer(ip), intent(in) :: step
@@ -85,7 +84,6 @@ contains
 
    !> Compare the number of pairs with the reference, if that is known.
    subroutine check_number(reference, step, finder, pairs, error)
-      !> Reference lists
       type(reference_t), intent(in) :: reference
       !> Number of the step, from 1
       integer(ip), intent(in) :: step
@@ -106,7 +104,6 @@ contains
    !> Compare number and hash of the pairs with the reference. Where the reference is not known, the list becomes the
    !> reference.
    subroutine check_list(reference, step, finder, pairs, error, hash)
-      !> Reference lists
       type(reference_t), intent(inout) :: reference
       !> Number of the step, from 1
       integer(ip), intent(in) :: step

@@ -17,7 +17,6 @@ contains
    subroutine write_reference(path, reference, start, finish, provenance, error)
       !> Path of the file
       character(len=*), intent(in) :: path
-      !> Reference lists
       type(reference_t), intent(in) :: reference
       !> Hash of all recorded bounds, or of the initial state
       integer(lp), intent(in) :: start
@@ -25,7 +24,6 @@ contains
       integer(lp), intent(in) :: finish
       !> Provenance of the file
       type(provenance_t), intent(in) :: provenance
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
 
@@ -50,7 +48,6 @@ contains
       integer(ip), intent(in) :: n_steps
       !> Hash of all recorded bounds, or of the initial state
       integer(lp), intent(in) :: start
-      !> Reference lists
       type(reference_t), intent(out) :: reference
       !> Hash of the last state; 0 if there is none
       integer(lp), intent(out) :: finish

@@ -179,7 +179,6 @@ contains
    subroutine set_by_trace(trace, reference)
       !> Recorded boxes
       type(trace_t), intent(in) :: trace
-      !> Reference lists
       type(reference_t), intent(inout) :: reference
 
       reference%other = 'the trace'

@@ -95,7 +95,6 @@ contains
       integer(ip), intent(in) :: n_steps
       !> Whether the sample has hashes and finder statistics
       logical, intent(in) :: checked
-      !> The sample
       type(sample_t), intent(inout) :: sample
 
       allocate (sample%elapsed(n_steps), sample%processor(n_steps), source=0.0_dp)

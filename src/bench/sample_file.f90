@@ -71,13 +71,11 @@ contains
    subroutine write_sample(path, sample, phase_names, count_names, provenance, error)
       !> Path of the file
       character(len=*), intent(in) :: path
-      !> The sample
       type(sample_t), intent(in) :: sample
       !> Names of the phases and counts of finders
       character(len=*), intent(in) :: phase_names(:), count_names(:)
       !> Program and machine
       type(provenance_t), intent(in) :: provenance
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
 

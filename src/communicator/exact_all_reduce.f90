@@ -11,7 +11,6 @@ contains
 
    !> Replace sums by their totals over all ranks; collective.
    subroutine all_reduce_exact_sums(comm, sums)
-      !> The communicator
       class(communicator_t), intent(inout) :: comm
       !> Sums of this rank; afterwards the totals, the same on all ranks
       type(exact_sum_t), intent(inout) :: sums(:)

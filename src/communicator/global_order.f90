@@ -55,7 +55,6 @@ contains
    !> Set up the communication plan; collective.
    subroutine lay_out(self, comm, n_bodies, n_known, key, slot)
       class(global_order_t), intent(inout) :: self
-      !> The communicator
       class(communicator_t), intent(inout) :: comm
       !> Number of bodies of the run
       integer(ip), intent(in) :: n_bodies
@@ -96,7 +95,6 @@ contains
    !> Bring a column of integers into blocks; collective.
    subroutine longs_to_blocks(self, comm, values, block)
       class(global_order_t), intent(in) :: self
-      !> The communicator, as in `lay_out`
       class(communicator_t), intent(inout) :: comm
       !> The local column, (width, n_known)
       integer(lp), intent(in) :: values(:, :)
@@ -124,7 +122,6 @@ contains
    !> Bring the blocks of a column back to the ranks that own the rows: the inverse of `to_blocks`. Collective.
    subroutine from_blocks(self, comm, block, values)
       class(global_order_t), intent(in) :: self
-      !> The communicator, as in `lay_out`
       class(communicator_t), intent(inout) :: comm
       !> The block of this rank, (width, n)
       integer(lp), intent(in) :: block(:, :)
@@ -153,7 +150,6 @@ contains
    !> Bring a column of real numbers into blocks without changing a bit; collective.
    subroutine doubles_to_blocks(self, comm, values, block)
       class(global_order_t), intent(in) :: self
-      !> The communicator, as in `lay_out`
       class(communicator_t), intent(inout) :: comm
       !> The local column, (width, n_known)
       real(dp), intent(in) :: values(:, :)

@@ -20,7 +20,6 @@ contains
    !> A warning if the ranks on any machine have more threads than processors that they may use; else an empty text.
    !> Collective.
    function oversubscription(comm) result(text)
-      !> The communicator of all ranks
       class(communicator_t), intent(inout) :: comm
       character(len=:), allocatable :: text
       integer(lp), allocatable :: all_of_them(:), facts(:, :)

@@ -30,7 +30,6 @@ contains
 
    !> Where an entry was given, for the beginning of a message: file:line, --set group.key=value, or the file alone
    pure function place_of(settings, group, key) result(place)
-      !> All settings
       type(settings_t), intent(in) :: settings
       !> Namelist group
       character(len=*), intent(in) :: group

@@ -15,13 +15,10 @@ contains
    !> separately for each quantity. Bodies and pairs are present numbers; all other counts are sums over steps.
    !> Collective.
    subroutine report_communication(comm, domain, n_free, n_pairs, counters)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
-      !> Domain of this rank
       type(domain_t), intent(in) :: domain
       !> Number of free bodies and of pairs of this rank
       integer(lp), intent(in) :: n_free, n_pairs
-      !> Counters of the run
       type(counters_t), intent(inout) :: counters
       integer(lp) :: sums(9), most(5)
 

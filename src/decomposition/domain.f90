@@ -66,13 +66,11 @@ contains
 
    !> Start a domain. In a run on several ranks the first redistribution is in the first step.
    subroutine new_domain(domain, settings, median_diameter, comm, error)
-      !> The domain
       type(domain_t), intent(out) :: domain
       !> Group &decomposition
       type(decomposition_settings_t), intent(in) :: settings
       !> Median diameter of the free bodies of the run [m]
       real(wp), intent(in) :: median_diameter
-      !> Ranks
       class(communicator_t), intent(in) :: comm
       !> Allocated if the settings name no known partition of space
       type(error_t), allocatable, intent(inout) :: error

@@ -14,9 +14,7 @@ contains
 
    !> Compute the hash of all bodies: the value of `state_hash` on a rank that had all of them. Collective.
    subroutine hash_all_bodies(comm, bodies, hash)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
-      !> Bodies of this rank
       type(bodies_t), intent(in) :: bodies
       !> The hash, equal on all ranks
       integer(lp), intent(out) :: hash
@@ -37,7 +35,6 @@ contains
    !> Compute the hash of the initial bodies: their state, and their constant properties (fixed or free, mass, inertia,
    !> shape). Collective.
    subroutine hash_scene(comm, bodies, hash)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Bodies of this rank at time 0
       type(bodies_t), intent(in) :: bodies

@@ -28,7 +28,6 @@ contains
 
    !> Prepare the halo exchange.
    subroutine new_halo(halo, counts_sent, sent, counts_received, received, with_acceleration)
-      !> The halo
       type(halo_t), intent(out) :: halo
       !> Number of bodies to send to each rank, (0:size - 1)
       integer(ip), intent(in) :: counts_sent(0:)
@@ -64,7 +63,6 @@ contains
    !> of the route must call this.
    subroutine follow(self, comm, bodies)
       class(halo_t), intent(inout) :: self
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Bodies; positions, angles, velocities and, if required, accelerations of halo bodies change
       type(bodies_t), intent(inout) :: bodies
@@ -97,7 +95,6 @@ contains
    !> Halo exchange of one value per body. All ranks of the route must call this.
    subroutine exchange_column(self, comm, values)
       class(halo_t), intent(inout) :: self
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> One value per body, (slot); those of halo bodies change
       real(wp), intent(inout) :: values(:)

@@ -40,7 +40,6 @@ contains
    !> Exchange the rows between ranks, and switch from storing to restoring. Collective.
    subroutine move(self, comm, counts)
       class(migration_buffer_t), intent(inout) :: self
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Number of rows for each rank, (0:size - 1)
       integer(ip), intent(in) :: counts(0:)

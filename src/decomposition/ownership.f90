@@ -26,7 +26,6 @@ contains
 
    !> Whether this rank owns a pair of bodies, not both fixed
    pure logical function owns_pair(bodies, first, second)
-      !> Bodies of this rank
       type(bodies_t), intent(in) :: bodies
       !> Slots of the two bodies, in ascending order
       integer(ip), intent(in) :: first, second
@@ -36,9 +35,7 @@ contains
 
    !> Find the global order of columns over the bodies. Collective.
    subroutine order_bodies(comm, bodies, blocks)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
-      !> Bodies of this rank
       type(bodies_t), intent(in) :: bodies
       !> Destination of each row
       type(global_order_t), intent(inout) :: blocks
@@ -49,9 +46,7 @@ contains
 
    !> Find the global order of columns over parts of bodies, such as boxes and vertices. Collective.
    subroutine order_parts(comm, bodies, body, blocks)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
-      !> Bodies of this rank
       type(bodies_t), intent(in) :: bodies
       !> Slot of the body of each part, ascending; the parts of one body have the same order on all ranks
       integer(ip), intent(in) :: body(:)
@@ -77,9 +72,7 @@ contains
    !> Find the global order of columns over pairs of bodies, such as contacts. Pairs of two fixed bodies are not
    !> allowed. Collective.
    subroutine order_pairs(comm, bodies, first, second, blocks)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
-      !> Bodies of this rank
       type(bodies_t), intent(in) :: bodies
       !> Slots of the two bodies of each pair, in ascending order
       integer(ip), intent(in) :: first(:), second(:)

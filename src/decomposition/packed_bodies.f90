@@ -22,7 +22,6 @@ contains
 
    !> Pack bodies.
    subroutine pack_bodies(bodies, slots, packed)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Slots of the bodies to pack
       integer(ip), intent(in) :: slots(:)
@@ -51,7 +50,6 @@ contains
 
    !> Exchange packed bodies between ranks, all-to-all. Collective.
    subroutine all_to_all_bodies(comm, counts, packed, counts_received)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Number of bodies for each rank, (0:size - 1)
       integer(ip), intent(in) :: counts(0:)

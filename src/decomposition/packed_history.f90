@@ -75,7 +75,6 @@ contains
    !>
    !> Both ranks that move a body of the pair have its history. Each sends it to the next owner of its own body.
    subroutine send_pairs(comm, id, owner, packed)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Identifier of each body, ascending, (slot)
       integer(ip), intent(in) :: id(:)

@@ -22,9 +22,7 @@ contains
    !> Whether a new partition of space is necessary: in the first step, and when the work of the ranks is uneven.
    !> Collective.
    logical function needs_repartition(domain, comm, step, weight, seconds)
-      !> Domain of this rank
       type(domain_t), intent(in) :: domain
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Number of completed steps
       integer(lp), intent(in) :: step
@@ -51,13 +49,10 @@ contains
 
    !> Compute a new partition of space with an even distribution of work. Collective.
    subroutine divide(domain, comm, step, bodies, weight, seconds)
-      !> Domain of this rank
       type(domain_t), intent(inout) :: domain
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Number of completed steps
       integer(lp), intent(in) :: step
-      !> Bodies of this rank
       type(bodies_t), intent(in) :: bodies
       !> Work of each free body, in pairs
       real(dp), intent(in) :: weight(:)
@@ -76,7 +71,6 @@ contains
 
    !> Work of each free body, in pairs
    pure function work_of_bodies(bodies, n_pairs, first, second) result(weight)
-      !> Bodies of this rank
       type(bodies_t), intent(in) :: bodies
       !> Number of pairs
       integer(ip), intent(in) :: n_pairs
@@ -96,9 +90,7 @@ contains
 
    !> Rank that owns each body after the redistribution, negative for fixed bodies, (slot)
    function owners_of(domain, bodies) result(owner)
-      !> Domain of this rank
       type(domain_t), intent(in) :: domain
-      !> Bodies of this rank
       type(bodies_t), intent(in) :: bodies
       integer(ip), allocatable :: owner(:)
       integer(ip) :: s
@@ -112,7 +104,6 @@ contains
 
    !> Boxes of the free bodies, padded by a margin and an allowance for rounding: xmin, ymin, xmax, ymax, (4, body) [m]
    pure function padded_boxes(bodies, margin) result(boxes)
-      !> Bodies of this rank
       type(bodies_t), intent(in) :: bodies
       !> Distance that bodies may move before the next redistribution, and the margin of boxes [m]
       real(wp), intent(in) :: margin
@@ -137,11 +128,8 @@ contains
 
    !> List the bodies that other ranks need, in the order of these ranks.
    subroutine list_needed(domain, comm, bodies, boxes, slots, counts)
-      !> Domain of this rank
       type(domain_t), intent(in) :: domain
-      !> Ranks
       class(communicator_t), intent(in) :: comm
-      !> Bodies of this rank
       type(bodies_t), intent(in) :: bodies
       !> Padded boxes of the free bodies, (4, body) [m]
       real(wp), intent(in) :: boxes(:, :)

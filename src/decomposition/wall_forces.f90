@@ -19,7 +19,6 @@ contains
    !> All terms are sent to the root rank and summed in descending order of the partner. This is the order of
    !> `force_sums`: the sums have the same bits as in a run on one rank. In such a run they are complete already.
    subroutine complete_wall_forces(comm, walls, bodies)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Contacts of the bodies of this rank with fixed bodies
       type(contacts_t), intent(in) :: walls

@@ -15,7 +15,6 @@ contains
 
    !> Replace values by the least ones of all ranks, element by element.
    subroutine reduce_to_least(comm, values)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Values of this rank
       real(wp), intent(inout) :: values(:)
@@ -27,7 +26,6 @@ contains
 
    !> Replace values by the greatest ones of all ranks, element by element.
    subroutine reduce_to_greatest(comm, values)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Values of this rank
       real(wp), intent(inout) :: values(:)
@@ -42,7 +40,6 @@ contains
    !> Keep the greatest value of all ranks with its place and text. Among equal values, that with the least place is
    !> kept.
    subroutine keep_greatest(comm, value, place, text)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Value of this rank
       real(wp), intent(inout) :: value
@@ -68,7 +65,6 @@ contains
 
    !> Sum terms of all ranks, rounded once.
    subroutine sum_exactly(comm, terms, total)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Terms of this rank, in any order
       real(wp), intent(in) :: terms(:)
@@ -86,7 +82,6 @@ contains
 
    !> Find the median of values of all ranks: the least value such that at least half of the values do not exceed it.
    subroutine find_median(comm, values, median)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Values of this rank
       real(wp), intent(in) :: values(:)

@@ -10,7 +10,6 @@ contains
 
    !> Set the terms of the balance as named values.
    subroutine name_terms(balance, row)
-      !> Energy and momentum balance
       type(balance_t), intent(in) :: balance
       !> Row of named values; those of the balance are set
       type(named_values_t), intent(inout) :: row

@@ -28,7 +28,6 @@ contains
 
    !> Add the powers of the elastic, damping and tangential forces on a body, times a weight, to its channels.
    pure subroutine add_powers(bodies, forces, weight, s, channels)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Sums of the forces on each body
       type(force_sums_t), intent(in) :: forces
@@ -60,7 +59,6 @@ contains
 
    !> Add the action of a fixed body on a free one: its terms of the powers, and the wall channels.
    pure subroutine add_wall(bodies, wall, term, weight, channels, wall_channels)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Slot of the fixed body
       integer(ip), intent(in) :: wall
@@ -91,7 +89,6 @@ contains
 
    !> Add the action of fixed bodies on free ones to the channels, and their share of the elastic energy.
    pure subroutine add_walls(bodies, walls, weight, channels, wall_channels, energy)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Contacts with fixed bodies
       type(contacts_t), intent(in) :: walls
@@ -127,7 +124,6 @@ contains
    pure function motion_of(gravity, bodies, s) result(values)
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Slot of the body
       integer(ip), intent(in) :: s

@@ -107,7 +107,6 @@ contains
    subroutine start_energy_balance(sums, comm, gravity, bodies, forces, walls)
       !> Running sums
       type(energy_balance_t), intent(out) :: sums
-      !> Ranks that share the bodies
       class(communicator_t), intent(inout) :: comm
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
@@ -187,7 +186,6 @@ contains
    subroutine evaluate_balance(sums, comm, dt, gravity, bodies, forces, walls, balance)
       !> Running sums
       type(energy_balance_t), intent(inout) :: sums
-      !> Ranks that share the bodies
       class(communicator_t), intent(inout) :: comm
       !> Time step, the same for the whole run [s]
       real(wp), intent(in) :: dt
@@ -227,7 +225,6 @@ contains
    subroutine serialize_balance(sums, serializer)
       !> Running sums
       type(energy_balance_t), intent(inout) :: sums
-      !> Serializer
       class(serializer_t), intent(inout) :: serializer
 
       call serializer%field('/run/energy_balance_start', sums%start, 'J/m, N s/m, N s', &
@@ -243,7 +240,6 @@ contains
       type(energy_balance_t), intent(inout) :: sums
       !> Number of bodies
       integer(ip), intent(in) :: n_bodies
-      !> Serializer
       class(serializer_t), intent(inout) :: serializer
 
       if (serializer%is_reading) sums%is_current = .false.

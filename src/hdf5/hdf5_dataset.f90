@@ -44,7 +44,6 @@ contains
    !> call only returns a status. If MPI was initialised before, HDF5 still registers itself for the end of MPI.
    !> Therefore a program initialises HDF5 before MPI.
    subroutine start_library(error)
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       logical :: is_open
       integer :: status
@@ -116,7 +115,6 @@ contains
       integer(hid_t), intent(in) :: kind_in_file
       !> Values to write
       type(slab_t), intent(in) :: slab
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: space, dataset
       integer :: status
@@ -143,7 +141,6 @@ contains
       integer(hid_t), intent(in) :: space
       !> HDF5 identifier of the open data set
       integer(hid_t), intent(out) :: dataset
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       !> Dataset creation property list, for chunks
       integer(hid_t), intent(in), optional :: properties
@@ -173,7 +170,6 @@ contains
       integer(hid_t), intent(in) :: kind_in_file
       !> Rows to append; the last dimension counts rows
       type(slab_t), intent(in) :: rows
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: dataset
       integer :: status

@@ -67,7 +67,6 @@ contains
       class(hdf5_handle_t), intent(inout) :: self
       !> Path of the file
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       !> Whether extendible data sets are compressed (lossless); false if absent
       logical, intent(in), optional :: compressed
@@ -105,7 +104,6 @@ contains
       class(hdf5_handle_t), intent(inout) :: self
       !> Path of the file
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: properties
       integer :: status, ignored
@@ -131,7 +129,6 @@ contains
       class(hdf5_handle_t), intent(inout) :: self
       !> Path of the file
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       logical :: is_hdf5
       integer :: status
@@ -162,7 +159,6 @@ contains
    !> Pass all written data to the operating system. They then survive a crash of the program.
    subroutine flush_file(self, error)
       class(hdf5_handle_t), intent(in) :: self
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer :: status
 
@@ -173,7 +169,6 @@ contains
    !> Close the file; nothing happens if it is already closed. A file that cannot be closed is abandoned.
    subroutine close_file(self, error)
       class(hdf5_handle_t), intent(inout) :: self
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: failure
       integer :: status
@@ -198,7 +193,6 @@ contains
       integer, intent(in) :: status
       !> Error message if the status is negative
       character(len=*), intent(in) :: problem
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       if (status >= 0) return

@@ -73,7 +73,6 @@ contains
       type(dataset_location_t), intent(in) :: location
       !> Values, and their position in the data set
       type(slab_t), intent(in) :: slab
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: file_space, memory_space, properties
       integer :: status, ignored
@@ -97,7 +96,6 @@ contains
       type(dataset_location_t), intent(in) :: location
       !> Position in the data set, and the array to fill
       type(slab_t), intent(in) :: slab
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: file_space, memory_space
       type(c_ptr) :: buffer

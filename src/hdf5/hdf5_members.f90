@@ -19,7 +19,6 @@ contains
       type(dataset_location_t), intent(in) :: location
       !> Number of names
       integer, intent(out) :: n
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: group
       integer :: kind_of_links, last_order, status, ignored
@@ -42,7 +41,6 @@ contains
       integer, intent(in) :: k
       !> The name
       character(len=:), allocatable, intent(out) :: name
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(size_t) :: length
       integer :: status, pass

@@ -29,7 +29,6 @@ contains
       integer(hsize_t), intent(in) :: extent(:)
       !> The texts; trailing blanks of list elements are removed
       character(len=*), intent(in) :: texts(:)
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       character(kind=c_char), allocatable, target :: characters(:)
       type(c_ptr), allocatable, target :: addresses(:)
@@ -129,7 +128,6 @@ contains
       character(len=*), intent(in) :: name
       !> The text
       character(len=*), intent(in) :: text
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       character(kind=c_char), allocatable, target :: characters(:)
       type(c_ptr), allocatable, target :: addresses(:)
@@ -153,7 +151,6 @@ contains
       integer(hid_t), intent(in) :: kind_in_file
       !> Address of the value
       type(c_ptr), intent(in) :: address
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: object, space, attribute
       logical :: there

@@ -23,7 +23,6 @@ contains
       type(hdf5_file_t), intent(inout) :: file
       !> Final path of the file
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       !> Whether growing data sets are compressed; default: false
       logical, intent(in), optional :: compressed

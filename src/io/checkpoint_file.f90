@@ -68,7 +68,6 @@ contains
       class(checkpoint_file_t), intent(inout) :: self
       !> Final path of the file; an older file of this name stays until `complete`
       character(len=*), intent(in) :: path
-      !> Origin of the result
       type(provenance_t), intent(in) :: provenance
       !> Communicator of the ranks that write it; absent: this rank writes alone
       class(communicator_t), intent(in), optional :: comm
@@ -217,7 +216,6 @@ contains
       character(len=:), allocatable, intent(out) :: revision
       !> Resolved settings of the run, one per line
       character(len=:), allocatable, intent(out) :: settings
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       call self%file%read('/provenance/revision', revision, error)

@@ -58,7 +58,6 @@ contains
       class(log_t), intent(inout) :: self
       !> Folder of the result, which must exist; empty: no log.txt
       character(len=*), intent(in) :: folder
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       !> Whether nothing is written on the screen; default: false
       logical, intent(in), optional :: quiet

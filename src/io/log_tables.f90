@@ -14,9 +14,7 @@ contains
 
    !> Write the header: program, machine, input and result folder.
    subroutine write_header(log, provenance, folder)
-      !> Log
       type(log_t), intent(inout) :: log
-      !> Origin of the result
       type(provenance_t), intent(in) :: provenance
       !> Folder of the result
       character(len=*), intent(in) :: folder
@@ -39,9 +37,7 @@ contains
 
    !> Write the time of each stage, per step and in total, and the speed of the run. Stages that never ran are omitted.
    subroutine write_timings(log, timers, seconds, steps, bodies)
-      !> Log
       type(log_t), intent(inout) :: log
-      !> Timers of the stages
       type(timers_t), intent(in) :: timers
       !> Elapsed time of the whole run [s]
       real(dp), intent(in) :: seconds
@@ -78,7 +74,6 @@ contains
    !> Write the distribution of the time of each stage over ranks. The time of stage `decomposition`
    !> includes waiting times.
    subroutine write_ranks(log, total)
-      !> Log
       type(log_t), intent(inout) :: log
       !> Total time, (stage, rank) [s]
       real(dp), intent(in) :: total(:, :)
@@ -102,7 +97,6 @@ contains
 
    !> Write one counter per line, and what it belongs to.
    subroutine write_counters(log, counters)
-      !> Log
       type(log_t), intent(inout) :: log
       !> Exact counts
       type(counters_t), intent(in) :: counters
@@ -119,7 +113,6 @@ contains
 
    !> Write the hash of the final state. It is the last line of a log.
    subroutine write_hash(log, state_hash)
-      !> Log
       type(log_t), intent(inout) :: log
       !> Hash of the final state, hexadecimal, as in the profile
       character(len=*), intent(in) :: state_hash

@@ -200,7 +200,6 @@ contains
       character(len=*), intent(in) :: folder
       !> Names of the files that the result owns from the start, blank-padded
       character(len=*), intent(in) :: names(:)
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: line
       integer :: k
@@ -324,7 +323,6 @@ contains
       class(manifest_t), intent(inout) :: self
       !> Final name of the file, with or without folder
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 
@@ -339,7 +337,6 @@ contains
       class(manifest_t), intent(inout) :: self
       !> Final name of the file, with or without folder
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       !> For a segment: number of frames, step of the first frame, step of the last frame
       integer(lp), intent(in), optional :: frames(3)
@@ -363,7 +360,6 @@ contains
       class(manifest_t), intent(inout) :: self
       !> Final name of the file, with or without folder
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       !> Whether the file with its final name stays; default: false
       logical, intent(in), optional :: stays
@@ -386,7 +382,6 @@ contains
       class(manifest_t), intent(inout) :: self
       !> Final name of the file, with or without folder
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 

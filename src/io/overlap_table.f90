@@ -20,9 +20,7 @@ contains
    subroutine write_overlap_table(path, bodies, contacts, thickness, limit, error, comm)
       !> Path of the file
       character(len=*), intent(in) :: path
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
-      !> Contacts
       type(contacts_t), intent(in) :: contacts
       !> Thickness of each body, (slot) [m]
       real(wp), intent(in) :: thickness(:)
@@ -30,7 +28,6 @@ contains
       real(wp), intent(in) :: limit
       !> Allocated on failure; the same on all ranks
       type(error_t), allocatable, intent(inout) :: error
-      !> Ranks that share the bodies
       class(communicator_t), intent(inout) :: comm
       type(line_writer_t) :: file
       type(global_order_t) :: rows

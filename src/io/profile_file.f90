@@ -20,19 +20,16 @@ contains
    subroutine write_profile(folder, timers, seconds, counters, provenance, state_hash, status, error, memory)
       !> Folder of the result
       character(len=*), intent(in) :: folder
-      !> Timers of the stages
       type(timers_t), intent(in) :: timers
       !> Elapsed time of the whole run [s]
       real(dp), intent(in) :: seconds
       !> Exact counts
       type(counters_t), intent(in) :: counters
-      !> Origin of the result
       type(provenance_t), intent(in) :: provenance
       !> Hash of the final state
       integer(lp), intent(in) :: state_hash
       !> 'finished', or the reason why the run stopped
       character(len=*), intent(in) :: status
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       !> Resident memory after the last step [KiB]; not written if absent
       integer(lp), intent(in), optional :: memory
@@ -55,7 +52,6 @@ contains
       character(len=:), allocatable, intent(out) :: status
       !> Hash of the final state, hexadecimal
       character(len=:), allocatable, intent(out) :: state_hash
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
 

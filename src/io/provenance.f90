@@ -85,7 +85,6 @@ contains
 
    !> Collect facts about build and machine, and store the input. Call it at the start of a run.
    subroutine collect_provenance(provenance, input_file, input_text, resolved_input, seed)
-      !> Origin of the result
       type(provenance_t), intent(out) :: provenance
       !> Path of the input file
       character(len=*), intent(in) :: input_file
@@ -143,9 +142,7 @@ contains
       type(hdf5_file_t), intent(inout) :: file
       !> What the file contains
       character(len=*), intent(in) :: content
-      !> Origin of the result
       type(provenance_t), intent(in) :: provenance
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       call file%write_attribute('/', 'content', content, error)

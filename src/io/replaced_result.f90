@@ -39,7 +39,6 @@ contains
 
    !> Reject the replacement of a result that contains an input file of the new run.
    subroutine check_inputs(manifest, folder, inputs, error)
-      !> Manifest of the result
       type(manifest_t), intent(in) :: manifest
       !> Folder of the result
       character(len=*), intent(in) :: folder
@@ -94,7 +93,6 @@ contains
       type(manifest_t), intent(inout) :: manifest
       !> Folder of the result
       character(len=*), intent(in) :: folder
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       if (.not. manifest%owns(replaced_name)) return
@@ -109,7 +107,6 @@ contains
       character(len=*), intent(in) :: folder
       !> Sentence for the log if the old result was moved back; otherwise unallocated
       character(len=:), allocatable, intent(out) :: note
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(manifest_t) :: manifest, former
       logical :: was_moved

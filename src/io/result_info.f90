@@ -26,7 +26,6 @@ contains
 
    !> Print version, compiler, compiler options and machine.
    subroutine describe_program(error)
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(provenance_t) :: provenance
       type(log_t) :: log

@@ -32,7 +32,6 @@ contains
    subroutine write_summary(folder, log, error)
       !> Result folder
       character(len=*), intent(in) :: folder
-      !> Log
       type(log_t), intent(inout) :: log
       !> Allocated if a file cannot be read
       type(error_t), allocatable, intent(inout) :: error

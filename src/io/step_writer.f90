@@ -69,7 +69,6 @@ contains
       character(len=*), intent(in) :: stage_names(:), phase_names(:), count_names(:)
       !> Origin of the file
       type(provenance_t), intent(in) :: provenance
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       self%path = path
@@ -94,7 +93,6 @@ contains
       class(step_writer_t), intent(inout) :: self
       !> Record of the step
       type(step_row_t), intent(in) :: row
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       self%n = self%n + 1_ip

@@ -52,7 +52,6 @@ contains
       real(wp), intent(in) :: dt
       !> Origin of the trace
       type(provenance_t), intent(in) :: provenance
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       self%path = path
@@ -83,7 +82,6 @@ contains
       integer(ip), intent(in) :: n_pairs
       !> Sum of the hashes of the pairs
       integer(lp), intent(in) :: hash
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       call self%file%write('/aabb', real(bounds, dp), error, 'm', 'xmin, ymin, xmax, ymax of each box', rows=one_row)

@@ -34,9 +34,7 @@ contains
    subroutine start_segment(file, provenance, error)
       !> New file
       type(hdf5_file_t), intent(inout) :: file
-      !> Origin of the result
       type(provenance_t), intent(in) :: provenance
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       call write_provenance(file, 'segment of a trajectory by polydem', provenance, error)
@@ -46,11 +44,8 @@ contains
    subroutine write_bodies(file, comm, bodies, error)
       !> Segment
       type(hdf5_file_t), intent(inout) :: file
-      !> Communicator
       class(communicator_t), intent(inout) :: comm
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(global_order_t) :: blocks
       type(part_t) :: part
@@ -126,15 +121,12 @@ contains
    subroutine add_frame(file, comm, step, time, bodies, error)
       !> Segment
       type(hdf5_file_t), intent(inout) :: file
-      !> Communicator
       class(communicator_t), intent(inout) :: comm
       !> Number of the step
       integer(lp), intent(in) :: step
       !> Simulated time [s]
       real(dp), intent(in) :: time
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(global_order_t) :: blocks
       type(part_t) :: part
@@ -168,7 +160,6 @@ contains
       type(hdf5_file_t), intent(inout) :: file
       !> Bodies; on the root rank with the total forces on the fixed bodies
       type(bodies_t), intent(in) :: bodies
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       real(dp), allocatable :: force(:, :), torque(:)
       integer(ip) :: s, w
@@ -192,15 +183,12 @@ contains
    subroutine add_contacts(file, comm, n_before, bodies, contacts, error)
       !> Segment
       type(hdf5_file_t), intent(inout) :: file
-      !> Communicator
       class(communicator_t), intent(inout) :: comm
       !> On entry the number of contacts in the earlier frames of this segment; on return including this frame
       integer(lp), intent(inout) :: n_before
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Contacts with their forces
       type(contacts_t), intent(in) :: contacts
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       type(global_order_t) :: blocks
       type(part_t) :: part
@@ -250,7 +238,6 @@ contains
       type(hdf5_file_t), intent(inout) :: file
       !> Entries of the energy balance of this frame, the same on all ranks
       type(named_values_t), intent(in) :: row
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 

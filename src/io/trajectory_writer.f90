@@ -66,9 +66,7 @@ contains
       character(len=*), intent(in) :: folder
       !> Maximum number of frames per segment, at least 1
       integer(ip), intent(in) :: frames_per_segment
-      !> Origin of the result
       type(provenance_t), intent(in) :: provenance
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       !> Number of the last existing segment; default: 0
       integer(ip), intent(in), optional :: last_number
@@ -101,7 +99,6 @@ contains
       real(wp), intent(in) :: time
       !> Bodies with their forces; on the root rank with the total forces on the fixed bodies
       type(bodies_t), intent(in) :: bodies
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       !> Contacts with their forces
       type(contacts_t), intent(in), optional :: contacts
@@ -154,7 +151,6 @@ contains
    !> Flush the open segment to disk, if there is one. Called by the root rank only.
    subroutine flush_to_disk(self, error)
       class(trajectory_writer_t), intent(in) :: self
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       if (self%is_open) call sync_file(segment_path(self%folder, self%number)//open_suffix, error)
@@ -163,7 +159,6 @@ contains
    !> Close the open segment, if there is one, even if it is not full.
    subroutine close_trajectory(self, error, manifest)
       class(trajectory_writer_t), intent(inout) :: self
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       !> Manifest of the result, as for `write_frame`
       type(manifest_t), intent(inout), optional :: manifest

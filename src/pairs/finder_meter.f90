@@ -24,7 +24,6 @@ contains
    !> Read the seconds since the last reading, but no counts.
    pure subroutine read_seconds(self, finder, phase)
       class(finder_meter_t), intent(inout) :: self
-      !> Finder
       class(finder_t), intent(in) :: finder
       !> Seconds of each phase since the last reading, (phases)
       real(dp), intent(out) :: phase(:)

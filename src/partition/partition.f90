@@ -22,7 +22,6 @@ module polydem_partition
       subroutine divide(self, comm, position, weight)
          import :: dp, partition_t, communicator_t, wp
          class(partition_t), intent(inout) :: self
-         !> Ranks
          class(communicator_t), intent(inout) :: comm
          !> Positions of the bodies of this rank, possibly none, (2, body) [m]
          real(wp), intent(in) :: position(:, :)

@@ -41,7 +41,6 @@ contains
    !> Exchange the bounding rectangles of all ranks. Collective.
    subroutine publish(self, comm, boxes)
       class(rank_bounds_t), intent(inout) :: self
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> xmin, ymin, xmax, ymax of the padded boxes of the bodies that this rank owns; the padding is the distance that
       !> they may move before the next call, (4, body) [m]

@@ -27,7 +27,6 @@ contains
    !> Find the greatest keys below each cut. The body at the cut goes to the side that brings the weights closer to the
    !> given ones; the error is at most half the weight of a body. Collective.
    subroutine split_groups(comm, keys, weight, group, lower, all_parts, cut)
-      !> Ranks
       class(communicator_t), intent(inout) :: comm
       !> Keys of the bodies of this rank, (2, body)
       integer(lp), intent(in) :: keys(:, :)

@@ -23,7 +23,6 @@ contains
    !> Build the scene and print the resolved settings, the models in use, sizes, masses, speeds, time step, memory and
    !> the warnings of a run at its start. A condition that stops a run at its first step is an error here, too.
    subroutine check_simulation(settings, error, oversubscription)
-      !> Checked settings
       type(settings_t), intent(in) :: settings
       !> Allocated for bad input, or if a run stops at its first step
       type(error_t), allocatable, intent(inout) :: error

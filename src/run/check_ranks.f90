@@ -15,7 +15,6 @@ contains
    subroutine check_ranks(settings, comm, error)
       !> Settings of a run
       type(settings_t), intent(in) :: settings
-      !> Communicator of the run
       class(communicator_t), intent(in) :: comm
       !> Names the entry; the same on all ranks
       type(error_t), allocatable, intent(inout) :: error

@@ -46,9 +46,7 @@ contains
       !> Written: the simulation at the end of a step. Restored: on entry any state of the same scene, on return the
       !> stored state without contacts, which the next step computes
       type(simulation_t), intent(inout) :: simulation
-      !> Attempts of the run
       type(attempts_t), intent(inout) :: attempts
-      !> Monitor
       type(monitor_t), intent(inout) :: monitor
 
       call serialize_global(serializer, simulation, attempts, monitor)
@@ -72,11 +70,8 @@ contains
    subroutine serialize_global(serializer, simulation, attempts, monitor)
       !> Serializer; its `error` holds a failure
       class(serializer_t), intent(inout) :: serializer
-      !> The simulation
       type(simulation_t), intent(inout) :: simulation
-      !> Attempts of the run
       type(attempts_t), intent(inout) :: attempts
-      !> Monitor
       type(monitor_t), intent(inout) :: monitor
 
       call serialize_progress(serializer, simulation%step, attempts)
@@ -103,7 +98,6 @@ contains
       class(serializer_t), intent(inout) :: serializer
       !> Number of completed steps
       integer(lp), intent(inout) :: step
-      !> Attempts of the run
       type(attempts_t), intent(inout) :: attempts
       real(dp) :: seconds(1)
 

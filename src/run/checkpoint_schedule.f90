@@ -114,15 +114,11 @@ contains
       class(checkpoints_t), intent(inout) :: self
       !> Result folder
       character(len=*), intent(in) :: folder
-      !> Provenance of the result
       type(provenance_t), intent(in) :: provenance
-      !> Communicator of the run
       class(communicator_t), intent(inout) :: comm
       !> The simulation at the end of a step
       type(simulation_t), intent(inout) :: simulation
-      !> Attempts of the run
       type(attempts_t), intent(inout) :: attempts
-      !> Monitor
       type(monitor_t), intent(inout) :: monitor
       !> Allocated if the checkpoint cannot be written; the last two are then unchanged
       type(error_t), allocatable, intent(inout) :: error
@@ -175,7 +171,6 @@ contains
    !> End the schedule, and write the number and times of the checkpoints to the log.
    subroutine close_checkpoints(self, log)
       class(checkpoints_t), intent(inout) :: self
-      !> Log
       type(log_t), intent(inout) :: log
 
       call release_signals()

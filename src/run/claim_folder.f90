@@ -20,7 +20,6 @@ contains
 
    !> Begin the manifest of a run, or continue that of earlier attempts. A result to be replaced is moved aside.
    subroutine claim_folder(settings, has_deep_contacts, folder, force, is_restart, manifest, error)
-      !> Settings of the run
       type(settings_t), intent(in) :: settings
       !> Whether the run writes a table of deep contacts
       logical, intent(in) :: has_deep_contacts

@@ -21,7 +21,6 @@ contains
       type(simulation_t), intent(in) :: simulation
       !> Its measures
       type(scene_measures_t), intent(in) :: measures
-      !> Log
       type(log_t), intent(inout) :: log
 
       associate (s => simulation)
@@ -103,7 +102,6 @@ contains
       type(scene_measures_t), intent(in) :: measures
       !> Folder for the table of deep contacts; empty: no table
       character(len=*), intent(in) :: folder
-      !> Log
       type(log_t), intent(inout) :: log
       !> Allocated if the table cannot be written
       type(error_t), allocatable, intent(inout) :: error

@@ -13,9 +13,7 @@ contains
 
    !> Write the work of each channel and the residuals of the energy and momentum balance; collective.
    subroutine write_energy_report(simulation, log)
-      !> The simulation
       type(simulation_t), intent(inout) :: simulation
-      !> Log
       type(log_t), intent(inout) :: log
       type(balance_t) :: balance
 

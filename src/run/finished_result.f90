@@ -37,7 +37,6 @@ contains
    !> Check on the root rank whether the folder holds the finished result of this run. No file changes. Collective; all
    !> ranks get the same error.
    subroutine find_finished_result(settings, run, last_state, error)
-      !> Settings of the run
       type(settings_t), intent(in) :: settings
       !> The run; its manifest is read, and its simulation built if needed
       type(run_t), intent(inout) :: run
@@ -56,7 +55,6 @@ contains
 
    !> Whether the root rank found a finished result, which it then reports; collective.
    logical function is_finished(run, last_state)
-      !> The run
       type(run_t), intent(inout) :: run
       !> Hash of the last state; allocated on the root rank if the result is finished
       character(len=:), allocatable, intent(in) :: last_state

@@ -43,7 +43,6 @@ contains
       type(simulation_t), intent(in) :: simulation
       !> Its measures
       type(scene_measures_t), intent(in) :: measures
-      !> Log
       type(log_t), intent(inout) :: log
       !> Number of warnings
       integer(lp), intent(out) :: n
@@ -159,7 +158,6 @@ contains
    !> Write a warning and count it.
    subroutine warn(self, log, text)
       class(warning_writer_t), intent(inout) :: self
-      !> Log
       type(log_t), intent(inout) :: log
       !> Text of the warning
       character(len=*), intent(in) :: text

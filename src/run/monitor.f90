@@ -46,7 +46,6 @@ contains
 
    !> Prepare the guards that are switched on. Collective.
    subroutine new_monitor(monitor, simulation)
-      !> The monitor
       type(monitor_t), intent(out) :: monitor
       !> A simulation at time 0
       type(simulation_t), intent(inout) :: simulation
@@ -58,9 +57,7 @@ contains
 
    !> Serialize the findings of the guards.
    subroutine serialize_monitor(monitor, serializer)
-      !> The monitor
       type(monitor_t), intent(inout) :: monitor
-      !> Serializer
       class(serializer_t), intent(inout) :: serializer
 
       call serializer%field('/run/deep_steps', monitor%overlap%count, '1', 'steps with a contact that was too deep')
@@ -75,13 +72,11 @@ contains
 
    !> Check a step with the guards, and write new warnings. Collective; all ranks get the error.
    subroutine check_step(monitor, simulation, is_last, log, error)
-      !> The monitor
       type(monitor_t), intent(inout) :: monitor
       !> The simulation at the end of a step
       type(simulation_t), intent(inout) :: simulation
       !> Whether to run all guards regardless of the interval between checks
       logical, intent(in) :: is_last
-      !> Log
       type(log_t), intent(inout) :: log
       !> Allocated if the run must stop; names body, position and step
       type(error_t), allocatable, intent(inout) :: error
@@ -108,7 +103,6 @@ contains
 
    !> Whether the monitor needs the table of contacts of a step
    pure logical function checks_contacts(simulation, step, is_last)
-      !> The simulation
       type(simulation_t), intent(in) :: simulation
       !> The step
       integer(lp), intent(in) :: step
@@ -120,11 +114,8 @@ contains
 
    !> Write the pending warnings of all ranks, and all-reduce their counts; collective.
    subroutine report_pending_warnings(monitor, simulation, log)
-      !> The monitor
       type(monitor_t), intent(inout) :: monitor
-      !> The simulation
       type(simulation_t), intent(inout) :: simulation
-      !> Log
       type(log_t), intent(inout) :: log
       integer(lp) :: counts(3)
 
@@ -161,9 +152,7 @@ contains
    !> Number of steps with a warning, for the guards that run on each rank independently: displacement, overlap,
    !> passing. Once per step the counts become the greatest of all ranks, so a step counts once however many ranks warn.
    pure function warning_counts(monitor, simulation) result(counts)
-      !> The monitor
       type(monitor_t), intent(in) :: monitor
-      !> The simulation
       type(simulation_t), intent(in) :: simulation
       integer(lp) :: counts(3)
 
@@ -172,9 +161,7 @@ contains
 
    !> Set the counts to the greatest of all ranks.
    pure subroutine set_warning_counts(monitor, simulation, counts)
-      !> The monitor
       type(monitor_t), intent(inout) :: monitor
-      !> The simulation
       type(simulation_t), intent(inout) :: simulation
       !> Counts in the order of `warning_counts`, (3)
       integer(lp), intent(in) :: counts(:)
@@ -186,11 +173,9 @@ contains
 
    !> Write the greatest dt / stable dt and the number of warnings of each guard.
    subroutine write_warning_counts(monitor, simulation, log)
-      !> The monitor
       type(monitor_t), intent(in) :: monitor
       !> The simulation at the end of the run
       type(simulation_t), intent(in) :: simulation
-      !> Log
       type(log_t), intent(inout) :: log
 
       if (monitor%greatest_share > 0.0_wp) call log%write_line( &

@@ -30,11 +30,9 @@ contains
    !> Build the scene, lock the folder, and find out whether its result is finished already. Collective; all ranks get
    !> the same error.
    subroutine build_and_lock(settings, force, run, last_state, error)
-      !> Checked settings
       type(settings_t), intent(in) :: settings
       !> Whether to replace an existing result
       logical, intent(in) :: force
-      !> The run
       type(run_t), intent(inout) :: run
       !> Hash of the last state; allocated on the root rank if the run is finished
       character(len=:), allocatable, intent(inout) :: last_state
@@ -72,7 +70,6 @@ contains
    !> Open the log, describe the run, and restore the state of earlier attempts, in a folder that this run has locked.
    !> Collective; all ranks get the same error.
    subroutine prepare(settings, force, run, error)
-      !> Checked settings
       type(settings_t), intent(in) :: settings
       !> Whether to replace an existing result
       logical, intent(in) :: force

@@ -53,13 +53,11 @@ contains
       type(simulation_t), intent(inout) :: simulation
       !> Result folder
       character(len=*), intent(in) :: folder
-      !> Provenance of the result
       type(provenance_t), intent(in) :: provenance
       !> Log, for warnings
       type(log_t), intent(inout) :: log
       !> Manifest, which already lists the files to be written
       type(manifest_t), intent(inout) :: manifest
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       associate (output => simulation%settings%output, boxes => simulation%boxes)
@@ -113,9 +111,7 @@ contains
       class(recorder_t), intent(inout) :: self
       !> Simulation; its finder can update statistics of its state
       type(simulation_t), intent(inout) :: simulation
-      !> Manifest of the result
       type(manifest_t), intent(inout) :: manifest
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       call record_boxes(self, simulation, manifest, error)
@@ -134,11 +130,8 @@ contains
    !> Close the recordings. A warning reports a trace with fewer steps than requested.
    subroutine close_recorder(self, log, manifest, error)
       class(recorder_t), intent(inout) :: self
-      !> Log
       type(log_t), intent(inout) :: log
-      !> Manifest of the result
       type(manifest_t), intent(inout) :: manifest
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       logical :: was_open(2)
 

@@ -13,7 +13,6 @@ contains
 
    !> Remove the replaced result after the first frame of this run; collective.
    subroutine remove_replaced(run, error)
-      !> The run
       type(run_t), intent(inout) :: run
       !> Allocated on all ranks if it cannot be removed
       type(error_t), allocatable, intent(inout) :: error

@@ -57,7 +57,6 @@ contains
    subroutine find_finished(folder, settings, scene, manifest, last_state, error)
       !> Result folder
       character(len=*), intent(in) :: folder
-      !> Settings of the run
       type(settings_t), intent(in) :: settings
       !> Hash of the initial bodies, as in the provenance of results
       character(len=*), intent(in) :: scene
@@ -86,7 +85,6 @@ contains
       character(len=*), intent(in) :: folder
       !> Valid manifest of the folder
       type(manifest_t), intent(in) :: manifest
-      !> Settings of the run
       type(settings_t), intent(in) :: settings
       !> Hash of the initial bodies, as in the provenance of results
       character(len=*), intent(in) :: scene
@@ -265,7 +263,6 @@ contains
       type(manifest_t), intent(inout) :: manifest
       !> State of the folder after earlier attempts
       type(earlier_attempts_t), intent(in) :: earlier
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: number
       integer :: k
@@ -287,7 +284,6 @@ contains
 
    !> Serialize what all ranks must know of the earlier attempts.
    subroutine serialize_earlier(serializer, earlier)
-      !> Serializer
       class(serializer_t), intent(inout) :: serializer
       !> State of the folder after earlier attempts
       type(earlier_attempts_t), intent(inout) :: earlier
@@ -315,7 +311,6 @@ contains
       type(attempts_t), intent(inout) :: attempts
       !> Monitor at time 0
       type(monitor_t), intent(inout) :: monitor
-      !> Log
       type(log_t), intent(inout) :: log
       !> Allocated if the checkpoint does not fit this run
       type(error_t), allocatable, intent(inout) :: error

@@ -92,7 +92,6 @@ contains
 
    !> Result folder: the one in the settings, or results/<name of the input without path and suffix>
    pure function result_folder(settings) result(folder)
-      !> Settings of the run
       type(settings_t), intent(in) :: settings
       character(len=:), allocatable :: folder
 

@@ -31,7 +31,6 @@ contains
 
    !> Check the guards, and write a frame and a line of the log if they are due; collective.
    subroutine end_step(run, error)
-      !> The run
       type(run_t), intent(inout) :: run
       !> Allocated if the run must stop; the same on all ranks
       type(error_t), allocatable, intent(inout) :: error
@@ -60,7 +59,6 @@ contains
 
    !> Choose whether the next step keeps the table of contacts: for output, or for the monitor.
    subroutine choose_tables(run)
-      !> The run
       type(run_t), intent(inout) :: run
 
       associate (s => run%simulation)
@@ -134,7 +132,6 @@ contains
    !> End a run, also after a failure: close the trajectory, write the profile and the summary of the log; collective.
    !> Nothing is written if another run has taken over the folder.
    subroutine finish(run, seconds, error)
-      !> The run
       type(run_t), intent(inout) :: run
       !> Elapsed time of all attempts [s]
       real(dp), intent(in) :: seconds
@@ -208,7 +205,6 @@ contains
 
    !> Number of frames of a complete run
    pure integer(lp) function count_frames(simulation)
-      !> The simulation
       type(simulation_t), intent(in) :: simulation
       real(dp) :: interval
 

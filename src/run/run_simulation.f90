@@ -27,7 +27,6 @@ contains
 
    !> Run a simulation, and write trajectory, profile and log to its result folder; collective.
    subroutine run_simulation(settings, force, error, attempt, comm)
-      !> Checked settings
       type(settings_t), intent(in) :: settings
       !> Whether to replace an existing result (--force)
       logical, intent(in) :: force

@@ -25,7 +25,6 @@ contains
 
    !> Build the scene and the simulation that the settings define. Collective; all ranks get the same error.
    subroutine new_simulation(settings, self, error, comm)
-      !> Checked settings
       type(settings_t), intent(in) :: settings
       !> The simulation, ready to advance
       type(simulation_t), intent(out) :: self
@@ -47,7 +46,6 @@ contains
    !> Build the simulation at time 0, measure it and hash its scene, unless an earlier call did. Collective; all ranks
    !> get the same error.
    subroutine build_start(settings, run, error)
-      !> Settings of the run
       type(settings_t), intent(in) :: settings
       !> The run; `simulation`, `measures` and the scene hashes are set
       type(run_t), intent(inout) :: run
@@ -87,7 +85,6 @@ contains
 
    !> Open the output files that the ranks share; collective.
    subroutine open_output(settings, run, error)
-      !> Settings of the run
       type(settings_t), intent(in) :: settings
       !> The run, prepared
       type(run_t), intent(inout) :: run

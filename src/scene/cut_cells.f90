@@ -34,7 +34,6 @@ contains
       real(wp), intent(in) :: inside(2, 4)
       !> Smallest allowed sides of the cells, (cell) [m]
       real(wp), intent(in) :: least(:)
-      !> Stream of random numbers
       type(random_t), intent(inout) :: random
       !> Centres of the cells, (2, cell) [m]
       real(wp), intent(out) :: centres(:, :)
@@ -66,7 +65,6 @@ contains
       real(wp), intent(in) :: inside(2, 4)
       !> Sides of the cells in descending order, (cell) [m]
       real(wp), intent(in) :: sides(:)
-      !> Stream of random numbers
       type(random_t), intent(inout) :: random
       !> Centres of the cells, (2, cell) [m]
       real(wp), intent(out) :: centres(:, :)

@@ -65,9 +65,7 @@ contains
       type(body_list_t), intent(inout) :: list
       !> Settings: speed, spin, moving_grains
       type(scene_settings_t), intent(in) :: scene
-      !> Stream of random numbers
       type(random_t), intent(inout) :: random
-      !> Grains
       type(grains_t), intent(in) :: grains
       !> Centres of the grains, (2, grain) [m]
       real(wp), intent(in) :: centres(:, :)

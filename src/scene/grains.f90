@@ -88,7 +88,6 @@ contains
    subroutine draw_grains(scene, random, n, grains, sizes)
       !> Numbers of corners and axes of the ellipses
       type(scene_settings_t), intent(in) :: scene
-      !> Stream of random numbers
       type(random_t), intent(inout) :: random
       !> Number of grains
       integer(ip), intent(in) :: n
@@ -143,7 +142,6 @@ contains
       type(body_list_t), intent(inout) :: list
       !> Order and density
       type(scene_settings_t), intent(in) :: scene
-      !> Grains
       type(grains_t), intent(in) :: grains
       !> Position of the origin of the corners of each grain, (2, grain) [m]
       real(wp), intent(in) :: centres(:, :)

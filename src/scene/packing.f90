@@ -34,7 +34,6 @@ contains
       type(scene_settings_t), intent(in) :: scene
       !> Corners of the container, convex, anticlockwise, (2, corner) [m]
       real(wp), intent(in) :: corners(:, :)
-      !> Grains
       type(grains_t), intent(out) :: grains
       !> Centres of the grains, (2, grain) [m]; their number is given
       real(wp), intent(out) :: centres(:, :)

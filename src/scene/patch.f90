@@ -37,7 +37,6 @@ contains
    subroutine read_patch(path, patch, error)
       !> Result folder, segment of a trajectory, or bodies file
       character(len=*), intent(in) :: path
-      !> Patch
       type(patch_t), intent(out) :: patch
       !> Allocated if the packing cannot be read or is too small
       type(error_t), allocatable, intent(inout) :: error
@@ -52,7 +51,6 @@ contains
    subroutine cut_patch(bodies, patch, error)
       !> Bodies of the packing; their corners must be rotated to their angles
       type(bodies_t), intent(in) :: bodies
-      !> Patch
       type(patch_t), intent(out) :: patch
       !> Allocated if the packing is too small
       type(error_t), allocatable, intent(inout) :: error

@@ -105,7 +105,6 @@ contains
 
    !> Displace points at random. The distance of two points decreases by less than `play`.
    subroutine displace_randomly(random, play, centres)
-      !> Stream of random numbers
       type(random_t), intent(inout) :: random
       !> Gap between neighbours [m]
       real(wp), intent(in) :: play

@@ -10,7 +10,6 @@ contains
 
    !> Draw velocities from a normal distribution.
    subroutine draw_velocities(random, speed, velocities)
-      !> Stream of random numbers
       type(random_t), intent(inout) :: random
       !> Expected root mean square speed [m/s]
       real(wp), intent(in) :: speed
@@ -26,7 +25,6 @@ contains
 
    !> Draw angular velocities from a normal distribution and scale them to a given root mean square.
    subroutine draw_spins(random, spin, spins)
-      !> Stream of random numbers
       type(random_t), intent(inout) :: random
       !> Root mean square of the angular velocities [rad/s]
       real(wp), intent(in) :: spin

@@ -167,7 +167,6 @@ contains
 
    !> Order of a body among all bodies of the run, or of a pair among all pairs; huge if unknown
    pure integer(lp) function place_of(bodies, first, second)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Slot of the body, or of the first body of the pair
       integer(ip), intent(in) :: first
@@ -234,7 +233,6 @@ contains
    pure subroutine greatest_displacement(guard, bodies, dt, move, slot)
       !> The guard
       type(motion_guard_t), intent(in) :: guard
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Time step [s]
       real(wp), intent(in) :: dt
@@ -266,9 +264,7 @@ contains
 
    !> Compare the time step with the stable time step of the contacts: warning above one half of it, error above it.
    subroutine check_step(bodies, contacts, step, dt, stable, critical, warning, error)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
-      !> Contacts
       type(contacts_t), intent(in) :: contacts
       !> Number of the step
       integer(lp), intent(in) :: step
@@ -302,9 +298,7 @@ contains
    subroutine check_contacts(degenerate, bodies, contacts, step, error)
       !> Entry `degenerate` of &overlap: 'push' or 'stop'
       character(len=*), intent(in) :: degenerate
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
-      !> Contacts
       type(contacts_t), intent(in) :: contacts
       !> Number of the step
       integer(lp), intent(in) :: step

@@ -156,7 +156,6 @@ contains
 
    !> Whether the centre of a body is inside another body
    pure logical function centre_inside(bodies, radius, s, other)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Greatest distance of a vertex from the centre of each body, (slot) [m]
       real(wp), intent(in) :: radius(:)

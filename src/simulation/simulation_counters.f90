@@ -74,7 +74,6 @@ contains
 
    !> Count the contacts of all ranks. Collective.
    subroutine count_contacts(simulation, n)
-      !> The simulation
       type(simulation_t), intent(inout) :: simulation
       !> Number of contacts
       integer(ip), intent(out) :: n

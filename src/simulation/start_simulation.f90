@@ -55,7 +55,6 @@ contains
    subroutine start_with_bodies(settings, comm, self, error)
       !> Checked settings; the group &scene is not used
       type(settings_t), intent(in) :: settings
-      !> Ranks that share the bodies
       class(communicator_t), intent(in) :: comm
       !> On entry with bodies and motions, on return ready to advance
       type(simulation_t), intent(inout) :: self

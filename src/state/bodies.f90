@@ -197,7 +197,6 @@ contains
 
    !> Contribution of a body to the hash of the state
    pure function state_words(bodies, s) result(words)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Slot of the body
       integer(ip), intent(in) :: s

@@ -13,7 +13,6 @@ contains
    subroutine serialize_bodies(serializer, bodies)
       !> Serializer, which reads or writes columns over /bodies
       class(serializer_t), intent(inout) :: serializer
-      !> Bodies
       type(bodies_t), intent(inout) :: bodies
 
       call serializer%match('/bodies/id', int(bodies%id, lp), '1', 'identifiers of the bodies, ascending')

@@ -11,7 +11,6 @@ contains
 
    !> Thickness and radius of one body.
    pure subroutine measure_body(bodies, s, thickness, radius)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Slot
       integer(ip), intent(in) :: s
@@ -38,7 +37,6 @@ contains
 
    !> Thickness of every body [m], (slot)
    pure function thickness_of_bodies(bodies) result(thickness)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       real(wp), allocatable :: thickness(:)
       real(wp) :: radius

@@ -68,7 +68,6 @@ contains
 
    !> Copy velocities and masses of the bodies to the contacts of a block.
    pure subroutine copy_motion(bodies, block)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Contacts; `velocity_first` to `mobility` are set
       type(contact_block_t), intent(inout) :: block
@@ -91,7 +90,6 @@ contains
    pure subroutine load_block(bodies, contacts, low, high, block)
       !> Bodies with their radii
       type(bodies_t), intent(in) :: bodies
-      !> Table of contacts
       type(contacts_t), intent(in) :: contacts
       !> First and last contact, at most `block_size` contacts. They are copied in descending order
       integer(ip), intent(in) :: low, high
@@ -167,7 +165,6 @@ contains
       type(contact_block_t), intent(in) :: block
       !> Index in the block
       integer(ip), intent(in) :: b
-      !> Table of contacts
       type(contacts_t), intent(inout) :: contacts
       !> Index in the table
       integer(ip), intent(in) :: c

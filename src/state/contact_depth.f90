@@ -15,7 +15,6 @@ contains
 
    !> Depth of a contact as a share of the thinner body
    pure real(wp) function depth_share(contacts, thickness, c)
-      !> Contacts
       type(contacts_t), intent(in) :: contacts
       !> Thickness of each body, (slot) [m]
       real(wp), intent(in) :: thickness(:)
@@ -28,7 +27,6 @@ contains
 
    !> The contact with the greatest share, 0 if there are no contacts
    pure integer(ip) function deepest_contact(contacts, thickness)
-      !> Contacts
       type(contacts_t), intent(in) :: contacts
       !> Thickness of each body, (slot) [m]
       real(wp), intent(in) :: thickness(:)
@@ -48,7 +46,6 @@ contains
 
    !> Whether any contact is deeper than a share of the thinner body
    logical function any_deeper(contacts, thickness, limit)
-      !> Contacts
       type(contacts_t), intent(in) :: contacts
       !> Thickness of each body, (slot) [m]
       real(wp), intent(in) :: thickness(:)
@@ -70,7 +67,6 @@ contains
 
    !> Number of contacts deeper than a share of the thinner body
    pure integer(ip) function count_deeper(contacts, thickness, limit)
-      !> Contacts
       type(contacts_t), intent(in) :: contacts
       !> Thickness of each body, (slot) [m]
       real(wp), intent(in) :: thickness(:)
@@ -86,9 +82,7 @@ contains
 
    !> Clause for a message: bodies, position and depth of a contact
    function depth_text(bodies, contacts, thickness, c) result(text)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
-      !> Contacts
       type(contacts_t), intent(in) :: contacts
       !> Thickness of each body, (slot) [m]
       real(wp), intent(in) :: thickness(:)

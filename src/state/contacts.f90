@@ -69,7 +69,6 @@ contains
 
    !> Whether a contact is degenerate: its `normal` vanishes, and its `length` is the square root of the area.
    pure logical function is_degenerate(contacts, c)
-      !> Table of contacts
       type(contacts_t), intent(in) :: contacts
       !> Index of the contact
       integer(ip), intent(in) :: c
@@ -79,7 +78,6 @@ contains
 
    !> Make room for at least `capacity` contacts. If the arrays grow, their contents are lost, and all values are zero.
    subroutine reserve_contacts(contacts, capacity)
-      !> Table of contacts
       type(contacts_t), intent(inout) :: contacts
       !> Number of contacts to make room for
       integer(ip), intent(in) :: capacity
@@ -106,7 +104,6 @@ contains
 
    !> Make room for at least `capacity` contacts without losing contacts 1..n.
    subroutine grow_contacts(contacts, capacity)
-      !> Table of contacts
       type(contacts_t), intent(inout) :: contacts
       !> Number of contacts to make room for
       integer(ip), intent(in) :: capacity
@@ -162,7 +159,6 @@ contains
 
    !> Set the force of a contact from its normal and tangential force.
    pure subroutine set_force_of_contact(contacts, c)
-      !> Table of contacts
       type(contacts_t), intent(inout) :: contacts
       !> Index of the contact
       integer(ip), intent(in) :: c

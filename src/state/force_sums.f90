@@ -269,7 +269,6 @@ contains
 
    !> Select the contacts with fixed bodies from a table.
    subroutine select_walls(bodies, contacts, walls)
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> All contacts
       type(contacts_t), intent(in) :: contacts

@@ -30,7 +30,6 @@ contains
    subroutine append_checksum(path, error)
       !> Path of the file; its first `checksum_length` bytes are reserved for the checksum
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       character(len=256) :: reason
       character(len=:), allocatable :: problem

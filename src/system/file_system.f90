@@ -120,7 +120,6 @@ contains
       character(len=*), intent(in) :: from
       !> New path, on the same file system
       character(len=*), intent(in) :: to
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       if (c_rename(from//c_null_char, to//c_null_char) == 0_c_int) return
@@ -131,7 +130,6 @@ contains
    subroutine remove_file(path, error)
       !> Path of the file
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
 
       if (c_unlink(path//c_null_char) == 0_c_int) return
@@ -183,7 +181,6 @@ contains
       character(len=*), intent(in) :: path
       !> The text
       character(len=*), intent(in) :: text
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: reason
       integer(c_int) :: descriptor
@@ -207,7 +204,6 @@ contains
    subroutine sync_file(path, error)
       !> Path of the file or folder
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       integer(c_int) :: descriptor, status
       character(len=:), allocatable :: reason

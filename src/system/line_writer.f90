@@ -50,7 +50,6 @@ contains
       class(line_writer_t), intent(inout) :: self
       !> Path of the file
       character(len=*), intent(in) :: path
-      !> Allocated on failure
       type(error_t), allocatable, intent(inout) :: error
       !> Whether to append to an existing file; false if absent
       logical, intent(in), optional :: appended

@@ -62,6 +62,9 @@ def is_pointer(statement):
     return statement.is_declaration and statement.scopes and re.search(r",\s*pointer\b", statement.attributes)
 
 
+#: Arguments that are named by a shorter form of the name of their type
+SHORT_NAMES = {"communicator": "comm"}
+
 #: Stages that have the name of a namelist group, not that of the room that does the work
 STAGES_OF_ROOMS = {"output": "io"}
 #: Table of namelist entries, which names the groups
@@ -160,8 +163,15 @@ def undocumented(source, scope, wanted):
         names = [name for name in statement.names if wanted is None or name in wanted]
         hidden = wanted is None and re.search(r",\s*private\b", statement.attributes)
         hidden = hidden or any(inner.code == "private" for inner in source.inside(scope) if wanted is None)
-        if names and names != ["self"] and not hidden and not source.has_comment_above(statement):
+        explained = names == ["self"] or (wanted is not None and is_named_as_its_type(statement))
+        if names and not explained and not hidden and not source.has_comment_above(statement):
             yield statement.line, f"no comment !> above {', '.join(names)}"
+
+
+def is_named_as_its_type(statement):
+    """Whether an argument has the name of its derived type, which explains it: `bodies` of bodies_t."""
+    match = re.match(r"(?:type|class)\s*\(\s*(\w+)_t\s*\)", statement.code)
+    return bool(match) and statement.names == [SHORT_NAMES.get(match.group(1), match.group(1))]
 
 
 def arguments_of(code):

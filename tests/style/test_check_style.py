@@ -101,6 +101,8 @@ BAD = [
     ("1.0_wp", "1.0d0", 14, "the real number 1.0d0 has no kind"),
     ("   !> Make it longer.\n", "\n", 28, "no comment !> above grow"),
     ("      !> How much [m]\n", "\n", 31, "no comment !> above by"),
+    ("      !> How much [m]\n      real(wp)", "      type(length_t)", 30, "no comment !> above by"),
+    ("      !> How much [m]\n      real(wp)", "      class(communicator_t)", 30, "no comment !> above by"),
     ("      self%length = self%length + by\n", "      stop 1\n", 33, "only the program"),
     ("      self%length = self%length + by\n", "      if (by > 0) error stop 'no'\n", 33, "only the program"),
     ("      self%length = self%length + by\n", "      if (by > 0) call abort()\n", 33, "only the program"),
@@ -128,6 +130,15 @@ def found_in(text, room="state"):
 
 
 class Rules(unittest.TestCase):
+    def test_an_argument_named_as_its_type_needs_no_comment(self):
+        for declaration in ("type(by_t), intent(in) :: by", "class( by_t ), intent(in) :: by",
+                            "type(by_t), allocatable, intent(inout) :: by", "type(by_t), intent(in) :: by(:)"):
+            text = GOOD.replace("      !> How much [m]\n      real(wp), intent(in) :: by\n", f"      {declaration}\n")
+            self.assertNotEqual(text, GOOD)
+            self.assertEqual(found_in(text), [])
+        text = GOOD.replace("by", "comm").replace("      !> How much [m]\n      real(wp)", "      class(communicator_t)")
+        self.assertEqual(found_in(text), [])
+
     def test_a_good_file_passes(self):
         self.assertEqual(found_in(GOOD), [])
 

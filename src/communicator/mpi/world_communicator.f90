@@ -16,7 +16,6 @@ contains
 
    !> Start MPI and create the communicator of all ranks.
    subroutine create_world(comm, error)
-      !> The communicator
       class(communicator_t), allocatable, intent(out) :: comm
       !> Unchanged: MPI itself ends the program if it cannot start
       type(error_t), allocatable, intent(inout) :: error

@@ -16,7 +16,6 @@ contains
 
    !> Create the communicator of one process.
    subroutine create_world(comm, error)
-      !> The communicator
       class(communicator_t), allocatable, intent(out) :: comm
       !> Allocated if several processes were started: they could not communicate
       type(error_t), allocatable, intent(inout) :: error
