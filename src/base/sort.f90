@@ -3,9 +3,29 @@ module polydem_sort
    use polydem_kinds, only: ip, lp
    implicit none
    private
-   public :: sort_keys
+   public :: sort_keys, place_in
 
 contains
+
+   !> Index of the first entry of an ascending list that is not less than a number; size + 1 if there is none
+   pure integer(ip) function place_in(list, wanted)
+      !> Ascending numbers
+      integer(ip), intent(in) :: list(:)
+      !> The number
+      integer(ip), intent(in) :: wanted
+      integer(ip) :: high, middle
+
+      place_in = 1_ip
+      high = size(list, kind=ip) + 1_ip
+      do while (place_in < high)
+         middle = place_in + (high - place_in)/2_ip
+         if (list(middle) < wanted) then
+            place_in = middle + 1_ip
+         else
+            high = middle
+         end if
+      end do
+   end function place_in
 
    !> Sort keys in ascending order, and permute one integer per key in the same way.
    pure subroutine sort_keys(n, keys, carried, spare_keys, spare_carried)

@@ -31,7 +31,6 @@ contains
 
    !> Take the missing samples of a bench, and print its results.
    subroutine run_bench(settings, error)
-      !> Settings of the bench
       type(bench_settings_t), intent(in) :: settings
       !> Allocated for bad input, a failed run, or a wrong list of pairs
       type(error_t), allocatable, intent(inout) :: error

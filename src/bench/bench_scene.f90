@@ -37,7 +37,6 @@ contains
       character(len=*), intent(in) :: place
       !> The entry: a trace, or a namelist file followed by overrides
       character(len=*), intent(in) :: text
-      !> The scene
       type(scene_t), intent(out) :: scene
       !> Allocated if the scene cannot be used
       type(error_t), allocatable, intent(inout) :: error

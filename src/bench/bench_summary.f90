@@ -16,7 +16,6 @@ contains
 
    !> Write the median and least time per box and step over the repeats, for every case of a scene.
    subroutine write_summary(settings, scene, n_boxes, folder, log, error)
-      !> Settings of the bench
       type(bench_settings_t), intent(in) :: settings
       !> Name of the scene
       character(len=*), intent(in) :: scene

@@ -22,7 +22,10 @@ contains
       type(provenance_t), intent(in) :: provenance
       !> Allocated if they differ; names the entry
       type(error_t), allocatable, intent(inout) :: error
+      character(len=15), parameter :: facts(10) = [character(len=15) :: 'version', 'revision', 'build_type', &
+         'compiler', 'options', 'precision', 'processor', 'instruction_set', 'binding', 'wait_policy']
       type(hdf5_file_t) :: file
+      integer :: k
 
       call file%open(path, error)
       if (allocated(error)) return
@@ -32,16 +35,9 @@ contains
       call compare('/case/trace', case%trace)
       call compare('/case/identity', hexadecimal(case%identity))
       call compare('/case/pair_hash', hexadecimal(case%pair_hash))
-      call compare('/provenance/version', provenance%version)
-      call compare('/provenance/revision', provenance%revision)
-      call compare('/provenance/build_type', provenance%build_type)
-      call compare('/provenance/compiler', provenance%compiler)
-      call compare('/provenance/options', provenance%options)
-      call compare('/provenance/precision', provenance%precision)
-      call compare('/provenance/processor', provenance%processor)
-      call compare('/provenance/instruction_set', provenance%instruction_set)
-      call compare('/provenance/binding', provenance%binding)
-      call compare('/provenance/wait_policy', provenance%wait_policy)
+      do k = 1, size(facts)
+         call compare('/provenance/'//trim(facts(k)), provenance%text_of(trim(facts(k))))
+      end do
       call file%close(error)
 
    contains

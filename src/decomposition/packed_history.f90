@@ -5,7 +5,7 @@ module polydem_packed_history
    use polydem_contact_history, only: contact_history_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_rank_order, only: sort_by_rank
-   use polydem_sort, only: sort_keys
+   use polydem_sort, only: place_in, sort_keys
    implicit none
    private
    public :: packed_history_t, pack_pairs, send_pairs, receive_pairs, slots_of_pair
@@ -131,20 +131,13 @@ contains
       integer(ip), intent(in) :: id(:)
       !> Identifier to find
       integer(ip), intent(in) :: wanted
-      integer(ip) :: low, high, middle
 
-      low = 1_ip
-      high = size(id, kind=ip)
-      slot_of = 0_ip
-      do while (low <= high)
-         middle = low + (high - low)/2_ip
-         if (id(middle) == wanted) slot_of = middle
-         if (id(middle) < wanted) then
-            low = middle + 1_ip
-         else
-            high = middle - 1_ip
-         end if
-      end do
+      slot_of = place_in(id, wanted)
+      if (slot_of > size(id)) then
+         slot_of = 0_ip
+      else if (id(slot_of) /= wanted) then
+         slot_of = 0_ip
+      end if
    end function slot_of
 
    !> Sort received pairs by their keys. A pair that two ranks sent is kept once.

@@ -8,7 +8,7 @@ module polydem_redistribution_plan
    use polydem_rank_order, only: sort_by_rank
    implicit none
    private
-   public :: needs_repartition, divide, work_of_bodies, owners_of, padded_boxes, list_needed, slots_of_global_indices
+   public :: needs_repartition, divide, work_of_bodies, owners_of, padded_boxes, list_needed
 
    !> Number of steps after a partition before work is compared again
    integer(lp), parameter :: patience = 100_lp
@@ -157,29 +157,5 @@ contains
       call sort_by_rank(to_rank(:n), comm%size, counts, order)
       slots = slots(order)
    end subroutine list_needed
-
-   !> Slots of bodies given by their global indices
-   pure function slots_of_global_indices(row, wanted) result(slots)
-      !> Global index of each body, ascending, (slot)
-      integer(ip), intent(in) :: row(:)
-      !> Global indices to find
-      integer(ip), intent(in) :: wanted(:)
-      integer(ip) :: slots(size(wanted))
-      integer(ip) :: k, low, high, middle
-
-      do k = 1_ip, size(wanted, kind=ip)
-         low = 1_ip
-         high = size(row, kind=ip)
-         do while (low < high)
-            middle = low + (high - low)/2_ip
-            if (row(middle) < wanted(k)) then
-               low = middle + 1_ip
-            else
-               high = middle
-            end if
-         end do
-         slots(k) = low
-      end do
-   end function slots_of_global_indices
 
 end module polydem_redistribution_plan

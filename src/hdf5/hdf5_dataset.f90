@@ -91,7 +91,6 @@ contains
    !> Whether a name exists. Every group of the path is tested, as HDF5 requires. A name that leads to another file
    !> exists; an attempt to read it gives an error.
    logical function has_link(location)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       integer :: k, status
 
@@ -109,7 +108,6 @@ contains
 
    !> Write a new data set of fixed shape.
    subroutine write_dataset(location, kind_in_file, slab, error)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> HDF5 type in memory and in the file
       integer(hid_t), intent(in) :: kind_in_file
@@ -133,7 +131,6 @@ contains
 
    !> Create a data set and its missing groups. The caller closes the data set.
    subroutine create_dataset(location, kind_in_file, space, dataset, error, properties)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> HDF5 type in the file
       integer(hid_t), intent(in) :: kind_in_file
@@ -164,7 +161,6 @@ contains
 
    !> Append rows along the slowest dimension, which is unlimited. The first call creates the data set.
    subroutine append_rows_to(location, kind_in_file, rows, error)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> HDF5 type in memory and in the file
       integer(hid_t), intent(in) :: kind_in_file
@@ -259,7 +255,6 @@ contains
 
    !> Read the shape of a data set, fastest dimension first.
    subroutine dataset_shape(location, extent, error)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> Shape; empty for a scalar
       integer(hsize_t), allocatable, intent(out) :: extent(:)
@@ -298,7 +293,6 @@ contains
 
    !> Read a slab of a data set into memory.
    subroutine read_dataset(location, wanted, kind_in_memory, start, extent, address, error)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> holds_reals or holds_integers
       integer, intent(in) :: wanted

@@ -192,7 +192,6 @@ contains
 
    !> Read the shape of a data set and check its number of dimensions.
    subroutine expect_rank(location, rank, extent, error)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> Required number of dimensions
       integer, intent(in) :: rank

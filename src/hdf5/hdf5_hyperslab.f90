@@ -69,7 +69,6 @@ contains
    subroutine write_slab(dataset, location, kind_in_memory, slab, error)
       !> HDF5 identifiers of the open data set and of the type in memory
       integer(hid_t), intent(in) :: dataset, kind_in_memory
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> Values, and their position in the data set
       type(slab_t), intent(in) :: slab
@@ -92,7 +91,6 @@ contains
    subroutine read_slab(dataset, location, kind_in_memory, slab, error)
       !> HDF5 identifiers of the open data set and of the type in memory
       integer(hid_t), intent(in) :: dataset, kind_in_memory
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> Position in the data set, and the array to fill
       type(slab_t), intent(in) :: slab

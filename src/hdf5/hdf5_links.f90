@@ -47,7 +47,6 @@ contains
 
    !> Whether the path of a name contains an external link
    recursive logical function is_external_link(location, followed) result(is_external)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> Number of soft links that were already followed; 0 if absent
       integer, intent(in), optional :: followed
@@ -103,7 +102,6 @@ contains
    subroutine check_storage(dataset, location, error)
       !> HDF5 identifier of the open data set
       integer(hid_t), intent(in) :: dataset
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> Allocated if the values are in other files
       type(error_t), allocatable, intent(inout) :: error
@@ -124,7 +122,6 @@ contains
 
    !> Report that a data set is in another file.
    subroutine raise_external(location, error)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> Always allocated afterwards
       type(error_t), allocatable, intent(inout) :: error

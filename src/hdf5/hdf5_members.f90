@@ -60,7 +60,6 @@ contains
    !> Whether a name is that of a data set, not of a group, a type or a dangling link. The result is true for a name in
    !> another file; an attempt to read it gives an error
    logical function is_dataset(location)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       integer(hid_t) :: object
       integer :: kind_of_object, status

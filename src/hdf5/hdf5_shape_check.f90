@@ -20,7 +20,6 @@ contains
 
    !> Read the shape of a data set, fastest dimension first, and check that the stored bytes can contain so many values.
    subroutine checked_shape(location, extent, error)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> Shape; empty for a scalar
       integer(hsize_t), allocatable, intent(out) :: extent(:)

@@ -23,7 +23,6 @@ contains
 
    !> Write a new data set of texts.
    subroutine write_texts(location, extent, texts, error)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> Shape: empty for a scalar, else the number of texts
       integer(hsize_t), intent(in) :: extent(:)
@@ -79,7 +78,6 @@ contains
 
    !> Read a data set of one text.
    subroutine read_text(location, text, error)
-      !> File and name
       type(dataset_location_t), intent(in) :: location
       !> The text
       character(len=:), allocatable, intent(out) :: text

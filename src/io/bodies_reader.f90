@@ -62,7 +62,6 @@ contains
       character(len=*), intent(in) :: path
       !> Density of the bodies if the file has no data set `density` [kg/m3]
       real(wp), intent(in) :: density
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Names the file, the data set and the body
       type(error_t), allocatable, intent(inout) :: error

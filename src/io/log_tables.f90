@@ -20,18 +20,19 @@ contains
       character(len=*), intent(in) :: folder
 
       associate (p => provenance)
-         call write_wrapped(log, 'polydem '//p%version//' (git '//p%revision//'), '//p%build_type//', '// &
-                            p%precision//' precision, '//p%compiler//', HDF5 '//p%hdf5_version)
-         call write_wrapped(log, 'options    '//p%options)
-         call write_wrapped(log, 'machine    '//p%host//', '//p%processor)
-         call write_wrapped(log, 'kernels    '//p%instruction_set)
-         call write_wrapped(log, 'caches     '//p%caches)
+         call write_wrapped(log, 'polydem '//p%text_of('version')//' (git '//p%text_of('revision')//'), '// &
+                            p%text_of('build_type')//', '//p%text_of('precision')//' precision, '// &
+                            p%text_of('compiler')//', HDF5 '//p%text_of('hdf5_version'))
+         call write_wrapped(log, 'options    '//p%text_of('options'))
+         call write_wrapped(log, 'machine    '//p%text_of('host')//', '//p%text_of('processor'))
+         call write_wrapped(log, 'kernels    '//p%text_of('instruction_set'))
+         call write_wrapped(log, 'caches     '//p%text_of('caches'))
          if (p%processes > 1_ip) call write_wrapped(log, 'processes  '//to_text(p%processes)//', by MPI, each with')
          call write_wrapped(log, 'threads    '//to_text(p%threads)//' on '//to_text(p%processors)// &
                             ' processors')
-         call write_wrapped(log, 'input      '//printable(p%input_file)//', seed '//to_text(p%seed))
+         call write_wrapped(log, 'input      '//printable(p%text_of('input_file'))//', seed '//to_text(p%seed))
          call write_wrapped(log, 'result     '//printable(folder))
-         call write_wrapped(log, 'started    '//p%started)
+         call write_wrapped(log, 'started    '//p%text_of('started'))
       end associate
    end subroutine write_header
 

@@ -14,68 +14,31 @@ module polydem_provenance
    private
    public :: provenance_t, collect_provenance, threads_are_bound, write_provenance, origin_of, schema_version
 
+   !> One fact
+   type :: fact_t
+      !> Name of its data set in the group /provenance, and its text
+      character(len=:), allocatable :: name, text
+   end type fact_t
+
    !> Origin of a result
    type :: provenance_t
-      !> Version of the program
-      character(len=:), allocatable :: version
-      !> Git commit of the program
-      character(len=:), allocatable :: revision
-      !> CMake build type
-      character(len=:), allocatable :: build_type
-      !> Compiler with its version
-      character(len=:), allocatable :: compiler
-      !> Compiler options that affect the code; without search paths and warning options
-      character(len=:), allocatable :: options
-      !> Name of the working precision
-      character(len=:), allocatable :: precision
-      !> Version of the HDF5 library
-      character(len=:), allocatable :: hdf5_version
-      !> Host name
-      character(len=:), allocatable :: host
-      !> Processor model
-      character(len=:), allocatable :: processor
-      !> Instruction set of the kernels
-      character(len=:), allocatable :: instruction_set
-      !> Clock of the first processor at the start
-      character(len=:), allocatable :: clock
-      !> Cache sizes
-      character(len=:), allocatable :: caches
-      !> Size of the main memory
-      character(len=:), allocatable :: memory
-      !> Frequency governor of the processors
-      character(len=:), allocatable :: governor
-      !> Kernel release
-      character(len=:), allocatable :: kernel
+      !> All facts but the numbers below
+      type(fact_t), allocatable, private :: facts(:)
       !> Number of online processors
       integer(ip) :: cores = 0_ip
       !> Load average of the minute before the start
       real(dp) :: load = 0.0_dp
-      !> Thread binding: whether threads are bound, OMP_PROC_BIND and OMP_PLACES
-      character(len=:), allocatable :: binding
-      !> Wait policy of idle threads (OMP_WAIT_POLICY)
-      character(len=:), allocatable :: wait_policy
       !> Number of MPI ranks
       integer(ip) :: processes = 1_ip
       !> OpenMP threads per rank
       integer(ip) :: threads = 0_ip
       !> Number of processors available to the run
       integer(ip) :: processors = 0_ip
-      !> Command line of the run
-      character(len=:), allocatable :: command_line
-      !> Path of the input file
-      character(len=:), allocatable :: input_file
-      !> Text of the input file
-      character(len=:), allocatable :: input_text
-      !> All resolved settings, one per line
-      character(len=:), allocatable :: resolved_input
       !> Seed of the scene
       integer(ip) :: seed = 0_ip
-      !> Hash of the initial bodies; empty if there are none
-      character(len=:), allocatable :: scene
-      !> Start time of this attempt of the run (UTC)
-      character(len=:), allocatable :: started
-      !> Checkpoint from which this attempt was restarted; 'none' for the first attempt
-      character(len=:), allocatable :: parent
+   contains
+      procedure :: set
+      procedure :: text_of
    end type provenance_t
 
    !> Version of the file layout. It increases when a reader of the previous version would fail.
@@ -98,37 +61,68 @@ contains
       integer :: isa
 
       call choose_instruction_set(isa, ignored)
-      provenance%instruction_set = isa_names(isa)
-      provenance%version = program_version
-      provenance%revision = git_revision
-      provenance%build_type = build_type
-      provenance%compiler = compiler_version()
-      provenance%options = relevant_options(compiler_options())
-      provenance%precision = trim(precision_name)
-      provenance%hdf5_version = library_version()
-      provenance%host = host_name()
-      provenance%processor = processor_name()
-      provenance%clock = processor_clock()
-      provenance%caches = cache_sizes()
-      provenance%memory = memory_size()
-      provenance%governor = frequency_governor()
-      provenance%kernel = kernel_release()
+      call provenance%set('version', program_version)
+      call provenance%set('revision', git_revision)
+      call provenance%set('build_type', build_type)
+      call provenance%set('compiler', compiler_version())
+      call provenance%set('options', relevant_options(compiler_options()))
+      call provenance%set('precision', trim(precision_name))
+      call provenance%set('hdf5_version', library_version())
+      call provenance%set('host', host_name())
+      call provenance%set('processor', processor_name())
+      call provenance%set('instruction_set', trim(isa_names(isa)))
+      call provenance%set('clock', processor_clock())
+      call provenance%set('caches', cache_sizes())
+      call provenance%set('memory', memory_size())
+      call provenance%set('governor', frequency_governor())
+      call provenance%set('kernel', kernel_release())
+      call provenance%set('binding', trim(merge('bound    ', 'not bound', threads_are_bound()))//', OMP_PROC_BIND '// &
+         environment('OMP_PROC_BIND')//', OMP_PLACES '//environment('OMP_PLACES'))
+      call provenance%set('wait_policy', environment('OMP_WAIT_POLICY'))
+      call provenance%set('command_line', command_line())
+      call provenance%set('input_file', input_file)
+      call provenance%set('input_text', input_text)
+      call provenance%set('resolved_input', resolved_input)
+      call provenance%set('started', utc_now())
+      ! Checkpoint from which this attempt of the run was restarted, and hash of the initial bodies
+      call provenance%set('parent', 'none')
+      call provenance%set('scene', '')
       provenance%cores = cores_online()
       provenance%load = load_average()
-      provenance%binding = trim(merge('bound    ', 'not bound', threads_are_bound()))//', OMP_PROC_BIND '// &
-         environment('OMP_PROC_BIND')//', OMP_PLACES '//environment('OMP_PLACES')
-      provenance%wait_policy = environment('OMP_WAIT_POLICY')
       provenance%threads = int(omp_get_max_threads(), ip)
       provenance%processors = int(omp_get_num_procs(), ip)
-      provenance%command_line = command_line()
-      provenance%input_file = input_file
-      provenance%input_text = input_text
-      provenance%resolved_input = resolved_input
       provenance%seed = seed
-      provenance%started = utc_now()
-      provenance%parent = 'none'
-      provenance%scene = ''
    end subroutine collect_provenance
+
+   !> Set a fact.
+   pure subroutine set(self, name, text)
+      class(provenance_t), intent(inout) :: self
+      !> Name of the fact, and its text
+      character(len=*), intent(in) :: name, text
+      integer :: k
+
+      if (.not. allocated(self%facts)) allocate (self%facts(0))
+      do k = 1, size(self%facts)
+         if (self%facts(k)%name == name) self%facts(k)%text = text
+         if (self%facts(k)%name == name) return
+      end do
+      self%facts = [self%facts, fact_t(name, text)]
+   end subroutine set
+
+   !> Text of a fact; empty if it is not set
+   pure function text_of(self, name) result(text)
+      class(provenance_t), intent(in) :: self
+      !> Name of the fact
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: text
+      integer :: k
+
+      text = ''
+      if (.not. allocated(self%facts)) return
+      do k = 1, size(self%facts)
+         if (self%facts(k)%name == name) text = self%facts(k)%text
+      end do
+   end function text_of
 
    !> Whether OpenMP binds its threads to processors
    logical function threads_are_bound()
@@ -144,40 +138,20 @@ contains
       character(len=*), intent(in) :: content
       type(provenance_t), intent(in) :: provenance
       type(error_t), allocatable, intent(inout) :: error
+      integer :: k
 
       call file%write_attribute('/', 'content', content, error)
       call file%write_attribute('/', 'schema_version', schema_version, error)
       call file%write('/provenance/program', 'polydem', error)
-      call file%write('/provenance/version', provenance%version, error)
-      call file%write('/provenance/revision', provenance%revision, error)
-      call file%write('/provenance/build_type', provenance%build_type, error)
-      call file%write('/provenance/compiler', provenance%compiler, error)
-      call file%write('/provenance/options', provenance%options, error)
-      call file%write('/provenance/precision', provenance%precision, error)
-      call file%write('/provenance/hdf5_version', provenance%hdf5_version, error)
-      call file%write('/provenance/host', provenance%host, error)
-      call file%write('/provenance/processor', provenance%processor, error)
-      call file%write('/provenance/instruction_set', provenance%instruction_set, error)
-      call file%write('/provenance/clock', provenance%clock, error)
-      call file%write('/provenance/caches', provenance%caches, error)
-      call file%write('/provenance/memory', provenance%memory, error)
-      call file%write('/provenance/governor', provenance%governor, error)
-      call file%write('/provenance/kernel', provenance%kernel, error)
+      do k = 1, size(provenance%facts)
+         call file%write('/provenance/'//provenance%facts(k)%name, provenance%facts(k)%text, error)
+      end do
       call file%write('/provenance/cores', provenance%cores, error)
       call file%write('/provenance/load', provenance%load, error)
-      call file%write('/provenance/binding', provenance%binding, error)
-      call file%write('/provenance/wait_policy', provenance%wait_policy, error)
       call file%write('/provenance/processes', provenance%processes, error)
       call file%write('/provenance/threads', provenance%threads, error)
       call file%write('/provenance/processors', provenance%processors, error)
-      call file%write('/provenance/command_line', provenance%command_line, error)
-      call file%write('/provenance/input_file', provenance%input_file, error)
-      call file%write('/provenance/input_text', provenance%input_text, error)
-      call file%write('/provenance/resolved_input', provenance%resolved_input, error)
       call file%write('/provenance/seed', provenance%seed, error)
-      call file%write('/provenance/started', provenance%started, error)
-      call file%write('/provenance/parent', provenance%parent, error)
-      call file%write('/provenance/scene', provenance%scene, error)
       call file%write('/provenance/written', utc_now(), error)
    end subroutine write_provenance
 

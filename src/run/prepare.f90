@@ -120,9 +120,9 @@ contains
       ! Repeat the check: now no other run can write to the folder.
       call check_overwrite(run, force, error)
       if (allocated(error)) return
-      scene = run%provenance%scene
+      scene = run%provenance%text_of('scene')
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
-      run%provenance%scene = scene
+      call run%provenance%set('scene', scene)
       run%provenance%processes = run%comm%size
       if (run%manifest%is_found .and. run%attempt%continues) &
          call find_restart(run%folder, run%manifest, settings, scene, run%attempt%may_change, run%earlier, error)

@@ -52,12 +52,12 @@ contains
       !> Allocated for bad input
       type(error_t), allocatable, intent(inout) :: error
 
-      if (allocated(run%provenance%scene)) return
+      if (run%provenance%text_of('scene') /= '') return
       call new_simulation(settings, run%simulation, error, run%comm)
       if (allocated(error)) return
       call measure_scene(run%simulation, run%measures)
       call hash_scene_of(run%simulation, run%attempts%scene)
-      run%provenance%scene = hexadecimal(run%attempts%scene)
+      call run%provenance%set('scene', hexadecimal(run%attempts%scene))
    end subroutine build_start
 
    !> Broadcast which checkpoint the root rank has chosen, start the schedule of checkpoints, and restore the checkpoint
@@ -76,8 +76,9 @@ contains
                                 merge(run%attempt%limit, 0.0_dp, run%comm%is_root()))
       if (allocated(run%earlier%remark)) call run%log%write_line(run%earlier%remark)
       if (run%earlier%checkpoint == 0_ip) return
-      run%provenance%parent = checkpoint_path(run%folder, run%earlier%checkpoint)//', step '//to_text(run%earlier%step)
-      call restore(run%folder, run%earlier, run%provenance%revision, run%simulation, run%attempts, run%monitor, &
+      call run%provenance%set('parent', checkpoint_path(run%folder, run%earlier%checkpoint)//', step '// &
+                              to_text(run%earlier%step))
+      call restore(run%folder, run%earlier, run%provenance%text_of('revision'), run%simulation, run%attempts, run%monitor, &
                    run%log, error)
       run%checkpoints%last_step = run%earlier%step
       run%checkpoints%next = modulo(run%earlier%checkpoint, n_checkpoints) + 1_ip

@@ -23,7 +23,6 @@ contains
    subroutine list_bed(scene, list, error)
       !> Settings: bodies (grains), width, grains, packing
       type(scene_settings_t), intent(in) :: scene
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Allocated if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error

@@ -25,7 +25,6 @@ contains
    subroutine list_channel(scene, list, error)
       !> Settings: bodies (grains), fraction (of the channel that the polygons cover), speed, grains
       type(scene_settings_t), intent(in) :: scene
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Allocated if the fraction is too large for a start without overlaps
       type(error_t), allocatable, intent(inout) :: error

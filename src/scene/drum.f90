@@ -28,7 +28,6 @@ contains
    subroutine list_drum(scene, list, error)
       !> Settings: boxes (total) or bodies (grains), radius, grains
       type(scene_settings_t), intent(in) :: scene
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Allocated if the segments need all boxes, or if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error

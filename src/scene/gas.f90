@@ -24,7 +24,6 @@ contains
    subroutine list_gas(scene, list, error)
       !> Settings: bodies (grains), fraction (of the container that the polygons cover), width, speed, spin, grains
       type(scene_settings_t), intent(in) :: scene
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Allocated if the fraction is too large for a start without overlaps
       type(error_t), allocatable, intent(inout) :: error
@@ -61,7 +60,6 @@ contains
    !> Append grains with random velocities and angular velocities. The total momentum is zero unless one grain alone
    !> moves.
    subroutine append_moving_grains(list, scene, random, grains, centres)
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Settings: speed, spin, moving_grains
       type(scene_settings_t), intent(in) :: scene

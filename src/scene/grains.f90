@@ -138,7 +138,6 @@ contains
    !> boxes are in the wrong order on x, and half of them on y. No other order has a larger total. Each box has two
    !> ends, so n grains that hardly overlap need about 2 n**2 exchanges on x and n**2 on y.
    subroutine append_grains(list, scene, grains, centres, velocities, spins)
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Order and density
       type(scene_settings_t), intent(in) :: scene

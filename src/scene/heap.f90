@@ -25,7 +25,6 @@ contains
    subroutine list_heap(scene, list, error)
       !> Settings: bodies (grains), width (length of the floor), grains
       type(scene_settings_t), intent(in) :: scene
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Allocated if the column is wider than the floor
       type(error_t), allocatable, intent(inout) :: error

@@ -21,7 +21,6 @@ contains
    subroutine list_hopper(scene, list, error)
       !> Settings: bodies (grains), opening, slope (of the inclined walls), width, grains
       type(scene_settings_t), intent(in) :: scene
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Allocated if the opening is not less than the width, or if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error

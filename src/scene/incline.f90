@@ -24,7 +24,6 @@ contains
    subroutine list_incline(settings, list)
       !> Settings: slope, width and height of the block, speed (downhill); gravity, stiffness and law
       type(settings_t), intent(in) :: settings
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       real(wp) :: along(2), depth, load, top, bottom
 

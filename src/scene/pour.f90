@@ -23,7 +23,6 @@ contains
 
    !> Append n free grains, from the bottom of the outline up, with random velocities.
    subroutine place_grains(list, scene, outline, n, error)
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Settings: grains, seed, speed, packing
       type(scene_settings_t), intent(in) :: scene

@@ -19,7 +19,6 @@ contains
    subroutine list_stack(settings, list)
       !> Settings: bodies (blocks), width and height of a block; gravity, stiffness and law
       type(settings_t), intent(in) :: settings
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       real(wp) :: weight, bottom, support(2)
       integer(ip) :: k

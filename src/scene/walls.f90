@@ -28,7 +28,6 @@ contains
 
    !> Append the walls of a container around an upright rectangle: floor, left, right and, if closed, a lid.
    subroutine append_box(list, inside, thickness, closed)
-      !> List to extend
       type(body_list_t), intent(inout) :: list
       !> Corners of the rectangle in the order of `rectangle`, (2, 4) [m]
       real(wp), intent(in) :: inside(2, 4)

@@ -100,7 +100,6 @@ contains
 
    !> Move the bodies with prescribed motion to their poses at a given time.
    subroutine move_walls(self, time)
-      !> The simulation
       type(simulation_t), intent(inout) :: self
       !> Simulated time [s]
       real(wp), intent(in) :: time

@@ -32,7 +32,6 @@ contains
 
    !> Record the elastic energy of the contacts. Call it at the start of the energy balance. Collective.
    subroutine open_energy_guard(guard, simulation)
-      !> The guard
       type(energy_guard_t), intent(out) :: guard
       !> Simulation at the start, with the forces of its contacts
       type(simulation_t), intent(inout) :: simulation
@@ -61,7 +60,6 @@ contains
 
    !> Warn or stop if the unexplained energy gain exceeds its limit. Collective; the result is the same on all ranks.
    subroutine check_energy(guard, simulation, error)
-      !> The guard
       type(energy_guard_t), intent(inout) :: guard
       !> Simulation at the end of a step; `energy` and `energy_limit` of &guards define the action and the limit
       type(simulation_t), intent(inout) :: simulation

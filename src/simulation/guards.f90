@@ -35,9 +35,7 @@ contains
 
    !> Prepare the guard for the present bodies.
    subroutine new_motion_guard(guard, settings, bodies, moving)
-      !> The guard
       type(motion_guard_t), intent(out) :: guard
-      !> Group &guards
       type(guards_settings_t), intent(in) :: settings
       !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
@@ -72,7 +70,6 @@ contains
 
    !> Stop if a body has an invalid pose, before boxes and neighbours are computed from it.
    subroutine check_poses(guard, bodies, step, error)
-      !> The guard
       type(motion_guard_t), intent(in) :: guard
       !> Bodies in the middle of a step
       type(bodies_t), intent(in) :: bodies
@@ -106,7 +103,6 @@ contains
 
    !> Whether the states of all bodies of a run are finite and none moves too far in a step
    pure logical function move_within_limit(guard, bodies, first, last, dt)
-      !> The guard
       type(motion_guard_t), intent(in) :: guard
       !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies
@@ -124,7 +120,6 @@ contains
 
    !> Stop if the state of a body is not finite. Stop or warn if a body moves too far in a step.
    subroutine check_motion(guard, bodies, step, dt, error)
-      !> The guard
       type(motion_guard_t), intent(inout) :: guard
       !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies
@@ -231,7 +226,6 @@ contains
 
    !> Greatest displacement per step of a point of any moving body, at the present velocities [m]
    pure subroutine greatest_displacement(guard, bodies, dt, move, slot)
-      !> The guard
       type(motion_guard_t), intent(in) :: guard
       type(bodies_t), intent(in) :: bodies
       !> Time step [s]

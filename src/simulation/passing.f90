@@ -42,9 +42,7 @@ contains
 
    !> Set up the guard for the present bodies.
    subroutine new_contact_guard(guard, settings, bodies, column)
-      !> The guard
       type(contact_guard_t), intent(out) :: guard
-      !> Group &guards
       type(guards_settings_t), intent(in) :: settings
       !> Bodies, for their shapes
       type(bodies_t), intent(in) :: bodies
@@ -59,7 +57,6 @@ contains
 
    !> Test the contacts of a block, and store their directions.
    subroutine test_block(guard, bodies, block, history, suspect, passing_pair)
-      !> The guard
       type(contact_guard_t), intent(in) :: guard
       !> Bodies with the positions of this step
       type(bodies_t), intent(in) :: bodies

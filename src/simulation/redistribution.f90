@@ -17,9 +17,10 @@ module polydem_redistribution
    use polydem_packed_history, only: pack_pairs, receive_pairs, send_pairs
    use polydem_rank_order, only: sort_by_rank
    use polydem_redistribution_plan, only: divide, needs_repartition, list_needed, owners_of, padded_boxes, &
-      slots_of_global_indices, work_of_bodies
+      work_of_bodies
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
+   use polydem_sort, only: place_in
    use polydem_timers, only: stage_boxes, stage_forces, stage_integrate, stage_neighbours, stage_overlap
    implicit none
    private
@@ -94,7 +95,7 @@ contains
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
       integer(ip), allocatable :: owner(:)
-      integer(ip) :: k
+      integer(ip) :: j, k
 
       do k = 1_ip, size(self%motions, kind=ip)
          self%motions(k)%slots = self%bodies%global_index(self%motions(k)%slots)
@@ -104,7 +105,9 @@ contains
       call send_bodies(self, owner)
       call receive_halo(self)
       do k = 1_ip, size(self%motions, kind=ip)
-         self%motions(k)%slots = slots_of_global_indices(self%bodies%global_index, self%motions(k)%slots)
+         associate (slots => self%motions(k)%slots)
+            slots = [(place_in(self%bodies%global_index, slots(j)), j=1_ip, size(slots, kind=ip))]
+         end associate
       end do
       call self%domain%halo%follow(self%comm, self%bodies)
       call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)], self%isa)

@@ -120,7 +120,6 @@ contains
 
    !> Simulated time [s]. It is a product, not a sum, and therefore has no accumulated rounding error.
    pure real(wp) function time_of(self)
-      !> The simulation
       type(simulation_t), intent(in) :: self
 
       time_of = real(self%step, wp)*self%dt

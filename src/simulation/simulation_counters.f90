@@ -13,7 +13,6 @@ contains
 
    !> Add up the counts of all ranks on the root rank, and reset them to zero on the other ranks. Collective.
    subroutine collect_counts(self)
-      !> The simulation
       type(simulation_t), intent(inout) :: self
       integer(lp), allocatable :: counts(:)
 
@@ -30,7 +29,6 @@ contains
    !> Set the counters of the run so far. Pairs that began or ended and the finder statistics are summed over all ranks
    !> that have the pair or ran the finder. All other items are counted once. Collective.
    subroutine report_counters(self, counters)
-      !> The simulation
       type(simulation_t), intent(inout) :: self
       !> List of counters
       type(counters_t), intent(inout) :: counters
@@ -56,7 +54,6 @@ contains
 
    !> Count the pairs that this rank owns.
    subroutine count_pairs(self)
-      !> The simulation
       type(simulation_t), intent(inout) :: self
       integer(lp) :: n
       integer(ip) :: p

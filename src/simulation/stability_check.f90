@@ -15,7 +15,6 @@ contains
    !> Compare the time step with the stable time step of the present contacts. The rank that has the critical contact
    !> warns or fails. Collective.
    subroutine check_stability(self, stable, warning, error)
-      !> The simulation
       type(simulation_t), intent(inout) :: self
       !> Stable time step of the present contacts [s], huge if there are none
       real(wp), intent(out) :: stable
@@ -38,7 +37,6 @@ contains
 
    !> Find the stable time step of the present contacts. Collective.
    subroutine find_stable_step(self, stable, critical)
-      !> The simulation
       type(simulation_t), intent(inout) :: self
       !> Stable time step of the contacts of all ranks [s], huge if there are none
       real(wp), intent(out) :: stable

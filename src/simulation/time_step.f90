@@ -23,7 +23,6 @@ contains
    !> Advance by one time step. Collective. An error of one rank reaches all ranks within the step, or at the latest in
    !> the all-reduce of errors after it.
    subroutine advance(self, error)
-      !> The simulation
       type(simulation_t), intent(inout) :: self
       !> Allocated if the run must stop; names the body, its position and the step
       type(error_t), allocatable, intent(inout) :: error

@@ -93,7 +93,6 @@ contains
       type(contacts_t), intent(in) :: contacts
       !> First and last contact, at most `block_size` contacts. They are copied in descending order
       integer(ip), intent(in) :: low, high
-      !> The block
       type(contact_block_t), intent(inout) :: block
       real(wp) :: side
       integer(ip) :: b, c
@@ -138,7 +137,6 @@ contains
 
    !> Copy what the force law has computed for contact b of a block to contact c of a table, and set `force`.
    pure subroutine store_forces(block, b, contacts, c)
-      !> The block
       type(contact_block_t), intent(in) :: block
       !> Index in the block
       integer(ip), intent(in) :: b
@@ -161,7 +159,6 @@ contains
 
    !> Copy contact b of a block to contact c of a table.
    pure subroutine store_contact(block, b, contacts, c)
-      !> The block
       type(contact_block_t), intent(in) :: block
       !> Index in the block
       integer(ip), intent(in) :: b

@@ -40,7 +40,6 @@ contains
 
    !> Add a column of zeros behind the others.
    subroutine add_column(history, kind, n_pairs)
-      !> Contact history
       type(contact_history_t), intent(inout) :: history
       !> Description of the column
       type(history_kind_t), intent(in) :: kind
@@ -63,7 +62,6 @@ contains
 
    !> Index of a column, 0 if there is none of that name
    pure integer function column_of(history, name)
-      !> Contact history
       type(contact_history_t), intent(in) :: history
       !> Name of the column, as in its description
       character(len=*), intent(in) :: name

@@ -21,7 +21,6 @@ contains
    pure subroutine start_rows(contacts, rows)
       !> The table
       type(contacts_t), intent(in) :: contacts
-      !> The rows
       type(contact_rows_t), intent(inout) :: rows
 
       rows%contacts%n = 0_ip
@@ -31,9 +30,7 @@ contains
 
    !> Append contacts of a block.
    subroutine append_rows(block, rows, with_forces, chosen)
-      !> The block
       type(contact_block_t), intent(in) :: block
-      !> The rows
       type(contact_rows_t), intent(inout) :: rows
       !> Whether the block has forces
       logical, intent(in) :: with_forces

@@ -55,7 +55,6 @@ contains
    subroutine reserve_sums(n, sums)
       !> Number of bodies
       integer(ip), intent(in) :: n
-      !> Sums of the bodies
       type(force_sums_t), intent(inout) :: sums
 
       if (allocated(sums%value)) then
@@ -69,7 +68,6 @@ contains
    subroutine start_sums(n, sums)
       !> Number of bodies
       integer(ip), intent(in) :: n
-      !> Sums of the bodies
       type(force_sums_t), intent(inout) :: sums
 
       call reserve_sums(n, sums)
@@ -138,7 +136,6 @@ contains
       type(contact_terms_t), intent(in) :: terms
       !> Last slot whose sums this thread may change
       integer(ip), intent(in) :: last
-      !> Sums of the bodies
       type(force_sums_t), intent(inout) :: sums
       !> Terms of the bodies after `last`
       type(late_terms_t), intent(inout) :: late
@@ -229,7 +226,6 @@ contains
       type(late_terms_t), intent(in) :: late
       !> First and last slot whose sums may change
       integer(ip), intent(in) :: low, high
-      !> Sums of the bodies
       type(force_sums_t), intent(inout) :: sums
       integer(ip) :: k
 
@@ -248,7 +244,6 @@ contains
       type(contacts_t), intent(inout) :: contacts
       !> Bodies; `force` and `torque` are set
       type(bodies_t), intent(inout) :: bodies
-      !> Sums of the bodies
       type(force_sums_t), intent(inout) :: sums
       type(contact_block_t) :: block
       type(contact_terms_t) :: terms
@@ -293,7 +288,6 @@ contains
    pure subroutine total_forces(gravity, sums, low, high, bodies)
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
-      !> Sums of the bodies
       type(force_sums_t), intent(in) :: sums
       !> First and last slot
       integer(ip), intent(in) :: low, high

@@ -169,9 +169,11 @@ def undocumented(source, scope, wanted):
 
 
 def is_named_as_its_type(statement):
-    """Whether an argument has the name of its derived type, which explains it: `bodies` of bodies_t."""
+    """Whether an argument has the name of its derived type, or its last words: `guard` of motion_guard_t."""
     match = re.match(r"(?:type|class)\s*\(\s*(\w+)_t\s*\)", statement.code)
-    return bool(match) and statement.names == [SHORT_NAMES.get(match.group(1), match.group(1))]
+    if not match or len(statement.names) != 1:
+        return False
+    return f"_{SHORT_NAMES.get(match.group(1), match.group(1))}".endswith(f"_{statement.names[0]}")
 
 
 def arguments_of(code):

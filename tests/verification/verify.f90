@@ -90,9 +90,9 @@ contains
 
       call collect_provenance(p, '-', '', '', 0_ip)
       text = '# Verification'//line_end//line_end//trim(merge('Thorough', 'Quick   ', thorough))//' run of polydem '// &
-         p%version//' (git '//p%revision//'), '//p%build_type//', '//p%precision//' precision, '//p%compiler// &
-                       line_end// &
-         'on '//p%processor//', '//to_text(p%threads)//' threads, '//p%started//'.'//line_end//line_end
+         p%text_of('version')//' (git '//p%text_of('revision')//'), '//p%text_of('build_type')//', '// &
+         p%text_of('precision')//' precision, '//p%text_of('compiler')//line_end//'on '//p%text_of('processor')// &
+         ', '//to_text(p%threads)//' threads, '//p%text_of('started')//'.'//line_end//line_end
    end function heading
 
    subroutine write_text(path, text, error)
