@@ -261,6 +261,22 @@ def test_a_slow_machine_makes_some_of_every_piece(tmp_path, monkeypatch):
     assert {comparison.status(piece) for piece in pieces} == {"cut"}
 
 
+def test_a_bench_leaves_out_scenes_whose_traces_are_missing_and_is_not_finished(output, tmp_path):
+    folder = tmp_path / "paper"
+    shutil.copytree(PLAN.parent, tmp_path / "plan")
+    plan = tmp_path / "plan" / "bench_threads.nml"
+    text = plan.read_text(encoding="utf-8").replace("names = 'drum_1200'", "names = 'drum_1200', 'drum_9'")
+    text = text.replace("trace.h5'", "trace.h5', 'results/bench_drums/traces/drum_9/trace.h5'")
+    plan.write_text(text, encoding="utf-8")
+    (piece,) = [each for each in make_plan("quick", folder, 2, plan.parent / "plan.json") if each.name == "threads"]
+    comparison = Comparison(folder, "quick", [piece], Tools({"double": PROGRAM}, VERIFIER), say=lambda line: None)
+    trace = folder / "drums" / "traces" / "drum_1200" / "trace.h5"
+    trace.parent.mkdir(parents=True)
+    shutil.copyfile(output[0] / "quick" / "drums" / "traces" / "drum_1200" / "trace.h5", trace)
+    assert comparison._make(piece) == "cut"
+    assert {path.name.split("-")[0] for path in (folder / "threads" / "samples").glob("*.h5")} == {"drum_1200"}
+
+
 # --- The plan ---------------------------------------------------------------------------------------------------------
 
 

@@ -21,6 +21,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from .bench import read_bench
+from .bench_file import BenchFile
 from .comparison_plan import ROOT, Piece, Rates, estimate
 from .statistics import number, typical
 from .trajectory import ResultError
@@ -33,6 +34,9 @@ INTERRUPTED = 75
 
 #: Seconds that are left for tables, figures and the page when time is limited
 FOR_THE_REPORT = 60.0
+
+#: Least seconds that a piece counts for when time is shared out
+SHORTEST = 20.0
 
 #: Bench whose times tell how fast this machine is
 TRIAL = """\
@@ -206,8 +210,8 @@ class Comparison:
                 self.say(f"{piece.name}: left out, since the time is over")
                 continue
             lacking = [name for name in piece.needs if not (self.folder / name).exists()]
-            if lacking:
-                self.say(f"{piece.name}: left out, since {', '.join(lacking)} is missing")
+            if lacking or (piece.bench and not self._available(piece).scenes):
+                self.say(f"{piece.name}: left out, since traces of {', '.join(lacking or piece.needs)} are missing")
                 continue
             self.say(f"{piece.name}: {piece.purpose}")
             began = time.monotonic()
@@ -225,7 +229,7 @@ class Comparison:
         if self.deadline is None:
             return
         left = self.deadline - FOR_THE_REPORT - time.monotonic()
-        needs = [estimate(piece, self.calibrate(), self.cores, self.mode) for piece in wanted]
+        needs = [max(SHORTEST, estimate(piece, self.calibrate(), self.cores, self.mode)) for piece in wanted]
         self.piece_deadline = time.monotonic() + left * needs[0] / sum(needs)
 
     def _left(self) -> float | None:
@@ -243,14 +247,19 @@ class Comparison:
             if code not in good:
                 self.say(f"{piece.name}: its command ended with code {code}; see {log}")
                 return "failed"
-        return "finished"
+        return "finished" if piece.bench is None or self._available(piece) == piece.bench else "cut"
+
+    def _available(self, piece: Piece) -> BenchFile:
+        """A bench without the scenes whose traces a bench that was cut has not recorded."""
+        return piece.bench.only([name for name, text in piece.bench.scenes.items()
+                                 if not text.endswith(".h5") or (ROOT / text).exists()])
 
     def commands(self, piece: Piece) -> list:
         """[(command, folder in which it runs, exit codes that are good)]"""
         folder, program = self.folder / piece.name, str(self.tools.program)
         own = [sys.executable, "-m", "polydem_post"]
         if piece.kind == "bench":
-            namelist = write(self.folder / f"{piece.name}.nml", piece.bench.written(folder))
+            namelist = write(self.folder / f"{piece.name}.nml", self._available(piece).written(folder))
             return [([program, "bench", str(namelist)], ROOT, (0,))]
         if piece.kind == "cache":
             scenes, finders = piece.options
