@@ -99,7 +99,11 @@ class Sweep:
         self.folder = Path(folder)
         if not (self.folder / TABLE).is_file():
             raise ResultError(f"{folder}: is not a sweep (holds no {TABLE}); ./polydem sweep make makes one")
-        self.columns, rows = read_table(self.folder / TABLE)
+        try:
+            self.columns, rows = read_table(self.folder / TABLE)
+        except ResultError as error:
+            # The program wrote this table, so it was damaged, and the first defect says enough.
+            raise ResultError(str(error).splitlines()[0]) from error
         self.runs = [Run(row.name, self.folder / RUNS / row.name, row.values) for row in rows]
 
     def choose(self, numbers: list[int] | None = None, names: list[str] | None = None) -> list[Run]:
