@@ -12,6 +12,7 @@ pytest.importorskip("mkdocs", reason="the manual needs pip install -e 'postproc[
 pytest.importorskip("material", reason="the manual needs pip install -e 'postproc[manual]'")
 
 from polydem_post.manual.site import ManualError, build_site
+from polydem_post.manual.sources import build_sources
 from polydem_post.manual.staging import stage
 
 #: What a browser would fetch from elsewhere
@@ -83,6 +84,22 @@ def test_a_broken_link_is_an_error(tmp_path, link):
     root = small_root(tmp_path / "root", f"# Title\n\n[a]({link})\n")
     with pytest.raises(ManualError, match=link.strip("#")):
         build_site(root, tmp_path / "site")
+
+
+def test_the_navigation_leads_to_the_pages_of_the_sources(tmp_path):
+    root = small_root(tmp_path / "root", "# Title\n\n[a](src/page.md)\n")
+    (root / "src").mkdir()
+    (root / "src" / "page.md").write_text("# Page\n", encoding="utf-8")
+    build_site(root, tmp_path / "site", sources=True)
+    assert 'href="../sources/index.html"' in (tmp_path / "site" / "src" / "page.html").read_text(encoding="utf-8")
+
+
+def test_ford_reads_the_sources(tmp_path):
+    tools = ROOT / "build" / "ford"
+    if not (tools / "version").exists():
+        pytest.skip("FORD is not installed; ./polydem manual --sources installs it")
+    build_sources(ROOT, tmp_path / "sources", tools, "geometry")
+    assert "Sutherland" in (tmp_path / "sources" / "module" / "polydem_clipping.html").read_text(encoding="utf-8")
 
 
 def test_a_folder_of_others_is_not_replaced(tmp_path):

@@ -21,6 +21,9 @@ PARTS = {"inputs": "Running", "postproc": "Results", "src": "Theory and sources"
 #: Script that the theme would fetch from the network, and the file in its place
 FETCHED, WORKER = "https://unpkg.com/iframe-worker/shim", "offline_worker.js"
 
+#: First page of the sources, which FORD writes
+SOURCES = "sources/index.html"
+
 #: File that marks a folder as made here
 MARK = ".made_by_polydem_manual"
 
@@ -52,6 +55,9 @@ def build_site(root: Path, output: Path, sources: bool = False) -> list[Path]:
         pages = staging.stage(root.resolve(), folder)
         (folder / "manual.css").write_text(STYLE, encoding="utf-8")
         shutil.copyfile(Path(__file__).with_name(WORKER), folder / WORKER)
+        if sources:
+            (folder / SOURCES).parent.mkdir()
+            (folder / SOURCES).write_text("FORD replaces this page.\n", encoding="utf-8")
         start = Path(name) / "mkdocs.yml"
         start.write_text("site_name: polydem\n", encoding="utf-8")
         logger = logging.getLogger("mkdocs")
@@ -129,7 +135,7 @@ def _navigation(root: Path, pages: list[Path], sources: bool) -> list[dict[str, 
         chosen.sort(key=lambda page: (str(page) != "README.md", *place(page)))
         listed: list[Any] = [{staging.title_of(root / page): str(page)} for page in chosen]
         if part == "src" and sources:
-            listed.append({"Every module": "sources/index.html"})
+            listed.append({"Every module": SOURCES})
         if listed:
             entries.append({name: listed})
     return entries

@@ -38,9 +38,9 @@ Modules, types and procedures of polydem, from the comments of the sources. [Man
 def build_sources(root: Path, output: Path, tools: Path, rooms: str = "") -> None:
     """Write the pages of all sources, or of one room, into `output`. FORD is installed in `tools` at need."""
     project = tools / "ford_project.md"
-    tools.mkdir(parents=True, exist_ok=True)
+    ford = _find_ford(tools)
     project.write_text(PROJECT.format(sources=root / "src" / rooms, output=output), encoding="utf-8")
-    _run([_find_ford(tools), "--quiet", str(project)])
+    _run([ford, "--quiet", str(project)])
 
 
 def _find_ford(tools: Path) -> str:
