@@ -1,12 +1,14 @@
 "use strict";
 
-// What is laid over the bodies, as segments: x, y of both ends relative to an origin, and width [m]; 0 is one picture element.
+// What is laid over the bodies: segments, as x and y of both ends relative to an origin and a width [m], and boxes, as x
+// and y of two corners.
 
-/** A growing list of segments. */
-class Segments {
-  constructor(originX, originY) {
+/** A growing list of segments (5 numbers each) or boxes (4). */
+class Shapes {
+  constructor(numbers, originX, originY) {
     this.n = 0;
-    this.data = new Float32Array(5 * 1024);
+    this.numbers = numbers;
+    this.data = new Float32Array(numbers * 1024);
     this.originX = originX;
     this.originY = originY;
   }
@@ -14,27 +16,21 @@ class Segments {
   clear() { this.n = 0; }
 
   reserve(more) {
-    if (5 * (this.n + more) <= this.data.length) return;
-    const larger = new Float32Array(Math.max(5 * (this.n + more), 2 * this.data.length));
+    const needed = this.numbers * (this.n + more);
+    if (needed <= this.data.length) return;
+    const larger = new Float32Array(Math.max(needed, 2 * this.data.length));
     larger.set(this.data);
     this.data = larger;
   }
 
   /** Add one; there must be room. */
   add(ax, ay, bx, by, width) {
-    const k = 5 * this.n++, data = this.data;
+    const k = this.numbers * this.n++, data = this.data;
     data[k] = ax - this.originX;
     data[k + 1] = ay - this.originY;
     data[k + 2] = bx - this.originX;
     data[k + 3] = by - this.originY;
-    data[k + 4] = width;
-  }
-
-  addBox(x0, y0, x1, y1) {
-    this.add(x0, y0, x1, y0, 0);
-    this.add(x1, y0, x1, y1, 0);
-    this.add(x1, y1, x0, y1, 0);
-    this.add(x0, y1, x0, y0, 0);
+    if (this.numbers === 5) data[k + 4] = width;
   }
 }
 
@@ -61,27 +57,27 @@ function contactSegments(run, segments) {
   for (let c = 0; c < t.n; c++) segments.add(t.x[c] - half, t.y[c], t.x[c] + half, t.y[c], 2 * half);
 }
 
-function boxSegments(run, segments) {
+function bodyBoxes(run, list) {
   const boxes = run.boxes();
-  segments.reserve(4 * run.n);
+  list.reserve(run.n);
   for (let i = 0; i < run.n; i++) {
-    if (!run.fixed[i]) segments.addBox(boxes[4 * i], boxes[4 * i + 1], boxes[4 * i + 2], boxes[4 * i + 3]);
+    if (!run.fixed[i]) list.add(boxes[4 * i], boxes[4 * i + 1], boxes[4 * i + 2], boxes[4 * i + 3]);
   }
 }
 
-function cellSegments(run, segments) {
+function cellBoxes(run, list) {
   const cells = treeCells(run);
-  segments.reserve(4 * cells.n);
+  list.reserve(cells.n);
   for (let k = 0; k < cells.n; k++) {
     const x = cells.data[3 * k], y = cells.data[3 * k + 1], side = cells.data[3 * k + 2];
-    segments.addBox(x, y, x + side, y + side);
+    list.add(x, y, x + side, y + side);
   }
 }
 
-/** Name of an overlay -> how it is made, and its colour; those of pictures (drawing.py). */
+/** Name of an overlay -> what makes it, of which shapes, and its colour; those of pictures (drawing.py). */
 const OVERLAYS = {
-  cells: {make: cellSegments, colour: [0.478, 0.239, 0.722]},
-  boxes: {make: boxSegments, colour: [0, 0.447, 0.698]},
-  forces: {make: forceSegments, colour: [0.627, 0.063, 0.125]},
-  contacts: {make: contactSegments, colour: [0.835, 0.369, 0]},
+  cells: {make: cellBoxes, shapes: "boxes", colour: [0.478, 0.239, 0.722]},
+  boxes: {make: bodyBoxes, shapes: "boxes", colour: [0, 0.447, 0.698]},
+  forces: {make: forceSegments, shapes: "segments", colour: [0.627, 0.063, 0.125]},
+  contacts: {make: contactSegments, shapes: "segments", colour: [0.835, 0.369, 0]},
 };

@@ -47,6 +47,16 @@ void main() {
   gl_Position = vec4(place / elements, 0.0, 1.0);
 }`;
 
+const BOX_VERTEX = `#version 300 es
+in vec4 box;
+uniform vec2 middle, scale;
+flat out float cover;
+void main() {
+  vec2 corner = vec2(gl_VertexID == 1 || gl_VertexID == 2 ? box.z : box.x, gl_VertexID < 2 ? box.y : box.w);
+  gl_Position = vec4((corner - middle) * scale, 0.0, 1.0);
+  cover = 1.0;
+}`;
+
 const SEGMENT_FRAGMENT = `#version 300 es
 precision highp float;
 uniform vec3 ink;
@@ -73,9 +83,9 @@ class Painter {
     const [x0, y0, x1, y1] = run.facts.limits;
     this.origin = [0.5 * (x0 + x1), 0.5 * (y0 + y1)];
     this.shown = {x: this.origin[0], y: this.origin[1], height: 1};
-    this.segments = new Segments(...this.origin);
     this.prepareBodies();
-    this.prepareSegments();
+    this.segments = this.shapes(SEGMENT_VERTEX, [["from", 2, 0], ["to", 2, 8], ["width", 1, 16]], this.gl.TRIANGLE_STRIP);
+    this.boxes = this.shapes(BOX_VERTEX, [["box", 4, 0]], this.gl.LINE_LOOP);
     // Lines thinner than a picture element are fainter instead.
     this.gl.enable(this.gl.BLEND);
     this.gl.blendFunc(this.gl.SRC_ALPHA, this.gl.ONE_MINUS_SRC_ALPHA);
@@ -149,19 +159,20 @@ class Painter {
     return texture;
   }
 
-  prepareSegments() {
-    const gl = this.gl;
-    this.lines = this.program(SEGMENT_VERTEX, SEGMENT_FRAGMENT);
-    this.ends = gl.createVertexArray();
-    gl.bindVertexArray(this.ends);
-    this.endBuffer = gl.createBuffer();
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.endBuffer);
-    for (const [name, size, offset] of [["from", 2, 0], ["to", 2, 8], ["width", 1, 16]]) {
-      const place = this.lines.attribute(name);
+  /** A list of shapes and what draws them: numbers of each by name, count and offset, and how four corners are joined. */
+  shapes(vertex, attributes, joined) {
+    const gl = this.gl, program = this.program(vertex, SEGMENT_FRAGMENT);
+    const numbers = attributes.reduce((sum, [, size]) => sum + size, 0);
+    const array = gl.createVertexArray(), buffer = gl.createBuffer();
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    for (const [name, size, offset] of attributes) {
+      const place = program.attribute(name);
       gl.enableVertexAttribArray(place);
-      gl.vertexAttribPointer(place, size, gl.FLOAT, false, 20, offset);
+      gl.vertexAttribPointer(place, size, gl.FLOAT, false, 4 * numbers, offset);
       gl.vertexAttribDivisor(place, 1);
     }
+    return {program, array, buffer, joined, list: new Shapes(numbers, ...this.origin)};
   }
 
   /** Colours of the scale, 256 times red, green and blue. */
@@ -199,9 +210,10 @@ class Painter {
     this.drawBodies(this.run.facts.diameter / step >= LEAST_OUTLINED * ratio);
     for (const name of Object.keys(OVERLAYS)) {
       if (!overlays.has(name)) continue;
-      this.segments.clear();
-      OVERLAYS[name].make(this.run, this.segments);
-      this.drawSegments(OVERLAYS[name].colour);
+      const {make, shapes, colour} = OVERLAYS[name];
+      this[shapes].list.clear();
+      make(this.run, this[shapes].list);
+      this.drawShapes(this[shapes], colour);
     }
     if (chosen >= 0) this.drawChosen(chosen, 2.5 * ratio * step);
   }
@@ -244,26 +256,26 @@ class Painter {
     }
   }
 
-  drawSegments(colour) {
-    const gl = this.gl, {program, places} = this.lines, {segments} = this;
+  drawShapes({program: {program, places}, array, buffer, joined, list}, colour) {
+    const gl = this.gl;
     gl.useProgram(program);
-    gl.bindVertexArray(this.ends);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.endBuffer);
-    gl.bufferData(gl.ARRAY_BUFFER, segments.data.subarray(0, 5 * segments.n), gl.STREAM_DRAW);
+    gl.bindVertexArray(array);
+    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
+    gl.bufferData(gl.ARRAY_BUFFER, list.data.subarray(0, list.numbers * list.n), gl.STREAM_DRAW);
     gl.uniform2fv(places.middle, this.view.middle);
     gl.uniform2fv(places.scale, this.view.scale);
-    gl.uniform2fv(places.elements, this.view.elements);
+    if (places.elements) gl.uniform2fv(places.elements, this.view.elements);
     gl.uniform3fv(places.ink, colour);
-    gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, segments.n);
+    gl.drawArraysInstanced(joined, 0, 4, list.n);
   }
 
   drawChosen(i, width) {
-    const {run, segments} = this, place = (v) => [
+    const {run} = this, segments = this.segments.list, place = (v) => [
       run.x[i] + run.cosine[i] * run.shape[2 * v] - run.sine[i] * run.shape[2 * v + 1],
       run.y[i] + run.sine[i] * run.shape[2 * v] + run.cosine[i] * run.shape[2 * v + 1]];
     segments.clear();
     segments.reserve(run.start[i + 1] - run.start[i]);
     for (let v = run.start[i], w = run.start[i + 1] - 1; v < run.start[i + 1]; w = v++) segments.add(...place(w), ...place(v), width);
-    this.drawSegments([1, 0, 1]);
+    this.drawShapes(this.segments, [1, 0, 1]);
   }
 }
