@@ -26,7 +26,6 @@ contains
    !> Sums, maxima, broadcast and relayed numbers: unchanged, as there is only one rank.
    subroutine unchanged_longs(self, values)
       class(serial_communicator_t), intent(inout) :: self
-      !> Numbers; unchanged
       integer(lp), intent(inout), contiguous :: values(:)
 
       associate (unused => self%size, unused_values => values)
@@ -36,7 +35,6 @@ contains
    !> Maxima: unchanged, as there is only one rank.
    subroutine all_reduce_max_doubles(self, values)
       class(serial_communicator_t), intent(inout) :: self
-      !> Numbers; unchanged
       real(dp), intent(inout), contiguous :: values(:)
 
       associate (unused => self%size, unused_values => values)
@@ -46,11 +44,8 @@ contains
    !> Return a copy of the only list.
    subroutine gather_longs(self, mine, all_of_them, counts)
       class(serial_communicator_t), intent(inout) :: self
-      !> List of the only rank
       integer(lp), intent(in), contiguous :: mine(:)
-      !> A copy of the list
       integer(lp), allocatable, intent(out) :: all_of_them(:)
-      !> Length of the list, (0:0)
       integer(ip), allocatable, intent(out) :: counts(:)
 
       all_of_them = mine
@@ -61,13 +56,9 @@ contains
    !> Return a copy of the rows.
    subroutine all_to_all_longs(self, rows, counts, received, counts_received)
       class(serial_communicator_t), intent(inout) :: self
-      !> Rows, (width, row)
       integer(lp), intent(in), contiguous :: rows(:, :)
-      !> Number of rows, (0:0)
       integer(ip), intent(in) :: counts(0:)
-      !> A copy of the rows, (width, row)
       integer(lp), allocatable, intent(out) :: received(:, :)
-      !> Number of rows, (0:0)
       integer(ip), allocatable, intent(out) :: counts_received(:)
 
       received = rows
@@ -78,11 +69,8 @@ contains
    !> No-op: there is no other rank.
    subroutine exchange(self, route, sent, received)
       class(serial_communicator_t), intent(inout) :: self
-      !> A route without neighbours
       type(neighbour_ranks_t), intent(in) :: route
-      !> No rows
       real(wp), intent(in), contiguous, target :: sent(:, :)
-      !> No rows
       real(wp), intent(inout), contiguous, target :: received(:, :)
 
       associate (unused => self%size, unused_route => route, unused_rows => sent, unused_values => received)

@@ -36,7 +36,6 @@ contains
    !> Replace numbers by their sums over all ranks.
    subroutine all_reduce_sum(self, values)
       class(mpi_communicator_t), intent(inout) :: self
-      !> Numbers of this rank; afterwards the same on all ranks
       integer(lp), intent(inout), contiguous :: values(:)
 
       if (self%size == 1_ip) return
@@ -46,7 +45,6 @@ contains
    !> Replace numbers by their maxima over all ranks.
    subroutine all_reduce_max_longs(self, values)
       class(mpi_communicator_t), intent(inout) :: self
-      !> Numbers of this rank; afterwards the same on all ranks
       integer(lp), intent(inout), contiguous :: values(:)
 
       if (self%size == 1_ip) return
@@ -56,7 +54,6 @@ contains
    !> Replace numbers by their maxima over all ranks.
    subroutine all_reduce_max_doubles(self, values)
       class(mpi_communicator_t), intent(inout) :: self
-      !> Numbers of this rank; afterwards the same on all ranks
       real(dp), intent(inout), contiguous :: values(:)
 
       if (self%size == 1_ip) return
@@ -66,7 +63,6 @@ contains
    !> Broadcast numbers of the root rank.
    subroutine broadcast_longs(self, values)
       class(mpi_communicator_t), intent(inout) :: self
-      !> Numbers of the root rank; afterwards the same on all ranks
       integer(lp), intent(inout), contiguous :: values(:)
 
       if (self%size == 1_ip) return
@@ -76,11 +72,8 @@ contains
    !> Collect the lists of all ranks on every rank.
    subroutine gather_longs(self, mine, all_of_them, counts)
       class(mpi_communicator_t), intent(inout) :: self
-      !> List of this rank
       integer(lp), intent(in), contiguous :: mine(:)
-      !> All lists, in the order of ranks
       integer(lp), allocatable, intent(out) :: all_of_them(:)
-      !> Lengths of the lists, (0:size - 1)
       integer(ip), allocatable, intent(out) :: counts(:)
       integer :: lengths(0:self%size - 1_ip), starts(0:self%size - 1_ip)
 
@@ -94,13 +87,9 @@ contains
    !> Send rows to all ranks and receive rows from all ranks.
    subroutine all_to_all_longs(self, rows, counts, received, counts_received)
       class(mpi_communicator_t), intent(inout) :: self
-      !> Rows to send, in the order of their destination ranks, (width, row)
       integer(lp), intent(in), contiguous :: rows(:, :)
-      !> Number of rows to send to each rank, (0:size - 1)
       integer(ip), intent(in) :: counts(0:)
-      !> Received rows, in the order of their source ranks, (width, row)
       integer(lp), allocatable, intent(out) :: received(:, :)
-      !> Number of rows received from each rank, (0:size - 1)
       integer(ip), allocatable, intent(out) :: counts_received(:)
       type(mpi_request) :: requests(2*self%size)
       integer :: n_out(0:self%size - 1_ip), n_in(0:self%size - 1_ip), from(0:self%size - 1_ip), to(0:self%size - 1_ip)
@@ -134,11 +123,8 @@ contains
    !> Exchange rows with neighbour ranks.
    subroutine exchange(self, route, sent, received)
       class(mpi_communicator_t), intent(inout) :: self
-      !> Neighbour ranks, and the rows sent to and received from each
       type(neighbour_ranks_t), intent(in) :: route
-      !> Rows to send, in the order of the route, (width, row)
       real(wp), intent(in), contiguous, target :: sent(:, :)
-      !> Received rows, in the order of the route, (width, row)
       real(wp), intent(inout), contiguous, target :: received(:, :)
       type(mpi_request) :: requests(2*size(route%rank))
       integer :: k, n, bytes, row_bytes
@@ -166,7 +152,6 @@ contains
    !> Receive numbers from rank - 1. Nothing happens on rank 0.
    subroutine receive_from_previous(self, values)
       class(mpi_communicator_t), intent(inout) :: self
-      !> Numbers of rank - 1; unchanged on rank 0
       integer(lp), intent(inout), contiguous :: values(:)
 
       if (self%rank == 0_ip) return
@@ -176,7 +161,6 @@ contains
    !> Send numbers to rank + 1. Nothing happens on the last rank.
    subroutine send_to_next(self, values)
       class(mpi_communicator_t), intent(inout) :: self
-      !> The numbers; unchanged
       integer(lp), intent(inout), contiguous :: values(:)
 
       if (self%rank == self%size - 1_ip) return
