@@ -57,7 +57,7 @@ def test_the_browser_has_the_numbers_of_the_run(page, run):
         assert np.abs(there - snapshot.frame.position[:, axis]).max() <= 0.51 * quantum
     free = ~snapshot.frame.fixed
     for name, quantity in QUANTITIES.items():
-        there = np.array(js(page, f"return Array.from(COLUMNS.{name}(viewer.run))"), dtype=float)[free]
+        there = np.array(js(page, f"return Array.from(viewer.run.id, (_, i) => COLUMNS.{name}(viewer.run, i))"), dtype=float)[free]
         true = quantity.values(snapshot)[free]
         if name == "angle":
             there = true + (there - true + np.pi) % (2.0 * np.pi) - np.pi
@@ -69,10 +69,15 @@ def test_the_browser_has_the_numbers_of_the_run(page, run):
 def test_the_browser_finds_the_cells_of_the_tree_and_the_boxes(page, run):
     js(page, "viewer.show(viewer.run.frames - 1)")
     cells = tree_cells(cell_grid(read_snapshot(run, 0)), read_snapshot(run, -1).boxes)
-    there = np.array(js(page, "const c = treeCells(viewer.run); return Array.from(c.data.subarray(0, 3 * c.n))"))
-    assert len(there) // 3 == pytest.approx(len(cells.side), abs=4)  # a centre may be rounded into the next cell
-    sides = there.reshape(-1, 3)[:, 2]
-    assert sides.max() == pytest.approx(cells.side.max())
+    there = np.array(js(page, "const c = new Texels(); cellBoxes(viewer.run, c); "
+                              "return Array.from(c.data.subarray(0, 4 * c.n))")).reshape(-1, 4)
+    assert len(there) == pytest.approx(len(cells.side), abs=4)  # a centre may be rounded into the next cell
+    assert (there[:, 2] - there[:, 0]).max() == pytest.approx(cells.side.max())
+    there[:, 2] -= there[:, 0]
+    there[:, :2] += js(page, "return viewer.run.origin")
+    places = [{tuple(row) for row in np.rint(rows / cells.side.min()).astype(int)}
+              for rows in (there[:, :3], np.column_stack((cells.low, cells.side)))]
+    assert len(places[0] & places[1]) >= len(cells.side) - 4
     boxes = np.array(js(page, "return Array.from(viewer.run.boxes())")).reshape(-1, 4)
     assert np.abs(boxes - run[-1].bounds).max() < 2e-3 * np.median(run[0].diameter)
 
@@ -126,6 +131,24 @@ def test_overlays_are_drawn_and_taken_away(page):
         assert (np.abs(drawn - colour).max(axis=2) < 30).sum() > 30, name
         page.find_element("id", f"show-{name}").click()
         assert np.array_equal(picture_of(page), plain), name
+
+
+def test_overlays_are_made_once_per_frame(page):
+    js(page, """window.made = {};
+        for (const [name, each] of Object.entries(OVERLAYS)) {
+          const make = each.make;
+          each.make = (run, list) => { made[name] = (made[name] || 0) + 1; make(run, list); };
+          viewer.setOverlay(name, true);
+        }
+        viewer.show(arguments[0])""", FRAME)
+    there = picture_of(page)
+    js(page, "window.made = {}; viewer.redraw(); viewer.painter.shown.height *= 1.1; viewer.redraw()")
+    assert js(page, "return made") == {}
+    js(page, "viewer.painter.fit(); viewer.show(arguments[0] + 1)", FRAME)
+    assert js(page, "return made") == {"forces": 1, "contacts": 1, "boxes": 1, "cells": 1}
+    assert not np.array_equal(picture_of(page), there)
+    js(page, "viewer.show(arguments[0])", FRAME)
+    assert np.array_equal(picture_of(page), there)
 
 
 def test_a_click_picks_a_body_and_shows_its_numbers(page, run):

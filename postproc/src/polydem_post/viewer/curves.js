@@ -6,11 +6,17 @@ class Curve {
     this.facts = facts;
     this.choice = document.createElement("select");
     for (const each of Object.keys(facts.curves)) this.choice.add(new Option(each.replaceAll("_", " "), each, false, each === name));
-    this.canvas = document.createElement("canvas");
     this.choice.setAttribute("aria-label", "curve");
-    parent.append(this.choice, this.canvas);
+    const plot = document.createElement("div");
+    plot.className = "curve";
+    this.canvas = document.createElement("canvas");
+    this.mark = document.createElement("i");
+    plot.append(this.canvas, this.mark);
+    parent.append(this.choice, plot);
+    this.left = 56;
     this.frame = 0;
-    this.choice.addEventListener("change", () => this.draw(this.frame));
+    this.choice.addEventListener("change", () => this.draw());
+    new ResizeObserver(() => this.draw()).observe(this.canvas);
     this.canvas.addEventListener("click", (event) => {
       const share = (event.offsetX - this.left) / (this.canvas.clientWidth - this.left - 4);
       const {times} = facts, time = times[0] + share * (times[times.length - 1] - times[0]);
@@ -18,17 +24,23 @@ class Curve {
     });
   }
 
-  /** Draw the curve, unless it is there, and the mark. */
-  draw(frame) {
+  /** Put the mark at a frame. */
+  show(frame) {
+    const {times} = this.facts, span = times[times.length - 1] - times[0] || 1;
     this.frame = frame;
+    this.mark.style.transform = `translateX(${this.left + this.wide * (times[frame] - times[0]) / span}px)`;
+  }
+
+  /** Draw the curve. */
+  draw() {
     const ratio = window.devicePixelRatio || 1, width = this.canvas.clientWidth, height = this.canvas.clientHeight;
-    this.left = 56;
     const {values, unit} = this.facts.curves[this.choice.value], {times} = this.facts;
-    const known = values.filter((value) => value !== null);
-    let low = Math.min(...known), high = Math.max(...known);
-    if (!(high > low)) [low, high] = [low - 1, high + 1];
+    let low = Infinity, high = -Infinity;
+    for (const value of values) if (value !== null) [low, high] = [Math.min(low, value), Math.max(high, value)];
+    if (!(high > low)) [low, high] = high === low ? [low - 1, high + 1] : [0, 1];
     const span = times[times.length - 1] - times[0] || 1;
-    const x = (k) => this.left + (width - this.left - 4) * (times[k] - times[0]) / span;
+    this.wide = width - this.left - 4;
+    const x = (k) => this.left + this.wide * (times[k] - times[0]) / span;
     const y = (value) => 6 + (height - 22) * (high - value) / (high - low);
     Object.assign(this.canvas, {width: Math.round(width * ratio), height: Math.round(height * ratio)});
     const ink = this.canvas.getContext("2d");
@@ -43,16 +55,12 @@ class Curve {
     ink.textAlign = "left";
     ink.fillText(number(times[0]) + " s", this.left, height - 3);
     ink.strokeStyle = "#bbb";
-    ink.strokeRect(this.left, 6, width - this.left - 4, height - 22);
+    ink.strokeRect(this.left, 6, this.wide, height - 22);
     ink.strokeStyle = "#0072b2";
     ink.lineWidth = 1.5;
     ink.beginPath();
     values.forEach((value, k) => { if (value !== null) ink.lineTo(x(k), y(value)); });
     ink.stroke();
-    ink.strokeStyle = "#d55e00";
-    ink.beginPath();
-    ink.moveTo(x(frame), 6);
-    ink.lineTo(x(frame), height - 16);
-    ink.stroke();
+    this.show(this.frame);
   }
 }

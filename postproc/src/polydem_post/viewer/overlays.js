@@ -1,36 +1,22 @@
 "use strict";
 
-// What is laid over the bodies: segments, as x and y of both ends relative to an origin and a width [m], and boxes, as x
-// and y of two corners.
+// What is laid over the bodies, as texels of four numbers: a segment has two, x and y of an end relative to the origin and
+// the width [m]; a box has one, x and y of two corners.
 
-/** A growing list of segments (5 numbers each) or boxes (4). */
-class Shapes {
-  constructor(numbers, originX, originY) {
+/** Texels in one row of a texture. */
+const ROW = 2048;
+
+/** A growing list of texels in whole rows. */
+class Texels {
+  constructor() {
     this.n = 0;
-    this.numbers = numbers;
-    this.data = new Float32Array(numbers * 1024);
-    this.originX = originX;
-    this.originY = originY;
+    this.data = new Float32Array(4 * ROW);
   }
 
-  clear() { this.n = 0; }
-
-  reserve(more) {
-    const needed = this.numbers * (this.n + more);
-    if (needed <= this.data.length) return;
-    const larger = new Float32Array(Math.max(needed, 2 * this.data.length));
-    larger.set(this.data);
-    this.data = larger;
-  }
-
-  /** Add one; there must be room. */
-  add(ax, ay, bx, by, width) {
-    const k = this.numbers * this.n++, data = this.data;
-    data[k] = ax - this.originX;
-    data[k + 1] = ay - this.originY;
-    data[k + 2] = bx - this.originX;
-    data[k + 3] = by - this.originY;
-    if (this.numbers === 5) data[k + 4] = width;
+  /** Empty it, and make room. */
+  clear(most) {
+    this.n = 0;
+    if (4 * most > this.data.length) this.data = new Float32Array(4 * ROW * Math.ceil(1.25 * most / ROW));
   }
 }
 
@@ -38,40 +24,58 @@ class Shapes {
 function widestForce(run) { return 0.45 * run.facts.diameter; }
 
 /** Lines from the centres of two bodies to their contact point, as wide as the force; to a wall none. */
-function forceSegments(run, segments) {
-  const t = run.contacts, widest = widestForce(run), covered = run.facts.contacts.covered;
-  segments.reserve(2 * t.n);
+function forceSegments(run, list) {
+  const t = run.contacts(), widest = widestForce(run), factor = widest / run.facts.contacts.covered, least = 0.002 * widest;
+  const [originX, originY] = run.origin, {state, fixed} = run;
+  list.clear(4 * t.n);
+  const {data} = list;
+  let k = 0;
   for (let c = 0; c < t.n; c++) {
-    const width = widest * Math.min(t.size[c] / covered, 1);
-    if (width < 0.002 * widest) continue;
-    for (const i of [t.first[c], t.second[c]]) {
-      if (!run.fixed[i]) segments.add(run.x[i], run.y[i], t.x[c], t.y[c], width);
+    const width = Math.min(t.size[c] * factor, widest);
+    if (width < least) continue;
+    const x = t.x[c] - originX, y = t.y[c] - originY;
+    for (let side = 0; side < 2; side++) {
+      const i = side === 0 ? t.first[c] : t.second[c];
+      if (fixed[i]) continue;
+      data[k] = state[4 * i];
+      data[k + 1] = state[4 * i + 1];
+      data[k + 2] = width;
+      data[k + 4] = x;
+      data[k + 5] = y;
+      k += 8;
     }
   }
+  list.n = k / 4;
 }
 
 /** A square at each contact point. */
-function contactSegments(run, segments) {
-  const t = run.contacts, half = 0.05 * run.facts.diameter;
-  segments.reserve(t.n);
-  for (let c = 0; c < t.n; c++) segments.add(t.x[c] - half, t.y[c], t.x[c] + half, t.y[c], 2 * half);
+function contactSegments(run, list) {
+  const t = run.contacts(), half = 0.05 * run.facts.diameter, [originX, originY] = run.origin;
+  list.clear(2 * t.n);
+  const {data} = list;
+  for (let c = 0, k = 0; c < t.n; c++, k += 8) {
+    data[k] = t.x[c] - originX - half;
+    data[k + 4] = t.x[c] - originX + half;
+    data[k + 1] = data[k + 5] = t.y[c] - originY;
+    data[k + 2] = 2 * half;
+  }
+  list.n = 2 * t.n;
 }
 
 function bodyBoxes(run, list) {
-  const boxes = run.boxes();
-  list.reserve(run.n);
+  const boxes = run.boxes(), [originX, originY] = run.origin;
+  list.clear(run.n);
+  const {data} = list;
+  let k = 0;
   for (let i = 0; i < run.n; i++) {
-    if (!run.fixed[i]) list.add(boxes[4 * i], boxes[4 * i + 1], boxes[4 * i + 2], boxes[4 * i + 3]);
+    if (run.fixed[i]) continue;
+    data[k] = boxes[4 * i] - originX;
+    data[k + 1] = boxes[4 * i + 1] - originY;
+    data[k + 2] = boxes[4 * i + 2] - originX;
+    data[k + 3] = boxes[4 * i + 3] - originY;
+    k += 4;
   }
-}
-
-function cellBoxes(run, list) {
-  const cells = treeCells(run);
-  list.reserve(cells.n);
-  for (let k = 0; k < cells.n; k++) {
-    const x = cells.data[3 * k], y = cells.data[3 * k + 1], side = cells.data[3 * k + 2];
-    list.add(x, y, x + side, y + side);
-  }
+  list.n = k / 4;
 }
 
 /** Name of an overlay -> what makes it, of which shapes, and its colour; those of pictures (drawing.py). */

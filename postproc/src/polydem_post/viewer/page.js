@@ -24,11 +24,11 @@ class Viewer {
     frame = Math.min(Math.max(frame, 0), this.run.frames - 1);
     if (frame !== this.run.frame) this.run.go(frame);
     this.frame = frame;
-    const {facts} = this.run, fact = facts.quantities[this.colour];
-    this.painter.draw(fact ? COLUMNS[this.colour](this.run) : null, fact ? fact.range : [0, 1], this.overlays, this.chosen);
+    const {facts} = this.run;
+    this.painter.draw(this.colour, this.overlays, this.chosen);
     this.scrub.value = frame;
     this.time.textContent = `t = ${number(facts.times[frame])} s, frame ${facts.frames[frame]}`;
-    for (const curve of this.curves) curve.draw(frame);
+    for (const curve of this.curves) curve.show(frame);
     if (this.chosen >= 0) this.tell();
     this.scriptTimes.push(performance.now() - began);
     if (this.scriptTimes.length > 1000) this.scriptTimes.shift();
@@ -74,12 +74,16 @@ class Viewer {
 
   /** The numbers of the chosen body. */
   tell() {
-    const rows = numbersOf(this.run, this.chosen).map(([name, value]) => {
-      const row = document.createElement("tr");
-      for (const text of [name, value]) row.insertCell().textContent = text;
-      return row;
-    });
-    document.getElementById("body").replaceChildren(...rows);
+    const table = document.getElementById("body"), numbers = numbersOf(this.run, this.chosen);
+    if (table.rows.length !== numbers.length) {
+      table.replaceChildren();
+      for (const [name] of numbers) {
+        const row = table.insertRow();
+        row.insertCell().textContent = name;
+        row.insertCell();
+      }
+    }
+    numbers.forEach(([, value], k) => { table.rows[k].cells[1].textContent = value; });
   }
 
   play(on) {
@@ -126,7 +130,7 @@ class Viewer {
     this.curves = Object.keys(facts.curves).length === 0 ? []
       : ["kinetic", "potential"].map((name) => new Curve(find("curves"), facts, name, (k) => this.show(k)));
     find("rounding").textContent = this.rounding();
-    window.addEventListener("resize", () => this.redraw());
+    new ResizeObserver(() => { this.painter.resize(); this.redraw(); }).observe(this.painter.canvas);
     window.addEventListener("keydown", (event) => this.press(event));
   }
 

@@ -10,7 +10,7 @@ uniform highp sampler2D value;
 uniform vec2 middle, scale;
 flat out float shade;
 void main() {
-  ivec2 at = ivec2(int(body) % 1024, int(body) / 1024);
+  ivec2 at = ivec2(int(body) % ${ROW}, int(body) / ${ROW});
   vec4 s = texelFetch(state, at, 0);
   vec2 turned = vec2(s.z * corner.x - s.w * corner.y, s.w * corner.x + s.z * corner.y);
   gl_Position = vec4((s.xy + turned - middle) * scale, 0.0, 1.0);
@@ -29,31 +29,37 @@ void main() {
   colour = vec4(outline ? vec3(0.1) : filled, 1.0);
 }`;
 
+/** Six vertices for each segment: two triangles. */
 const SEGMENT_VERTEX = `#version 300 es
-in vec2 from, to;
-in float width;
+uniform highp sampler2D shapes;
 uniform vec2 middle, scale, elements;
 flat out float cover;
+vec4 texel(int k) { return texelFetch(shapes, ivec2(k % ${ROW}, k / ${ROW}), 0); }
 void main() {
-  vec2 a = (from - middle) * scale * elements, b = (to - middle) * scale * elements;
+  int segment = gl_VertexID / 6, vertex = gl_VertexID % 6;
+  int corner = vertex < 3 ? vertex : vertex - 2;
+  vec4 from = texel(2 * segment);
+  vec2 a = (from.xy - middle) * scale * elements, b = (texel(2 * segment + 1).xy - middle) * scale * elements;
   vec2 along = b - a;
   float size = length(along);
   along = size > 1e-6 ? along / size : vec2(1.0, 0.0);
-  float side = gl_VertexID % 2 == 0 ? 1.0 : -1.0;
-  float half_width = 0.5 * width * scale.y * elements.y;
-  cover = width > 0.0 ? min(2.0 * half_width, 1.0) : 1.0;
-  half_width = max(half_width, 0.5);
-  vec2 place = (gl_VertexID < 2 ? a : b) + side * half_width * vec2(-along.y, along.x);
+  float half_width = 0.5 * from.z * scale.y * elements.y;
+  cover = min(2.0 * half_width, 1.0);
+  half_width = corner % 2 == 0 ? max(half_width, 0.5) : -max(half_width, 0.5);
+  vec2 place = (corner < 2 ? a : b) + half_width * vec2(-along.y, along.x);
   gl_Position = vec4(place / elements, 0.0, 1.0);
 }`;
 
+/** Eight vertices for each box: four lines. */
 const BOX_VERTEX = `#version 300 es
-in vec4 box;
+uniform highp sampler2D shapes;
 uniform vec2 middle, scale;
 flat out float cover;
 void main() {
-  vec2 corner = vec2(gl_VertexID == 1 || gl_VertexID == 2 ? box.z : box.x, gl_VertexID < 2 ? box.y : box.w);
-  gl_Position = vec4((corner - middle) * scale, 0.0, 1.0);
+  int k = gl_VertexID / 8, corner = (gl_VertexID % 8 + 1) / 2 % 4;
+  vec4 box = texelFetch(shapes, ivec2(k % ${ROW}, k / ${ROW}), 0);
+  vec2 place = vec2(corner == 1 || corner == 2 ? box.z : box.x, corner < 2 ? box.y : box.w);
+  gl_Position = vec4((place - middle) * scale, 0.0, 1.0);
   cover = 1.0;
 }`;
 
@@ -64,11 +70,11 @@ flat in float cover;
 out vec4 colour;
 void main() { colour = vec4(ink, cover); }`;
 
-/** Bodies in one row of the textures of their state. */
-const ROW = 1024;
-
 /** What stands for a value in the texture of shades. */
 const FIXED = -1, UNKNOWN = -2, PLAIN = -3;
+
+/** Texture unit of what is laid over the bodies; those before are state, shades and colours. */
+const SHAPES = 3;
 
 /** Outlines are drawn where bodies are at least so large [picture elements]. */
 const LEAST_OUTLINED = 5;
@@ -80,12 +86,17 @@ class Painter {
     this.gl = canvas.getContext("webgl2", {antialias: true, alpha: false});
     if (!this.gl) throw new Error("This browser has no WebGL 2, which the viewer needs to draw bodies. " +
       "Try another browser, or make a film: ./polydem movie.");
-    const [x0, y0, x1, y1] = run.facts.limits;
-    this.origin = [0.5 * (x0 + x1), 0.5 * (y0 + y1)];
-    this.shown = {x: this.origin[0], y: this.origin[1], height: 1};
+    this.shown = {x: 0, y: 0, height: 1};
     this.prepareBodies();
-    this.segments = this.shapes(SEGMENT_VERTEX, [["from", 2, 0], ["to", 2, 8], ["width", 1, 16]], this.gl.TRIANGLE_STRIP);
-    this.boxes = this.shapes(BOX_VERTEX, [["box", 4, 0]], this.gl.LINE_LOOP);
+    this.programs = {
+      segments: {...this.program(SEGMENT_VERTEX, SEGMENT_FRAGMENT), texels: 2, vertices: 6, kind: this.gl.TRIANGLES},
+      boxes: {...this.program(BOX_VERTEX, SEGMENT_FRAGMENT), texels: 1, vertices: 8, kind: this.gl.LINES},
+    };
+    this.layers = {};
+    for (const name of Object.keys(OVERLAYS)) this.layers[name] = this.layer();
+    this.outline = this.layer();
+    this.nothing = this.gl.createVertexArray();
+    this.resize();
     // Lines thinner than a picture element are fainter instead.
     this.gl.enable(this.gl.BLEND);
     this.gl.blendFunc(this.gl.SRC_ALPHA, this.gl.ONE_MINUS_SRC_ALPHA);
@@ -129,12 +140,13 @@ class Painter {
     this.attribute(this.bodies.attribute("body"), 1, bodyOf);
     this.fan = this.indices(fan);
     this.edges = this.indices(edges);
-    this.rows = Math.ceil(run.n / ROW);
-    this.stateData = new Float32Array(4 * ROW * this.rows);
+    this.state = this.texture(0);
+    this.shade = this.texture(1);
+    this.colours = this.texture(2);
+    this.rows = run.state.length / (4 * ROW);
     this.shadeData = new Float32Array(ROW * this.rows);
-    this.state = this.texture();
-    this.shade = this.texture();
-    this.colours = this.texture();
+    /** The frame whose state is on the graphics unit, and the quantity and frame of its shades. */
+    this.present = {state: -1, colour: null, shade: -1};
   }
 
   attribute(place, size, data) {
@@ -152,41 +164,41 @@ class Painter {
     return {buffer, count: list.length};
   }
 
-  texture() {
+  /** A texture that stays bound to a unit. */
+  texture(unit) {
     const gl = this.gl, texture = gl.createTexture();
+    gl.activeTexture(gl.TEXTURE0 + unit);
     gl.bindTexture(gl.TEXTURE_2D, texture);
     for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
     return texture;
   }
 
-  /** A list of shapes and what draws them: numbers of each by name, count and offset, and how four corners are joined. */
-  shapes(vertex, attributes, joined) {
-    const gl = this.gl, program = this.program(vertex, SEGMENT_FRAGMENT);
-    const numbers = attributes.reduce((sum, [, size]) => sum + size, 0);
-    const array = gl.createVertexArray(), buffer = gl.createBuffer();
-    gl.bindVertexArray(array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    for (const [name, size, offset] of attributes) {
-      const place = program.attribute(name);
-      gl.enableVertexAttribArray(place);
-      gl.vertexAttribPointer(place, size, gl.FLOAT, false, 4 * numbers, offset);
-      gl.vertexAttribDivisor(place, 1);
-    }
-    return {program, array, buffer, joined, list: new Shapes(numbers, ...this.origin)};
-  }
+  /** Texels with the texture that holds them, and the frame to which they belong. */
+  layer() { return {texels: new Texels(), texture: this.texture(SHAPES), rows: 0, frame: -1}; }
 
   /** Colours of the scale, 256 times red, green and blue. */
   setColours(bytes) {
     const gl = this.gl;
-    gl.bindTexture(gl.TEXTURE_2D, this.colours);
+    gl.activeTexture(gl.TEXTURE2);
     gl.pixelStorei(gl.UNPACK_ALIGNMENT, 1);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB8, 256, 1, 0, gl.RGB, gl.UNSIGNED_BYTE, bytes);
   }
 
+  /** Take the size of the canvas in the page. */
+  resize() {
+    const {canvas} = this;
+    this.ratio = window.devicePixelRatio || 1;
+    this.width = Math.max(Math.round(canvas.clientWidth * this.ratio), 1);
+    this.height = Math.max(Math.round(canvas.clientHeight * this.ratio), 1);
+    if (canvas.width !== this.width || canvas.height !== this.height) {
+      Object.assign(canvas, {width: this.width, height: this.height});
+    }
+  }
+
   /** Show all bodies. */
   fit() {
-    const [x0, y0, x1, y1] = this.run.facts.limits, aspect = this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1);
-    this.shown = {x: this.origin[0], y: this.origin[1], height: Math.max(y1 - y0, (x1 - x0) / aspect)};
+    const [x0, y0, x1, y1] = this.run.facts.limits, [x, y] = this.run.origin;
+    this.shown = {x, y, height: Math.max(y1 - y0, (x1 - x0) * this.height / this.width)};
   }
 
   /** Place in the plane of a place in the canvas [CSS picture elements]. */
@@ -195,48 +207,51 @@ class Painter {
     return [this.shown.x + (left - 0.5 * width) * step, this.shown.y - (top - 0.5 * height) * step];
   }
 
-  /** Draw the present frame: values of a quantity (null: all alike), names of overlays, and the body that is chosen. */
-  draw(values, range, overlays, chosen) {
-    const gl = this.gl, canvas = this.canvas, ratio = window.devicePixelRatio || 1;
-    const width = Math.round(canvas.clientWidth * ratio), height = Math.round(canvas.clientHeight * ratio);
-    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, {width, height});
+  /** Draw the present frame: name of a quantity (another: all alike), names of overlays, and the body that is chosen. */
+  draw(colour, overlays, chosen) {
+    const {gl, run, width, height} = this, [originX, originY] = run.origin, step = this.shown.height / height;
     gl.viewport(0, 0, width, height);
     gl.clearColor(1, 1, 1, 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    const step = this.shown.height / height;
-    this.view = {middle: [this.shown.x - this.origin[0], this.shown.y - this.origin[1]],
+    this.view = {middle: [this.shown.x - originX, this.shown.y - originY],
       scale: [2 / (step * width), 2 / (step * height)], elements: [0.5 * width, 0.5 * height]};
-    this.upload(values, range);
-    this.drawBodies(this.run.facts.diameter / step >= LEAST_OUTLINED * ratio);
+    this.uploadBodies(colour);
+    this.drawBodies(run.facts.diameter / step >= LEAST_OUTLINED * this.ratio);
     for (const name of Object.keys(OVERLAYS)) {
       if (!overlays.has(name)) continue;
-      const {make, shapes, colour} = OVERLAYS[name];
-      this[shapes].list.clear();
-      make(this.run, this[shapes].list);
-      this.drawShapes(this[shapes], colour);
+      const {make, shapes, colour: ink} = OVERLAYS[name], layer = this.layers[name];
+      if (layer.frame !== run.frame) {
+        make(run, layer.texels);
+        this.uploadLayer(layer);
+        layer.frame = run.frame;
+      }
+      this.drawLayer(layer, this.programs[shapes], ink);
     }
-    if (chosen >= 0) this.drawChosen(chosen, 2.5 * ratio * step);
+    if (chosen >= 0) this.drawChosen(chosen, 2.5 * this.ratio * step);
   }
 
-  upload(values, [low, high]) {
-    const run = this.run, state = this.stateData, shade = this.shadeData, factor = 1 / (high - low);
-    for (let i = 0; i < run.n; i++) {
-      state[4 * i] = run.x[i] - this.origin[0];
-      state[4 * i + 1] = run.y[i] - this.origin[1];
-      state[4 * i + 2] = run.cosine[i];
-      state[4 * i + 3] = run.sine[i];
-      shade[i] = run.fixed[i] ? FIXED : !values ? PLAIN
-        : Number.isFinite(values[i]) ? Math.min(Math.max((values[i] - low) * factor, 0), 1) : UNKNOWN;
+  /** State and shades of the bodies, unless they are there. */
+  uploadBodies(colour) {
+    const {gl, run, present, rows, shadeData: shade} = this;
+    if (present.state !== run.frame) {
+      gl.activeTexture(gl.TEXTURE0);
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, ROW, rows, 0, gl.RGBA, gl.FLOAT, run.state);
+      present.state = run.frame;
     }
-    const gl = this.gl;
-    gl.activeTexture(gl.TEXTURE0);
-    gl.bindTexture(gl.TEXTURE_2D, this.state);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, ROW, this.rows, 0, gl.RGBA, gl.FLOAT, state);
+    if (present.shade === run.frame && present.colour === colour) return;
+    const value = COLUMNS[colour], [low, high] = value ? run.facts.quantities[colour].range : [0, 1];
+    const factor = 1 / (high - low);
+    for (let i = 0; i < run.n; i++) {
+      if (run.fixed[i]) shade[i] = FIXED;
+      else if (!value) shade[i] = PLAIN;
+      else {
+        const share = (value(run, i) - low) * factor;
+        shade[i] = share === share ? Math.min(Math.max(share, 0), 1) : UNKNOWN;
+      }
+    }
     gl.activeTexture(gl.TEXTURE1);
-    gl.bindTexture(gl.TEXTURE_2D, this.shade);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, ROW, this.rows, 0, gl.RED, gl.FLOAT, shade);
-    gl.activeTexture(gl.TEXTURE2);
-    gl.bindTexture(gl.TEXTURE_2D, this.colours);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.R32F, ROW, rows, 0, gl.RED, gl.FLOAT, shade);
+    Object.assign(present, {shade: run.frame, colour});
   }
 
   drawBodies(outlined) {
@@ -256,26 +271,39 @@ class Painter {
     }
   }
 
-  drawShapes({program: {program, places}, array, buffer, joined, list}, colour) {
+  uploadLayer(layer) {
+    const {gl} = this, {texels} = layer, rows = texels.data.length / (4 * ROW);
+    gl.activeTexture(gl.TEXTURE0 + SHAPES);
+    gl.bindTexture(gl.TEXTURE_2D, layer.texture);
+    if (layer.rows !== rows) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, ROW, rows, 0, gl.RGBA, gl.FLOAT, null);
+    layer.rows = rows;
+    const used = Math.ceil(texels.n / ROW);
+    if (used) gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, ROW, used, gl.RGBA, gl.FLOAT, texels.data);
+  }
+
+  drawLayer({texels, texture}, {program, places, texels: each, vertices, kind}, colour) {
     const gl = this.gl;
     gl.useProgram(program);
-    gl.bindVertexArray(array);
-    gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
-    gl.bufferData(gl.ARRAY_BUFFER, list.data.subarray(0, list.numbers * list.n), gl.STREAM_DRAW);
+    gl.bindVertexArray(this.nothing);
+    gl.activeTexture(gl.TEXTURE0 + SHAPES);
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.uniform1i(places.shapes, SHAPES);
     gl.uniform2fv(places.middle, this.view.middle);
     gl.uniform2fv(places.scale, this.view.scale);
     if (places.elements) gl.uniform2fv(places.elements, this.view.elements);
     gl.uniform3fv(places.ink, colour);
-    gl.drawArraysInstanced(joined, 0, 4, list.n);
+    gl.drawArrays(kind, 0, vertices * texels.n / each);
   }
 
   drawChosen(i, width) {
-    const {run} = this, segments = this.segments.list, place = (v) => [
-      run.x[i] + run.cosine[i] * run.shape[2 * v] - run.sine[i] * run.shape[2 * v + 1],
-      run.y[i] + run.sine[i] * run.shape[2 * v] + run.cosine[i] * run.shape[2 * v + 1]];
-    segments.clear();
-    segments.reserve(run.start[i + 1] - run.start[i]);
-    for (let v = run.start[i], w = run.start[i + 1] - 1; v < run.start[i + 1]; w = v++) segments.add(...place(w), ...place(v), width);
-    this.drawShapes(this.segments, [1, 0, 1]);
+    const {run, outline} = this, {shape, start} = run, [x, y, cosine, sine] = run.state.subarray(4 * i, 4 * i + 4);
+    const place = (v) => [x + cosine * shape[2 * v] - sine * shape[2 * v + 1], y + sine * shape[2 * v] + cosine * shape[2 * v + 1]];
+    outline.texels.clear(2 * (start[i + 1] - start[i]));
+    for (let v = start[i], w = start[i + 1] - 1; v < start[i + 1]; w = v++) {
+      outline.texels.data.set([...place(w), width, 0, ...place(v), 0, 0], 4 * outline.texels.n);
+      outline.texels.n += 2;
+    }
+    this.uploadLayer(outline);
+    this.drawLayer(outline, this.programs.segments, [1, 0, 1]);
   }
 }

@@ -16,15 +16,18 @@ class Run {
     run.material = await readArray("material", Int32Array);
     run.inTree = await readArray("in_tree", Uint8Array);
     run.series = {};
-    for (const name of Object.keys(facts.series)) {
-      run.series[name] = await readSeries(name, facts.series[name], run.frames, run.n);
+    for (const [name, fact] of Object.entries(facts.series)) {
+      run.series[name] = {quantum: fact.quantum, values: await readSeries(name, fact, run.frames, run.n)};
     }
     run.area = run.areas();
     if (facts.contacts) await run.readContacts();
+    const [x0, y0, x1, y1] = facts.limits;
+    /** Middle of what is shown [m]; single precision is only used relative to it. */
+    run.origin = [0.5 * (x0 + x1), 0.5 * (y0 + y1)];
     run.x = new Float64Array(run.n);
     run.y = new Float64Array(run.n);
-    run.cosine = new Float64Array(run.n);
-    run.sine = new Float64Array(run.n);
+    /** Of each body: x and y relative to the origin, cosine and sine of the angle; whole rows of a texture. */
+    run.state = new Float32Array(4 * ROW * Math.max(1, Math.ceil(run.n / ROW)));
     run.bounds = new Float64Array(4 * run.n);
     run.go(0);
     return run;
@@ -53,11 +56,11 @@ class Run {
     }
     this.cosines = Float64Array.from({length: 256}, (_, k) => Math.cos(2 * Math.PI * k / 256));
     this.sines = Float64Array.from({length: 256}, (_, k) => Math.sin(2 * Math.PI * k / 256));
-    const most = Math.max(...facts.count, 0);
-    this.contacts = {
-      n: 0, first: new Uint32Array(most), second: new Uint32Array(most), x: new Float64Array(most),
-      y: new Float64Array(most), fx: new Float64Array(most), fy: new Float64Array(most), size: new Float64Array(most),
-    };
+    const most = facts.count.reduce((a, b) => Math.max(a, b), 0), numbers = () => new Float64Array(most);
+    this.table = {n: 0, frame: -1, first: new Uint32Array(most), second: new Uint32Array(most), x: numbers(), y: numbers(),
+      fx: numbers(), fy: numbers(), size: numbers()};
+    const sums = () => new Float64Array(this.n);
+    this.sums = {frame: -1, fx: sums(), fy: sums(), load: sums(), count: sums(), xx: sums(), yy: sums(), xy: sums()};
   }
 
   areas() {
@@ -71,49 +74,80 @@ class Run {
   }
 
   /** Value of a series for a body in the present frame. */
-  value(name, i) { return this.series[name][this.frame * this.n + i] * this.facts.series[name].quantum; }
+  value(series, i) { return series.values[this.frame * this.n + i] * series.quantum; }
 
-  /** Make a frame the present one. */
+  /** Make a frame the present one. What depends on it is found when it is asked for. */
   go(frame) {
     this.frame = frame;
     this.hasBounds = false;
-    const {x, y, angle} = this.series, quanta = this.facts.series, base = frame * this.n;
-    for (let i = 0; i < this.n; i++) {
-      this.x[i] = x[base + i] * quanta.x.quantum;
-      this.y[i] = y[base + i] * quanta.y.quantum;
-      const turned = angle[base + i] * quanta.angle.quantum;
-      this.cosine[i] = Math.cos(turned);
-      this.sine[i] = Math.sin(turned);
+    const {x, y, state} = this, {x: seriesX, y: seriesY, angle} = this.series, [originX, originY] = this.origin;
+    for (let i = 0, k = frame * this.n; i < this.n; i++, k++) {
+      x[i] = seriesX.values[k] * seriesX.quantum;
+      y[i] = seriesY.values[k] * seriesY.quantum;
+      const turned = angle.values[k] * angle.quantum;
+      state[4 * i] = x[i] - originX;
+      state[4 * i + 1] = y[i] - originY;
+      state[4 * i + 2] = Math.cos(turned);
+      state[4 * i + 3] = Math.sin(turned);
     }
-    if (this.contacts) this.findContacts();
   }
 
-  findContacts() {
-    const facts = this.facts.contacts, table = this.contacts, from = this.contactStart[this.frame];
-    const arm = facts.reach / 127;
+  /** Contacts of the present frame: indices of bodies, points, forces on the first body and their magnitudes. */
+  contacts() {
+    const {table, pairFirst, pairSecond, fixed, cosines, sines} = this;
+    if (table.frame === this.frame) return table;
+    const facts = this.facts.contacts, from = this.contactStart[this.frame], arm = facts.reach / 127;
+    const {first, second, x, y, fx, fy, size} = table;
+    table.frame = this.frame;
     table.n = this.contactStart[this.frame + 1] - from;
-    for (let c = 0; c < table.n; c++) {
-      const k = from + c, pair = this.contactPair[k], first = this.pairFirst[pair], second = this.pairSecond[pair];
-      const base = this.fixed[first] ? second : first;
+    for (let c = 0, k = from; c < table.n; c++, k++) {
+      const pair = this.contactPair[k], base = fixed[pairFirst[pair]] ? pairSecond[pair] : pairFirst[pair];
       const root = this.forceRoot[k] / 255;
-      table.first[c] = first;
-      table.second[c] = second;
-      table.x[c] = this.x[base] + arm * this.armX[k];
-      table.y[c] = this.y[base] + arm * this.armY[k];
-      table.size[c] = facts.greatest * root * root;
-      table.fx[c] = table.size[c] * this.cosines[this.direction[k]];
-      table.fy[c] = table.size[c] * this.sines[this.direction[k]];
+      first[c] = pairFirst[pair];
+      second[c] = pairSecond[pair];
+      x[c] = this.x[base] + arm * this.armX[k];
+      y[c] = this.y[base] + arm * this.armY[k];
+      size[c] = facts.greatest * root * root;
+      fx[c] = size[c] * cosines[this.direction[k]];
+      fy[c] = size[c] * sines[this.direction[k]];
     }
+    return table;
+  }
+
+  /**
+   * Sums over the contacts of each body in the present frame: force, magnitudes of forces, number, and the symmetric part
+   * of arm times force.
+   */
+  contactSums() {
+    const {sums} = this;
+    if (sums.frame === this.frame) return sums;
+    const t = this.contacts(), {fx, fy, load, count, xx, yy, xy} = sums;
+    sums.frame = this.frame;
+    for (const sum of [fx, fy, load, count, xx, yy, xy]) sum.fill(0);
+    for (let c = 0; c < t.n; c++) {
+      for (let sign = 1; sign >= -1; sign -= 2) {
+        const i = sign > 0 ? t.first[c] : t.second[c];
+        const x = sign * t.fx[c], y = sign * t.fy[c], rx = t.x[c] - this.x[i], ry = t.y[c] - this.y[i];
+        fx[i] += x;
+        fy[i] += y;
+        load[i] += t.size[c];
+        count[i] += 1;
+        xx[i] += rx * x;
+        yy[i] += ry * y;
+        xy[i] += 0.5 * (rx * y + ry * x);
+      }
+    }
+    return sums;
   }
 
   /** Bounding boxes of the bodies in the present frame: xmin, ymin, xmax, ymax of each. */
   boxes() {
     if (this.hasBounds) return this.bounds;
-    const {shape, start, bounds} = this;
+    const {shape, start, bounds, state} = this;
     for (let i = 0; i < this.n; i++) {
-      const c = this.cosine[i], s = this.sine[i];
+      const c = state[4 * i + 2], s = state[4 * i + 3], end = 2 * start[i + 1];
       let x0 = Infinity, y0 = Infinity, x1 = -Infinity, y1 = -Infinity;
-      for (let v = 2 * start[i]; v < 2 * start[i + 1]; v += 2) {
+      for (let v = 2 * start[i]; v < end; v += 2) {
         const x = c * shape[v] - s * shape[v + 1], y = s * shape[v] + c * shape[v + 1];
         if (x < x0) x0 = x;
         if (x > x1) x1 = x;
@@ -132,8 +166,8 @@ class Run {
   /** The body at a point, the last if several are; -1 if there is none. */
   bodyAt(px, py) {
     for (let i = this.n - 1; i >= 0; i--) {
-      const dx = px - this.x[i], dy = py - this.y[i];
-      const x = this.cosine[i] * dx + this.sine[i] * dy, y = this.cosine[i] * dy - this.sine[i] * dx;
+      const dx = px - this.x[i], dy = py - this.y[i], cosine = this.state[4 * i + 2], sine = this.state[4 * i + 3];
+      const x = cosine * dx + sine * dy, y = cosine * dy - sine * dx;
       let inside = true;
       for (let a = this.start[i], b = this.start[i + 1] - 1; a < this.start[i + 1] && inside; b = a++) {
         const bx = this.shape[2 * b], by = this.shape[2 * b + 1];
