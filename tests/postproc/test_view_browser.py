@@ -57,7 +57,8 @@ def test_the_browser_has_the_numbers_of_the_run(page, run):
         assert np.abs(there - snapshot.frame.position[:, axis]).max() <= 0.51 * quantum
     free = ~snapshot.frame.fixed
     for name, quantity in QUANTITIES.items():
-        there = np.array(js(page, f"return Array.from(viewer.run.id, (_, i) => COLUMNS.{name}(viewer.run, i))"), dtype=float)[free]
+        there = js(page, f"return Array.from(viewer.run.id, (_, i) => COLUMNS.{name}(viewer.run, i))")
+        there = np.array(there, dtype=float)[free]
         true = quantity.values(snapshot)[free]
         if name == "angle":
             there = true + (there - true + np.pi) % (2.0 * np.pi) - np.pi
