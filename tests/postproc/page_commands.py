@@ -6,7 +6,8 @@ A remark, which is a comment of Markdown, may stand above a block:
     <!-- tests do not run this: REASON -->      an excuse
     <!-- tests run first: COMMANDS -->          commands of other pages on which the block relies
 
-A block of shell or Python commands without a remark is run as it is. A block `csv`,
+A block of shell or Python commands without a remark is run as it is. A remark that matches no commands is an error:
+one above nothing, above another kind of block, above a block without commands, or one of two of a kind. A block `csv`,
 `json` or `nml` is a file, which is written before; the last file name above it is its name.
 """
 
@@ -73,12 +74,14 @@ def blocks_of(text):
     blocks, language, lines, remarks, file, comment = [], None, [], {}, "", None
     for number, line in enumerate(text.split("\n"), 1):
         fence = re.match(r"```(\w*)$", line)
-        if comment is None and language is None and line.startswith("<!-- tests "):
+        if comment is None and language is None and re.match(r"\s*<!--\s*tests?\b", line):
             comment = ""
         if comment is not None:
             comment += line + "\n"
             if "-->" in line:
                 kind, words = _read_remark(comment, number)
+                if kind in remarks:
+                    raise PageError(f"line {number}: a second remark '{kind}' for one block")
                 remarks[kind], comment = words, None
         elif fence and language is None:
             language, lines = fence.group(1), []
@@ -91,6 +94,8 @@ def blocks_of(text):
             if line.strip() and remarks:
                 raise PageError(f"line {number}: a remark on tests must stand just above its block")
             file = (re.findall(r"`([\w/.]+\.\w+)`", line) or [file])[-1]
+    if language is not None or comment is not None or remarks:
+        raise PageError(f"the last block or remark does not end, or the remark has no block: {comment or remarks}")
     hidden = COMMAND.search(re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL))
     if hidden:
         raise PageError(f"a command in an indented block, which must be a block ```sh: {hidden.group(0)}")
@@ -107,6 +112,10 @@ def _read_remark(comment, number):
 def _checked(block):
     if block.language not in RUN + FILES + SHOWN:
         raise PageError(f"line {block.line}: a block of '{block.language}', which is neither run nor known as text")
+    if block.remarks and (block.language not in RUN or not _has_commands(block)):
+        raise PageError(f"line {block.line}: a remark on tests matches no commands")
+    if block.language in FILES and not block.file:
+        raise PageError(f"line {block.line}: no name of a file above a block of '{block.language}'")
     if "tests run" in block.remarks:
         if "tests do not run this" in block.remarks:
             raise PageError(f"line {block.line}: both run and excused")
@@ -114,3 +123,8 @@ def _checked(block):
     if block.commands is None and len(block.remarks["tests do not run this"].split()) < 3:
         raise PageError(f"line {block.line}: an excuse without a reason")
     return block
+
+
+def _has_commands(block):
+    """Whether a block has anything but comments and empty lines."""
+    return any(line.strip() and not line.strip().startswith("#") for line in block.text.splitlines())

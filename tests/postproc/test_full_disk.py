@@ -1,6 +1,8 @@
 """Results of a writer that ran out of room."""
 
+import resource
 import subprocess
+import sys
 import warnings
 
 import pytest
@@ -36,3 +38,18 @@ def test_a_failed_profile_leaves_no_part_of_it(tmp_path):
         warnings.simplefilter("error")
         warnings.simplefilter("ignore", NoManifest)
         assert len(Trajectory(folder)) == 5
+
+
+@pytest.mark.parametrize("verb, name", [
+    (["plot", "--dpi", "600"], "a.png"), (["movie", "--size", "640,480"], "a.mp4"),
+    (["movie", "--size", "640,480"], "a.gif"), (["view"], "a.html"), (["export", "--to", "csv"], "a.csv")])
+def test_a_verb_without_room_leaves_nothing_but_a_sentence(small_drum, tmp_path, verb, name):
+    def small_files():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (8000, 8000))
+
+    call = [sys.executable, "-m", "polydem_post", verb[0], str(small_drum), *verb[1:], "-o", str(tmp_path / name)]
+    done = subprocess.run(call, preexec_fn=small_files, capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert done.stderr.startswith(f"error: {tmp_path / name}: cannot be written (")
+    assert done.stderr.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []

@@ -78,8 +78,8 @@ def test_a_gif_has_the_chosen_frames_and_their_time(small_drum, tmp_path):
     (["--every", "0"], "--every and --processes take numbers from 1 on"),
     (["--size", "100,2"], "--size takes a width and a height from 160"),
     (["--frames", "50:"], "50: contains none of the 1"),
-    (["-o", "no/such/folder/m.gif"], "no/such/folder/m.gif: cannot be written"),
-    (["-o", "no/such/folder/m.mp4"], "no/such/folder/m.mp4: cannot be written"),
+    (["-o", "no/such/folder/m.gif"], "no/such/folder/m.gif: cannot be written (there is no folder no/such/folder)"),
+    (["-o", "no/such/folder/m.mp4"], "no/such/folder/m.mp4: cannot be written (there is no folder no/such/folder)"),
 ])
 def test_wrong_options_are_explained(small_drum, capsys, arguments, message):
     assert main(["movie", str(small_drum), *arguments]) == 2

@@ -4,6 +4,7 @@ POLYDEM_PAGES=NAME,... chooses pages, POLYDEM_TIMES=1 prints the time of each bl
 """
 
 import os
+import re
 import subprocess
 import sys
 import time
@@ -74,6 +75,47 @@ def test_a_command_that_fails_is_found(tmp_path):
 def test_a_block_that_is_neither_run_nor_excused_is_found(text):
     with pytest.raises(PageError):
         blocks_of(text)
+
+
+EXCUSE = "<!-- tests do not run this: takes a week on one core -->\n"
+VARIANT = "<!-- tests run: true -->\n"
+
+
+@pytest.mark.parametrize("text", [
+    EXCUSE,
+    "Text\n\n" + EXCUSE + "\n",
+    EXCUSE + "```text\n./polydem run inputs/drum.nml\n```\n",
+    EXCUSE + "`a.csv`\n```csv\na,b\n```\n",
+    EXCUSE + "```sh\n```\n",
+    EXCUSE + "```sh\n# ./polydem run inputs/drum.nml\n\n```\n",
+    EXCUSE + "```python\n# nothing\n```\n",
+    EXCUSE + EXCUSE + "```sh\ntrue\n```\n",
+    VARIANT + VARIANT + "```sh\ntrue\n```\n",
+    EXCUSE + VARIANT + "```sh\ntrue\n```\n",
+    "<!--tests do not run this: takes a week on one core -->\n```sh\ntrue\n```\n",
+    " " + EXCUSE,
+    "<!-- tests do not run this: takes a week on one core\n",
+    "<!-- tests run first: true -->\n```f90\nend\n```\n",
+    "```sh\ntrue\n"])
+def test_a_remark_that_matches_no_commands_is_found(text):
+    with pytest.raises(PageError):
+        blocks_of(text)
+
+
+def test_the_tests_that_excuses_name_exist():
+    build = Path(os.environ["POLYDEM_PROGRAM"]).parents[2]
+    listed = subprocess.run(["ctest", "--test-dir", str(build), "-N"], capture_output=True, text=True, check=True).stdout
+    known = set(re.findall(r"^ *Test +#\d+: (\S+)", listed, re.MULTILINE))
+    for path in (ROOT / "tests").rglob("CMakeLists.txt"):  # also those that another build has
+        known |= set(re.findall(r"\bNAME (\w+)", path.read_text(encoding="utf-8")))
+    named = {name for page in PAGES for block in blocks_of(page.read_text(encoding="utf-8"))
+             for name in re.findall(r"tests? `(\w+)`", block.remarks.get("tests do not run this", ""))}
+    assert len(named) > 5 and named - known == set()
+
+
+def test_an_excuse_of_commands_is_accepted():
+    block, = blocks_of(EXCUSE + "```sh\n# a remark\n./polydem run inputs/drum.nml\n```\n")
+    assert block.commands is None
 
 
 def test_a_variant_has_more_words():

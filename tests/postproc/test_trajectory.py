@@ -118,8 +118,10 @@ def test_real_numbers_are_double(finished):
 def test_names_what_is_missing(tmp_path, finished):
     with pytest.raises(ResultError, match="there is no such file or folder"):
         Trajectory(tmp_path / "nowhere")
-    with pytest.raises(ResultError, match="holds no result"):
+    with pytest.raises(ResultError, match=r"holds no result \(.*h5\)$"):
         Trajectory(tmp_path)
+    with pytest.raises(ResultError, match=f"holds no result .*; did you mean {finished}\\?$"):
+        Trajectory(finished.parent)
     text = tmp_path / "trajectory_0001.h5"
     text.write_text("not HDF5")
     with pytest.raises(ResultError, match="trajectory_0001.h5: cannot be read"):

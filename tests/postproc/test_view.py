@@ -58,7 +58,7 @@ def test_positions_and_angles_are_rounded_as_stated(view, run):
     (["--colour", "sped"], "there is no colour sped"),
     (["--colour", "load", "--no-contacts"], "there is no colour load in this page"),
     (["--every", "0"], "--every takes a number from 1 on"),
-    (["-o", "no/such/folder/v.html"], "no/such/folder/v.html: cannot be written (No such file or directory)"),
+    (["-o", "no/such/folder/v.html"], "no/such/folder/v.html: cannot be written (there is no folder no/such/folder)"),
 ])
 def test_wrong_options_are_explained(small_drum, capsys, arguments, message):
     assert main(["view", str(small_drum), *arguments]) == 2

@@ -21,8 +21,8 @@ from .trajectory import ResultError, Trajectory
 #: Exit code of a result that cannot be used, as in the program itself
 INPUT_ERROR = 2
 
-#: Exit code of what no reader foresaw, and of a program whose output nobody reads any more, as shells have it
-UNFORESEEN, CLOSED_PIPE = 1, 141
+#: Exit code of an error that no reader foresaw; after Ctrl-C; if nobody reads the output any more, as in shells
+UNFORESEEN, INTERRUPTED, CLOSED_PIPE = 1, 130, 141
 
 #: Help texts of the verbs
 HELP = Path(__file__).parent / "help"
@@ -47,13 +47,15 @@ def main(arguments: list[str] | None = None) -> int:
         return INPUT_ERROR
     except BrokenPipeError:
         return _end_quietly()
-    except Exception as error:  # the last resort: what no reader foresaw is told in a sentence as well
+    except KeyboardInterrupt:
+        print(f"{options.verb}: interrupted", file=sys.stderr)
+        return INTERRUPTED
+    except Exception as error:  # the last resort: an error that no reader foresaw is reported in a sentence, too
         if os.environ.get(TRACEBACK):
             raise
         words = " ".join(str(error).split())
         print(f"error: {options.verb} cannot go on: {type(error).__name__}: {printable(words)[:300]}. A file may be "
-              f"damaged; "
-              f"{TRACEBACK}=1 shows where", file=sys.stderr)
+              f"damaged; {TRACEBACK}=1 shows where", file=sys.stderr)
         return UNFORESEEN
 
 

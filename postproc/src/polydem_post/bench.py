@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from .former_names import COUNTERS, STAGES, present
+from .result_file import cannot_read
 from .scene_kinds import making_of, settings_of
 from .trajectory import UNREADABLE, ResultError, open_file
 
@@ -236,7 +237,7 @@ def read_sample(path: Path) -> Sample:
                 _columns(steps, "stage"),
             ))
         except UNREADABLE as error:
-            raise ResultError(f"{path}: cannot be read ({error})") from error
+            raise cannot_read(path, error) from error
 
 
 #: Levels of a tree, one for each bit of a coordinate at most

@@ -6,6 +6,7 @@ import re
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from .result_file import cannot_read
 from .trajectory import ResultError
 
 #: Words of a namelist: texts in quotes, comments, and what stands between blanks and commas
@@ -66,7 +67,7 @@ def read_bench_file(path: Path) -> BenchFile:
     try:
         text = Path(path).read_text(encoding="utf-8")
     except OSError as error:
-        raise ResultError(f"{path}: cannot be read ({error})") from error
+        raise cannot_read(path, error) from error
     values = _entries(text)
     try:
         return BenchFile(

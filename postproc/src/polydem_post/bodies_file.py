@@ -14,7 +14,7 @@ import numpy as np
 from .convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
 from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
 from .polygons import FloatArray, join
-from .result_file import ResultError
+from .result_file import ResultError, cannot_write
 
 #: Columns with several numbers per body
 WIDE = {"velocity": 2}
@@ -121,4 +121,4 @@ def _write(path: Path, polygons: list[FloatArray], columns: dict[str, Any]) -> N
         os.replace(unfinished, path)
     except OSError as error:
         unfinished.unlink(missing_ok=True)
-        raise ResultError(f"{path}: cannot be written ({error})") from error
+        raise cannot_write(path, error) from error

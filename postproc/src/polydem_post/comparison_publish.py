@@ -6,6 +6,7 @@ import shutil
 from pathlib import Path
 
 from .comparison_report import Contents
+from .result_file import cannot_write
 from .trajectory import ResultError
 
 #: Page, and folder of the tables beside it
@@ -40,7 +41,7 @@ def publish(contents: Contents, mode: str, report: Path, folder: Path) -> Path:
             shutil.copyfile(report / "tables" / name, folder / TABLES / name)
         page.write_text(written(contents, mode), encoding="utf-8")
     except OSError as error:
-        raise ResultError(f"{folder}: cannot be written ({error})") from error
+        raise cannot_write(folder, error) from error
     return page
 
 

@@ -17,6 +17,7 @@ from .precision_report import origin_of
 from .published import published_table
 from .report import drawings_of, tables_of
 from .report_files import write_figures, write_tables
+from .result_file import cannot_write
 from .statistics import number
 from .trajectory import ResultError
 
@@ -65,7 +66,7 @@ def write_comparison(comparison: Comparison, contents: Contents, output: Path) -
         page = output / "report.html"
         page.write_text(page_of(contents, comparison, output / "figures"), encoding="utf-8")
     except OSError as error:
-        raise ResultError(f"{output}: cannot be written ({error})") from error
+        raise cannot_write(output, error) from error
     return page
 
 

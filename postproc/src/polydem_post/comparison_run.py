@@ -23,6 +23,7 @@ from pathlib import Path
 from .bench import read_bench
 from .bench_file import BenchFile
 from .comparison_plan import ROOT, Piece, Rates, estimate
+from .result_file import cannot_read
 from .statistics import number, typical
 from .trajectory import ResultError
 
@@ -104,7 +105,7 @@ class Comparison:
                                   "--output") from None
             self.state = {}
         except (OSError, ValueError) as error:
-            raise ResultError(f"{self.folder / STATE}: cannot be read ({error})") from error
+            raise cannot_read(self.folder / STATE, error) from error
         if as_it_is:
             if not self.state:
                 raise ResultError(f"{self.folder}: there is nothing to report yet")

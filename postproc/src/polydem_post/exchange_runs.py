@@ -15,6 +15,7 @@ from pathlib import Path
 from .emit import Table
 from .exchange_model import Count
 from .records import read_lines, read_records
+from .result_file import cannot_write
 from .statistics import number
 from .trajectory import ResultError, Trajectory
 
@@ -147,7 +148,7 @@ def write_runs(runs: list[RunCount], path: Path) -> None:
             writer.writeheader()
             writer.writerows(map(asdict, runs))
     except OSError as error:
-        raise ResultError(f"{path}: cannot be written ({error.strerror})") from error
+        raise cannot_write(path, error) from error
 
 
 def read_runs(path: Path) -> list[RunCount]:

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from . import series
-from .trajectory import ResultError
+from .result_file import cannot_write
 
 #: Forms in which every figure is written, and what keeps the time of writing out of each
 FORMS = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}
@@ -170,5 +170,5 @@ def save_drawing(drawing: Drawing, folder: Path) -> list[Path]:
             for path, metadata in zip(paths, FORMS.values()):
                 drawing.figure.savefig(path, dpi=200, metadata=metadata)
     except OSError as error:
-        raise ResultError(f"{folder}: cannot be written ({error})") from error
+        raise cannot_write(folder, error) from error
     return paths

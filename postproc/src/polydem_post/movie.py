@@ -20,7 +20,7 @@ from . import drawing
 from .drawing import Look
 from .film_files import write_gif, write_mp4
 from .plot import add_scale, finish_axes, prepare
-from .result_file import ResultError
+from .result_file import ResultError, cannot_write
 from .snapshot import read_snapshot
 from .trajectory import Trajectory
 
@@ -103,7 +103,7 @@ def make_movie(trajectory: Trajectory, numbers: list[int], path: Path, look: Loo
             write(part, film.size, fps, progress.count(frames))
         os.replace(part, path)
     except OSError as error:
-        raise ResultError(f"{path}: cannot be written ({error.strerror or error})") from error
+        raise cannot_write(path, error) from error
     finally:
         part.unlink(missing_ok=True)
         progress.end()

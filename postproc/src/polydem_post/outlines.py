@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from .polygons import FloatArray
-from .result_file import ResultError
+from .result_file import ResultError, cannot_read
 
 #: Properties of a body that GeoJSON may give, besides its outline
 PROPERTIES = ("fixed", "velocity", "angular_velocity", "density", "mass", "inertia", "id")
@@ -41,7 +41,7 @@ def read_outlines(path: Path, form: str = "") -> list[Outline]:
     try:
         text = path.read_text(encoding="utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
-        raise ResultError(f"{path}: cannot be read ({error})") from error
+        raise cannot_read(path, error) from error
     outlines = list(READERS[form](text, str(path)))
     if not outlines:
         raise ResultError(f"{path}: holds no polygons")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import warnings
 from pathlib import Path
 
@@ -16,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 from . import drawing
 from .drawing import Look
 from .figure_style import FORMS, SETTINGS
-from .result_file import ResultError
+from .result_file import ResultError, cannot_write
 from .snapshot import Snapshot, read_snapshot
 from .trajectory import Trajectory
 
@@ -137,12 +138,16 @@ def _legend_columns(figure: Figure, lines: list) -> int:
 def save(figure: Figure, path: Path, dpi: float = DPI, tight: bool = False) -> None:
     """Write a figure without anything in it that changes from run to run; `tight`: without empty margins."""
     form = check_form(path)
+    part = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
         with matplotlib.rc_context(SETTINGS):
-            figure.savefig(path, dpi=dpi, metadata=FORMS[form], bbox_inches="tight" if tight else None,
+            figure.savefig(part, dpi=dpi, metadata=FORMS[form], bbox_inches="tight" if tight else None,
                            pad_inches=0.05)
+        os.replace(part, path)
     except (OSError, ValueError) as error:
-        raise ResultError(f"{path}: cannot be written ({error})") from error
+        raise cannot_write(path, error) from error
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def check_form(path: Path) -> str:

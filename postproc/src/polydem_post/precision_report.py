@@ -7,7 +7,7 @@ from pathlib import Path
 from .precision_samples import ORIGIN
 from .precision_tables import all_tables
 from .report_files import write_figures, write_tables
-from .trajectory import ResultError
+from .result_file import cannot_write
 from .work_precision import read_study
 
 #: Tables that stand on the page itself
@@ -30,7 +30,7 @@ def write_precision_report(folder: Path, figures: bool = True) -> list[Path]:
         documents = "\n".join(table.document("markdown") for table in shown)
         page.write_text(f"## Speed against error\n\n{origin}\n\n{documents}", encoding="utf-8")
     except OSError as error:
-        raise ResultError(f"{output}: cannot be written ({error})") from error
+        raise cannot_write(output, error) from error
     return [*written, page]
 
 

@@ -22,6 +22,7 @@ import h5py
 import numpy as np
 
 from .precision_scenes import INPUTS, SCENES, Model, Scene, last_frame
+from .result_file import cannot_read
 from .trajectory import ResultError, Trajectory
 
 #: Name of the file in the folder of a study
@@ -111,7 +112,7 @@ def read_samples(folder: Path) -> list[Sample]:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise ResultError(f"{path}: cannot be read ({error})") from error
+        raise cannot_read(path, error) from error
     samples, kinds = [], {"str": str, "int": int, "float": float}
     try:
         for number, row in enumerate(csv.DictReader(io.StringIO(text[: text.rfind("\n") + 1])), 2):

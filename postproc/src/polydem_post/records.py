@@ -8,6 +8,7 @@ from dataclasses import MISSING, fields
 from pathlib import Path
 
 from .former_names import COLUMNS, present
+from .result_file import cannot_read
 from .trajectory import ResultError
 
 _KINDS = {"str": str, "int": int, "float": float}
@@ -33,7 +34,7 @@ def _read(path: Path) -> tuple:
     except FileNotFoundError as error:
         raise ResultError(f"{path}: there is no such file") from error
     except OSError as error:
-        raise ResultError(f"{path}: cannot be read ({error.strerror or error})") from error
+        raise cannot_read(path, error) from error
     except UnicodeDecodeError as error:
         raise ResultError(f"{path}: is not text, or was damaged") from error
     except csv.Error as error:

@@ -12,9 +12,9 @@ from .emit import Table
 from .fine_grained import fine_grained_tables
 from .own_scenes import skipped
 from .report_files import write_figures, write_tables
+from .result_file import cannot_write
 from .slope_tables import local_exponents, slopes
 from .targets import targets
-from .trajectory import ResultError
 
 
 def write_report(folders: list, output: Path | None = None, figures: bool = True) -> list[Path]:
@@ -31,7 +31,7 @@ def write_report(folders: list, output: Path | None = None, figures: bool = True
         claims = output / "claims.md"
         claims.write_text(claims_document(bench, judged), encoding="utf-8")
     except OSError as error:
-        raise ResultError(f"{output}: cannot be written ({error})") from error
+        raise cannot_write(output, error) from error
     return [*written, claims]
 
 

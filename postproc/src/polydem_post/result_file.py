@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -27,6 +28,10 @@ UNREADABLE = (
     MemoryError,
 )
 
+#: Parts of messages of the HDF5 library, and what they mean
+HDF5_REASONS = {"file signature not found": "it is not an HDF5 file",
+                "truncated file": "it is truncated: its end is missing"}
+
 #: Bytes that one byte of a file can stand for at most: deflate makes a thousand zeros one byte
 MOST_COMPRESSED = 1100
 
@@ -36,6 +41,28 @@ DEEPEST, MOST_OBJECTS = 8, 10000
 
 class ResultError(Exception):
     """A result that is not there, not complete or not a result; the message says which and what to do."""
+
+
+def cannot_read(path: Path, error: Exception) -> ResultError:
+    """The error that a file cannot be read, with the reason in a few words."""
+    return ResultError(f"{path}: cannot be read ({reason(error)})")
+
+
+def cannot_write(path: Path, error: Exception) -> ResultError:
+    """The error that a file cannot be written, with the reason in a few words."""
+    folder = Path(path).parent
+    why = reason(error) if folder.is_dir() else f"there is no folder {folder}"
+    return ResultError(f"{path}: cannot be written ({why})")
+
+
+def reason(error: Exception) -> str:
+    """The reason that an exception gives, in one line; of the system's errors without their number."""
+    words = " ".join(str(getattr(error, "strerror", None) or error).split()).strip("'\"")
+    for said, meaning in HDF5_REASONS.items():
+        if said in words:
+            return meaning
+    inner = re.search(r"error message = '([^']+)'", words)
+    return inner.group(1) if inner else words or type(error).__name__
 
 
 def open_file(path: Path) -> h5py.File:
@@ -48,7 +75,7 @@ def open_file(path: Path) -> h5py.File:
                 raise
             file = _open_hdf5(present_path(path))
     except OSError as error:
-        raise ResultError(f"{path}: cannot be read ({error})") from error
+        raise cannot_read(path, error) from error
     try:
         version = int(file.attrs.get("schema_version", 0))
         if not 1 <= version <= SCHEMA_VERSION:
@@ -56,7 +83,7 @@ def open_file(path: Path) -> h5py.File:
         insist_on_own_data(path, file)
     except UNREADABLE as error:
         file.close()
-        raise ResultError(f"{path}: cannot be read ({error})") from error
+        raise cannot_read(path, error) from error
     except ResultError:
         file.close()
         raise
@@ -70,7 +97,7 @@ def reading(path: Path):
         try:
             yield file
         except UNREADABLE as error:
-            raise ResultError(f"{path}: cannot be read ({_reason(error)})") from error
+            raise cannot_read(path, error) from error
 
 
 def insist_on_own_data(path: Path, file: h5py.File) -> None:
@@ -127,9 +154,3 @@ def _open_hdf5(path: Path) -> h5py.File:
         return h5py.File(path, "r", locking=False)
     except (TypeError, ValueError):
         return h5py.File(path, "r")
-
-
-def _reason(error: Exception) -> str:
-    """What an exception says, in one line."""
-    words = " ".join(str(error).split()).strip("'\"")
-    return words or type(error).__name__

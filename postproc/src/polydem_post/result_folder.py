@@ -35,7 +35,7 @@ class ResultFolder:
         self.profile_path = self.folder / "profile.h5"
         self.segments = find_segments(path) if path.is_dir() else [read_segment(path)]
         if not self.segments and not self.profile_path.exists():
-            raise ResultError(f"{path}: holds no result (neither trajectory_0001.h5 nor profile.h5)")
+            raise ResultError(f"{path}: holds no result (neither trajectory_0001.h5 nor profile.h5){_nearby(path)}")
         self._manifest: Manifest | None = None
         self._unchecked: dict[str, int] = {}
         if check:
@@ -131,3 +131,11 @@ class ResultFolder:
     def steps(self) -> np.ndarray:
         """Steps of all frames."""
         return np.concatenate([np.empty(0, dtype=np.int64)] + [segment.steps for segment in self.segments])
+
+
+def _nearby(folder: Path) -> str:
+    """A hint at the results in the folders of a folder that is none itself."""
+    found = sorted({path.parent for name in ("trajectory_0001.h5*", "profile.h5") for path in folder.glob(f"*/{name}")})
+    if not found:
+        return ""
+    return f"; did you mean {', '.join(map(str, found[:4]))}{' ...' if len(found) > 4 else ''}?"

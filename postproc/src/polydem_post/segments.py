@@ -12,7 +12,7 @@ import numpy as np
 
 from .former_names import balance_of
 from .manifest import MANIFEST, ManifestError
-from .result_file import OPEN_SUFFIX, ResultError, insist, present_path, reading
+from .result_file import OPEN_SUFFIX, ResultError, cannot_read, insist, present_path, reading
 
 #: Name of a segment: trajectory_0001.h5, or trajectory_0001.h5.open while it is written
 SEGMENT_NAME = re.compile(r"trajectory_(\d{4,})\.h5(\.open)?")
@@ -38,7 +38,7 @@ def find_segments(folder: Path) -> list[Segment]:
     try:
         paths = sorted(folder.iterdir(), reverse=True)
     except OSError as error:
-        raise ResultError(f"{folder}: cannot be read ({error.strerror})") from error
+        raise cannot_read(folder, error) from error
     for path in paths:
         match = SEGMENT_NAME.fullmatch(path.name)
         if match:

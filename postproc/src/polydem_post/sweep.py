@@ -23,6 +23,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from .result_file import cannot_read, cannot_write
 from .trajectory import ResultError
 
 TABLE, RUNS = "table.csv", "runs"
@@ -76,7 +77,7 @@ class Run:
         try:
             return path.read_text(encoding="utf-8").splitlines()
         except (OSError, UnicodeDecodeError) as error:
-            raise ResultError(f"{path}: cannot be read ({error})") from error
+            raise cannot_read(path, error) from error
 
     def attempts(self) -> list[dict]:
         """What was tried so far: `started` (UTC), `seconds`, `exit_code` and `threads` of each attempt."""
@@ -163,7 +164,7 @@ def _read_lines(path: Path) -> list[tuple[int, list[str]]]:
     except FileNotFoundError as error:
         raise ResultError(f"{path}: there is no such file") from error
     except (OSError, UnicodeDecodeError) as error:
-        raise ResultError(f"{path}: cannot be read ({error})") from error
+        raise cannot_read(path, error) from error
     except csv.Error as error:
         raise ResultError(f"{path}:{reader.line_num}: is not CSV ({error})") from error
     return lines
@@ -288,7 +289,7 @@ def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = Non
             writer.writerows([row.name, *row.values] for row in rows)
         os.replace(new, folder)
     except OSError as error:
-        raise ResultError(f"{folder}: cannot be written ({error})") from error
+        raise cannot_write(folder, error) from error
     return Sweep(folder)
 
 

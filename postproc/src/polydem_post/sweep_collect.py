@@ -10,6 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from .result_file import cannot_write
 from .sweep import NAME, Run, Sweep
 from .sweep_run import FAILING, FINISHED, RUNNING, describe, last_words, state_of
 from .trajectory import ResultError, Trajectory
@@ -65,7 +66,7 @@ def collect_sweep(sweep: Sweep, say=print) -> list[Outcome]:
         _replace(sweep.folder / CSV_FILE, lambda path: _write_csv(path, sweep, outcomes))
         _replace(sweep.folder / HDF5_FILE, lambda path: _write_hdf5(path, sweep, outcomes))
     except OSError as error:
-        raise ResultError(f"{sweep.folder}: cannot be written ({error})") from error
+        raise cannot_write(sweep.folder, error) from error
     finished = sum(outcome.facts["state"] == FINISHED for outcome in outcomes)
     say(f"{finished} of {len(outcomes)} runs are finished")
     return outcomes

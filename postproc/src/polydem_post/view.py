@@ -8,7 +8,7 @@ import os
 import sys
 from pathlib import Path
 
-from .result_file import ResultError
+from .result_file import ResultError, cannot_write
 from .trajectory import Trajectory
 from .view_data import Packed, pack_run
 
@@ -40,7 +40,7 @@ def write_view(trajectory: Trajectory, numbers: list[int], path: Path, contacts:
                 file.write(piece)
         os.replace(part, path)
     except OSError as error:
-        raise ResultError(f"{path}: cannot be written ({error.strerror or error})") from error
+        raise cannot_write(path, error) from error
     finally:
         part.unlink(missing_ok=True)
     return packed

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..frames import Frame
-from ..result_file import ResultError
+from ..result_file import ResultError, cannot_write
 from ..trajectory import Trajectory
 from .csv_tables import write_balance_csv, write_bodies_csv, write_contacts_csv, write_vertices_csv
 from .gsd_file import write_gsd
@@ -48,7 +48,7 @@ def export_result(run: Trajectory, form: str, output: str | os.PathLike[str], *,
         path.parent.mkdir(parents=True, exist_ok=True)
         return job.write(form, targets)
     except OSError as error:
-        raise ResultError(f"{path}: cannot be written ({error})") from error
+        raise cannot_write(path, error) from error
 
 
 class _Job:

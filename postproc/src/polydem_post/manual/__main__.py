@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from ..__main__ import INPUT_ERROR
+from ..result_file import reason
 
 #: Default folder of the site, below the root of the repository
 FOLDER = Path("build") / "manual"
@@ -30,8 +31,11 @@ def main() -> int:
 
             print("reading the sources with FORD, which takes a minute", file=sys.stderr)
             build_sources(root, output / "sources", root / "build" / "ford")
-    except (ManualError, OSError) as error:
+    except ManualError as error:
         print(f"error: {error}", file=sys.stderr)
+        return INPUT_ERROR
+    except OSError as error:
+        print(f"error: {error.filename or output}: {reason(error)}", file=sys.stderr)
         return INPUT_ERROR
     print(f"{len(pages)} pages; open {(output / 'index.html').as_uri()}")
     return 0
