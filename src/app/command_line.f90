@@ -331,7 +331,7 @@ contains
          end if
       end do
       if (command%continues .and. command%force) call raise(error, input_error, &
-         '--continue does not go with --force, which begins anew; give one of them')
+         '--continue cannot be combined with --force, which starts the run again; give only one of them')
       if (command%may_change .and. .not. command%continues) call raise(error, input_error, '--changed needs --continue')
       if (command%help .or. command%version .or. command%file /= '') return
       if (command%checks) call raise(error, input_error, '--check needs the folder of a result: '// &

@@ -4,7 +4,7 @@ module polydem_strings
    use polydem_kinds, only: ip, lp, wp
    implicit none
    private
-   public :: to_text, join, printable, text_t, lower_case, quoted, count_words, split_words, suggestion
+   public :: to_text, counted, join, printable, text_t, lower_case, quoted, count_words, split_words, suggestion
 
    !> Text of a number without blanks
    interface to_text
@@ -38,6 +38,18 @@ contains
       write (buffer, '(i0)') number
       text = trim(buffer)
    end function text_lp
+
+   !> A number of things in words, such as '1 step' or '2 steps'
+   pure function counted(number, noun) result(text)
+      !> Number of the things
+      integer(lp), intent(in) :: number
+      !> One of them; the plural has the suffix s
+      character(len=*), intent(in) :: noun
+      character(len=:), allocatable :: text
+
+      text = to_text(number)//' '//noun
+      if (number /= 1_lp) text = text//'s'
+   end function counted
 
    !> Text of a real number in exponent form
    pure function text_wp(number, digits) result(text)

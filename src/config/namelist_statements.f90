@@ -90,9 +90,24 @@ contains
             statements(n)%group//' is not closed by ''/''')
       else if (next <= size(tokens)) then
          call raise(error, input_error, source%place(tokens(next)%line)//': '// &
-            text_of(source, tokens(next))//' is outside a group; &name opens a group and / closes it')
+            text_of(source, tokens(next))//' is outside a group; &name opens a group and / closes it'// &
+            hint_of_quotes(tokens(:next)))
       end if
    end subroutine read_statements
+
+   !> Hint if the last token follows a value and a slash on one line, as in a path without quotes
+   pure function hint_of_quotes(tokens) result(hint)
+      type(token_t), intent(in) :: tokens(:)
+      character(len=:), allocatable :: hint
+
+      hint = ''
+      associate (n => size(tokens))
+         if (n < 3) return
+         if (any(tokens(n - 2:n)%line /= tokens(n)%line)) return
+         if (tokens(n - 2)%kind == bare_token .and. tokens(n - 1)%kind == end_token) &
+            hint = '; a value that contains / must be in quotes'
+      end associate
+   end function hint_of_quotes
 
    !> Make the statement that opens a group.
    pure subroutine open_group(source, token, statement)

@@ -4,7 +4,7 @@ module polydem_namelist_values
    use polydem_kinds, only: ip, lp, wp
    use polydem_namelist_entries, only: entry_t, required
    use polydem_namelist_statements, only: literal_t, statement_t
-   use polydem_strings, only: to_text, count_words, lower_case, quoted, split_words, suggestion, text_t
+   use polydem_strings, only: to_text, counted, count_words, lower_case, quoted, split_words, suggestion, text_t
    implicit none
    private
    public :: value_t, read_value, value_text, label, is_text
@@ -54,8 +54,9 @@ contains
       value%is_override = statement%is_override
       value%is_given = statement%is_override .or. statement%line > 0
       if (entry%count > 0 .and. n /= entry%count) then
-         call raise(error, input_error, value%place//': '//label(entry)//' takes '//counted(entry%count)// &
-            ', but '//counted(n)//trim(merge(' is ', ' are', n == 1))//' given')
+         call raise(error, input_error, value%place//': '//label(entry)//' takes '// &
+            counted(int(entry%count, lp), 'value')//', but '//counted(int(n, lp), 'value')// &
+            trim(merge(' is ', ' are', n == 1))//' given')
          return
       end if
       value%reals = [(0.0_wp, k=1, merge(n, 0, entry%type == 'real'))]
@@ -88,15 +89,6 @@ contains
 
       is_text = entry%type == 'word' .or. entry%type == 'path'
    end function is_text
-
-   !> Number of values as text, such as '2 values'
-   pure function counted(n) result(text)
-      integer, intent(in) :: n
-      character(len=:), allocatable :: text
-
-      text = to_text(n)//' value'
-      if (n /= 1) text = text//'s'
-   end function counted
 
    !> Read value k of an entry.
    pure subroutine read_one(entry, literal, k, value, problem)

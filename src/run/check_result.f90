@@ -12,7 +12,7 @@ module polydem_check_result
    use polydem_replaced_result, only: replaced_name
    use polydem_result_files, only: checkpoint_path, complete_name, forms_of, manifest_name, n_checkpoints, name_in, &
       overlaps_name, profile_name, segment_number, steps_name, trace_name
-   use polydem_strings, only: to_text
+   use polydem_strings, only: to_text, counted
    implicit none
    private
    public :: check_result
@@ -91,7 +91,7 @@ contains
       if (entry%is_closed) then
          call find_problem(folder, entry, problem)
          remark = to_text(entry%bytes)//' bytes'
-         if (segment_number(name) > 0_ip) remark = remark//', '//to_text(entry%frames(1))//' frames, steps '// &
+         if (segment_number(name) > 0_ip) remark = remark//', '//counted(entry%frames(1), 'frame')//', steps '// &
             to_text(entry%frames(2))//' to '//to_text(entry%frames(3))
          call report_file(findings, name, problem, remark)
          return

@@ -7,7 +7,7 @@ module polydem_description
    use polydem_overlap_table, only: write_overlap_table
    use polydem_result_files, only: overlaps_name
    use polydem_simulation, only: simulation_t
-   use polydem_strings, only: to_text
+   use polydem_strings, only: to_text, counted
    use polydem_scene_measures, only: scene_measures_t
    implicit none
    private
@@ -39,7 +39,7 @@ contains
          call log%write_line('duration   '//to_text(real(s%n_steps, wp)*s%dt)//' s, '//to_text(s%n_steps)// &
                              ' steps'//rounding_text(real(s%n_steps, wp)*s%dt, s%settings%integrate%duration))
          if (measures%contacts > 0_lp) then
-            call log%write_line('at start   '//to_text(measures%contacts)//' contacts, the deepest '// &
+            call log%write_line('at start   '//counted(measures%contacts, 'contact')//', the deepest '// &
                                 measures%longest_depth)
             call log%write_line('           elastic energy '//to_text(measures%stored, 3)//' J/m, kinetic energy '// &
                                 to_text(measures%kinetic, 3)//' J/m, weight times extent '// &
@@ -108,7 +108,7 @@ contains
 
       if (measures%deep == 0_lp) return
       associate (s => simulation, limit => simulation%settings%guards%listed_depth)
-         call log%write_line('overlaps   '//to_text(measures%deep)//' initial contacts deeper than '// &
+         call log%write_line('overlaps   '//counted(measures%deep, 'initial contact')//' deeper than '// &
                              to_text(limit, 3)//' of the thickness of the thinner body; the deepest:')
          call log%write_line('           '//measures%deepest)
          if (folder == '') then
@@ -151,7 +151,7 @@ contains
       text = ''
       do k = 1, size(simulation%motions)
          text = text//', '//trim(simulation%motions(k)%kind)//' of '// &
-            to_text(size(simulation%motions(k)%slots, kind=ip))//' walls'
+            counted(size(simulation%motions(k)%slots, kind=lp), 'wall')
       end do
    end function motion_text
 

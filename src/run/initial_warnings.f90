@@ -110,7 +110,7 @@ contains
       is_energetic = measures%stored > measures%kinetic + measures%potential .and. &
          measures%depth_share > simulation%settings%guards%listed_depth
       if (measures%depth_share <= deep_fraction .and. .not. is_energetic) return
-      call writer%warn(log, to_text(measures%deep)//' contacts are deep at the start: '//measures%deepest// &
+      call writer%warn(log, 'deep contacts at the start: '//to_text(measures%deep)//'; in the deepest '//measures%deepest// &
                        '. All contacts store '//to_text(measures%stored, 3)//' J/m, which can accelerate all '// &
                        'free bodies to '// &
                        to_text(sqrt(2.0_wp*measures%stored/max(measures%mass(3), tiny(1.0_wp))), 3)// &
@@ -123,7 +123,7 @@ contains
       type(scene_measures_t), intent(in) :: measures
       type(warning_writer_t), intent(inout) :: writer
       type(log_t), intent(inout) :: log
-      character(len=:), allocatable :: thinnest
+      character(len=:), allocatable :: mover, thinnest
       real(wp) :: fastest
 
       associate (s => simulation)
@@ -133,9 +133,10 @@ contains
             to_text(measures%farthest)//' moves '//to_text(measures%move/measures%thickness, 3)//thinnest// &
             ' in one step: it may pass through other bodies undetected. Reduce dt')
          fastest = max(measures%wall_speed, merge(measures%fall_speed, 0.0_wp, measures%free > 0_lp))
+         mover = 'a body that falls through the extent'
+         if (measures%wall_speed >= fastest) mover = 'a wall'
          if (measures%move <= fast_fraction*measures%thickness .and. fastest*s%dt > fast_fraction*measures%thickness) &
-            call writer%warn(log, 'walls reach '//to_text(measures%wall_speed, 3)//' m/s, a fall through the '// &
-            'extent '//to_text(measures%fall_speed, 3)//' m/s: the faster of them moves '// &
+            call writer%warn(log, mover//' reaches '//to_text(fastest, 3)//' m/s and then moves '// &
             to_text(fastest*s%dt/measures%thickness, 3)//thinnest//' in one step. Reduce dt')
          if (measures%impact > fast_fraction*measures%thickness) call writer%warn(log, 'body '// &
             to_text(measures%fastest)//' is so fast that stopping it takes an overlap of '// &

@@ -13,7 +13,7 @@ module polydem_monitor
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
    use polydem_stability_check, only: check_stability
-   use polydem_strings, only: to_text
+   use polydem_strings, only: to_text, counted
    use polydem_warning, only: warning_t
    implicit none
    private
@@ -180,20 +180,21 @@ contains
 
       if (monitor%greatest_share > 0.0_wp) call log%write_line( &
          'max dt / stable dt of the contacts: '//to_text(monitor%greatest_share, 3))
-      call write_count(monitor%at_start, 'about the initial state')
-      call write_count(simulation%guard%warning%count, 'steps in which a body moved too far')
-      call write_count(monitor%overlap%count, 'steps with a contact that was too deep')
-      call write_count(monitor%passing%count, 'steps in which a body was passing through another')
-      call write_count(monitor%energy%warning%count, 'checks that found an unexplained energy gain')
-      call write_count(monitor%large_steps, 'checks with dt above half the stable time step')
+      if (monitor%at_start > 0_lp) call log%write_line( &
+         'warnings: '//to_text(monitor%at_start)//' about the initial state')
+      call write_count(simulation%guard%warning%count, 'step', ' in which a body moved too far')
+      call write_count(monitor%overlap%count, 'step', ' with a contact that was too deep')
+      call write_count(monitor%passing%count, 'step', ' in which a body was passing through another')
+      call write_count(monitor%energy%warning%count, 'check', ' that found an unexplained energy gain')
+      call write_count(monitor%large_steps, 'check', ' with dt above half the stable time step')
 
    contains
 
-      subroutine write_count(n, what)
+      subroutine write_count(n, noun, which)
          integer(lp), intent(in) :: n
-         character(len=*), intent(in) :: what
+         character(len=*), intent(in) :: noun, which
 
-         if (n > 0_lp) call log%write_line('warnings: '//to_text(n)//' '//what)
+         if (n > 0_lp) call log%write_line('warnings: '//counted(n, noun)//which)
       end subroutine write_count
 
    end subroutine write_warning_counts

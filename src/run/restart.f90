@@ -136,8 +136,9 @@ contains
       if (changes == '') then
          call count_segments(folder, manifest, scene, .false., earlier, error)
       else
-         call raise(error, input_error, folder//' holds the result of another run and no checkpoint: '//changes// &
-                    '. Use --force instead of --continue to overwrite it')
+         call raise(error, input_error, folder//' has no checkpoint from which a run with other settings could '// &
+                    'continue: '//changes//'. Choose another folder with --set output.folder=NAME, or use --force '// &
+                    'instead of --continue to overwrite it')
       end if
    end subroutine restart_without_checkpoint
 

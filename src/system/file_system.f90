@@ -75,6 +75,7 @@ contains
          if (exists(path(:k - 1))) cycle
          if (c_mkdir(path(:k - 1)//c_null_char, all_permissions) /= 0_c_int) then
             reason = last_failure()
+            if (.not. exists(path(:k - 1))) exit
          else
             call sync_folder_of(path(:k - 1), error)
          end if

@@ -15,15 +15,15 @@ from pathlib import Path
 #: Scenes whose warnings are true: bars that lie across each other, without forces, and grains as soft as a liquid, both
 #: for finders alone
 TRUE_WARNINGS = {
-    "rods.nml": ["contacts are deep at the start", "the area law is not conservative", "overlap by", "is inside body"],
-    "soft.nml": ["contacts are deep at the start", "is so fast", "overlap by", "is inside body"],
+    "rods.nml": ["deep contacts at the start: ", "the area law is not conservative", "overlap by", "is inside body"],
+    "soft.nml": ["deep contacts at the start: ", "is so fast", "overlap by", "is inside body"],
 }
 #: Scene, mistake, part of the warning, exit code of `check`
 DANGERS = (
     ("stack", ("integrate.fraction=258", "integrate.duration=10"), "is 2.58E+02 times the stable time step", 1),
     ("bed", ("integrate.fraction=258", "integrate.duration=10"), "is 2.58E+02 times the stable time step", 0),
     ("bed", ("scene.short_axis=8", "scene.long_axis_min=8", "scene.long_axis_max=11"), "lengths are in metres", 0),
-    ("gas", ("scene.overlap=.true.", "scene.fraction=0.9"), "contacts are deep at the start", 0),
+    ("gas", ("scene.overlap=.true.", "scene.fraction=0.9"), "deep contacts at the start: ", 0),
     ("gas", ("scene.speed=500",), "it may pass through other bodies undetected", 1),
     ("gas", ("forces.damping=none",), "the area law is not conservative", 0),
 )

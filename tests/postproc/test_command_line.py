@@ -67,7 +67,7 @@ def test_an_interrupted_verb_ends_with_a_sentence(monkeypatch, capsys):
         (["plot", "no/such/folder"], "no/such/folder: there is no such file or folder"),
         (["table", "no/such/folder"], "no/such/folder: there is no such file or folder"),
         (["plot", "RESULT", "--frame", "7"], "there is no frame 7, only 7 frames"),
-        (["plot", "RESULT", "--output", "no/such/folder/x.png"], "no/such/folder/x.png: cannot be written (there is no folder no/such/folder)"),
+        (["plot", "RESULT", "--output", "no/such/folder/x.png"], "x.png: cannot be written (there is no folder no/"),
         (["plot", "RESULT", "--output", "x.unknown"], "x.unknown: cannot be written: the name must end with .pdf"),
         (["plot", "RESULT", "--output", "x.gif"], "./polydem movie makes films"),
         (["plot", "RESULT", "--frames", "1,b"], "'b' is neither a number of a frame nor like FIRST:END:STEP"),

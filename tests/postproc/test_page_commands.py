@@ -104,8 +104,8 @@ def test_a_remark_that_matches_no_commands_is_found(text):
 
 def test_the_tests_that_excuses_name_exist():
     build = Path(os.environ["POLYDEM_PROGRAM"]).parents[2]
-    listed = subprocess.run(["ctest", "--test-dir", str(build), "-N"], capture_output=True, text=True, check=True).stdout
-    known = set(re.findall(r"^ *Test +#\d+: (\S+)", listed, re.MULTILINE))
+    listed = subprocess.run(["ctest", "--test-dir", str(build), "-N"], capture_output=True, text=True, check=True)
+    known = set(re.findall(r"^ *Test +#\d+: (\S+)", listed.stdout, re.MULTILINE))
     for path in (ROOT / "tests").rglob("CMakeLists.txt"):  # also those that another build has
         known |= set(re.findall(r"\bNAME (\w+)", path.read_text(encoding="utf-8")))
     named = {name for page in PAGES for block in blocks_of(page.read_text(encoding="utf-8"))

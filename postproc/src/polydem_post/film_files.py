@@ -7,6 +7,7 @@ import re
 import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 from PIL import Image
@@ -34,12 +35,14 @@ def write_mp4(path: Path, size: tuple[int, int], fps: float, frames: Iterable[by
             try:
                 for frame in frames:
                     ffmpeg.stdin.write(frame)
-                ffmpeg.stdin.close()
             except BrokenPipeError:  # ffmpeg has ended early; its exit code and its last line say why
                 pass
             except BaseException:
                 ffmpeg.kill()
                 raise
+            finally:
+                with suppress(BrokenPipeError):
+                    ffmpeg.stdin.close()
         if ffmpeg.returncode != 0 or not path.exists():
             said.seek(0)
             lines = said.read().decode(errors="replace").splitlines() or [f"exit code {ffmpeg.returncode}"]

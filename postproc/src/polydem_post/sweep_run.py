@@ -19,6 +19,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
+from .result_file import reason
 from .scene_kinds import settings_of
 from .sweep import ATTEMPTS, INPUT, OUTPUT, Run
 from .trajectory import ResultError, input_of, status_of
@@ -131,7 +132,7 @@ def can_continue(program: Path) -> bool:
     try:
         answer = subprocess.run([str(program), "run", "--help"], capture_output=True, text=True, check=False)
     except OSError as error:
-        raise ResultError(f"{program}: cannot be run ({error})") from error
+        raise ResultError(f"{program}: cannot be run ({reason(error)})") from error
     return "--continue" in answer.stdout
 
 
@@ -158,12 +159,13 @@ class Runner:
                 self.say(f"{describe(run)} (--retry runs it again)")
             elif state != FINISHED or self._asks_again(run):
                 due.append((run, known))
-        self.say(f"{len(runs)} runs, {len(due)} to do, {len(self.slots)} at once, {self.threads} threads each")
+        self.say(f"{len(runs)} runs, {len(due)} to do, {len(self.slots)} at once, "
+                 f"threads of each run: {self.threads}")
         try:
             with self._signals():
                 self._turns(due)
         except OSError as error:
-            raise ResultError(f"the sweep cannot go on: {error}") from error
+            raise ResultError(f"the sweep cannot go on: {error.filename}: {reason(error)}") from error
         finally:
             for slot in self.slots:
                 slot.give_up()
@@ -296,6 +298,8 @@ class _Slot:
             self.process.terminate()
             self.process.wait()
             self.process = None
+        if self.record:
+            self.record.close()
 
     def has_ended(self) -> bool:
         """Whether the run is over."""
