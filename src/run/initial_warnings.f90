@@ -111,8 +111,8 @@ contains
          measures%depth_share > simulation%settings%guards%listed_depth
       if (measures%depth_share <= deep_fraction .and. .not. is_energetic) return
       call writer%warn(log, 'deep contacts at the start: '//to_text(measures%deep)//'; in the deepest '// &
-                       measures%deepest//'. All contacts store '//to_text(measures%stored, 3)//' J/m, which can accelerate all '// &
-                       'free bodies to '// &
+                       measures%deepest//'. All contacts store '//to_text(measures%stored, 3)//' J/m, which can '// &
+                       'accelerate all free bodies to '// &
                        to_text(sqrt(2.0_wp*measures%stored/max(measures%mass(3), tiny(1.0_wp))), 3)// &
                        ' m/s. Separate the bodies: set relaxed_depth in &guards')
    end subroutine warn_of_overlaps
