@@ -8,12 +8,13 @@
 module polydem_linked_cells
    use polydem_box_pairs, only: box_pairs_t, record_differences
    use polydem_boxes, only: boxes_t
-   use polydem_cell_grids, only: cell_grids_t, part
+   use polydem_cell_grids, only: cell_grids_t
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_nodes, count_rebuilds, &
       count_searches, count_tests, count_visits, phase_filter, phase_search, phase_structure
    use polydem_kinds, only: ip, lp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
+   use polydem_thread_changes, only: part, thread_changes_t
    implicit none
    private
    public :: linked_cells_t
@@ -26,8 +27,8 @@ module polydem_linked_cells
       type(box_pairs_t), private :: list(2)
       !> Index of this step in `list`
       integer, private :: now = 1
-      !> Changes recorded by each thread, (thread)
-      type(pair_changes_t), allocatable, private :: part_changes(:)
+      !> Changes that each thread recorded
+      type(thread_changes_t), private :: part_changes
    contains
       procedure :: find
       procedure :: survey
@@ -68,23 +69,17 @@ contains
       integer(ip) :: low, high
       integer :: w
 
-      if (allocated(self%part_changes)) then
-         if (size(self%part_changes) /= size(self%grids%found)) deallocate (self%part_changes)
-      end if
-      if (.not. allocated(self%part_changes)) allocate (self%part_changes(size(self%grids%found)))
+      call self%part_changes%clear()
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
-      do w = 1, size(self%part_changes)
-         call self%part_changes(w)%clear()
-         call part(1_ip, boxes%n, size(self%part_changes), w, low, high)
+      do w = 1, self%part_changes%n_threads()
+         call part(boxes%n, self%part_changes%n_threads(), w, low, high)
          call self%list(self%now)%sort_rows(low, high)
          call record_differences(self%list(3 - self%now), self%list(self%now), low, high, boxes%body, &
-                                 self%part_changes(w))
+                                 self%part_changes%of(w))
       end do
       !$omp end parallel do
-      do w = 1, size(self%part_changes)
-         call changes%append(self%part_changes(w))
-      end do
+      call self%part_changes%join(changes)
    end subroutine record_rows
 
    !> Set the counters: pairs stored between steps, cells, grids, and memory [B].

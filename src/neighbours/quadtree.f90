@@ -22,7 +22,6 @@
 !> whose leaves all have the same size, and a binary tree along the longer axis for nearly one-dimensional scenes. They
 !> differ only in the tree or in the compilation.
 module polydem_quadtree
-   use omp_lib, only: omp_get_max_threads
    use polydem_boxes, only: boxes_t
    use polydem_candidates, only: overlapping, index_list_t
    use polydem_exponential, only: exponential, logarithm
@@ -35,6 +34,7 @@ module polydem_quadtree
    use polydem_pair_changes, only: pair_changes_t
    use polydem_quadtree_nodes, only: tree_t
    use polydem_quadtree_search, only: padded_cells_t, search
+   use polydem_thread_changes, only: part, thread_changes_t
    implicit none
    private
    public :: quadtree_t
@@ -56,8 +56,6 @@ module polydem_quadtree
       type(index_list_t) :: found
       !> Number of visited nodes
       integer(lp) :: visits = 0_lp
-      !> Changes of pairs
-      type(pair_changes_t) :: changes
    end type worker_t
 
    !> Finder that stores a tree
@@ -78,6 +76,8 @@ module polydem_quadtree
       real(wp), allocatable, private :: greatest_side(:)
       !> Results of the threads, (thread)
       type(worker_t), allocatable, private :: worker(:)
+      !> Changes that each thread recorded
+      type(thread_changes_t), private :: changes
    contains
       procedure :: find
       procedure :: survey
@@ -115,27 +115,17 @@ contains
       type(quadtree_t), intent(inout) :: self
       integer :: w
 
+      call self%changes%clear()
       if (allocated(self%worker)) then
-         if (size(self%worker) /= omp_get_max_threads()) deallocate (self%worker)
+         if (size(self%worker) /= self%changes%n_threads()) deallocate (self%worker)
       end if
-      if (.not. allocated(self%worker)) allocate (self%worker(omp_get_max_threads()))
+      if (.not. allocated(self%worker)) allocate (self%worker(self%changes%n_threads()))
       do w = 1, size(self%worker)
          self%worker(w)%outside%n = 0_ip
          self%worker(w)%found%n = 0_ip
          self%worker(w)%visits = 0_lp
-         call self%worker(w)%changes%clear()
       end do
    end subroutine prepare_workers
-
-   !> First and last element of part w, if 1..n is split into m parts of equal size
-   pure subroutine part(n, m, w, low, high)
-      integer(ip), intent(in) :: n
-      integer, intent(in) :: m, w
-      integer(ip), intent(out) :: low, high
-
-      low = int((int(n, lp)*int(w - 1, lp))/int(m, lp), ip) + 1_ip
-      high = int((int(n, lp)*int(w, lp))/int(m, lp), ip)
-   end subroutine part
 
    !> Insert all boxes into a new tree.
    subroutine build_tree(self, boxes)
@@ -294,20 +284,18 @@ contains
       integer :: w
 
       if (self%filtered) then
-         call self%candidates%compare_active(boxes, changes, low)
-         call self%work%add(count_tests, int(low, lp))
+         call self%candidates%compare_active(boxes, changes)
+         call self%work%add(count_tests, int(self%candidates%filter%active%n, lp))
          return
       end if
       !$omp parallel do if (self%candidates%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, size(self%worker)
          call part(self%candidates%n, size(self%worker), w, low, high)
-         call self%candidates%compare(low, high, boxes%bounds, boxes%body, self%worker(w)%changes)
+         call self%candidates%compare(low, high, boxes%bounds, boxes%body, self%changes%of(w))
       end do
       !$omp end parallel do
-      do w = 1, size(self%worker)
-         call changes%append(self%worker(w)%changes)
-      end do
+      call self%changes%join(changes)
       call self%work%add(count_tests, int(self%candidates%n, lp))
    end subroutine compare_candidates
 

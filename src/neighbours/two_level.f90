@@ -11,25 +11,21 @@
 !> A box that leaves its fat box, or will if it follows its lines, gets a new one by a search for this box alone. So one
 !> fast box costs only the search for its own candidates.
 module polydem_two_level
-   use omp_lib, only: omp_get_max_threads
-   use polydem_active_pairs, only: active_pairs_t
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: index_list_t
-   use polydem_cell_grids, only: part
    use polydem_fat_candidates, only: fat_candidates_t
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_nodes, count_passes, &
       count_rebuilds, count_searches, count_tests, count_visits, phase_filter, phase_search, phase_structure
-   use polydem_kinds, only: dp, ip, lp, wp, min_parallel_size
-   use polydem_line_filter, only: class_cost, line_filter_t
+   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_line_filter, only: class_cost
    use polydem_pair_changes, only: pair_changes_t
+   use polydem_parallel_filter, only: parallel_filter_t
    implicit none
    private
    public :: two_level_t
 
-   !> Length of the first interval, which measures velocities, and least upper bound of the length of the others [steps]
-   integer(ip), parameter :: first_interval = 2_ip
-   integer(lp), parameter :: shortest = 16_lp
+   !> Length up to which intervals are not shortened to keep boxes inside their fat boxes [steps]
+   integer(ip), parameter :: shortest = 16_ip
 
    !> Finder with a list of candidates and a filter of the candidates
    type, extends(finder_t) :: two_level_t
@@ -37,15 +33,7 @@ module polydem_two_level
       !> Candidates
       type(fat_candidates_t) :: list
       !> Lines, intervals and active candidates
-      type(line_filter_t) :: filter
-      !> Candidates of a box
-      type(index_list_t) :: own
-      !> Changes that each thread recorded, (thread)
-      type(pair_changes_t), allocatable :: changes(:)
-      !> Boxes off their lines, or boxes that can leave their fat boxes, (thread)
-      type(index_list_t), allocatable :: found(:)
-      !> Active candidates that each thread found, (thread)
-      type(active_pairs_t), allocatable :: active(:)
+      type(parallel_filter_t) :: filter
    contains
       procedure :: find
       procedure :: survey
@@ -59,12 +47,10 @@ contains
       type(boxes_t), intent(in) :: boxes
       type(pair_changes_t), intent(inout) :: changes
       integer(lp) :: tests
-      integer :: w
 
-      call prepare_threads(self)
+      call self%filter%begin_step()
       tests = self%list%grids%total%tests
       if (allocated(self%list%fat)) then
-         self%filter%step = self%filter%step + 1_ip
          self%list%age = self%list%age + 1_lp
          if (.not. must_begin(self)) call follow_lines(self, boxes)
       else
@@ -73,86 +59,44 @@ contains
          call self%filter%start(boxes%n, self%list%side)
       end if
       if (must_begin(self)) call begin_interval(self, boxes)
-      call compare_active(self, boxes)
-      call self%work%add(count_tests, self%list%grids%total%tests - tests)
-      do w = 1, size(self%changes)
-         call changes%append(self%changes(w))
-      end do
+      call self%filter%compare_active(boxes)
+      call self%work%add(count_tests, self%list%grids%total%tests - tests + int(self%filter%active%n, lp))
+      call self%filter%changes%join(changes)
       call self%work%lap(phase_filter)
    end subroutine find
 
-   !> Make the results of all threads empty.
-   subroutine prepare_threads(self)
-      type(two_level_t), intent(inout) :: self
-      integer :: w, m
-
-      if (allocated(self%changes)) then
-         if (size(self%changes) /= omp_get_max_threads()) deallocate (self%changes, self%found, self%active)
-      end if
-      if (.not. allocated(self%changes)) then
-         m = omp_get_max_threads()
-         allocate (self%changes(m), self%found(m), self%active(m))
-      end if
-      do w = 1, size(self%changes)
-         call self%changes(w)%clear()
-      end do
-   end subroutine prepare_threads
-
-   !> Whether an interval must begin: at the start, when it is due, and when all boxes must be searched
+   !> Whether an interval must begin: when it is due, and when all boxes must be searched
    pure logical function must_begin(self)
       type(two_level_t), intent(in) :: self
 
-      must_begin = self%filter%length == 0_ip .or. self%filter%is_due(self%list%n) .or. self%list%must_search(0_ip)
+      must_begin = self%filter%is_due(self%list%n) .or. self%list%must_search()
    end function must_begin
 
    !> Find the boxes that left their lines and review their candidates. Search for boxes that can leave their fat boxes.
    subroutine follow_lines(self, boxes)
       type(two_level_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
-      integer(ip) :: low, high, k, i
-      integer :: w
+      integer(ip) :: k, i
 
-      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes) private(w, low, high)
-      do w = 1, size(self%changes)
-         call part(1_ip, boxes%n, size(self%changes), w, low, high)
-         self%found(w)%n = 0_ip
-         call self%filter%find_off_lines(low, high, boxes%n, boxes%bounds, self%found(w))
-      end do
-      !$omp end parallel do
+      call self%filter%follow_lines(boxes, self%list%fat)
       call self%work%lap(phase_structure)
-      do w = 1, size(self%changes)
-         do k = 1_ip, self%found(w)%n
-            call leave_lines(self, self%found(w)%at(k), boxes)
-            if (must_begin(self)) return
-         end do
+      do k = 1_ip, self%filter%strays%n
+         if (must_begin(self)) return
+         i = self%filter%strays%at(k)
+         if (.not. self%filter%leaves_often(i)) then
+            call search_single(self, i, boxes)
+            if (self%filter%stays_inside(i, self%list%fat(:, i))) cycle
+         end if
+         call self%filter%activate_candidates_of(i, self%list)
       end do
       do k = 1_ip, self%filter%off%n
-         i = self%filter%off%at(k)
-         if (lies_inside(boxes%bounds(:, i), self%list%fat(:, i))) cycle
-         call search_single(self, i, boxes)
          if (must_begin(self)) return
+         i = self%filter%off%at(k)
+         if (.not. lies_inside(boxes%bounds(:, i), self%list%fat(:, i))) call search_single(self, i, boxes)
       end do
+      if (.not. must_begin(self)) call self%filter%review_left(self%list)
       call self%work%lap(phase_search)
    end subroutine follow_lines
-
-   !> Draw new lines through a box that left its lines, and review its candidates.
-   subroutine leave_lines(self, i, boxes)
-      type(two_level_t), intent(inout) :: self
-      integer(ip), intent(in) :: i
-      type(boxes_t), intent(in) :: boxes
-      logical :: was_off
-
-      was_off = self%filter%is_off(i)
-      call self%filter%leave_lines(i, boxes%bounds(:, i))
-      if (was_off) return
-      if (.not. (self%filter%is_off(i) .or. self%filter%stays_inside(i, self%list%fat(:, i)))) then
-         call search_single(self, i, boxes)
-         if (.not. self%filter%stays_inside(i, self%list%fat(:, i))) call self%filter%mark_off(i)
-      end if
-      call self%list%candidates_of(i, self%own)
-      call self%filter%review(i, self%own, self%list)
-   end subroutine leave_lines
 
    !> Whether a box lies inside another one
    pure logical function lies_inside(box, other)
@@ -169,9 +113,9 @@ contains
       integer(ip) :: n_before, k
 
       n_before = self%list%n
-      call self%list%search_single(i, boxes, self%filter, self%changes(1))
+      call self%list%search_single(i, boxes, self%filter, self%filter%changes%of(1))
       do k = n_before + 1_ip, self%list%n
-         call self%filter%activate(k, self%list)
+         call self%filter%active%activate(k, self%list)
       end do
    end subroutine search_single
 
@@ -179,130 +123,57 @@ contains
    subroutine begin_interval(self, boxes)
       type(two_level_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
-      integer(ip) :: low, high, n_strays, longest, n_wanted
-      integer :: w
+      integer(ip) :: n_wanted, longest, k, i
 
-      longest = first_interval
-      if (self%list%age > 0_lp) &
-         longest = int(min(max(shortest, self%list%life/3_lp, self%list%age/2_lp), 1024_lp), ip)
       n_wanted = self%filter%active%n_sure + self%filter%active%n
       self%list%surplus = self%list%surplus + self%filter%surplus()
-      call self%filter%active%write_back(self%list)
-      call self%filter%begin_interval(self%list%n, longest)
-      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes) private(w, low, high)
-      do w = 1, size(self%changes)
-         call part(1_ip, boxes%n, size(self%changes), w, low, high)
-         call self%filter%draw_lines(low, high, boxes%n, boxes%bounds)
-      end do
-      !$omp end parallel do
-      n_strays = 0_ip
-      call find_strays(self, n_strays)
+      call self%filter%begin_interval(self%list)
+      call self%filter%draw_all_lines(boxes)
+      longest = self%filter%length
+      call choose_length(self)
       call self%work%add(count_passes, 1_lp)
       call self%work%lap(phase_structure)
-      if (self%list%is_empty() .or. self%list%must_search(n_strays)) then
-         call self%list%search_all(boxes, self%filter, n_wanted, self%changes)
+      if (self%list%should_search(self%filter%strays%n, self%filter%length)) then
+         self%filter%length = longest
+         call self%list%search_all(boxes, self%filter, n_wanted, self%filter%changes%of)
          call self%work%add(count_rebuilds, 1_lp)
-         call find_strays(self, n_strays)
+         call self%filter%list_strays(self%list%fat)
       else
-         call search_strays(self, boxes)
+         do k = 1_ip, self%filter%strays%n
+            call self%list%search_single(self%filter%strays%at(k), boxes, self%filter, self%filter%changes%of(1))
+         end do
       end if
       call self%work%lap(phase_search)
-      call classify(self, boxes)
-      call mark_strays(self)
+      call self%filter%classify_all(boxes, self%list)
+      self%list%surplus = self%list%surplus + class_cost* &
+         real(self%list%n - self%filter%active%n - self%filter%active%n_sure, dp)
+      do k = 1_ip, self%filter%strays%n
+         i = self%filter%strays%at(k)
+         if (.not. self%filter%stays_inside(i, self%list%fat(:, i))) &
+            call self%filter%activate_candidates_of(i, self%list)
+      end do
       call self%work%lap(phase_structure)
    end subroutine begin_interval
 
-   !> List the boxes that can leave their fat boxes in the interval.
-   subroutine find_strays(self, n_strays)
+   !> List the boxes that can leave their fat boxes in the interval, and shorten the interval while this makes single
+   !> searches and intervals together cheaper per step.
+   subroutine choose_length(self)
       type(two_level_t), intent(inout) :: self
-      integer(ip), intent(out) :: n_strays
-      integer(ip) :: low, high, n
-      integer :: w
+      real(dp) :: cost
 
-      n = size(self%list%fat, 2, kind=ip)
-      !$omp parallel do if (n > min_parallel_size) schedule(static, 1) default(none) shared(self, n) &
-      !$omp    private(w, low, high)
-      do w = 1, size(self%changes)
-         call part(1_ip, n, size(self%changes), w, low, high)
-         self%found(w)%n = 0_ip
-         call self%filter%find_strays(low, high, n, self%list%fat, self%found(w))
+      call self%filter%list_strays(self%list%fat)
+      do while (self%filter%length > shortest)
+         cost = self%list%cost_of_singles(self%filter%strays%n)
+         if (cost <= self%filter%interval_cost(self%list%n)) exit
+         self%filter%length = self%filter%length/2_ip
+         call self%filter%list_strays(self%list%fat)
+         if (cost > self%filter%interval_cost(self%list%n) + &
+             2.0_dp*self%list%cost_of_singles(self%filter%strays%n)) cycle
+         self%filter%length = 2_ip*self%filter%length
+         call self%filter%list_strays(self%list%fat)
+         exit
       end do
-      !$omp end parallel do
-      n_strays = 0_ip
-      do w = 1, size(self%changes)
-         n_strays = n_strays + self%found(w)%n
-      end do
-   end subroutine find_strays
-
-   !> Search for each box that can leave its fat box.
-   subroutine search_strays(self, boxes)
-      type(two_level_t), intent(inout) :: self
-      type(boxes_t), intent(in) :: boxes
-      integer(ip) :: k
-      integer :: w
-
-      do w = 1, size(self%changes)
-         do k = 1_ip, self%found(w)%n
-            call self%list%search_single(self%found(w)%at(k), boxes, self%filter, self%changes(1))
-         end do
-      end do
-   end subroutine search_strays
-
-   !> Mark the boxes as off that can leave even their new fat boxes.
-   subroutine mark_strays(self)
-      type(two_level_t), intent(inout) :: self
-      integer(ip) :: k, i
-      integer :: w
-
-      do w = 1, size(self%changes)
-         do k = 1_ip, self%found(w)%n
-            i = self%found(w)%at(k)
-            if (self%filter%stays_inside(i, self%list%fat(:, i))) cycle
-            call self%filter%mark_off(i)
-            call self%list%candidates_of(i, self%own)
-            call self%filter%review(i, self%own, self%list)
-         end do
-      end do
-   end subroutine mark_strays
-
-   !> Classify all candidates.
-   subroutine classify(self, boxes)
-      type(two_level_t), intent(inout) :: self
-      type(boxes_t), intent(in) :: boxes
-      integer(ip) :: low, high
-      integer :: w
-
-      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes) private(w, low, high)
-      do w = 1, size(self%changes)
-         call part(1_ip, self%list%n, size(self%changes), w, low, high)
-         call self%filter%classify(low, high, boxes%body, self%list, self%active(w), self%changes(w))
-      end do
-      !$omp end parallel do
-      call self%filter%collect(self%list%n, self%active)
-      self%list%surplus = self%list%surplus + class_cost* &
-         real(self%list%n - self%filter%active%n - self%filter%active%n_sure, dp)
-   end subroutine classify
-
-   !> Compare the boxes of the active candidates.
-   subroutine compare_active(self, boxes)
-      type(two_level_t), intent(inout) :: self
-      type(boxes_t), intent(in) :: boxes
-      integer(ip) :: low, high, n
-      integer :: w
-
-      n = self%filter%active%n
-      !$omp parallel do if (n > min_parallel_size) schedule(static, 1) default(none) shared(self, boxes, n) &
-      !$omp    private(w, low, high)
-      do w = 1, size(self%changes)
-         call part(1_ip, n, size(self%changes), w, low, high)
-         call self%filter%active%compare(low, high, boxes%bounds, boxes%body, self%changes(w))
-      end do
-      !$omp end parallel do
-      call self%work%add(count_tests, int(n, lp))
-      call self%filter%count_step()
-   end subroutine compare_active
+   end subroutine choose_length
 
    !> Set the counters: candidates, cells, grids, and memory [B].
    subroutine survey(self)

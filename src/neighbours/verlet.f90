@@ -17,16 +17,16 @@
 !> last list and no clock, so runs are reproducible. A list that lasts too long (k m > 4 R n, for example at rest) is
 !> rebuilt with half the skin.
 module polydem_verlet
-   use omp_lib, only: omp_get_max_threads
    use polydem_boxes, only: boxes_t
    use polydem_candidate_rows, only: candidate_rows_t
-   use polydem_cell_grids, only: cell_grids_t, part
+   use polydem_cell_grids, only: cell_grids_t
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_nodes, count_rebuilds, &
       count_searches, count_tests, count_visits, phase_filter, phase_search, phase_structure
    use polydem_kinds, only: bp, dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
    use polydem_size_levels, only: choose_levels, typical_side
+   use polydem_thread_changes, only: part, thread_changes_t
    implicit none
    private
    public :: verlet_t
@@ -57,10 +57,8 @@ module polydem_verlet
       type(candidate_rows_t), private :: candidates
       !> Grids for the search of a rebuild
       type(cell_grids_t), private :: grids
-      !> Changes that each thread recorded, (thread)
-      type(pair_changes_t), allocatable, private :: changes(:)
-      !> Whether all boxes of each thread lie inside their padded boxes, (thread)
-      logical, allocatable, private :: inside(:)
+      !> Changes that each thread recorded
+      type(thread_changes_t), private :: changes
    contains
       procedure :: find
       procedure :: survey
@@ -73,10 +71,9 @@ contains
       class(verlet_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       type(pair_changes_t), intent(inout) :: changes
-      integer :: w
       logical :: keep
 
-      call prepare_threads(self)
+      call self%changes%clear()
       if (allocated(self%padded)) then
          self%age = self%age + 1_lp
          keep = all_inside(self, boxes) .and. .not. is_too_thick(self, boxes%n)
@@ -90,26 +87,9 @@ contains
       call compare_candidates(self, boxes)
       if (.not. keep) self%surplus = int(self%candidates%n, lp) - &
          count(self%candidates%overlap(1:self%candidates%n) /= 0_bp, kind=lp)
-      do w = 1, size(self%changes)
-         call changes%append(self%changes(w))
-      end do
+      call self%changes%join(changes)
       call self%work%lap(phase_filter)
    end subroutine find
-
-   !> Make the results of all threads empty.
-   subroutine prepare_threads(self)
-      type(verlet_t), intent(inout) :: self
-      integer :: w, m
-
-      if (allocated(self%changes)) then
-         if (size(self%changes) /= omp_get_max_threads()) deallocate (self%changes, self%inside)
-      end if
-      m = omp_get_max_threads()
-      if (.not. allocated(self%changes)) allocate (self%changes(m), self%inside(m))
-      do w = 1, size(self%changes)
-         call self%changes(w)%clear()
-      end do
-   end subroutine prepare_threads
 
    !> Choose skin and grids, and make an empty list.
    subroutine start(self, boxes)
@@ -134,15 +114,16 @@ contains
       type(boxes_t), intent(in) :: boxes
       integer(ip) :: low, high
       integer :: w
+      logical :: inside(self%changes%n_threads())
 
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes) private(w, low, high)
-      do w = 1, size(self%changes)
-         call part(1_ip, boxes%n, size(self%changes), w, low, high)
-         self%inside(w) = part_inside(boxes%n, boxes%bounds, self%padded, low, high)
+      !$omp    shared(self, boxes, inside) private(w, low, high)
+      do w = 1, size(inside)
+         call part(boxes%n, size(inside), w, low, high)
+         inside(w) = part_inside(boxes%n, boxes%bounds, self%padded, low, high)
       end do
       !$omp end parallel do
-      all_inside = all(self%inside)
+      all_inside = all(inside)
    end function all_inside
 
    !> Whether the boxes low..high lie inside their padded boxes; the loop over a block has no branches
@@ -201,7 +182,7 @@ contains
       call self%work%add(count_tests, self%grids%total%tests - tests)
       self%work%value(count_searches) = self%grids%total%searches
       self%work%value(count_visits) = self%grids%total%visits
-      call self%candidates%replace(self%grids%found, boxes, self%changes)
+      call self%candidates%replace(self%grids%found, boxes, self%changes%of)
       call self%work%lap(phase_search)
    end subroutine rebuild
 
@@ -214,9 +195,9 @@ contains
 
       !$omp parallel do if (self%candidates%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
-      do w = 1, size(self%changes)
-         call part(1_ip, self%candidates%n, size(self%changes), w, low, high)
-         call self%candidates%compare(low, high, boxes%bounds, boxes%body, self%changes(w))
+      do w = 1, self%changes%n_threads()
+         call part(self%candidates%n, self%changes%n_threads(), w, low, high)
+         call self%candidates%compare(low, high, boxes%bounds, boxes%body, self%changes%of(w))
       end do
       !$omp end parallel do
       call self%work%add(count_tests, int(self%candidates%n, lp))

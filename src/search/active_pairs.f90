@@ -1,6 +1,6 @@
 !> Active candidates: those that are compared in every step of an interval (`polydem_line_filter`).
 module polydem_active_pairs
-   use polydem_candidates, only: candidates_t
+   use polydem_candidates, only: candidates_t, index_list_t
    use polydem_kinds, only: bp, ip
    implicit none
    private
@@ -10,6 +10,8 @@ module polydem_active_pairs
    type, extends(candidates_t) :: active_pairs_t
       !> Number of each active candidate in the list of all candidates, (active candidate)
       integer(ip), allocatable :: owner(:)
+      !> Place of each candidate among the active ones, 0 if it is not active, (candidate)
+      integer(ip), allocatable :: place(:)
       !> Number of candidates that are active because a gap is close to zero at the start of the interval; the others
       !> are active because of their motion
       integer(ip) :: n_close = 0_ip
@@ -18,7 +20,10 @@ module polydem_active_pairs
    contains
       procedure :: reserve
       procedure :: append
-      procedure :: remove
+      procedure :: activate
+      procedure :: activate_all
+      procedure :: forget
+      procedure :: reserve_places
       procedure :: write_back
    end type active_pairs_t
 
@@ -63,17 +68,69 @@ contains
       self%owner(self%n) = k
    end subroutine append
 
-   !> Remove a candidate; the last one takes its place.
-   pure subroutine remove(self, p)
+   !> Make a candidate active, unless it is.
+   pure subroutine activate(self, k, candidates)
       class(active_pairs_t), intent(inout) :: self
-      !> Place of the candidate
-      integer(ip), intent(in) :: p
+      !> Number of the candidate
+      integer(ip), intent(in) :: k
+      !> All candidates
+      class(candidates_t), intent(in) :: candidates
 
-      self%box(:, p) = self%box(:, self%n)
-      self%overlap(p) = self%overlap(self%n)
-      self%owner(p) = self%owner(self%n)
-      self%n = self%n - 1_ip
-   end subroutine remove
+      call self%reserve_places(k)
+      if (self%place(k) /= 0_ip) return
+      call self%append(k, candidates)
+      self%place(k) = self%n
+   end subroutine activate
+
+   !> Make the candidates of a list active, unless they are.
+   pure subroutine activate_all(self, list, candidates)
+      class(active_pairs_t), intent(inout) :: self
+      !> Numbers of the candidates
+      type(index_list_t), intent(in) :: list
+      !> All candidates
+      class(candidates_t), intent(in) :: candidates
+      integer(ip) :: m
+
+      do m = 1_ip, list%n
+         call self%activate(list%at(m), candidates)
+      end do
+   end subroutine activate_all
+
+   !> Take a candidate out of the active ones before it is removed; the last candidate gets its number.
+   pure subroutine forget(self, k, last)
+      class(active_pairs_t), intent(inout) :: self
+      !> Number of the candidate, and of the last candidate
+      integer(ip), intent(in) :: k, last
+      integer(ip) :: p
+
+      call self%reserve_places(last)
+      p = self%place(k)
+      if (p /= 0_ip) then
+         self%box(:, p) = self%box(:, self%n)
+         self%overlap(p) = self%overlap(self%n)
+         self%owner(p) = self%owner(self%n)
+         self%n = self%n - 1_ip
+         self%place(self%owner(p)) = p
+      end if
+      self%place(k) = self%place(last)
+      if (k == last) self%place(k) = 0_ip
+      if (self%place(k) /= 0_ip) self%owner(self%place(k)) = k
+      self%place(last) = 0_ip
+   end subroutine forget
+
+   !> Make room for the places of n candidates; new ones are not active.
+   pure subroutine reserve_places(self, n)
+      class(active_pairs_t), intent(inout) :: self
+      !> Number of candidates
+      integer(ip), intent(in) :: n
+      integer(ip), allocatable :: longer(:)
+
+      if (.not. allocated(self%place)) allocate (self%place(0))
+      if (n <= size(self%place)) return
+      allocate (longer(n + n/4_ip + 64_ip), source=0_ip)
+      longer(1:size(self%place)) = self%place
+      call move_alloc(longer, self%place)
+   end subroutine reserve_places
 
    !> Copy the states to the list of all candidates.
    pure subroutine write_back(self, candidates)

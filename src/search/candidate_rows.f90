@@ -5,10 +5,10 @@
 module polydem_candidate_rows
    use polydem_box_pairs, only: box_pairs_t, found_pairs_t
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t
-   use polydem_cell_grids, only: part
+   use polydem_candidates, only: candidates_t, index_list_t
    use polydem_kinds, only: bp, ip, lp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
+   use polydem_thread_changes, only: part
    implicit none
    private
    public :: candidate_rows_t
@@ -21,11 +21,17 @@ module polydem_candidate_rows
       integer, private :: now = 1
       !> 1 if a candidate of the previous rows overlapped, else 0, (candidate)
       integer(bp), allocatable, private :: overlap_before(:)
+      !> Place in `of_higher` of the first candidate in which each box is the higher one, and behind the last box,
+      !> (boxes + 2); the last element is work space
+      integer(ip), allocatable, private :: first_of_higher(:)
+      !> Candidates of the rows in the order of their higher box
+      integer(ip), allocatable, private :: of_higher(:)
    contains
       procedure :: start => start_rows
       procedure :: replace
       procedure :: append
-      procedure :: row
+      procedure :: list_by_higher
+      procedure :: append_row_candidates_of
       procedure :: place_of
       procedure :: bytes => bytes_of_rows
    end type candidate_rows_t
@@ -67,7 +73,7 @@ contains
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes, changes) private(w, low, high)
       do w = 1, size(changes)
-         call part(1_ip, boxes%n, size(changes), w, low, high)
+         call part(boxes%n, size(changes), w, low, high)
          call self%list(self%now)%sort_rows(low, high)
          call carry_over(self%list(3 - self%now), self%overlap_before, self%list(self%now), low, high, boxes%body, &
                          self%box, self%overlap, changes(w))
@@ -142,26 +148,68 @@ contains
       self%overlap(self%n) = merge(1_bp, 0_bp, overlap)
    end subroutine append
 
-   !> First and last candidate of a row
-   pure function row(self, box)
-      class(candidate_rows_t), intent(in) :: self
-      !> Box of the row
-      integer(ip), intent(in) :: box
-      integer(ip) :: row(2)
+   !> List the candidates of the rows by their higher box, by counting.
+   pure subroutine list_by_higher(self)
+      class(candidate_rows_t), intent(inout) :: self
+      integer(ip) :: k, j, n
 
-      row = [self%list(self%now)%first(box), self%list(self%now)%first(box + 1_ip) - 1_ip]
-   end function row
+      n = self%list(self%now)%n_rows
+      if (.not. allocated(self%of_higher)) allocate (self%of_higher(0), self%first_of_higher(n + 2_ip))
+      if (size(self%of_higher) < self%n) then
+         deallocate (self%of_higher)
+         allocate (self%of_higher(self%n + self%n/4_ip + 64_ip))
+      end if
+      associate (first => self%first_of_higher)
+         first = 0_ip
+         do k = 1_ip, self%n
+            first(self%box(2, k) + 2_ip) = first(self%box(2, k) + 2_ip) + 1_ip
+         end do
+         first(1:2) = 1_ip
+         do j = 1_ip, n
+            first(j + 2_ip) = first(j + 1_ip) + first(j + 2_ip)
+         end do
+         ! first(j + 1) is the next free place of box j, and at the end the first place of the next box.
+         do k = 1_ip, self%n
+            j = self%box(2, k) + 1_ip
+            self%of_higher(first(j)) = k
+            first(j) = first(j) + 1_ip
+         end do
+      end associate
+   end subroutine list_by_higher
+
+   !> Append the candidates of a box in the rows to a list. `list_by_higher` must have been called.
+   pure subroutine append_row_candidates_of(self, i, list)
+      class(candidate_rows_t), intent(in) :: self
+      !> Box
+      integer(ip), intent(in) :: i
+      !> Numbers of candidates
+      type(index_list_t), intent(inout) :: list
+      integer(ip) :: from, low, k, n_row, n_higher
+
+      from = self%list(self%now)%first(i)
+      n_row = self%list(self%now)%first(i + 1_ip) - from
+      low = self%first_of_higher(i)
+      n_higher = self%first_of_higher(i + 1_ip) - low
+      call list%reserve(list%n + n_row + n_higher)
+      do k = 1_ip, n_row
+         list%at(list%n + k) = from + k - 1_ip
+      end do
+      list%n = list%n + n_row
+      do k = 1_ip, n_higher
+         list%at(list%n + k) = self%of_higher(low + k - 1_ip)
+      end do
+      list%n = list%n + n_higher
+   end subroutine append_row_candidates_of
 
    !> Candidate of two boxes, 0 if the rows do not contain them
    pure integer(ip) function place_of(self, lower, higher)
       class(candidate_rows_t), intent(in) :: self
       !> The lower and the higher of the two boxes
       integer(ip), intent(in) :: lower, higher
-      integer(ip) :: ends(2), k
+      integer(ip) :: k
 
-      ends = self%row(lower)
       place_of = 0_ip
-      do k = ends(1), ends(2)
+      do k = self%list(self%now)%first(lower), self%list(self%now)%first(lower + 1_ip) - 1_ip
          if (self%box(2, k) == higher) place_of = k
       end do
    end function place_of
@@ -190,6 +238,8 @@ contains
       bytes = self%list(1)%bytes() + self%list(2)%bytes() + &
          (int(storage_size(self%box), lp)*size(self%box, kind=lp) + &
           int(storage_size(self%overlap), lp)*(size(self%overlap, kind=lp) + size(self%overlap_before, kind=lp)))/8_lp
+      if (allocated(self%of_higher)) bytes = bytes + int(storage_size(self%of_higher)/8, lp)* &
+         (size(self%first_of_higher, kind=lp) + size(self%of_higher, kind=lp))
    end function bytes_of_rows
 
 end module polydem_candidate_rows

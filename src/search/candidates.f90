@@ -33,7 +33,7 @@ module polydem_candidates
       procedure :: compare
       procedure :: drop
       procedure :: remove_separated
-      procedure :: candidates_of
+      procedure :: append_candidates_of
       procedure :: bytes
    end type candidates_t
 
@@ -168,22 +168,21 @@ contains
       end do
    end subroutine remove_separated
 
-   !> List the candidates of a box.
-   pure subroutine candidates_of(self, i, list)
+   !> Append the candidates of a box to a list.
+   pure subroutine append_candidates_of(self, i, list)
       class(candidates_t), intent(in) :: self
       !> Box
       integer(ip), intent(in) :: i
-      !> Numbers of its candidates
+      !> Numbers of candidates
       type(index_list_t), intent(inout) :: list
       integer(ip) :: link
 
-      list%n = 0_ip
       link = self%first(i)
       do while (link /= 0_ip)
          call list%push(place(link))
          link = self%next(side(link), place(link))
       end do
-   end subroutine candidates_of
+   end subroutine append_candidates_of
 
    !> Allocated memory [B]
    pure integer(lp) function bytes(self)

@@ -24,9 +24,10 @@ module polydem_cell_grids
    use polydem_cell_grid, only: cell_grid_t, extent_t, measure, measure_levels, new_grid
    use polydem_cell_order, only: cell_order_t
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
+   use polydem_thread_changes, only: part
    implicit none
    private
-   public :: cell_grids_t, part
+   public :: cell_grids_t
 
    !> Counts of one thread
    type :: tally_t
@@ -69,23 +70,6 @@ module polydem_cell_grids
    end type cell_grids_t
 
 contains
-
-   !> Split the range low..high into m parts of equal size and return part w.
-   pure subroutine part(low, high, m, w, from, to)
-      !> Range to split
-      integer(ip), intent(in) :: low, high
-      !> Number of parts
-      integer, intent(in) :: m
-      !> Number of the part, from 1
-      integer, intent(in) :: w
-      !> First and last element of the part
-      integer(ip), intent(out) :: from, to
-      integer(lp) :: n
-
-      n = int(high, lp) - int(low, lp) + 1_lp
-      from = low + int((n*int(w - 1, lp))/int(m, lp), ip)
-      to = low + int((n*int(w, lp))/int(m, lp), ip) - 1_ip
-   end subroutine part
 
    !> Assign each box to a grid.
    subroutine set_levels(self, n_levels, level, fixed)
@@ -209,13 +193,13 @@ contains
       call move_alloc(found%box, mine%box)
       call mine%reserve(64_ip)
       do l = 1, self%n_levels
-         call part(self%grid(l)%first_box, self%grid(l)%last_box, m, w, low, high)
+         call part_of_level(self%grid(l), m, w, low, high)
          call search_own_grid(self, self%grid(l), low, high, mine, my_tally)
          do other = l + 1, self%n_levels
             call search_other_grid(self, self%grid(other), low, high, mine, my_tally)
          end do
       end do
-      call part(self%grid(l)%first_box, self%grid(l)%last_box, m, w, low, high)
+      call part_of_level(self%grid(l), m, w, low, high)
       do other = 1, self%n_levels
          call search_other_grid(self, self%grid(other), low, high, mine, my_tally)
       end do
@@ -223,6 +207,17 @@ contains
       found%n = mine%n
       tally = my_tally
    end subroutine search_part
+
+   !> Part w of m of the boxes of a level
+   pure subroutine part_of_level(grid, m, w, low, high)
+      type(cell_grid_t), intent(in) :: grid
+      integer, intent(in) :: m, w
+      integer(ip), intent(out) :: low, high
+
+      call part(grid%last_box - grid%first_box + 1_ip, m, w, low, high)
+      low = grid%first_box + low - 1_ip
+      high = grid%first_box + high - 1_ip
+   end subroutine part_of_level
 
    !> Compare boxes with later boxes of their own grid.
    subroutine search_own_grid(self, grid, low, high, found, tally)

@@ -14,10 +14,11 @@ module polydem_fat_candidates
    use polydem_boxes, only: boxes_t
    use polydem_candidate_rows, only: candidate_rows_t
    use polydem_candidates, only: index_list_t, overlapping
-   use polydem_cell_grids, only: cell_grids_t, part
+   use polydem_cell_grids, only: cell_grids_t
    use polydem_kinds, only: bp, dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
    use polydem_size_levels, only: choose_levels, typical_side
+   use polydem_thread_changes, only: part
    implicit none
    private
    public :: fat_candidates_t
@@ -52,11 +53,6 @@ module polydem_fat_candidates
       integer(ip), private :: n_fixed = 0_ip
       !> Number of candidates in the rows
       integer(ip), private :: n_listed = 0_ip
-      !> Place in `of_higher` of the first candidate in which each box is the higher one, and behind the last box,
-      !> (boxes + 2); the last element is work space
-      integer(ip), allocatable, private :: first_of_higher(:)
-      !> Candidates of the rows in the order of their higher box
-      integer(ip), allocatable, private :: of_higher(:)
       !> First link of each box to the candidates behind the rows, (box), 0: none. The link 2(k - 1) + s is box s of
       !> candidate k behind the rows
       integer(ip), allocatable, private :: first_link(:)
@@ -74,11 +70,12 @@ module polydem_fat_candidates
       type(index_list_t), private :: near, known
    contains
       procedure :: prepare
-      procedure :: is_empty
       procedure :: must_search
+      procedure :: should_search
+      procedure :: cost_of_singles
       procedure :: search_all
       procedure :: search_single
-      procedure :: candidates_of
+      procedure :: append_candidates_of
       procedure :: bytes => bytes_of_all
    end type fat_candidates_t
 
@@ -102,29 +99,49 @@ contains
       allocate (self%fat(4, boxes%n), source=0.0_wp)
       allocate (self%first_link(boxes%n), self%met_by(boxes%n), source=0_ip)
       allocate (self%is_moved(boxes%n), source=0_bp)
-      allocate (self%next_link(2, 0), self%of_higher(0))
-      allocate (self%first_of_higher(boxes%n + 2_ip), source=1_ip)
+      allocate (self%next_link(2, 0))
    end subroutine prepare
 
-   !> Whether there was no search yet
-   pure logical function is_empty(self)
+   !> Whether all boxes must be searched: single searches cost as much, or the margin is much too wide
+   pure logical function must_search(self)
       class(fat_candidates_t), intent(in) :: self
 
-      is_empty = .not. self%searched
-   end function is_empty
+      must_search = .not. self%searched .or. self%singles > cost_of_all(self) .or. &
+         (self%surplus > 4.0_dp*cost_of_all(self) .and. self%margin > least_margin*self%side)
+   end function must_search
 
-   !> Whether single searches cost as much as a search for all boxes, or the margin is much too wide
-   pure logical function must_search(self, n_strays)
+   !> Whether it is best to search all boxes now: single searches in the next interval would cost more per step than all
+   !> searches since the last one for all boxes, or more than another one
+   pure logical function should_search(self, n_strays, steps)
       class(fat_candidates_t), intent(in) :: self
       !> Number of boxes that need a single search now
       integer(ip), intent(in) :: n_strays
-      real(dp) :: all
+      !> Length of the interval
+      integer(ip), intent(in) :: steps
+      real(dp) :: now, so_far
 
-      all = box_cost*real(size(self%is_moved), dp) + candidate_cost*real(self%n, dp)
-      must_search = self%singles + real(n_strays, dp)* &
-         (single_cost + real(self%n_fixed + self%moved%n, dp) + 0.5_dp*real(n_strays, dp)) > all .or. &
-         (self%surplus > 4.0_dp*all .and. self%margin > least_margin*self%side)
-   end function must_search
+      now = self%cost_of_singles(n_strays)
+      so_far = cost_of_all(self) + self%singles
+      should_search = self%must_search() .or. self%singles + now > cost_of_all(self) .or. &
+         now*real(self%age, dp) > so_far*real(steps, dp)
+   end function should_search
+
+   !> Cost of a search for all boxes [comparisons]
+   pure real(dp) function cost_of_all(self)
+      type(fat_candidates_t), intent(in) :: self
+
+      cost_of_all = box_cost*real(size(self%is_moved), dp) + candidate_cost*real(self%n, dp)
+   end function cost_of_all
+
+   !> Cost of single searches [comparisons]
+   pure real(dp) function cost_of_singles(self, n_strays)
+      class(fat_candidates_t), intent(in) :: self
+      !> Number of boxes
+      integer(ip), intent(in) :: n_strays
+
+      cost_of_singles = real(n_strays, dp)* &
+         (single_cost + real(self%n_fixed + self%moved%n, dp) + 0.5_dp*real(n_strays, dp))
+   end function cost_of_singles
 
    !> Set the margin, make all fat boxes, and search for all candidates.
    subroutine search_all(self, boxes, lines, n_wanted, changes)
@@ -151,7 +168,7 @@ contains
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes, lines, changes) private(w, low, high)
       do w = 1, size(changes)
-         call part(1_ip, boxes%n, size(changes), w, low, high)
+         call part(boxes%n, size(changes), w, low, high)
          call fatten(self, low, high, boxes%bounds, lines)
       end do
       !$omp end parallel do
@@ -163,7 +180,8 @@ contains
          call carry_extra(self, extras%at(k), extras%at(k + 1_ip), boxes%body, changes(1))
       end do
       self%searched = .true.
-      call link_rows(self)
+      self%first_link = 0_ip
+      call self%list_by_higher()
    end subroutine search_all
 
    !> Set the margin from the costs of the last list. The first list was made without velocities, so its life says
@@ -229,35 +247,6 @@ contains
       end do
    end subroutine fatten
 
-   !> List the candidates of the rows by their higher box, by counting. No candidate is behind the rows.
-   pure subroutine link_rows(self)
-      type(fat_candidates_t), intent(inout) :: self
-      integer(ip) :: k, j, n
-
-      n = size(self%first_link, kind=ip)
-      if (size(self%of_higher) < self%n_listed) then
-         deallocate (self%of_higher)
-         allocate (self%of_higher(self%n_listed + self%n_listed/4_ip + 64_ip))
-      end if
-      self%first_link = 0_ip
-      associate (first => self%first_of_higher)
-         first = 0_ip
-         do k = 1_ip, self%n_listed
-            first(self%box(2, k) + 2_ip) = first(self%box(2, k) + 2_ip) + 1_ip
-         end do
-         first(1:2) = 1_ip
-         do j = 1_ip, n
-            first(j + 2_ip) = first(j + 1_ip) + first(j + 2_ip)
-         end do
-         ! first(j + 1) is the next free place of box j, and at the end the first place of the next box.
-         do k = 1_ip, self%n_listed
-            j = self%box(2, k) + 1_ip
-            self%of_higher(first(j)) = k
-            first(j) = first(j) + 1_ip
-         end do
-      end associate
-   end subroutine link_rows
-
    !> Make room for the links of n candidates behind the rows.
    pure subroutine reserve_links(self, n)
       type(fat_candidates_t), intent(inout) :: self
@@ -316,40 +305,30 @@ contains
       end if
       self%n_single = self%n_single + 1_ip
       self%met_by(i) = self%n_single
-      call self%candidates_of(i, self%known)
+      self%known%n = 0_ip
+      call self%append_candidates_of(i, self%known)
       do k = 1_ip, self%known%n
          self%met_by(self%box(:, self%known%at(k))) = self%n_single
       end do
    end subroutine meet_candidates
 
-   !> List the candidates of a box.
-   pure subroutine candidates_of(self, i, list)
+   !> Append the candidates of a box to a list.
+   pure subroutine append_candidates_of(self, i, list)
       class(fat_candidates_t), intent(in) :: self
       !> Box
       integer(ip), intent(in) :: i
-      !> Numbers of its candidates
+      !> Numbers of candidates
       type(index_list_t), intent(inout) :: list
-      integer(ip) :: ends(2), low, high, link, k, n
+      integer(ip) :: link, k
 
-      ends = self%row(i)
-      low = self%first_of_higher(i)
-      high = self%first_of_higher(i + 1_ip) - 1_ip
-      n = ends(2) - ends(1) + 1_ip
-      call list%reserve(n + high - low + 1_ip)
-      do k = 1_ip, n
-         list%at(k) = ends(1) + k - 1_ip
-      end do
-      do k = low, high
-         list%at(n + k - low + 1_ip) = self%of_higher(k)
-      end do
-      list%n = n + high - low + 1_ip
+      call self%append_row_candidates_of(i, list)
       link = self%first_link(i)
       do while (link /= 0_ip)
          k = shiftr(link + 1_ip, 1)
          call list%push(self%n_listed + k)
          link = self%next_link(2_ip - iand(link, 1_ip), k)
       end do
-   end subroutine candidates_of
+   end subroutine append_candidates_of
 
    !> Append a candidate, unless it is one already or no pair is possible.
    subroutine add_candidate(self, i, j, boxes, changes)
@@ -381,7 +360,7 @@ contains
       if (.not. allocated(self%fat)) return
       bytes = self%candidate_rows_t%bytes() + self%grids%bytes() + size(self%is_moved, kind=lp) + &
          (int(storage_size(self%fat), lp)*size(self%fat, kind=lp) + int(storage_size(self%first_link), lp)* &
-          (3_lp*size(self%first_link, kind=lp) + size(self%next_link, kind=lp) + size(self%of_higher, kind=lp)))/8_lp
+          (2_lp*size(self%first_link, kind=lp) + size(self%next_link, kind=lp)))/8_lp
    end function bytes_of_all
 
 end module polydem_fat_candidates

@@ -41,12 +41,14 @@ module polydem_line_filter
 
    !> Costs in units of a comparison of two boxes (measured): new lines of a box, classification or review of a
    !> candidate, a box that leaves its lines
-   real(dp), parameter :: line_cost = 7.0_dp, class_cost = 6.0_dp, leave_cost = 40.0_dp
+   real(dp), parameter :: line_cost = 6.0_dp, class_cost = 3.0_dp, leave_cost = 60.0_dp
    !> Initial value, lower and upper bound of the tolerance in units of the typical side of a box
    real(wp), parameter :: first_tolerance = 2.0_wp**(-7), least_tolerance = 2.0_wp**(-20), &
       greatest_tolerance = 2.0_wp**(-3)
    !> Initial value, lower and upper bound of the length of an interval [steps]
    real(dp), parameter :: first_length = 16.0_dp, least_length = 2.0_dp, greatest_length = 1024.0_dp
+   !> Length of the first interval, which measures velocities [steps]
+   integer(ip), parameter :: first_interval = 2_ip
    !> Number of times that a box may leave its lines in an interval before it is off
    integer(bp), parameter :: often = 4_bp
 
@@ -58,8 +60,6 @@ module polydem_line_filter
       type(index_list_t) :: off
       !> Number of times that each box left its lines in this interval, `often` if it is off, (box)
       integer(bp), allocatable, private :: left(:)
-      !> Place of each candidate in `active`, 0 if it is not active, (candidate)
-      integer(ip), allocatable, private :: active_at(:)
       !> Length of the intervals before rounding to whole steps
       real(dp), private :: exact_length = first_length
       !> Number of active candidates at the start of the interval
@@ -67,9 +67,9 @@ module polydem_line_filter
       !> Number of comparisons in this interval of candidates that became active in it
       integer(lp), private :: n_extra = 0_lp
       !> Number of times that boxes left their lines in this interval
-      integer(lp), private :: n_left = 0_lp
+      integer(lp) :: n_left = 0_lp
       !> Number of candidates that were reviewed in this interval
-      integer(lp), private :: n_reviewed = 0_lp
+      integer(lp) :: n_reviewed = 0_lp
    contains
       procedure :: start
       procedure :: is_due
@@ -77,11 +77,11 @@ module polydem_line_filter
       procedure :: classify
       procedure :: collect
       procedure :: leave_lines
+      procedure :: leaves_often
       procedure :: mark_off
       procedure :: is_off
       procedure :: review
-      procedure :: activate
-      procedure :: forget
+      procedure :: interval_cost
       procedure :: surplus
       procedure :: count_step
       procedure :: bytes
@@ -101,25 +101,26 @@ contains
       allocate (self%speed(4, n_boxes), source=0.0_sp)
       allocate (self%drawn(n_boxes), source=0_ip)
       allocate (self%left(n_boxes), source=0_bp)
-      allocate (self%active_at(0))
       self%side = side
       self%tolerance = first_tolerance*side
       call self%active%reserve(64_ip)
    end subroutine start
 
-   !> Whether an interval should begin: the last one is over, or the comparisons that boxes off their lines cost exceed
-   !> the cost of a new interval
+   !> Whether an interval should begin: there was none, the last one is over, or the comparisons that boxes off their
+   !> lines cost exceed the cost of a new interval
    pure logical function is_due(self, n_candidates)
       class(line_filter_t), intent(in) :: self
       !> Number of candidates
       integer(ip), intent(in) :: n_candidates
 
-      is_due = self%step > self%length .or. extra_cost(self) > interval_cost(self, n_candidates)
+      is_due = self%length == 0_ip .or. self%step > self%length .or. &
+         extra_cost(self) > self%interval_cost(n_candidates)
    end function is_due
 
    !> Cost of the start of an interval [comparisons]
    pure real(dp) function interval_cost(self, n_candidates)
-      type(line_filter_t), intent(in) :: self
+      class(line_filter_t), intent(in) :: self
+      !> Number of candidates
       integer(ip), intent(in) :: n_candidates
 
       interval_cost = line_cost*real(size(self%left), dp) + class_cost*real(n_candidates, dp)
@@ -132,17 +133,20 @@ contains
       extra_cost = real(self%n_extra, dp) + leave_cost*real(self%n_left, dp) + class_cost*real(self%n_reviewed, dp)
    end function extra_cost
 
-   !> Set tolerance and length of a new interval. `write_back` must have been called. Then call `draw_lines`, and
-   !> `classify` and `collect` when the candidates are complete.
-   pure subroutine begin_interval(self, n_candidates, longest)
+   !> Set tolerance and length of a new interval. Then call `draw_lines`, and `classify` and `collect` when the
+   !> candidates are complete.
+   pure subroutine begin_interval(self, candidates)
       class(line_filter_t), intent(inout) :: self
-      !> Number of candidates in the last interval
-      integer(ip), intent(in) :: n_candidates
-      !> Upper bound of the length [steps]
-      integer(ip), intent(in) :: longest
+      !> All candidates; the states of the active ones are written back
+      class(candidates_t), intent(inout) :: candidates
 
-      if (self%length > 0_ip .and. self%is_due(n_candidates)) call adapt(self, n_candidates)
-      self%length = min(nint(self%exact_length, ip), longest)
+      call self%active%write_back(candidates)
+      if (self%length > 0_ip) then
+         if (self%is_due(candidates%n)) call adapt(self, candidates%n)
+         self%length = nint(self%exact_length, ip)
+      else
+         self%length = first_interval
+      end if
       self%left = 0_bp
       self%off%n = 0_ip
       self%n_extra = 0_lp
@@ -157,7 +161,8 @@ contains
    !>     C        the candidates that are active because a gap is close to zero, proportional to d
    !>     X        the boxes that leave their lines: decreases with d and increases with T
    !>
-   !> The new length makes I/T equal to B + X, the new tolerance makes C equal to X; both change slowly.
+   !> The new length makes I/T equal to B + X, the new tolerance makes C equal to X; both change slowly. The first
+   !> interval has no velocities, so its X says nothing about the tolerance.
    pure subroutine adapt(self, n_candidates)
       type(line_filter_t), intent(inout) :: self
       integer(ip), intent(in) :: n_candidates
@@ -171,8 +176,9 @@ contains
       factor = sqrt(intervals/max(moving + off, 1.0_dp))
       self%exact_length = min(self%exact_length, max(2.0_dp*steps, first_length))*min(max(factor, 0.5_dp), 2.0_dp)
       self%exact_length = min(max(self%exact_length, least_length), greatest_length)
+      if (self%share < trust) return
       factor = sqrt(max(off, 1.0_dp)/max(touching, 1.0_dp))
-      self%tolerance = self%tolerance*real(min(max(factor, 0.75_dp), 4.0_dp), wp)
+      self%tolerance = self%tolerance*real(min(max(factor, 0.5_dp), 2.0_dp), wp)
       self%tolerance = min(max(self%tolerance, least_tolerance*self%side), greatest_tolerance*self%side)
    end subroutine adapt
 
@@ -229,12 +235,9 @@ contains
       integer(ip) :: k, n
       integer :: w
 
-      if (size(self%active_at) < n_candidates) then
-         deallocate (self%active_at)
-         allocate (self%active_at(n_candidates + n_candidates/4_ip + 64_ip))
-      end if
-      self%active_at = 0_ip
       call self%active%reserve(sum(found%n))
+      call self%active%reserve_places(n_candidates)
+      self%active%place = 0_ip
       n = 0_ip
       do w = 1, size(found)
          do k = 1_ip, found(w)%n
@@ -242,7 +245,7 @@ contains
             self%active%box(:, n) = found(w)%box(:, k)
             self%active%overlap(n) = found(w)%overlap(k)
             self%active%owner(n) = found(w)%owner(k)
-            self%active_at(found(w)%owner(k)) = n
+            self%active%place(found(w)%owner(k)) = n
          end do
       end do
       self%active%n = n
@@ -253,7 +256,7 @@ contains
       self%step = 0_ip
    end subroutine collect
 
-   !> Draw new lines through a box that left its lines in this step; it is off if that is often the case.
+   !> Draw new lines through a box that left its lines in this step, and count this.
    pure subroutine leave_lines(self, i, box)
       class(line_filter_t), intent(inout) :: self
       !> Box
@@ -262,10 +265,17 @@ contains
       real(wp), intent(in) :: box(4)
 
       call self%redraw(i, box)
-      self%n_left = self%n_left + 1_lp
       if (self%left(i) < often) self%left(i) = self%left(i) + 1_bp
-      if (self%left(i) == often - 1_bp) call self%mark_off(i)
    end subroutine leave_lines
+
+   !> Whether a box that is not off has left its lines so often that it must be marked as off
+   pure logical function leaves_often(self, i)
+      class(line_filter_t), intent(in) :: self
+      !> Box
+      integer(ip), intent(in) :: i
+
+      leaves_often = self%left(i) == often - 1_bp
+   end function leaves_often
 
    !> Mark a box as off; all its candidates must be activated.
    pure subroutine mark_off(self, i)
@@ -286,89 +296,49 @@ contains
       is_off = self%left(i) >= often
    end function is_off
 
-   !> Activate those candidates of a box with new lines whose state is not sure from this step to the end of the
-   !> interval; all of them if the box is off.
-   pure subroutine review(self, i, own, candidates)
-      class(line_filter_t), intent(inout) :: self
-      !> Box
-      integer(ip), intent(in) :: i
-      !> Numbers of its candidates
-      type(index_list_t), intent(in) :: own
+   !> Reduce a list of candidates to those that must become active: candidates that are not active, and whose state is
+   !> not sure from this step to the end of the interval or one of whose boxes is off.
+   pure subroutine review(self, candidates, list, n_reviewed)
+      class(line_filter_t), intent(in) :: self
       !> All candidates; the states of those that are not active are valid
       class(candidates_t), intent(in) :: candidates
-      integer(ip) :: unsure(pair_block), box(2, pair_block), listed(pair_block + 1_ip), next, n, n_listed, m, k
+      !> Numbers of candidates
+      type(index_list_t), intent(inout) :: list
+      !> Number of candidates that were classified
+      integer(lp), intent(out) :: n_reviewed
+      integer(ip) :: asked(pair_block), box(2, pair_block), listed(pair_block + 1_ip), next, n, n_listed, kept, k, m
       integer(bp) :: state(pair_block), kind(pair_block)
 
-      if (own%n > 0_ip) call reserve_places(self, candidates%n)
+      n_reviewed = 0_lp
+      kept = 0_ip
       next = 1_ip
-      do while (next <= own%n)
+      do while (next <= list%n)
          n = 0_ip
-         do while (next <= own%n .and. n < pair_block)
-            k = own%at(next)
+         do while (next <= list%n .and. n < pair_block)
+            k = list%at(next)
             next = next + 1_ip
-            if (self%active_at(k) /= 0_ip) cycle
+            if (self%active%place(k) /= 0_ip) cycle
+            if (max(self%left(candidates%box(1, k)), self%left(candidates%box(2, k))) >= often) then
+               kept = kept + 1_ip
+               list%at(kept) = k
+               cycle
+            end if
             n = n + 1_ip
-            unsure(n) = k
+            asked(n) = k
             box(1, n) = candidates%box(1, k)
             box(2, n) = candidates%box(2, k)
             state(n) = candidates%overlap(k)
          end do
-         kind = active
-         if (.not. self%is_off(i)) then
-            self%n_reviewed = self%n_reviewed + int(n, lp)
-            call self%classify_pairs(n, box, self%step, kind)
-         end if
+         n_reviewed = n_reviewed + int(n, lp)
+         call self%classify_pairs(n, box, self%step, kind)
          call list_differences(n, kind, state, n_listed, listed)
          do m = 1_ip, n_listed
-            call self%activate(unsure(listed(m)), candidates)
+            kept = kept + 1_ip
+            list%at(kept) = asked(listed(m))
          end do
       end do
+      list%n = kept
    end subroutine review
-
-   !> Make a candidate active, unless it is.
-   pure subroutine activate(self, k, candidates)
-      class(line_filter_t), intent(inout) :: self
-      !> Number of the candidate
-      integer(ip), intent(in) :: k
-      !> All candidates
-      class(candidates_t), intent(in) :: candidates
-
-      call reserve_places(self, k)
-      if (self%active_at(k) /= 0_ip) return
-      call self%active%append(k, candidates)
-      self%active_at(k) = self%active%n
-   end subroutine activate
-
-   !> Take a candidate out of the active ones before it is removed; the last candidate gets its number.
-   pure subroutine forget(self, k, last)
-      class(line_filter_t), intent(inout) :: self
-      !> Number of the candidate, and of the last candidate
-      integer(ip), intent(in) :: k, last
-      integer(ip) :: p
-
-      call reserve_places(self, last)
-      p = self%active_at(k)
-      if (p /= 0_ip) then
-         call self%active%remove(p)
-         self%active_at(self%active%owner(p)) = p
-      end if
-      self%active_at(k) = self%active_at(last)
-      if (k == last) self%active_at(k) = 0_ip
-      if (self%active_at(k) /= 0_ip) self%active%owner(self%active_at(k)) = k
-      self%active_at(last) = 0_ip
-   end subroutine forget
-
-   !> Make room for the places of n candidates; new ones are not active.
-   pure subroutine reserve_places(self, n)
-      type(line_filter_t), intent(inout) :: self
-      integer(ip), intent(in) :: n
-      integer(ip), allocatable :: longer(:)
-
-      if (n <= size(self%active_at)) return
-      allocate (longer(n + n/4_ip + 64_ip), source=0_ip)
-      longer(1:size(self%active_at)) = self%active_at
-      call move_alloc(longer, self%active_at)
-   end subroutine reserve_places
 
    !> Work in this interval on candidates that were separate when it began [comparisons]
    pure real(dp) function surplus(self)
@@ -391,8 +361,8 @@ contains
       bytes = 0_lp
       if (.not. allocated(self%place)) return
       bytes = (int(storage_size(self%place) + storage_size(self%speed), lp)*size(self%place, kind=lp) + &
-               int(storage_size(self%active_at), lp)*(size(self%active_at, kind=lp) + &
-                                                      3_lp*size(self%active%owner, kind=lp)) + &
+               int(storage_size(self%drawn), lp)*(size(self%drawn, kind=lp) + size(self%active%place, kind=lp) + &
+                                                  3_lp*size(self%active%owner, kind=lp)) + &
                int(storage_size(self%left), lp)*(size(self%left, kind=lp) + size(self%active%overlap, kind=lp)))/8_lp
    end function bytes
 

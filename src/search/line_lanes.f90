@@ -168,35 +168,39 @@ contains
       real(sp), intent(in) :: speed(4, n_boxes)
       !> Class of each pair: `separate`, `overlapping` or `active`
       integer(bp), intent(out) :: kind(n)
-      real(wp) :: left, right, below, above, left_speed, right_speed, below_speed, above_speed, from, to
-      real(wp) :: greatest(pair_block), least(pair_block)
-      integer(ip) :: k, i, j
+      real(wp) :: gap(4), rate(4), most(4, pair_block), least(4, pair_block), greatest(2, pair_block), &
+         smallest(2, pair_block), largest_gap(pair_block), largest_least(pair_block)
+      integer(ip) :: k, i, j, a
 
-      from = steps(1)
-      to = steps(2)
+      ! Elements 1 and 2 of gap, rate, most and least belong to the gaps left of box i and below it, 3 and 4 to the
+      ! negative gaps right of it and above it.
       do k = 1_ip, n
          i = box(1, k)
          j = box(2, k)
-         left = place(1, i) - place(3, j)
-         below = place(2, i) - place(4, j)
-         right = place(1, j) - place(3, i)
-         above = place(2, j) - place(4, i)
-         left_speed = real(speed(1, i), wp) - real(speed(3, j), wp)
-         below_speed = real(speed(2, i), wp) - real(speed(4, j), wp)
-         right_speed = real(speed(1, j), wp) - real(speed(3, i), wp)
-         above_speed = real(speed(2, j), wp) - real(speed(4, i), wp)
-         greatest(k) = max(max(max(left + left_speed*from, left + left_speed*to), &
-                               max(below + below_speed*from, below + below_speed*to)), &
-                           max(max(right + right_speed*from, right + right_speed*to), &
-                               max(above + above_speed*from, above + above_speed*to)))
-         least(k) = max(max(min(left + left_speed*from, left + left_speed*to), &
-                            min(below + below_speed*from, below + below_speed*to)), &
-                        max(min(right + right_speed*from, right + right_speed*to), &
-                            min(above + above_speed*from, above + above_speed*to)))
+         gap(1) = place(1, i) - place(3, j)
+         gap(2) = place(2, i) - place(4, j)
+         gap(3) = place(3, i) - place(1, j)
+         gap(4) = place(4, i) - place(2, j)
+         rate(1) = real(speed(1, i), wp) - real(speed(3, j), wp)
+         rate(2) = real(speed(2, i), wp) - real(speed(4, j), wp)
+         rate(3) = real(speed(3, i), wp) - real(speed(1, j), wp)
+         rate(4) = real(speed(4, i), wp) - real(speed(2, j), wp)
+         most(:, k) = max(gap + rate*steps(1), gap + rate*steps(2))
+         least(:, k) = min(gap + rate*steps(1), gap + rate*steps(2))
       end do
       do k = 1_ip, n
-         kind(k) = merge(overlapping, active, greatest(k) < -margin)
-         kind(k) = merge(separate, kind(k), least(k) > margin)
+         do a = 1_ip, 2_ip
+            greatest(a, k) = max(most(a, k), -least(a + 2_ip, k))
+            smallest(a, k) = max(least(a, k), -most(a + 2_ip, k))
+         end do
+      end do
+      do k = 1_ip, n
+         largest_gap(k) = max(greatest(1, k), greatest(2, k))
+         largest_least(k) = max(smallest(1, k), smallest(2, k))
+      end do
+      do k = 1_ip, n
+         kind(k) = merge(overlapping, active, largest_gap(k) < -margin)
+         kind(k) = merge(separate, kind(k), largest_least(k) > margin)
       end do
    end subroutine classify
 

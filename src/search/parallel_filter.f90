@@ -1,0 +1,251 @@
+!> Filter of candidates (`polydem_line_filter`) by several threads. Each thread works on a part of the boxes, of the
+!> candidates or of the active candidates. The results do not depend on the number of threads.
+module polydem_parallel_filter
+   use polydem_active_pairs, only: active_pairs_t
+   use polydem_boxes, only: boxes_t
+   use polydem_candidates, only: candidates_t, index_list_t
+   use polydem_kinds, only: ip, lp, wp, min_parallel_size
+   use polydem_line_filter, only: line_filter_t
+   use polydem_thread_changes, only: part, thread_changes_t
+   implicit none
+   private
+   public :: parallel_filter_t
+
+   !> Number of boxes above which the review of their candidates is parallel; a box takes about 100 ns
+   integer(ip), parameter :: worth_reviewing = 32_ip
+
+   !> Results of one thread
+   type :: worker_t
+      !> Boxes that left their lines in this step
+      type(index_list_t) :: left
+      !> Those of them that left their lines often or leave their bounds, or the boxes that do so in a new interval
+      type(index_list_t) :: strays
+      !> Candidates of the boxes that left their lines; after the review those that must become active
+      type(index_list_t) :: asked
+      !> Number of candidates that were classified
+      integer(lp) :: n_reviewed = 0_lp
+      !> Active candidates at the start of an interval
+      type(active_pairs_t) :: active
+   end type worker_t
+
+   !> Filter with the results of its threads
+   type, extends(line_filter_t) :: parallel_filter_t
+      !> Changes that each thread recorded
+      type(thread_changes_t) :: changes
+      !> Results of each thread, (thread)
+      type(worker_t), allocatable, private :: worker(:)
+      !> Boxes that left their lines often or leave their bounds
+      type(index_list_t) :: strays
+   contains
+      procedure :: begin_step
+      procedure :: follow_lines
+      procedure :: review_left
+      procedure :: activate_candidates_of
+      procedure :: draw_all_lines
+      procedure :: list_strays
+      procedure :: classify_all
+      procedure :: compare_active
+   end type parallel_filter_t
+
+contains
+
+   !> Begin a step: the results of all threads are empty.
+   subroutine begin_step(self)
+      class(parallel_filter_t), intent(inout) :: self
+
+      if (self%length > 0_ip) self%step = self%step + 1_ip
+      call self%changes%clear()
+      if (allocated(self%worker)) then
+         if (size(self%worker) /= self%changes%n_threads()) deallocate (self%worker)
+      end if
+      if (.not. allocated(self%worker)) allocate (self%worker(self%changes%n_threads()))
+   end subroutine begin_step
+
+   !> Draw new lines through the boxes that left theirs. Then handle the `strays`, and call `review_left`.
+   subroutine follow_lines(self, boxes, limits)
+      class(parallel_filter_t), intent(inout) :: self
+      !> Boxes of this step
+      type(boxes_t), intent(in) :: boxes
+      !> Bounds that each box must not leave while it is on its lines, (4, box) [m]
+      real(wp), intent(in), contiguous :: limits(:, :)
+      integer(ip) :: low, high
+      integer :: w
+
+      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes, limits) private(w, low, high)
+      do w = 1, size(self%worker)
+         call part(boxes%n, size(self%worker), w, low, high)
+         call self%find_off_lines(low, high, boxes%n, boxes%bounds, self%worker(w)%left)
+         call redraw_lines(self, boxes, limits, self%worker(w))
+      end do
+      !$omp end parallel do
+      self%n_left = self%n_left + sum(int(self%worker%left%n, lp))
+      call gather_strays(self)
+   end subroutine follow_lines
+
+   !> Draw new lines through the boxes of a thread that left theirs, and list the strays among them. Boxes that were off
+   !> before are removed from the list.
+   pure subroutine redraw_lines(self, boxes, limits, worker)
+      class(parallel_filter_t), intent(inout) :: self
+      type(boxes_t), intent(in) :: boxes
+      real(wp), intent(in), contiguous :: limits(:, :)
+      type(worker_t), intent(inout) :: worker
+      integer(ip) :: k, i, kept
+      logical :: was_off
+
+      kept = 0_ip
+      worker%strays%n = 0_ip
+      do k = 1_ip, worker%left%n
+         i = worker%left%at(k)
+         was_off = self%is_off(i)
+         call self%leave_lines(i, boxes%bounds(:, i))
+         if (was_off) cycle
+         kept = kept + 1_ip
+         worker%left%at(kept) = i
+         if (self%leaves_often(i)) then
+            call worker%strays%push(i)
+         else if (.not. self%stays_inside(i, limits(:, i))) then
+            call worker%strays%push(i)
+         end if
+      end do
+      worker%left%n = kept
+   end subroutine redraw_lines
+
+   !> Join the strays of all threads.
+   pure subroutine gather_strays(self)
+      class(parallel_filter_t), intent(inout) :: self
+      integer(ip) :: k
+      integer :: w
+
+      self%strays%n = 0_ip
+      do w = 1, size(self%worker)
+         do k = 1_ip, self%worker(w)%strays%n
+            call self%strays%push(self%worker(w)%strays%at(k))
+         end do
+      end do
+   end subroutine gather_strays
+
+   !> Review the candidates of the boxes that left their lines in this step.
+   subroutine review_left(self, candidates)
+      class(parallel_filter_t), intent(inout) :: self
+      !> All candidates
+      class(candidates_t), intent(in) :: candidates
+      integer :: w
+
+      if (all(self%worker%left%n == 0_ip)) return
+      call self%active%reserve_places(candidates%n)
+      !$omp parallel do if (sum(self%worker%left%n) > worth_reviewing) schedule(static, 1) default(none) &
+      !$omp    shared(self, candidates) private(w)
+      do w = 1, size(self%worker)
+         call review_part(self, candidates, self%worker(w))
+      end do
+      !$omp end parallel do
+      do w = 1, size(self%worker)
+         call self%active%activate_all(self%worker(w)%asked, candidates)
+         self%n_reviewed = self%n_reviewed + self%worker(w)%n_reviewed
+      end do
+   end subroutine review_left
+
+   !> Review the candidates of the boxes of a thread.
+   pure subroutine review_part(self, candidates, worker)
+      class(parallel_filter_t), intent(in) :: self
+      class(candidates_t), intent(in) :: candidates
+      type(worker_t), intent(inout) :: worker
+      integer(ip) :: k
+
+      worker%asked%n = 0_ip
+      do k = 1_ip, worker%left%n
+         call candidates%append_candidates_of(worker%left%at(k), worker%asked)
+      end do
+      call self%review(candidates, worker%asked, worker%n_reviewed)
+   end subroutine review_part
+
+   !> Mark a box as off and make all its candidates active.
+   pure subroutine activate_candidates_of(self, i, candidates)
+      class(parallel_filter_t), intent(inout) :: self
+      !> Box
+      integer(ip), intent(in) :: i
+      !> All candidates
+      class(candidates_t), intent(in) :: candidates
+
+      call self%mark_off(i)
+      self%worker(1)%asked%n = 0_ip
+      call candidates%append_candidates_of(i, self%worker(1)%asked)
+      call self%active%activate_all(self%worker(1)%asked, candidates)
+   end subroutine activate_candidates_of
+
+   !> Draw new lines through all boxes.
+   subroutine draw_all_lines(self, boxes)
+      class(parallel_filter_t), intent(inout) :: self
+      !> Boxes of this step
+      type(boxes_t), intent(in) :: boxes
+      integer(ip) :: low, high
+      integer :: w
+
+      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes) private(w, low, high)
+      do w = 1, size(self%worker)
+         call part(boxes%n, size(self%worker), w, low, high)
+         call self%draw_lines(low, high, boxes%n, boxes%bounds)
+      end do
+      !$omp end parallel do
+   end subroutine draw_all_lines
+
+   !> List the boxes that do not stay inside given bounds in an interval that begins.
+   subroutine list_strays(self, limits)
+      class(parallel_filter_t), intent(inout) :: self
+      !> Bounds of each box, (4, box) [m]
+      real(wp), intent(in), contiguous :: limits(:, :)
+      integer(ip) :: low, high, n
+      integer :: w
+
+      n = size(limits, 2, ip)
+      !$omp parallel do if (n > min_parallel_size) schedule(static, 1) default(none) shared(self, limits, n) &
+      !$omp    private(w, low, high)
+      do w = 1, size(self%worker)
+         call part(n, size(self%worker), w, low, high)
+         call self%find_strays(low, high, n, limits, self%worker(w)%strays)
+      end do
+      !$omp end parallel do
+      call gather_strays(self)
+   end subroutine list_strays
+
+   !> Classify all candidates.
+   subroutine classify_all(self, boxes, candidates)
+      class(parallel_filter_t), intent(inout) :: self
+      !> Boxes of this step
+      type(boxes_t), intent(in) :: boxes
+      !> All candidates
+      class(candidates_t), intent(inout) :: candidates
+      integer(ip) :: low, high
+      integer :: w
+
+      !$omp parallel do if (candidates%n > min_parallel_size) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes, candidates) private(w, low, high)
+      do w = 1, size(self%worker)
+         call part(candidates%n, size(self%worker), w, low, high)
+         call self%classify(low, high, boxes%body, candidates, self%worker(w)%active, self%changes%of(w))
+      end do
+      !$omp end parallel do
+      call self%collect(candidates%n, self%worker%active)
+   end subroutine classify_all
+
+   !> Compare the boxes of the active candidates.
+   subroutine compare_active(self, boxes)
+      class(parallel_filter_t), intent(inout) :: self
+      !> Boxes of this step
+      type(boxes_t), intent(in) :: boxes
+      integer(ip) :: low, high
+      integer :: w
+
+      !$omp parallel do if (self%active%n > min_parallel_size) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes) private(w, low, high)
+      do w = 1, size(self%worker)
+         call part(self%active%n, size(self%worker), w, low, high)
+         call self%active%compare(low, high, boxes%bounds, boxes%body, self%changes%of(w))
+      end do
+      !$omp end parallel do
+      call self%count_step()
+   end subroutine compare_active
+
+end module polydem_parallel_filter
