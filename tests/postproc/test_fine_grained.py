@@ -11,11 +11,11 @@ from polydem_post.series import TREE
 from synthetic_bench import Truth, write_sample
 
 BOXES = 10000
-#: Time of a step on one thread [s]: of the sweep 100 us, of which threads share 90; of the tree 300 us, of which 255
+#: Time of a step on one thread [s]: of the sweep 100 us, of which threads share 90; of the tree 300 us, of which 225 (search, filter)
 SWEEP = Truth(10.0, 1.0, (0.9, 0.0, 0.05, 0.03, 0.02, 0.0), counts={"swaps": 0.5, "passes": 2.0 / BOXES})
 TREE_TRUTH = Truth(30.0, 1.0, (0.1, 0.5, 0.25, 0.1, 0.05, 0.0))
 #: Cost of a barrier and of a region for each thread more [s]
-BARRIER, REGION = 20e-6, 2e-6
+BARRIER, REGION = 22e-6, 2e-6
 
 
 def sweep_time(n):
@@ -23,7 +23,7 @@ def sweep_time(n):
 
 
 def tree_time(n):
-    return 45e-6 + 255e-6 / n + (n > 1) * 3 * REGION * n
+    return 75e-6 + 225e-6 / n + (n > 1) * 3 * REGION * n
 
 
 @pytest.fixture(scope="module")

@@ -99,44 +99,46 @@ def local(bench: Bench) -> Drawing | None:
 
 
 def threads(bench: Bench) -> Drawing | None:
-    """The failing parallel sweep and what works, on the largest drum that was run on several threads."""
-    scene = _threaded_scene(bench)
-    if scene is None:
+    """The parallel finders over threads, from the smallest to the largest scene that was run on several threads."""
+    scenes = _threaded_scenes(bench)
+    if not scenes:
         return None
-    figure, (axis,), below = panels_with_legend(1, 5.0, 3.4, rows=3)
-    most = 1
-    for finder, name in PARALLEL.items():
-        cases = bench.select(scene=scene, finder=finder, mode="replay")
-        one = [case for case in cases if case.threads == 1]
-        if not one or len(cases) < 2:
-            continue
-        gains = [series.ratio(one[0], case, series.elapsed_time) for case in cases]
-        draw_estimates(axis, [case.threads for case in cases], gains, label=name, **style_of(finder))
-        most = max(most, *(case.threads for case in cases))
-    counts = np.arange(1, most + 1)
-    axis.plot(counts, counts, color="0.75", linewidth=0.8, zorder=0, label="as many as threads")
-    axis.axhline(1.0, color="0.75", linewidth=0.8, linestyle="--", zorder=0)
-    axis.set(xlabel="threads", ylabel="speed-up against one thread", xticks=counts if most <= 16 else counts[::8])
-    axis.set_ylim(0.0, axis.get_ylim()[1] * 1.1)
-    shared_legend(below, [axis], columns=2)
+    figure, axes, below = panels_with_legend(len(scenes), 5.0 if len(scenes) == 1 else 3.2, 3.2, rows=3)
+    for axis, scene in zip(axes, scenes):
+        for k, (finder, name) in enumerate(PARALLEL.items()):
+            cases = bench.select(scene=scene, finder=finder, mode="replay")
+            one = [case for case in cases if case.threads == 1]
+            if not one or len(cases) < 2:
+                continue
+            gains = [series.ratio(one[0], case, series.elapsed_time) for case in cases]
+            draw_estimates(axis, [case.threads * (1.0 + 0.015 * k) for case in cases], gains, label=name,
+                           **style_of(finder))
+        counts = np.arange(1, max(case.threads for case in bench.select(scene=scene, mode="replay")) + 1)
+        axis.plot(counts, counts, color="0.75", linewidth=0.8, zorder=0, label="as many as threads")
+        axis.axhline(1.0, color="0.75", linewidth=0.8, linestyle="--", zorder=0)
+        axis.set(xlabel="threads", xticks=counts if len(counts) <= 16 else counts[::8], title=scene)
+        axis.title.set_fontsize(9)
+        axis.set_ylim(0.0, axis.get_ylim()[1] * 1.1)
+    axes[0].set_ylabel("speed-up against one thread")
+    shared_legend(below, axes, columns=2 if len(scenes) == 1 else 3)
     cores = bench.cases[0].provenance.get("processors", "?")
     return Drawing(
         "speed_up",
         figure,
-        f"Speed-up (ratio of elapsed times, median and 95 % interval) of one scene, {scene}, against one thread of the "
-        f"same finder; {cores} processors. Below the dashed line threads make it slower.",
+        "Speed-up (ratio of elapsed times, median and 95 % interval) against one thread of the same finder, over "
+        f"sizes; {cores} processors. Below the dashed line threads make it slower.",
     )
 
 
-def _threaded_scene(bench: Bench) -> str | None:
-    """The drum with most parallel finders on several threads, of those the largest; else any such scene."""
-    counts: dict = {}
+def _threaded_scenes(bench: Bench, most: int = 3) -> list[str]:
+    """Scenes with most parallel finders on several threads, spread over size; drums if there are any."""
+    finders: dict = {}
     for case in bench.select(mode="replay"):
         if case.threads > 1 and case.finder in PARALLEL:
-            drum = series.kind(case) == "drum"
-            counts.setdefault((case.scene, drum, case.boxes), set()).add(case.finder)
-    best = max(counts, key=lambda key: (key[1], len(counts[key]), key[2]), default=None)
-    return best[0] if best else None
+            finders.setdefault((series.kind(case) == "drum", case.boxes, case.scene), set()).add(case.finder)
+    best = max(((key[0], len(found)) for key, found in finders.items()), default=None)
+    kept = sorted(key for key, found in finders.items() if (key[0], len(found)) == best)
+    return [kept[k][2] for k in np.unique(np.linspace(0, len(kept) - 1, most).round().astype(int))] if kept else []
 
 
 def misses(bench: Bench) -> Drawing | None:

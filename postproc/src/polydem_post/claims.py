@@ -27,6 +27,10 @@ class Missing(Exception):
     """What a rule needs is not among the samples; the message says what to run."""
 
 
+class Elsewhere(Missing):
+    """What a rule needs cannot be measured on this machine alone, however long."""
+
+
 @dataclass(frozen=True)
 class Finding:
     """What a rule found."""
@@ -36,6 +40,8 @@ class Finding:
     ours: str
     #: Why, with numbers
     reason: str = ""
+    #: Whether more samples on this machine could decide it, if it is undecided or not measured
+    open_here: bool = True
 
 
 @dataclass(frozen=True)
@@ -58,7 +64,7 @@ class Claim:
         try:
             return self.rule(bench)
         except Missing as missing:
-            return Finding(NOT_MEASURED, "-", f"run: {missing}")
+            return Finding(NOT_MEASURED, "-", f"It needs {missing}.", not isinstance(missing, Elsewhere))
 
 
 #: All claims by identifier, filled by the modules of rules
@@ -139,8 +145,10 @@ def counts_table(judged: list) -> Table:
 
 def of_quick(judged: list) -> list:
     """The same verdicts where few repeats were taken: what they leave open is undecided for now."""
+    left_open = (UNDECIDED, NOT_MEASURED)
     return [
-        (each, replace(finding, verdict=UNDECIDED_QUICK) if finding.verdict in (UNDECIDED, NOT_MEASURED) else finding)
+        (each, replace(finding, verdict=UNDECIDED_QUICK) if finding.open_here and finding.verdict in left_open
+         else finding)
         for each, finding in judged
     ]
 

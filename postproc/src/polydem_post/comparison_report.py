@@ -29,7 +29,7 @@ SECTIONS = (
     ("Finders over size", ("slopes", "local_exponents", "times", "phases", "counters", "targets", "live", "scale",
                            "figure_09", "figure_10", "finders_over_size", "work_over_size", "figure_01")),
     ("Scenes and motion", ("scenes", "first_step", "own_over_size", "all_scenes")),
-    ("Threads: the failing sweep and the working tree", ("fine_grained", "waiting", "speed_up")),
+    ("Threads: the fine-grained sweep beside the tree", ("fine_grained", "waiting", "speed_up")),
     ("Structure, inlining and memory", ("table_2", "table_3", "complexity", "list_cost", "cache", "figure_11",
                                         "figure_12", "builds")),
     ("Machines", ("machine", "table_1", "figure_08_13")),
@@ -38,8 +38,11 @@ SECTIONS = (
     ("What was made, and what was not", ("pieces", "skipped", "published_points")),
 )
 
-#: Tables that stand in the first section
+#: Tables whose contents the first section has
 FIRST = ("claims", "reasons", "verdicts")
+
+#: Beginnings of what the page says of the machine at its head
+SHORTLY = ("processor", "caches", "cores used", "compiler", "load average")
 
 
 @dataclass
@@ -121,12 +124,14 @@ def _add_verification(contents: Contents, path: Path, comparison: Comparison) ->
     with path.open(newline="", encoding="utf-8") as file:
         heading, *rows = list(csv.reader(file))
     table = Table("verification", "Verification: runs against theory and publications", tuple(heading), texts=2)
+    table.note = "Good: within its tolerance; shown: a number without a tolerance, to be looked at."
     for row in rows:
         table.add(*row)
     verdicts = [row[-1] for row in rows]
     summary = Table("verification_summary", "Verification: rows by result", ("result", "rows"))
     for verdict in dict.fromkeys(verdicts):
         summary.add(verdict, verdicts.count(verdict))
+    summary.note = table.note
     for each in (summary, table):
         each.origin = f"Benchmarks of {comparison.state['base']['program']}."
     contents.tables += [summary, table]
@@ -165,6 +170,8 @@ def page_of(contents: Contents, comparison: Comparison, figures: Path) -> str:
     """report.html"""
     page = Page(f"Neighbour search in 2-D DEM: the {comparison.mode} comparison")
     page.paragraph(contents.origin)
+    page.paragraph(". ".join(f"{name[0].upper()}{name[1:]}: {value}" for name, value in contents.table("machine").rows
+                             if name.startswith(SHORTLY)) + ".", ("machine",))
     page.paragraph("The claims are those of Krengel, Watanabe, Kandori, Chen and Matuttis (2026), tree codes and "
                    "sort-and-sweep algorithms for neighbourhood computation. A verdict judges a statement by samples "
                    "of this program on this machine, not their measurement.")
@@ -172,12 +179,10 @@ def page_of(contents: Contents, comparison: Comparison, figures: Path) -> str:
     counts = contents.table("verdicts")
     for verdict, count, named in counts.rows:
         page.paragraph(f"{count} ({named})", ("verdicts",), f"{verdict}:")
-    for name in FIRST[:1]:
-        page.table(contents.table(name), is_open=True)
+    page.table(contents.table("claims"), is_open=True)
     for each, finding in contents.judged:
-        page.paragraph(f"{each.text}. Paper: {each.paper}. Here: {finding.ours}. {finding.reason}",
-                       ("claims", "reasons"), f"{each.id}, {finding.verdict}.")
-    page.table(contents.table("reasons"))
+        page.paragraph(f"{each.text}. Rule: {each.threshold}. {finding.reason}", ("claims", "reasons"),
+                       f"{each.id}, {finding.verdict}.")
     shown = set(FIRST)
     for title, names in SECTIONS:
         _add_section(page, contents, title, names, figures, shown)

@@ -17,7 +17,7 @@ from .paper import COMPLEXITY
 SOURCES = Path(__file__).resolve().parents[3] / "src" / "neighbours"
 
 #: What to do when the tool is not there
-HOW_TO_GET = "lizard is not installed: .venv/bin/pip install --editable './postproc[complexity]'"
+HOW_TO_GET = "the tool lizard: .venv/bin/pip install --editable './postproc[complexity]'"
 
 #: What lizard does not see, found by trial with version 1.24
 BLIND_SPOTS = (
@@ -26,8 +26,8 @@ BLIND_SPOTS = (
     "for every finder that includes it."
 )
 
-#: Modules that all finders share
-SHARED = {"finder_factory", "neighbours"}
+#: Modules that all finders share, or that only variants of a finder use
+SHARED = {"finder_factory", "neighbours", "filtered_candidates"}
 
 #: Part of Table 3 -> beginnings of the names of procedures; what is of no part updates the structure
 INITIALIZATION = re.compile(r"(start|begin|build|new_|make|prepare|set_up|reserve|first|finest|initial|choose|create)")
@@ -137,7 +137,7 @@ def complexity_tables(folder: Path) -> list[Table]:
         ("part", "sweep, paper", "sort_and_sweep", "tree inlined, paper", "tree not inlined, paper", "quadtree"),
     )
     if tool is None:
-        table.note = HOW_TO_GET
+        table.note = f"It needs {HOW_TO_GET}"
         return [table]
     if not folder.is_dir():
         table.note = f"The sources of the finders are not where this package expects them: {folder}"
@@ -150,7 +150,7 @@ def complexity_tables(folder: Path) -> list[Table]:
         f"Counted by lizard {version}. Our procedures are assigned to the parts by their files and the beginnings "
         "of their names, reporting ones only to the total. quadtree inlined or not is one source: the compiler "
         "inlines, so "
-        f"both have the same complexity. {BLIND_SPOTS}"
+        f"both have the same complexity. The filter of filtered_quadtree does not count. {BLIND_SPOTS}"
     )
     return [table, _by_file(folder, version)]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,6 +14,9 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from . import series
 from .result_file import cannot_write
+
+# Fonts for symbols that no figure has may be missing.
+logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
 
 #: Forms in which every figure is written, and what keeps the time of writing out of each
 FORMS = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}

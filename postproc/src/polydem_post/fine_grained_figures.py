@@ -1,4 +1,4 @@
-"""The figure of the failing parallel sweep beside the working parallel tree, with the model of both."""
+"""The figure of the fine-grained parallel sweep beside the parallel tree, with the model of both."""
 
 from __future__ import annotations
 
@@ -24,8 +24,9 @@ def fine_grained_drawings(bench: Bench) -> list[Drawing]:
     found = contests(bench.on())
     if not found:
         return []
+    loses = any(each.seen_to_lose_at() or (each.has_model and each.loses_at()) for each in found)
     with matplotlib.rc_context(SETTINGS):
-        return [side_by_side(found), limits(found)]
+        return [side_by_side(found), *([limits(found)] if loses else [])]
 
 
 def shown(found: list[Contest]) -> list[Contest]:
@@ -62,12 +63,12 @@ def side_by_side(found: list[Contest]) -> Drawing:
     shared_legend(below, [failed], columns=2)
     return Drawing(
         "fine_grained", figure,
-        "Above: time per box and step over threads, left of the sweep that all threads sort together, which fails, "
-        "right of the tree, whose traversal works; both have the same axis. Below left: waiting of a thread per pass "
-        "(points) against the work of a part per pass (lines): where points lie above their line, threads wait longer "
-        "than they work. Below right: time of the sweep over that of the tree; above 1 the sweep loses. Points: "
-        "measured, with 95 % intervals; lines: the model, which knows one thread and the cost of waiting alone; beyond "
-        "the last point it is a prediction.",
+        "Above: time per box and step over threads, left of the sweep that all threads sort together, right of the "
+        "tree; titles: gain of the most threads over one, of all scenes; both have the same axis. Below left: waiting "
+        "of a thread per pass (points) against the work of a part per pass (lines): where points lie above their line, "
+        "threads wait longer than they work. Below right: time of the sweep over that of the tree; above 1 the sweep "
+        "loses. Points: measured, with 95 % intervals; lines: the model, a lower bound that knows one thread and the "
+        "cost of waiting; beyond the last point it is a prediction.",
     )
 
 
@@ -87,14 +88,16 @@ def _label(axes: list, scenes: list[Contest]) -> None:
     most = max(contest.threads[-1] for contest in scenes)
     drawn = [contest.measured(finder, n).value * 1e9 / contest.one.boxes
              for contest in scenes for n in contest.threads for finder in (PARTITIONED, TREE)]
-    for axis, title in ((failed, "fails: one sort by all threads"), (working, "works: traversal of the tree")):
-        axis.set(yscale="log", title=title, ylabel="time per box and step [ns]")
-        axis.set_ylim(0.3 * min(drawn), 10.0 * max(drawn))
+    for axis, what, finder in ((failed, "one sort by all threads", PARTITIONED),
+                               (working, "traversal of the tree", TREE)):
+        axis.set(yscale="log", title=_titled(what, finder, scenes), ylabel="time per box and step [ns]")
+        axis.set_ylim(0.3 * min(drawn), 2.0 * max(drawn))
         readable_decades(axis.yaxis)
         axis.title.set_fontsize(9)
     waits.set(yscale="log", ylabel="per pass [us]: waiting, work")
-    wins.set(yscale="log", ylabel="sweep / tree")
-    readable_decades(wins.yaxis)
+    readable_decades(waits.yaxis)
+    wins.set(ylabel="sweep / tree")
+    wins.set_ylim(bottom=0.0)
     wins.axhline(1.0, color="0.6", linewidth=0.8, zorder=0)
     for row in axes:
         for axis in row:
@@ -103,6 +106,12 @@ def _label(axes: list, scenes: list[Contest]) -> None:
             axis.set_xticks(ticks, [str(tick) for tick in ticks])
             axis.minorticks_off()
             axis.axvspan(most * 1.15, axis.get_xlim()[1], color="0.94", zorder=-1)
+
+
+def _titled(what: str, finder: str, scenes: list[Contest]) -> str:
+    """A title that says how much several threads gain."""
+    gains = sorted(contest.speed_up(finder).value for contest in scenes)
+    return f"{what}: {gains[0]:.2g} to {gains[-1]:.2g} times as fast"
 
 
 def limits(found: list[Contest]) -> Drawing:

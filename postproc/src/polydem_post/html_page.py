@@ -15,9 +15,12 @@ h1, h2, h3 { line-height: 1.2; } h2 { margin-top: 2.5rem; border-bottom: 1px sol
 figure { margin: 1.5rem 0; } figure img { max-width: 100%; height: auto; } figcaption { color: #333; font-size: 0.9em; }
 .scroll { overflow-x: auto; } table { border-collapse: collapse; font-size: 0.85em; }
 th, td { padding: 0.15rem 0.6rem; border-bottom: 1px solid #ddd; vertical-align: top; text-align: left; }
-td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap; }
+td.number, th.number { text-align: right; font-variant-numeric: tabular-nums; } td.number { white-space: nowrap; }
 details { margin: 0.6rem 0; } summary { cursor: pointer; font-weight: bold; } .note { color: #333; font-size: 0.85em; }
-nav ul { columns: 2; } @media print { details { display: block; } }
+nav ul { columns: 2; }
+@media print {
+  details::details-content { content-visibility: visible; } table { font-size: 0.6em; } figure { break-inside: avoid; }
+}
 """
 
 #: Kinds of pictures that a page can hold

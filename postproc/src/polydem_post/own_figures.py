@@ -4,8 +4,19 @@ from __future__ import annotations
 
 import matplotlib
 
+from . import series
 from .bench import Bench
-from .figure_style import LOOKS, SETTINGS, Drawing, draw_estimates, grid_with_legend, over_size, shared_legend, style_of
+from .figure_style import (
+    LOOKS,
+    SETTINGS,
+    Drawing,
+    draw_estimates,
+    grid_with_legend,
+    over_size,
+    readable_decades,
+    shared_legend,
+    style_of,
+)
 from .own_scenes import families, family_name
 from .statistics import typical
 
@@ -51,7 +62,7 @@ def own_over_size(bench: Bench) -> Drawing | None:
 def all_scenes(bench: Bench) -> Drawing | None:
     """All scenes with all finders: which one suits what."""
     cases = [case for case in bench.select(threads=1, mode="replay") if case.time()]
-    scenes = list(dict.fromkeys(case.scene for case in cases))
+    scenes = list(dict.fromkeys(case.scene for case in sorted(cases, key=lambda case: (series.kind(case), case.boxes))))
     finders = sorted({case.finder for case in cases}, key=_rank)
     if not scenes:
         return None
@@ -66,11 +77,13 @@ def all_scenes(bench: Bench) -> Drawing | None:
     for k in range(0, len(scenes), 2):
         axis.axhspan(k - 0.5, k + 0.5, color="0.94", zorder=-1)
     axis.set(xscale="log", xlabel="time per box and step [ns]", ylim=(len(scenes) - 0.5, -0.5))
+    readable_decades(axis.xaxis)
     axis.set_yticks(range(len(scenes)), scenes, fontsize=7)
     shared_legend(below, [axis], columns=4)
     return Drawing(
         "all_scenes", figure,
-        "Time per box and step of all finders on all scenes, one thread, first step excluded: medians. Within a row "
+        "Time per box and step of all finders on all scenes, by kind and size, one thread, first step excluded: "
+        "medians. Within a row "
         "the finders are shifted, so that none hides another.",
     )
 

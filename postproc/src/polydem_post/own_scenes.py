@@ -22,7 +22,7 @@ NEEDED = {
     "cache_misses": "counts of ./polydem cache",
     "work_over_size": "counts of rotating drums, one thread",
     "fine_grained": "quadtree and partitioned_sweep on one scene with one thread and with several",
-    "fine_grained_limits": "quadtree and partitioned_sweep on one scene with one thread and with several",
+    "fine_grained_limits": "a scene on which partitioned_sweep loses to quadtree, measured or by the model",
     "own_over_size": "scenes that are no drums, one thread",
     "all_scenes": "any scene, one thread",
 }
@@ -57,7 +57,7 @@ def skipped(bench: Bench, judged: list, drawn: list) -> Table:
             table.add(name, "figure", needed)
     for each, finding in judged:
         if finding.verdict.startswith(NOT_MEASURED):
-            table.add(each.id, "claim", finding.reason.removeprefix("run: "))
+            table.add(each.id, "claim", finding.reason.removeprefix("It needs ").rstrip("."))
     here = bench.on()
     cases = {(case.scene, case.finder) for case in here.select()}
     for scene in here.named("scene"):

@@ -13,7 +13,7 @@ from .statistics import number
 
 #: Facts of a machine: column and where its provenance says so, the first that is there
 FACTS = (
-    ("cores", ("cores", "processors")),
+    ("cores", ("processors", "cores")),
     ("caches", ("caches",)),
     ("memory", ("memory",)),
     ("governor", ("governor",)),
@@ -30,6 +30,7 @@ def machines(bench: Bench) -> Table:
         "table_1",
         "Table 1: machines of the paper and of these samples",
         ("machine", "clock [GHz]", *(name for name, _ in FACTS), "load"),
+        texts=3 + len(FACTS),
     )
     for name, clock, cores, memory, caches in paper.MACHINES:
         known = {"cores": cores, "caches": caches, "memory": memory}
@@ -60,7 +61,8 @@ def clock_of(provenance: dict) -> str:
     """Clock in GHz, as the samples state it or the name of the processor does; - if neither."""
     for key in ("clock", "clock_ghz", "frequency"):
         if provenance.get(key) not in (None, "", "unknown"):
-            return str(provenance[key]).replace("GHz", "").strip()
+            told = str(provenance[key]).replace("GHz", "").strip()
+            return told.rstrip("0").rstrip(".") if "." in told else told
     told = re.search(r"@\s*([\d.]+)\s*GHz", str(provenance.get("processor", "")))
     return f"{float(told.group(1)):g}" if told else "-"
 

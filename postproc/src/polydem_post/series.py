@@ -81,6 +81,15 @@ def elapsed_time(case: Case) -> dict:
     )
 
 
+def whole_steps(bench: Bench, finder: str) -> list:
+    """Drums of the paper's sizes within whole time steps on one thread: their times hold the making of the boxes.
+
+    Empty if there are fewer than three sizes: what has no slope does not replace the replay.
+    """
+    cases = [case for case in of_paper(over_size(bench, finder, mode="live")) if total_time(case)]
+    return cases if len(cases) >= 3 else []
+
+
 def structure_time(case: Case) -> dict:
     """Repeat -> time per box and step to update the structure [ns]."""
     return case.phase("structure")
