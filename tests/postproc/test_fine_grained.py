@@ -11,7 +11,8 @@ from polydem_post.series import TREE
 from synthetic_bench import Truth, write_sample
 
 BOXES = 10000
-#: Time of a step on one thread [s]: of the sweep 100 us, of which threads share 90; of the tree 300 us, of which 225 (search, filter)
+#: Time of a step on one thread [s]: of the sweep 100 us, of which threads share 90; of the tree 300 us,
+#: of which search and filter take 225
 SWEEP = Truth(10.0, 1.0, (0.9, 0.0, 0.05, 0.03, 0.02, 0.0), counts={"swaps": 0.5, "passes": 2.0 / BOXES})
 TREE_TRUTH = Truth(30.0, 1.0, (0.1, 0.5, 0.25, 0.1, 0.05, 0.0))
 #: Cost of a barrier and of a region for each thread more [s]
