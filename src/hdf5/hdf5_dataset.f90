@@ -30,8 +30,8 @@ module polydem_hdf5_dataset
    integer, parameter :: holds_integers = 2
 
    !> Maximum size of a chunk of an extendible data set, unless one row is larger [B]
-   integer(hsize_t), parameter :: chunk_bytes = 32768_hsize_t
-   !> Number of chunks for the expected number of rows. At most one of them is partly filled.
+   integer(hsize_t), parameter :: chunk_bytes = 16384_hsize_t
+   !> Least number of chunks for the expected number of rows. At most one of them is partly filled.
    integer(hsize_t), parameter :: expected_chunks = 5_hsize_t
 
 contains
@@ -198,8 +198,13 @@ contains
       call h5tget_size_f(kind_in_file, bytes, status)
       chunk(:n - 1) = max(1_hsize_t, row)
       chunk(n) = max(1_hsize_t, chunk_bytes/(product(chunk(:n - 1))*int(bytes, hsize_t)))
-      if (location%expected_rows > 0_lp) chunk(n) = min(chunk(n), (int(location%expected_rows, hsize_t) + &
-                                                                   expected_chunks - 1_hsize_t)/expected_chunks)
+      if (location%expected_rows > 0_lp) then
+         associate (expected => int(location%expected_rows, hsize_t))
+            chunk(n) = min(chunk(n), (expected + expected_chunks - 1_hsize_t)/expected_chunks)
+            ! As many chunks as these need, of equal size
+            chunk(n) = 1_hsize_t + (expected - 1_hsize_t)/(1_hsize_t + (expected - 1_hsize_t)/chunk(n))
+         end associate
+      end if
       call h5screate_simple_f(n, extent, space, status, limit)
       if (status >= 0) call h5pcreate_f(h5p_dataset_create_f, properties, status)
       if (status >= 0) call h5pset_chunk_f(properties, n, chunk, status)

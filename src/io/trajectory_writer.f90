@@ -192,7 +192,7 @@ contains
       if (allocated(error)) return
       self%is_open = .true.
       ! Chunks of contacts are then small enough for loose grains, and large enough for dense packings.
-      call self%file%expect_rows(int(self%capacity, lp), int(self%capacity, lp)*int(bodies%n_all, lp)/4_lp)
+      call self%file%expect_rows(int(self%capacity, lp), int(self%capacity, lp)*int(bodies%n_all, lp)/8_lp)
       call write_bodies(self%file, self%comm, bodies, error)
    end subroutine open_segment
 

@@ -22,7 +22,10 @@ module polydem_run_output
    use polydem_wall_forces, only: complete_wall_forces
    implicit none
    private
-   public :: choose_intervals, choose_tables, count_frames, end_step, finish
+   public :: choose_intervals, choose_tables, count_frames, end_step, finish, frames_per_segment
+
+   !> Limits of the automatic number of frames per segment, and of its product with the number of bodies
+   integer(lp), parameter :: least_frames = 20_lp, most_frames = 200_lp, most_poses = 200000_lp
 
    !> Number of lines of the log if the settings give no interval
    real(dp), parameter :: default_lines = 20.0_dp
@@ -215,6 +218,20 @@ contains
          if (interval > 0.0_dp) count_frames = 1_lp + max(1_lp, ceiling(last_multiple(n)/interval, lp))
       end associate
    end function count_frames
+
+   !> Number of frames per segment. Segments of few bodies have many frames, since each has all constant data; all
+   !> segments of a complete run have about as many.
+   pure integer(ip) function frames_per_segment(simulation)
+      type(simulation_t), intent(in) :: simulation
+      integer(lp) :: most, total
+
+      frames_per_segment = simulation%settings%output%frames_per_segment
+      if (frames_per_segment > 0_ip) return
+      most = max(least_frames, min(most_frames, most_poses/max(1_lp, int(simulation%bodies%n_all, lp))))
+      total = count_frames(simulation)
+      ! The number of segments is the quotient rounded up.
+      frames_per_segment = int(min(most, 1_lp + (total - 1_lp)/(1_lp + (total - 1_lp)/most)), ip)
+   end function frames_per_segment
 
    !> An interval in steps, at least one; 0: no interval
    pure real(dp) function in_steps(interval, dt)

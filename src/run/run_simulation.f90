@@ -56,7 +56,7 @@ contains
          end if
          call prepare(settings, force, run, error)
       end if
-      if (.not. allocated(error)) call open_output(settings, run, error)
+      if (.not. allocated(error)) call open_output(run, error)
       if (.not. allocated(error)) call run_steps(run, error)
       if (run%lock%is_held() .and. allocated(error) .and. .not. run%has_lost_folder) call restore_replaced(run%folder)
       call run%lock%release()

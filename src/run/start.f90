@@ -10,6 +10,7 @@ module polydem_start
    use polydem_restart, only: restore, serialize_earlier
    use polydem_result_files, only: checkpoint_path, n_checkpoints
    use polydem_run, only: run_t
+   use polydem_run_output, only: frames_per_segment
    use polydem_scene, only: build_scene
    use polydem_serial_communicator, only: serial_communicator_t
    use polydem_settings, only: settings_t
@@ -85,14 +86,13 @@ contains
    end subroutine recall
 
    !> Open the output files that the ranks share; collective.
-   subroutine open_output(settings, run, error)
-      type(settings_t), intent(in) :: settings
+   subroutine open_output(run, error)
       !> The run, prepared
       type(run_t), intent(inout) :: run
       !> Allocated on failure; the same on all ranks
       type(error_t), allocatable, intent(inout) :: error
 
-      call run%trajectory%open(run%folder, settings%output%frames_per_segment, run%provenance, error, &
+      call run%trajectory%open(run%folder, frames_per_segment(run%simulation), run%provenance, error, &
                                run%earlier%segments, run%comm)
       if (run%comm%size == 1_ip .and. .not. allocated(error)) &
          call run%recorder%open(run%simulation, run%folder, run%provenance, run%log, run%manifest, error)
