@@ -204,6 +204,8 @@ class Words(Toy):
         self.assertEqual(self.call("fly"), (2, "", "polydem: there is no verb fly; see ./polydem --help\n"))
         for words in (("help", "fly"), ("fly", "--help")):
             self.assertEqual(self.call(*words), (2, "", "polydem: there is no verb fly; see ./polydem --help\n"))
+        said = "polydem: the verb comes first: ./polydem VERB --threads ...; see ./polydem --help\n"
+        self.assertEqual(self.call("--threads", "2", "run", "a.nml"), (2, "", said))
         self.assertEqual(self.call("test", "a", "b")[0], 2)
         self.assertEqual(self.call("test", "--quick")[0], 2)
         self.assertEqual(self.call("build", "--quick")[0], 2)

@@ -39,7 +39,7 @@ class Film:
     """How a film looks, alike for all its frames."""
 
     look: Look
-    #: Width and height [picture elements], even
+    #: Width and height [pixels], even
     size: tuple[int, int]
     #: Digits behind the point of the time
     digits: int

@@ -181,7 +181,7 @@ def _movie(options: argparse.Namespace) -> None:
     if options.size is not None:
         _expect(options.size, 2, "--size", "W,H")
         if not all(160.0 <= side <= 7680.0 for side in options.size):
-            raise ResultError("--size takes a width and a height from 160 to 7680 picture elements")
+            raise ResultError("--size takes a width and a height from 160 to 7680 pixels")
     if not 0.1 <= options.fps <= 240.0:
         raise ResultError("--fps takes a number from 0.1 to 240")
     if options.every < 1 or (options.processes is not None and options.processes < 1):
