@@ -222,8 +222,8 @@ contains
                        'after step '//to_text(earlier%last_frame))
          else
             earlier%surplus = earlier%surplus + 1_ip
-            earlier%remark = earlier%remark//new_line('a')//'removed    '//path// &
-               ', its frames belong to the earlier settings'
+            earlier%remark = earlier%remark//new_line('a')//'to remove  '//path// &
+               ', whose frames belong to the earlier settings'
          end if
          earlier%segments = earlier%segments - 1_ip
          earlier%last_frame = -1_lp
@@ -326,9 +326,11 @@ contains
       call file%close(error)
       if (allocated(error)) then
          error%message = checkpoint_path(folder, earlier%checkpoint)//' does not fit this run: '//error%message
+         if (index(error%message, '/run/time_step') > 0) error%message = error%message// &
+            '. Set dt in &integrate to the saved value; a dt that polydem chooses depends on the duration'
          return
       end if
-      ! The first step distributes the bodies anew. The sums over all ranks continue on the root rank.
+      ! The first step distributes the bodies again. The sums over all ranks continue on the root rank.
       associate (s => simulation, median_diameter => simulation%domain%median_diameter)
          call new_domain(s%domain, s%settings%decomposition, (median_diameter), s%comm, error)
          if (.not. s%comm%is_root()) then
