@@ -10,8 +10,7 @@ from polydem_post import ResultError, Trajectory
 from polydem_post.__main__ import help_text, main
 from polydem_post.drawing import OVERLAYS, Look, settle
 from polydem_post.plot import plot_frames
-from polydem_post.quantities import QUANTITIES, pressure, range_of, resultant, stress
-from polydem_post.snapshot import read_snapshot
+from polydem_post.quantities import QUANTITIES, pressure, range_of, stress
 from polydem_post.tree_cells import cell_grid, tree_cells
 
 
@@ -38,27 +37,32 @@ def test_the_help_text_names_all_quantities_and_overlays():
 
 @pytest.mark.parametrize("name", QUANTITIES)
 def test_every_quantity_has_a_value_for_every_body(run, name):
-    snapshot = read_snapshot(run, -1)
+    frame = run[-1]
     quantity = QUANTITIES[name]
-    values = quantity.values(snapshot)
-    free = ~snapshot.frame.fixed
+    values = quantity.values(frame)
+    free = ~frame.fixed
     assert values.shape == free.shape
     assert np.isfinite(values[free]).all()
     low, high = range_of(quantity, values[free])
     assert low < high
     assert np.mean((values[free] >= low) & (values[free] <= high)) > 0.98
     if quantity.constant:
-        assert np.array_equal(values, quantity.values(read_snapshot(run, 0)), equal_nan=True)
+        assert np.array_equal(values, quantity.values(run[0]), equal_nan=True)
 
 
 def test_resultants_on_walls_are_the_stored_ones_and_bodies_are_compressed(run):
-    snapshot, walls = read_snapshot(run, -1), run.walls(-1)
-    rows = np.searchsorted(snapshot.frame.id, walls.id)
+    frame, walls = run[-1], run.walls(-1)
+    rows = np.searchsorted(frame.id, walls.id)
     assert np.abs(walls.force).max() > 1.0
-    assert np.allclose(resultant(snapshot)[rows], walls.force, rtol=0.0, atol=1e-9)
-    free = ~snapshot.frame.fixed
-    assert np.mean(pressure(snapshot)[free] > 0.0) > 0.8
-    tensor = stress(snapshot)
+    force = np.zeros((len(frame), 2))
+    np.add.at(force, frame.contacts.first_index, frame.contacts.force)
+    np.add.at(force, frame.contacts.second_index, -frame.contacts.force)
+    assert np.allclose(force[rows], walls.force, rtol=0.0, atol=1e-9)
+    assert np.allclose(force, frame.force, rtol=0.0, atol=1e-9)
+    assert np.array_equal(QUANTITIES["force"].values(frame), np.hypot(*frame.force.T))
+    free = ~frame.fixed
+    assert np.mean(pressure(frame)[free] > 0.0) > 0.8
+    tensor = stress(frame)
     assert np.array_equal(tensor, tensor.transpose(0, 2, 1))
 
 
@@ -73,15 +77,15 @@ def test_a_range_is_kept_for_bodies_at_rest_and_for_equal_bodies():
 
 def test_the_cells_are_those_of_the_program(run):
     """The finder counted its nodes and levels in the last step."""
-    cells = tree_cells(cell_grid(read_snapshot(run, 0)), read_snapshot(run, -1).boxes)
+    cells = tree_cells(cell_grid(run[0]), run[-1].bounds)
     assert len(cells.side) == run.counters["finder nodes"]
     assert np.log2(cells.side.max() / cells.side.min()) + 1 == run.counters["finder depth"]
 
 
 def test_the_leaves_are_the_largest_cells_with_one_box(run):
-    snapshot, grid = read_snapshot(run, -1), cell_grid(read_snapshot(run, 0))
-    cells = tree_cells(grid, snapshot.boxes)
-    centre = 0.5 * (snapshot.boxes[grid.bodies, :2] + snapshot.boxes[grid.bodies, 2:])
+    frame, grid = run[-1], cell_grid(run[0])
+    cells = tree_cells(grid, frame.bounds)
+    centre = 0.5 * (frame.bounds[grid.bodies, :2] + frame.bounds[grid.bodies, 2:])
     offset = centre[:, None, :] - cells.low
     inside = ((offset >= 0.0) & (offset < cells.side[None, :, None])).all(axis=2)
     assert np.array_equal(inside.sum(axis=0), cells.count)
@@ -132,7 +136,7 @@ def test_bodies_are_drawn_where_they_are_in_their_colour(run, tmp_path):
     figure.savefig(path, dpi=200)
     pixels = imread(path)
     frame = run.frame(-1)
-    colours = look.colour_map(np.mod(frame.id, 20) / 20.0 + 1e-3)
+    colours = look.colour_map(look.quantity)(np.mod(frame.id, 20) / 20.0 + 1e-3)
     axis, found = figure.axes[0], 0
     for k in np.flatnonzero(~frame.fixed & (np.abs(frame.position) < 0.078).all(axis=1)):
         x, y = axis.transData.transform(frame.position[k])

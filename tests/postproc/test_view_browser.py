@@ -9,7 +9,6 @@ from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from polydem_post import Trajectory
 from polydem_post.quantities import QUANTITIES
-from polydem_post.snapshot import read_snapshot
 from polydem_post.tree_cells import cell_grid, tree_cells
 
 need_browser()
@@ -50,16 +49,16 @@ def test_the_browser_has_the_numbers_of_the_run(page, run):
     js(page, "viewer.show(arguments[0])", FRAME)
     facts = js(page, "return viewer.run.facts")
     assert facts["times"] == list(run.times)
-    snapshot = read_snapshot(run, FRAME)
+    frame = run[FRAME]
     quantum = facts["series"]["x"]["quantum"]
     for axis, name in enumerate("xy"):
         there = np.array(js(page, f"return Array.from(viewer.run.{name})"))
-        assert np.abs(there - snapshot.frame.position[:, axis]).max() <= 0.51 * quantum
-    free = ~snapshot.frame.fixed
+        assert np.abs(there - frame.position[:, axis]).max() <= 0.51 * quantum
+    free = ~frame.fixed
     for name, quantity in QUANTITIES.items():
         there = js(page, f"return Array.from(viewer.run.id, (_, i) => COLUMNS.{name}(viewer.run, i))")
         there = np.array(there, dtype=float)[free]
-        true = quantity.values(snapshot)[free]
+        true = quantity.values(frame)[free]
         if name == "angle":
             there = true + (there - true + np.pi) % (2.0 * np.pi) - np.pi
         scale = np.abs(true).max()
@@ -69,7 +68,7 @@ def test_the_browser_has_the_numbers_of_the_run(page, run):
 
 def test_the_browser_finds_the_cells_of_the_tree_and_the_boxes(page, run):
     js(page, "viewer.show(viewer.run.frames - 1)")
-    cells = tree_cells(cell_grid(read_snapshot(run, 0)), read_snapshot(run, -1).boxes)
+    cells = tree_cells(cell_grid(run[0]), run[-1].bounds)
     there = np.array(js(page, "const c = new Texels(); cellBoxes(viewer.run, c); "
                               "return Array.from(c.data.subarray(0, 4 * c.n))")).reshape(-1, 4)
     assert len(there) == pytest.approx(len(cells.side), abs=4)  # a centre may be rounded into the next cell
@@ -94,7 +93,7 @@ def reference(run, number, facts, shown, size, colour):
     axis.set(xlim=(shown["x"] - half[0], shown["x"] + half[0]), ylim=(shown["y"] - half[1], shown["y"] + half[1]))
     axis.axis("off")
     fact = facts["quantities"][colour]
-    values = QUANTITIES[colour].values(read_snapshot(run, number))
+    values = QUANTITIES[colour].values(run[number])
     colours = colormaps[fact["map"]](np.clip((values - fact["range"][0]) / np.ptp(fact["range"]), 0, 1))
     colours[frame.fixed] = (0.62, 0.62, 0.62, 1)
     axis.add_collection(PolyCollection(frame.vertices, facecolor=colours, edgecolor=(0.1, 0.1, 0.1), linewidth=0.72))

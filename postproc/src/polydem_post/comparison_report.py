@@ -55,9 +55,9 @@ class Contents:
     drawings: list = field(default_factory=list)
     document: str = ""
 
-    def table(self, name: str) -> Table | None:
+    def table(self, name: str) -> Table:
         """A table by its name."""
-        return next((table for table in self.tables if table.name == name), None)
+        return next(table for table in self.tables if table.name == name)
 
 
 def write_comparison(comparison: Comparison, contents: Contents, output: Path) -> Path:

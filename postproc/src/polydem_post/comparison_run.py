@@ -17,6 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -78,7 +79,7 @@ class Comparison:
     tools: Tools
     #: Time at which the last piece must end, on the clock of time.monotonic; absent: never
     deadline: float | None = None
-    say: object = print
+    say: Callable[[str], None] = print
     #: Whether nothing on disk may change
     dry: bool = False
     #: Time at which the present piece must end
@@ -211,7 +212,7 @@ class Comparison:
                 self.say(f"{piece.name}: left out, since the time is over")
                 continue
             lacking = [name for name in piece.needs if not (self.folder / name).exists()]
-            if lacking or (piece.bench and not self._available(piece).scenes):
+            if lacking or (piece.bench and not self._available(piece.bench).scenes):
                 self.say(f"{piece.name}: left out, since traces of {', '.join(lacking or piece.needs)} are missing")
                 continue
             self.say(f"{piece.name}: {piece.purpose}")
@@ -248,19 +249,19 @@ class Comparison:
             if code not in good:
                 self.say(f"{piece.name}: its command ended with code {code}; see {log}")
                 return "failed"
-        return "finished" if piece.bench is None or self._available(piece) == piece.bench else "cut"
+        return "finished" if piece.bench is None or self._available(piece.bench) == piece.bench else "cut"
 
-    def _available(self, piece: Piece) -> BenchFile:
+    def _available(self, bench: BenchFile) -> BenchFile:
         """A bench without the scenes whose traces a bench that was cut has not recorded."""
-        return piece.bench.only([name for name, text in piece.bench.scenes.items()
-                                 if not text.endswith(".h5") or (ROOT / text).exists()])
+        return bench.only([name for name, text in bench.scenes.items()
+                           if not text.endswith(".h5") or (ROOT / text).exists()])
 
     def commands(self, piece: Piece) -> list:
         """[(command, folder in which it runs, exit codes that are good)]"""
         folder, program = self.folder / piece.name, str(self.tools.program)
         own = [sys.executable, "-m", "polydem_post"]
-        if piece.kind == "bench":
-            namelist = write(self.folder / f"{piece.name}.nml", self._available(piece).written(folder))
+        if piece.bench:
+            namelist = write(self.folder / f"{piece.name}.nml", self._available(piece.bench).written(folder))
             return [([program, "bench", str(namelist)], ROOT, (0,))]
         if piece.kind == "cache":
             scenes, finders = piece.options

@@ -12,9 +12,9 @@ from matplotlib.colors import Colormap, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.path import Path
 
+from .frames import Frame
 from .quantities import QUANTITIES, Quantity, range_of, stress
 from .result_file import ResultError
-from .snapshot import Snapshot, has_contacts, read_snapshot, read_snapshots
 from .trajectory import Trajectory
 from .tree_cells import CellGrid, cell_grid, tree_cells
 
@@ -72,16 +72,10 @@ class Look:
         """The quantity of the colours."""
         return QUANTITIES.get(self.colour)
 
-    @property
-    def colour_map(self) -> Colormap:
+    def colour_map(self, quantity: Quantity) -> Colormap:
         """The colour map."""
-        colours = matplotlib.colormaps[self.colours or self.quantity.colours].with_extremes(bad=UNKNOWN_COLOUR)
-        return colours.resampled(self.quantity.count) if self.quantity.count else colours
-
-    @property
-    def norm(self) -> Normalize:
-        """The scale of colours."""
-        return Normalize(*self.colour_range)
+        colours = matplotlib.colormaps[self.colours or quantity.colours].with_extremes(bad=UNKNOWN_COLOUR)
+        return colours.resampled(quantity.count) if quantity.count else colours
 
     @property
     def needs_contacts(self) -> bool:
@@ -100,6 +94,16 @@ class Look:
                               "plasma, coolwarm, PuOr, twilight and the others of matplotlib")
 
 
+@dataclass(frozen=True)
+class SettledLook(Look):
+    """A look that leaves nothing open."""
+
+    limits: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)
+    colour_range: tuple[float, float] = (0.0, 1.0)
+    greatest_force: float = 0.0
+    greatest_stress: float = 0.0
+
+
 class _Extent:
     """What all frames together span."""
 
@@ -109,20 +113,20 @@ class _Extent:
         self.forces: list[np.ndarray] = []
         self.stresses: list[np.ndarray] = []
 
-    def add(self, snapshot: Snapshot, look: Look) -> None:
+    def add(self, frame: Frame, look: Look) -> None:
         """Take a frame into account."""
-        if len(snapshot.corners):
-            self.low = np.minimum(self.low, snapshot.corners.min(axis=0))
-            self.high = np.maximum(self.high, snapshot.corners.max(axis=0))
-        free = ~snapshot.frame.fixed
+        if len(frame.vertex):
+            self.low = np.minimum(self.low, frame.vertex.min(axis=0))
+            self.high = np.maximum(self.high, frame.vertex.max(axis=0))
+        free = ~frame.fixed
         if look.quantity and look.colour_range is None:
-            self.values.append(look.quantity.values(snapshot)[free])
+            self.values.append(look.quantity.values(frame)[free])
         if "forces" in look.show and look.greatest_force is None:
-            self.forces.append(snapshot.known_contacts().magnitude)
+            self.forces.append(frame.contacts.force_magnitude)
         if "stress" in look.show and look.greatest_stress is None:
-            self.stresses.append(np.abs(np.linalg.eigvalsh(stress(snapshot)[free])).max(axis=1, initial=0.0))
+            self.stresses.append(np.abs(np.linalg.eigvalsh(stress(frame)[free])).max(axis=1, initial=0.0))
 
-    def settle(self, look: Look) -> Look:
+    def settle(self, look: Look) -> SettledLook:
         """The look with all that was left open."""
         limits, colour_range = look.limits, look.colour_range
         if limits is None:
@@ -130,11 +134,11 @@ class _Extent:
                 raise ResultError("there are no bodies to draw")
             margin = 0.02 * max(self.high - self.low)
             limits = (self.low[0] - margin, self.high[0] + margin, self.low[1] - margin, self.high[1] + margin)
-        if look.quantity and colour_range is None:
-            colour_range = range_of(look.quantity, _joined(self.values))
-        return replace(look, limits=limits, colour_range=colour_range,
-                       greatest_force=look.greatest_force or _covered(self.forces),
-                       greatest_stress=look.greatest_stress or _covered(self.stresses))
+        if colour_range is None:
+            colour_range = range_of(look.quantity, _joined(self.values)) if look.quantity else (0.0, 1.0)
+        return SettledLook(look.colour, look.show, limits, colour_range, look.colours,
+                           look.greatest_force or _covered(self.forces),
+                           look.greatest_stress or _covered(self.stresses), look.grid)
 
 
 def _joined(parts: list[np.ndarray]) -> np.ndarray:
@@ -146,26 +150,26 @@ def _covered(parts: list[np.ndarray]) -> float:
     return float(np.percentile(values, COVERED_FORCES)) if len(values) else 0.0
 
 
-def settle(trajectory: Trajectory, numbers: list[int], look: Look) -> Look:
+def settle(trajectory: Trajectory, numbers: list[int], look: Look) -> SettledLook:
     """Find from frames what a look leaves open: limits, ranges and the grid of the quadtree."""
     look.check()
-    if look.needs_contacts and not has_contacts(trajectory):
+    if look.needs_contacts and not trajectory.has_contacts:
         named = [name for name in look.show if name in NEED_CONTACTS] or [look.colour]
         raise ResultError(f"{trajectory.folder}: holds no contacts, which {named[0]} needs; run with "
                           "output.contacts = .true.")
     extent = _Extent()
-    for snapshot in read_snapshots(trajectory, numbers, look.needs_contacts):
-        extent.add(snapshot, look)
+    for frame in trajectory[numbers]:
+        extent.add(frame, look)
     if "cells" in look.show:
-        look = replace(look, grid=cell_grid(read_snapshot(trajectory, 0, False)))
+        look = replace(look, grid=cell_grid(trajectory[0]))
     return extent.settle(look)
 
 
 class Bodies:
     """Some bodies in axes. Their outlines are views of one array, so moving them costs little."""
 
-    def __init__(self, axis: Axes, snapshot: Snapshot, rows: np.ndarray, **style):
-        start = snapshot.frame.vertex_start
+    def __init__(self, axis: Axes, frame: Frame, rows: np.ndarray, **style):
+        start = frame.vertex_start
         self.rows = np.flatnonzero(rows)
         count = np.diff(start)[self.rows]
         ends = np.cumsum(count + 1)
@@ -173,33 +177,34 @@ class Bodies:
         # Each outline and one row more, in which a closed path needs a point.
         self._chosen = np.repeat(start[self.rows] - begins, count + 1) + np.arange(ends[-1] if len(ends) else 0)
         self._chosen[ends - 1] = start[self.rows]
-        self._vertices = snapshot.corners[self._chosen]
+        self._vertices = frame.vertex[self._chosen]
         paths = [Path(self._vertices[a:b], closed=True) for a, b in zip(begins, ends)]
         self.artist = PathCollection(paths, **style)
         axis.add_collection(self.artist, autolim=False)
 
-    def move(self, snapshot: Snapshot, look: Look) -> None:
+    def move(self, frame: Frame, look: SettledLook) -> None:
         """Move them to where they are in another frame."""
-        self._vertices[:] = snapshot.corners[self._chosen]
-        if self.artist.get_array() is not None:
-            self.artist.set_array(look.quantity.values(snapshot)[self.rows])
+        self._vertices[:] = frame.vertex[self._chosen]
+        if look.quantity and self.artist.get_array() is not None:
+            self.artist.set_array(look.quantity.values(frame)[self.rows])
 
 
-def draw_bodies(axis: Axes, snapshot: Snapshot, look: Look) -> tuple[Bodies, Bodies]:
+def draw_bodies(axis: Axes, frame: Frame, look: SettledLook) -> tuple[Bodies, Bodies]:
     """Draw the fixed and the free bodies."""
-    fixed = snapshot.frame.fixed
-    walls = Bodies(axis, snapshot, fixed, facecolor=WALL_COLOUR, edgecolor="none", zorder=1)
-    grains = Bodies(axis, snapshot, ~fixed, facecolor=PLAIN_COLOUR, edgecolor="black", linewidth=0.2, zorder=2)
+    fixed = frame.fixed
+    walls = Bodies(axis, frame, fixed, facecolor=WALL_COLOUR, edgecolor="none", zorder=1)
+    grains = Bodies(axis, frame, ~fixed, facecolor=PLAIN_COLOUR, edgecolor="black", linewidth=0.2, zorder=2)
     if look.quantity:
-        grains.artist.set(array=look.quantity.values(snapshot)[grains.rows], cmap=look.colour_map, norm=look.norm)
+        grains.artist.set(array=look.quantity.values(frame)[grains.rows], cmap=look.colour_map(look.quantity),
+                          norm=Normalize(*look.colour_range))
     return walls, grains
 
 
-def overlays(axis: Axes, snapshot: Snapshot, look: Look) -> list[PathCollection]:
+def overlays(axis: Axes, frame: Frame, look: SettledLook) -> list[PathCollection]:
     """Draw what is laid over the bodies. Widths are in units of the axes, which must have their final size."""
     makers = {"cells": _cells, "boxes": _boxes, "stress": _stresses, "forces": _forces, "contacts": _contacts}
     drawn = [artist for name, make in makers.items() if name in look.show
-             for artist in make(snapshot, look, points_per_metre(axis))]
+             for artist in make(frame, look, points_per_metre(axis))]
     for order, artist in enumerate(drawn):
         artist.set_zorder(3 + order)
         axis.add_collection(artist, autolim=False)
@@ -212,31 +217,31 @@ def points_per_metre(axis: Axes) -> float:
     return float(inverse[1, 0] - inverse[0, 0]) * 72.0 / axis.figure.dpi
 
 
-def fit_outlines(grains: Bodies, snapshot: Snapshot, scale: float) -> None:
+def fit_outlines(grains: Bodies, frame: Frame, scale: float) -> None:
     """Give the outlines of bodies a width that suits the size in which they are drawn."""
-    grains.artist.set_linewidth(float(np.clip(OUTLINE * _typical_size(snapshot) * scale, *OUTLINES)))
+    grains.artist.set_linewidth(float(np.clip(OUTLINE * _typical_size(frame) * scale, *OUTLINES)))
 
 
-def force_width(snapshot: Snapshot, scale: float) -> float:
+def force_width(frame: Frame, scale: float) -> float:
     """Width in points of the line of the greatest force."""
-    return max(WIDEST_FORCE * _typical_size(snapshot) * scale, 1.0)
+    return max(WIDEST_FORCE * _typical_size(frame) * scale, 1.0)
 
 
-def _typical_size(snapshot: Snapshot) -> float:
+def _typical_size(frame: Frame) -> float:
     """Median diameter of the free bodies, of circles of the same area [m]."""
-    free = ~snapshot.frame.fixed
-    return float(np.sqrt(4.0 * np.median(snapshot.area[free]) / np.pi)) if free.any() else 0.0
+    free = ~frame.fixed
+    return float(np.median(frame.diameter[free])) if free.any() else 0.0
 
 
-def _forces(snapshot: Snapshot, look: Look, scale: float) -> list[PathCollection]:
+def _forces(frame: Frame, look: SettledLook, scale: float) -> list[PathCollection]:
     """Each contact as lines from the two centres to its point, as wide as its force is large."""
-    contacts, frame = snapshot.known_contacts(), snapshot.frame
-    if not look.greatest_force or not len(contacts.first):
+    contacts = frame.contacts
+    if not look.greatest_force or not len(contacts):
         return []
     # A wall is large, and its centre may be anywhere: draw no line to it.
     ends = [np.where(frame.fixed[rows][:, None], contacts.point, frame.position[rows])
-            for rows in (contacts.first, contacts.second)]
-    widths = np.minimum(contacts.magnitude / look.greatest_force, 1.0) * force_width(snapshot, scale)
+            for rows in (contacts.first_index, contacts.second_index)]
+    widths = np.minimum(contacts.force_magnitude / look.greatest_force, 1.0) * force_width(frame, scale)
     lines = np.stack([ends[0], contacts.point, ends[1]], axis=1)
     # Lines of about the same width are one path, which is drawn much faster.
     steps = np.ceil(np.clip(widths / widths.max(initial=1e-9), 0.0, 1.0) * WIDTHS).astype(int)
@@ -257,48 +262,48 @@ def _lines(lines: np.ndarray, width: float, colour: str) -> PathCollection:
     return PathCollection([_strokes(lines)], linewidths=[width], edgecolor=colour, facecolor="none")
 
 
-def _contacts(snapshot: Snapshot, look: Look, scale: float) -> list[PathCollection]:
+def _contacts(frame: Frame, look: SettledLook, scale: float) -> list[PathCollection]:
     """The contact points as crosses."""
-    point, size = snapshot.known_contacts().point, 0.07 * _typical_size(snapshot)
+    point, size = frame.contacts.point, 0.07 * _typical_size(frame)
     lines = [np.stack([point - arm, point + arm], axis=1) for arm in (np.array([size, size]), np.array([size, -size]))]
     return [_lines(np.concatenate(lines), float(np.clip(0.5 * size * scale, 0.3, 1.2)), CONTACT_COLOUR)]
 
 
-def _boxes(snapshot: Snapshot, look: Look, scale: float) -> list[PathCollection]:
-    x0, y0, x1, y1 = snapshot.boxes[~snapshot.frame.fixed].T
+def _boxes(frame: Frame, look: SettledLook, scale: float) -> list[PathCollection]:
+    x0, y0, x1, y1 = frame.bounds[~frame.fixed].T
     outlines = np.stack([x0, y0, x1, y0, x1, y1, x0, y1, x0, y0], axis=1).reshape(-1, 5, 2)
     return [_lines(outlines, 0.5, BOX_COLOUR)]
 
 
-def _cells(snapshot: Snapshot, look: Look, scale: float) -> list[PathCollection]:
+def _cells(frame: Frame, look: SettledLook, scale: float) -> list[PathCollection]:
     if look.grid is None:
         return []
-    cells = tree_cells(look.grid, snapshot.boxes)
+    cells = tree_cells(look.grid, frame.bounds)
     corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
     return [_lines(cells.low[:, None, :] + cells.side[:, None, None] * corners, 0.5, CELL_COLOUR)]
 
 
-def _stresses(snapshot: Snapshot, look: Look, scale: float) -> list[PathCollection]:
+def _stresses(frame: Frame, look: SettledLook, scale: float) -> list[PathCollection]:
     """Each free body's principal stresses as a cross; the longest as long as the bodies are wide."""
-    free = ~snapshot.frame.fixed
+    free = ~frame.fixed
     if not look.greatest_stress or not free.any():
         return []
-    values, axes = np.linalg.eigh(stress(snapshot)[free])
-    size = 0.9 * _typical_size(snapshot)
+    values, axes = np.linalg.eigh(stress(frame)[free])
+    size = 0.9 * _typical_size(frame)
     half = 0.5 * size * np.minimum(np.abs(values) / look.greatest_stress, 1.0)
     arm = half[:, :, None] * axes.transpose(0, 2, 1)
-    centre = snapshot.frame.position[free][:, None, :]
+    centre = frame.position[free][:, None, :]
     lines = np.stack([centre - arm, centre + arm], axis=2)
     width = float(np.clip(0.1 * size * scale, 0.4, 2.0))
-    return [_lines(lines[values <= 0.0], width, COMPRESSED_COLOUR), _lines(lines[values > 0.0], width, PULLED_COLOUR)]
+    return [_lines(lines[values >= 0.0], width, COMPRESSED_COLOUR), _lines(lines[values < 0.0], width, PULLED_COLOUR)]
 
 
-def legend_of(snapshot: Snapshot, look: Look, scale: float) -> list[Line2D]:
+def legend_of(frame: Frame, look: SettledLook, scale: float) -> list[Line2D]:
     """What the overlays are, with a scale of the widths of forces and the lengths of crosses."""
     lines = []
     for name in look.show:
         if name == "forces" and look.greatest_force:
-            widest = force_width(snapshot, scale)
+            widest = force_width(frame, scale)
             lines += [Line2D([], [], color=FORCE_COLOUR, linewidth=share * widest, solid_capstyle="butt",
                              label=f"force {share * look.greatest_force:.3g} N/m{more}")
                       for share, more in ((1.0, " or more"), (0.3, ""))]

@@ -200,8 +200,7 @@ def _micro(seconds: float) -> str:
 
 
 def _micros(estimate: Estimate) -> str:
-    scaled = Estimate(*(1e6 * value for value in (estimate.value, estimate.low, estimate.high)))
-    return scaled.text()
+    return Estimate(1e6 * estimate.value, 1e6 * estimate.low, 1e6 * estimate.high).text()
 
 
 def times_table(found: list[Contest]) -> Table:
@@ -239,8 +238,8 @@ def limits_table(found: list[Contest]) -> Table:
     )
     for contest in found:
         model, seen, most = contest.loses_at(), contest.seen_to_lose_at(), contest.threads[-1]
-        model = model if contest.has_model else "-"
-        table.add(contest.one.scene, contest.one.boxes, number(contest.exchanges), model or f"not to {MOST_THREADS}",
+        predicted = model or f"not to {MOST_THREADS}" if contest.has_model else "-"
+        table.add(contest.one.scene, contest.one.boxes, number(contest.exchanges), predicted,
                   seen or f"not to {most}", most, agreement(contest), contest.best_threads() or "-")
     table.note = (
         "Agree: model and measurement name the same winner with every measured number of threads; undecided where the "

@@ -17,11 +17,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from . import drawing
-from .drawing import Look
+from .drawing import Look, SettledLook
 from .film_files import write_gif, write_mp4
 from .plot import add_scale, finish_axes, prepare
 from .result_file import ResultError, cannot_write
-from .snapshot import read_snapshot
 from .trajectory import Trajectory
 
 #: Ends of the names of films, and what writes them
@@ -38,7 +37,7 @@ FRAMES_PER_PROCESS = 8
 class Film:
     """How a film looks, alike for all its frames."""
 
-    look: Look
+    look: SettledLook
     #: Width and height [pixels], even
     size: tuple[int, int]
     #: Digits behind the point of the time
@@ -57,12 +56,12 @@ class Painter:
         self._figure = Figure(figsize=(width / dpi, height / dpi), dpi=dpi, layout="compressed")
         self._canvas = FigureCanvasAgg(self._figure)
         self._axis = self._figure.subplots()
-        snapshot = read_snapshot(trajectory, first, film.look.needs_contacts)
-        prepare(self._axis, film.look, self._title(snapshot.frame.time))
-        self._bodies = drawing.draw_bodies(self._axis, snapshot, film.look)
+        frame = trajectory[first]
+        prepare(self._axis, film.look, self._title(frame.time))
+        self._bodies = drawing.draw_bodies(self._axis, frame, film.look)
         add_scale(self._figure, [self._axis], self._bodies[1:], film.look, film.extend)
-        finish_axes(self._figure, [self._axis], snapshot, film.look)
-        drawing.fit_outlines(self._bodies[1], snapshot, drawing.points_per_metre(self._axis))
+        finish_axes(self._figure, [self._axis], frame, film.look)
+        drawing.fit_outlines(self._bodies[1], frame, drawing.points_per_metre(self._axis))
         for artist in (*(each.artist for each in self._bodies), self._axis.title):
             artist.set_animated(True)
         self._figure.set_layout_engine("none")
@@ -72,12 +71,12 @@ class Painter:
     def paint(self, number: int) -> bytes:
         """A frame as red, green and blue of each picture element."""
         look = self._film.look
-        snapshot = read_snapshot(self._trajectory, number, look.needs_contacts)
+        frame = self._trajectory[number]
         for each in self._bodies:
-            each.move(snapshot, look)
-        self._axis.title.set_text(self._title(snapshot.frame.time))
+            each.move(frame, look)
+        self._axis.title.set_text(self._title(frame.time))
         self._canvas.restore_region(self._background)
-        overlays = drawing.overlays(self._axis, snapshot, look)
+        overlays = drawing.overlays(self._axis, frame, look)
         for artist in (*(each.artist for each in self._bodies), *overlays, self._axis.title):
             self._axis.draw_artist(artist)
         for artist in overlays:
@@ -95,8 +94,8 @@ def make_movie(trajectory: Trajectory, numbers: list[int], path: Path, look: Loo
     processes = max(1, min(processes or len(os.sched_getaffinity(0)), len(numbers) // FRAMES_PER_PROCESS))
     progress = _Progress(len(numbers))
     progress.say("measuring the frames")
-    look = drawing.settle(trajectory, numbers, look)
-    film = Film(look, _even(size or _fitting(look)), _digits(trajectory.times[numbers]), _arrows(look))
+    settled = drawing.settle(trajectory, numbers, look)
+    film = Film(settled, _even(size or _fitting(settled)), _digits(trajectory.times[numbers]), _arrows(settled))
     part = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
         with _Frames(trajectory, numbers, film, processes) as frames:
@@ -123,7 +122,7 @@ class _Frames:
 
     def __init__(self, trajectory: Trajectory, numbers: list[int], film: Film, processes: int):
         self._arguments, self._numbers, self._processes = (trajectory, film, numbers[0]), numbers, processes
-        self._pool = None
+        self._pool: ProcessPoolExecutor | None = None
 
     def __enter__(self) -> _Frames:
         if self._processes > 1:
@@ -206,7 +205,7 @@ def _even(size: tuple) -> tuple[int, int]:
     return int(size[0]) // 2 * 2, int(size[1]) // 2 * 2
 
 
-def _fitting(look: Look) -> tuple[float, float]:
+def _fitting(look: SettledLook) -> tuple[float, float]:
     """Picture elements in which the scene and its scale have room: at most 1280 x 720."""
     x0, x1, y0, y1 = look.limits
     aside, above = (220.0 if look.quantity else 110.0), (150.0 if look.show else 110.0)

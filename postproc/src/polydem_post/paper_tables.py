@@ -63,8 +63,8 @@ def clock_of(provenance: dict) -> str:
         if provenance.get(key) not in (None, "", "unknown"):
             told = str(provenance[key]).replace("GHz", "").strip()
             return told.rstrip("0").rstrip(".") if "." in told else told
-    told = re.search(r"@\s*([\d.]+)\s*GHz", str(provenance.get("processor", "")))
-    return f"{float(told.group(1)):g}" if told else "-"
+    named = re.search(r"@\s*([\d.]+)\s*GHz", str(provenance.get("processor", "")))
+    return f"{float(named.group(1)):g}" if named else "-"
 
 
 def depth_and_nodes(bench: Bench) -> Table:

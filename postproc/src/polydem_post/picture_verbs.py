@@ -110,7 +110,7 @@ def _expect_order(values: list, name: str) -> None:
 
 def chosen_frames(text: str, count: int) -> list[int]:
     """Numbers of frames of a list like 0,10,-1 or 0:100:10, counted from 0."""
-    numbers = []
+    numbers: list[int] = []
     for word in text.split(","):
         try:
             if ":" in word:

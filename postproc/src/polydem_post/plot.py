@@ -15,10 +15,10 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from . import drawing
-from .drawing import Look
+from .drawing import Look, SettledLook
 from .figure_style import FORMS, SETTINGS
+from .frames import Frame
 from .result_file import ResultError, cannot_write
-from .snapshot import Snapshot, read_snapshot
 from .trajectory import Trajectory
 
 #: Longest side of the picture of one frame, and of a page of several [mm]
@@ -34,28 +34,28 @@ DPI = 150
 def plot_frames(trajectory: Trajectory, numbers: list[int], look: Look | None = None, size: tuple | None = None,
                 columns: int | None = None, dpi: float = DPI) -> Figure:
     """Draw frames in one figure on one scale of colours and lengths; `size` is its width and height [mm]."""
-    look = drawing.settle(trajectory, numbers, look or Look())
-    snapshots = [read_snapshot(trajectory, number, look.needs_contacts) for number in numbers]
-    columns = min(columns or _columns(len(numbers), look), len(numbers))
+    settled = drawing.settle(trajectory, numbers, look or Look())
+    frames = [trajectory[number] for number in numbers]
+    columns = min(columns or _columns(len(numbers), settled), len(numbers))
     rows = -(-len(numbers) // columns)
-    width, height = size or _size(look, rows, columns)
+    width, height = size or _size(settled, rows, columns)
     figure = Figure(figsize=(width / INCH, height / INCH), dpi=dpi, layout="compressed")
     FigureCanvasAgg(figure)
     axes = figure.subplots(rows, columns, squeeze=False, sharex=True, sharey=True).ravel()
     for axis in axes[len(numbers) :]:
         axis.remove()
     axes = axes[: len(numbers)]
-    for place, (axis, snapshot) in enumerate(zip(axes, snapshots)):
-        prepare(axis, look, f"t = {snapshot.frame.time:.4g} s")
+    for place, (axis, frame) in enumerate(zip(axes, frames)):
+        prepare(axis, settled, f"t = {frame.time:.4g} s")
         axis.label_outer()
         if place + columns >= len(axes):  # the lowest of its column, also above an empty place
             axis.xaxis.set_tick_params(labelbottom=True)
             axis.set_xlabel("x [m]")
-    _finish(figure, axes, snapshots, look)
+    _finish(figure, axes, frames, settled)
     return figure
 
 
-def prepare(axis, look: Look, title: str) -> None:
+def prepare(axis, look: SettledLook, title: str) -> None:
     """Limits, labels and equal scales of axes."""
     x0, x1, y0, y1 = look.limits
     axis.set(xlim=(x0, x1), ylim=(y0, y1), xlabel="x [m]", ylabel="y [m]")
@@ -64,7 +64,7 @@ def prepare(axis, look: Look, title: str) -> None:
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def add_scale(figure: Figure, axes, grains, look: Look, extend: str | None = None) -> Colorbar | None:
+def add_scale(figure: Figure, axes, grains, look: SettledLook, extend: str | None = None) -> Colorbar | None:
     """The scale of colours beside the axes, with arrows where bodies lie outside it, unless they are given."""
     if not look.quantity:
         return None
@@ -82,17 +82,17 @@ def add_scale(figure: Figure, axes, grains, look: Look, extend: str | None = Non
     return bar
 
 
-def _finish(figure: Figure, axes, snapshots: list[Snapshot], look: Look) -> None:
+def _finish(figure: Figure, axes, frames: list[Frame], look: SettledLook) -> None:
     """Draw bodies, scale and legend; then, as the axes have their size, what is as wide as bodies."""
-    grains = [drawing.draw_bodies(axis, snapshot, look)[1] for axis, snapshot in zip(axes, snapshots)]
+    grains = [drawing.draw_bodies(axis, frame, look)[1] for axis, frame in zip(axes, frames)]
     add_scale(figure, axes, grains, look)
-    finish_axes(figure, axes, snapshots[0], look)
-    for axis, snapshot, each in zip(axes, snapshots, grains):
-        drawing.fit_outlines(each, snapshot, drawing.points_per_metre(axis))
-        drawing.overlays(axis, snapshot, look)
+    finish_axes(figure, axes, frames[0], look)
+    for axis, frame, each in zip(axes, frames, grains):
+        drawing.fit_outlines(each, frame, drawing.points_per_metre(axis))
+        drawing.overlays(axis, frame, look)
 
 
-def finish_axes(figure: Figure, axes, snapshot: Snapshot, look: Look) -> None:
+def finish_axes(figure: Figure, axes, frame: Frame, look: SettledLook) -> None:
     """Give the axes their final size, with ticks that have room and the legend of overlays."""
     legend = None
     for _ in range(2):  # the legend takes room, which changes the scale
@@ -101,7 +101,7 @@ def finish_axes(figure: Figure, axes, snapshot: Snapshot, look: Look) -> None:
             _fit_ticks(axis)
         if legend:
             legend.remove()
-        lines = drawing.legend_of(snapshot, look, drawing.points_per_metre(axes[0]))
+        lines = drawing.legend_of(frame, look, drawing.points_per_metre(axes[0]))
         if not lines:
             break
         legend = figure.legend(handles=lines, loc="outside lower center", ncols=_legend_columns(figure, lines),
@@ -160,13 +160,13 @@ def check_form(path: Path) -> str:
     return form
 
 
-def _columns(count: int, look: Look) -> int:
+def _columns(count: int, look: SettledLook) -> int:
     """Panels side by side: so many that the figure is about as wide as a page."""
     x0, x1, y0, y1 = look.limits
     return max(1, min(count, round(math.sqrt(1.6 * count * (y1 - y0) / (x1 - x0)))))
 
 
-def _size(look: Look, rows: int, columns: int) -> tuple[float, float]:
+def _size(look: SettledLook, rows: int, columns: int) -> tuple[float, float]:
     """Width and height of a figure whose panels have their shape [mm]."""
     x0, x1, y0, y1 = look.limits
     extent = np.array([x1 - x0, y1 - y0])

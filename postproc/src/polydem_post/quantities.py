@@ -7,7 +7,8 @@ from typing import Callable
 
 import numpy as np
 
-from .snapshot import Snapshot
+from .analysis.stress import body_stress
+from .frames import Frame
 
 #: Share of the bodies whose values the range of colours covers, unless it is given: a few fast ones do not darken the
 #: rest. What lies outside has the colour of the end, and the scale has an arrow there.
@@ -27,8 +28,8 @@ class Quantity:
     #: What is written at the scale of colours
     label: str
     unit: str
-    #: Values of a snapshot, (n)
-    values: Callable[[Snapshot], np.ndarray]
+    #: Values of a frame, (n)
+    values: Callable[[Frame], np.ndarray]
     #: Colour map of matplotlib: sequential, diverging or cyclic; all can be told apart by the colour-blind
     colours: str = "viridis"
     #: "zero": the range starts at 0; "both": it is symmetric; "data": least to greatest; "turn": 0 to 2 pi; "class":
@@ -72,50 +73,28 @@ def range_of(quantity: Quantity, values: np.ndarray) -> tuple[float, float]:
     return low, high
 
 
-def coordination(snapshot: Snapshot) -> np.ndarray:
-    """Number of contacts of each body."""
-    contacts, n = snapshot.known_contacts(), len(snapshot.frame.id)
-    return np.bincount(contacts.first, minlength=n) + np.bincount(contacts.second, minlength=n)
-
-
-def resultant(snapshot: Snapshot) -> np.ndarray:
-    """Sum of the contact forces on each body [N/m], (n, 2)."""
-    contacts = snapshot.known_contacts()
-    force = np.zeros((len(snapshot.frame.id), 2))
-    np.add.at(force, contacts.first, contacts.force)
-    np.add.at(force, contacts.second, -contacts.force)
-    return force
-
-
-def load(snapshot: Snapshot) -> np.ndarray:
+def load(frame: Frame) -> np.ndarray:
     """Sum of the magnitudes of the contact forces on each body [N/m], (n)."""
-    contacts, n = snapshot.known_contacts(), len(snapshot.frame.id)
-    return (np.bincount(contacts.first, contacts.magnitude, n) + np.bincount(contacts.second, contacts.magnitude, n))
+    contacts, n = frame.contacts, len(frame)
+    return (np.bincount(contacts.first_index, contacts.force_magnitude, n)
+            + np.bincount(contacts.second_index, contacts.force_magnitude, n))
 
 
-def stress(snapshot: Snapshot) -> np.ndarray:
-    """Mean stress of each body [N/m2], (n, 2, 2): sum over its contacts of force times arm, over its area.
-
-    The arm goes from the centre of mass to the contact point. Tension is positive. The symmetric part is given.
-    """
-    contacts, centre = snapshot.known_contacts(), snapshot.frame.position
-    tensor = np.zeros((len(centre), 2, 2))
-    for body, sign in ((contacts.first, 1.0), (contacts.second, -1.0)):
-        arm = contacts.point - centre[body]
-        np.add.at(tensor, body, sign * arm[:, :, None] * contacts.force[:, None, :])
-    tensor = 0.5 * (tensor + tensor.transpose(0, 2, 1))
-    return tensor / snapshot.area[:, None, None]
+def stress(frame: Frame) -> np.ndarray:
+    """Symmetric part of the mean stress of each body [N/m2], (n, 2, 2); compression is positive."""
+    tensor = body_stress(frame)
+    return 0.5 * (tensor + tensor.transpose(0, 2, 1))
 
 
-def pressure(snapshot: Snapshot) -> np.ndarray:
+def pressure(frame: Frame) -> np.ndarray:
     """Mean of the principal stresses of each body, compression positive [N/m2], (n)."""
-    tensor = stress(snapshot)
-    return -0.5 * (tensor[:, 0, 0] + tensor[:, 1, 1])
+    tensor = body_stress(frame)
+    return 0.5 * (tensor[:, 0, 0] + tensor[:, 1, 1])
 
 
-def shear_stress(snapshot: Snapshot) -> np.ndarray:
+def shear_stress(frame: Frame) -> np.ndarray:
     """Half the difference of the principal stresses of each body [N/m2], (n)."""
-    tensor = stress(snapshot)
+    tensor = stress(frame)
     return np.hypot(0.5 * (tensor[:, 0, 0] - tensor[:, 1, 1]), tensor[:, 0, 1])
 
 
@@ -129,24 +108,24 @@ def _given(values: np.ndarray) -> np.ndarray:
 
 #: What bodies can be coloured by
 QUANTITIES = {
-    "speed": Quantity("speed", "m/s", lambda s: _length(s.frame.velocity)),
-    "velocity_x": Quantity("velocity along x", "m/s", lambda s: s.frame.velocity[:, 0], "coolwarm", "both"),
-    "velocity_y": Quantity("velocity along y", "m/s", lambda s: s.frame.velocity[:, 1], "coolwarm", "both"),
-    "angular_velocity": Quantity("angular velocity", "rad/s", lambda s: s.frame.angular_velocity, "PuOr", "both"),
-    "angle": Quantity("angle", "rad", lambda s: np.mod(s.frame.angle, 2.0 * np.pi), "twilight", "turn"),
-    "rotation": Quantity("rotation since the start", "rad", lambda s: s.frame.angle, "PuOr", "both"),
-    "size": Quantity("diameter of equal area", "m", lambda s: np.sqrt(4.0 * s.area / np.pi), "cividis", "data",
+    "speed": Quantity("speed", "m/s", lambda f: f.speed),
+    "velocity_x": Quantity("velocity along x", "m/s", lambda f: f.velocity[:, 0], "coolwarm", "both"),
+    "velocity_y": Quantity("velocity along y", "m/s", lambda f: f.velocity[:, 1], "coolwarm", "both"),
+    "angular_velocity": Quantity("angular velocity", "rad/s", lambda f: f.angular_velocity, "PuOr", "both"),
+    "angle": Quantity("angle", "rad", lambda f: np.mod(f.angle, 2.0 * np.pi), "twilight", "turn"),
+    "rotation": Quantity("rotation since the start", "rad", lambda f: f.angle, "PuOr", "both"),
+    "size": Quantity("diameter of equal area", "m", lambda f: f.diameter, "cividis", "data",
                      constant=True),
-    "mass": Quantity("mass per depth", "kg/m", lambda s: _given(s.mass), "cividis", "data", constant=True),
-    "density": Quantity("density", "kg/m3", lambda s: _given(s.mass) / s.area, "cividis", "data", constant=True),
-    "material": Quantity("material", "", lambda s: s.frame.material.astype(float), "tab10", "class", constant=True),
-    "force": Quantity("resultant of the contact forces", "N/m", lambda s: _length(resultant(s)), "YlOrRd",
+    "mass": Quantity("mass per depth", "kg/m", lambda f: _given(f.mass), "cividis", "data", constant=True),
+    "density": Quantity("density", "kg/m3", lambda f: _given(f.mass) / f.area, "cividis", "data", constant=True),
+    "material": Quantity("material", "", lambda f: f.material.astype(float), "tab10", "class", constant=True),
+    "force": Quantity("resultant of the contact forces", "N/m", lambda f: _length(f.force), "YlOrRd",
                       needs_contacts=True),
     "load": Quantity("sum of the contact forces' magnitudes", "N/m", load, "YlOrRd", needs_contacts=True),
-    "coordination": Quantity("number of contacts", "", lambda s: coordination(s).astype(float),
+    "coordination": Quantity("number of contacts", "", lambda f: f.coordination.astype(float),
                              needs_contacts=True),
     "pressure": Quantity("pressure", "N/m2", pressure, "YlOrRd", needs_contacts=True),
     "shear_stress": Quantity("shear stress", "N/m2", shear_stress, "YlOrRd", needs_contacts=True),
-    "id": Quantity("id modulo 20", "", lambda s: np.mod(s.frame.id, 20).astype(float), "tab20", "class",
+    "id": Quantity("id modulo 20", "", lambda f: np.mod(f.id, 20).astype(float), "tab20", "class",
                    constant=True),
 }

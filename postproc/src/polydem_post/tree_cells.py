@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .snapshot import Snapshot
+from .frames import Frame
 
 #: Side of the cells of one level in units of the geometric mean of the reaches, and most levels below it
 TYPICAL_SHARE, MOST_LEVELS = 1.2, 12
@@ -65,10 +65,10 @@ class Cells:
     count: np.ndarray
 
 
-def cell_grid(snapshot: Snapshot) -> CellGrid | None:
+def cell_grid(frame: Frame) -> CellGrid | None:
     """The grid of a run from its first frame; nothing if there is no body with a size."""
-    reach = _half_diameters(snapshot)
-    free = ~snapshot.frame.fixed
+    reach = _half_diameters(frame)
+    free = ~frame.fixed
     median = np.median(reach[free]) if free.any() else np.inf
     bodies = np.flatnonzero(reach <= LONGEST * median)
     sizes = reach[bodies]
@@ -80,7 +80,7 @@ def cell_grid(snapshot: Snapshot) -> CellGrid | None:
         if finest <= sizes.min():
             break
         finest *= 0.5
-    return CellGrid(finest, snapshot.boxes[bodies[0], :2], bodies)
+    return CellGrid(finest, frame.bounds[bodies[0], :2], bodies)
 
 
 def tree_cells(grid: CellGrid, boxes: np.ndarray) -> Cells:
@@ -105,9 +105,9 @@ def _root_level(at: np.ndarray) -> int:
     return spread.bit_length()
 
 
-def _half_diameters(snapshot: Snapshot) -> np.ndarray:
+def _half_diameters(frame: Frame) -> np.ndarray:
     """Half the greatest distance of two vertices of each body [m], (n)."""
-    shape, start = snapshot.frame.shape, snapshot.frame.vertex_start
+    shape, start = frame.shape, frame.vertex_start
     half = np.empty(len(start) - 1)
     count = np.diff(start)
     for corners in np.unique(count):

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .drawing import OVERLAYS
+from .frames import Frame
 from .quantities import QUANTITIES, range_of
 from .result_file import ResultError
-from .snapshot import Snapshot, read_snapshots
 from .trajectory import Trajectory
 from .tree_cells import cell_grid
 
@@ -59,12 +59,12 @@ class _Contacts:
         self.forces: list[np.ndarray] = []
         self.bodies = 0
 
-    def add(self, snapshot: Snapshot) -> None:
+    def add(self, frame: Frame) -> None:
         """Append those of a frame. The arm goes from a free body, the first if both are."""
-        contacts, frame = snapshot.known_contacts(), snapshot.frame
+        contacts = frame.contacts
         self.bodies = len(frame.id)
-        order = np.lexsort((contacts.second, contacts.first))
-        first, second = contacts.first[order], contacts.second[order]
+        order = np.lexsort((contacts.second_index, contacts.first_index))
+        first, second = contacts.first_index[order], contacts.second_index[order]
         base = np.where(frame.fixed[first], second, first)
         self.keys.append(first.astype(np.int64) * self.bodies + second)
         self.arms.append((contacts.point[order] - frame.position[base]).astype(np.float32))
@@ -101,19 +101,18 @@ def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, 
     columns: dict[str, list] = {name: [] for name in ("x", "y", "angle", "vx", "vy", "spin")}
     values: dict[str, list] = {name: [] for name, each in QUANTITIES.items() if contacts or not each.needs_contacts}
     table, first, low, high = _Contacts(), None, np.full(2, np.inf), np.full(2, -np.inf)
-    for snapshot in read_snapshots(trajectory, numbers, contacts):
-        frame = snapshot.frame
+    for frame in trajectory[numbers]:
         if first is None:
-            first = snapshot
-            _pack_bodies(packed, snapshot)
+            first = frame
+            _pack_bodies(packed, frame)
         for name, column in zip(columns, (*frame.position.T, frame.angle, *frame.velocity.T, frame.angular_velocity)):
             columns[name].append(column)
         for name, collected in values.items():
             if not (QUANTITIES[name].constant and collected):
-                collected.append(QUANTITIES[name].values(snapshot)[~frame.fixed].astype(np.float32))
-        low, high = np.minimum(low, snapshot.corners.min(axis=0)), np.maximum(high, snapshot.corners.max(axis=0))
+                collected.append(QUANTITIES[name].values(frame)[~frame.fixed].astype(np.float32))
+        low, high = np.minimum(low, frame.vertex.min(axis=0)), np.maximum(high, frame.vertex.max(axis=0))
         if contacts:
-            table.add(snapshot)
+            table.add(frame)
         if progress:
             progress()
     if first is None:
@@ -127,16 +126,15 @@ def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, 
     return packed
 
 
-def _pack_bodies(packed: Packed, snapshot: Snapshot) -> None:
+def _pack_bodies(packed: Packed, frame: Frame) -> None:
     """What does not change."""
-    frame = snapshot.frame
     packed.add("shape", frame.shape.astype(np.float32))
     packed.add("start", frame.vertex_start.astype(np.uint32))
     packed.add("id", frame.id.astype(np.int32))
     packed.add("fixed", frame.fixed.astype(np.uint8))
     packed.add("mass", np.where(np.isfinite(frame.mass), frame.mass, np.nan).astype(np.float32))
     packed.add("material", frame.material.astype(np.int32))
-    grid = cell_grid(snapshot)
+    grid = cell_grid(frame)
     in_tree = np.zeros(len(frame.id), dtype=np.uint8)
     if grid is not None:
         in_tree[grid.bodies] = 1
@@ -145,11 +143,11 @@ def _pack_bodies(packed: Packed, snapshot: Snapshot) -> None:
     packed.facts["bodies"] = len(frame.id)
 
 
-def _pack_columns(packed: Packed, columns: dict, first: Snapshot) -> float:
+def _pack_columns(packed: Packed, columns: dict, first: Frame) -> float:
     """Positions, angles and velocities; returns the greatest radius of the free bodies."""
-    free = ~first.frame.fixed
+    free = ~first.fixed
     chosen = free if free.any() else np.ones(len(free), dtype=bool)
-    diameter = float(np.median(first.frame.diameter[chosen]))
+    diameter = float(np.median(first.diameter[chosen]))
     quanta = {"x": POSITION_SHARE * diameter, "y": POSITION_SHARE * diameter, "angle": ANGLE_QUANTUM}
     for name, collected in columns.items():
         series = np.array(collected)
@@ -157,7 +155,7 @@ def _pack_columns(packed: Packed, columns: dict, first: Snapshot) -> float:
         packed.add_series(name, series, quantum)
         collected.clear()
     packed.facts["diameter"] = diameter
-    return float(first.frame.radius[chosen].max())
+    return float(first.radius[chosen].max())
 
 
 def _describe(packed: Packed, trajectory: Trajectory, numbers: list[int], values: dict) -> None:
