@@ -5,7 +5,7 @@
 !> from the centres of mass. Two equal squares face to face have the stiffness E.
 module polydem_area_law
    use polydem_bodies, only: bodies_t
-   use polydem_contact_block, only: contact_block_t
+   use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
@@ -56,17 +56,27 @@ contains
       type(contact_block_t), intent(inout) :: block
       !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
-      real(wp) :: r1, r2, length, force
+      real(wp) :: length(block_size), r1, r2, least, force
       integer(ip) :: c
 
       associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
       end associate
+      least = 1.0_wp
       do c = 1_ip, block%n
          r1 = sqrt(block%arm_first(c, 1)**2 + block%arm_first(c, 2)**2)
          r2 = sqrt(block%arm_second(c, 1)**2 + block%arm_second(c, 2)**2)
-         length = max(least_length*sqrt(block%area(c)), block%degenerate(c)*block%length(c))
-         length = max(length, 4.0_wp*(r1*r2)/max(r1 + r2, tiny(r1)))
-         block%inverse_length(c) = 1.0_wp/length
+         length(c) = 4.0_wp*(r1*r2)/max(r1 + r2, tiny(r1))
+         least = min(least, min(length(c)**2 - (2.0_wp*least_length)**2*block%area(c), &
+                                length(c) - block%degenerate(c)*block%length(c)))
+      end do
+      ! Without a short length, the square roots of the areas are not needed.
+      if (least < 0.0_wp) then
+         do c = 1_ip, block%n
+            length(c) = max(length(c), max(least_length*sqrt(block%area(c)), block%degenerate(c)*block%length(c)))
+         end do
+      end if
+      do c = 1_ip, block%n
+         block%inverse_length(c) = 1.0_wp/length(c)
          block%lever(c) = 0.0_wp
          force = self%stiffness*block%area(c)*block%inverse_length(c)
          block%elastic(c) = block%elastic(c) + force

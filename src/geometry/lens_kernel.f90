@@ -18,14 +18,18 @@
 !> Y and changes no bit but signs. A turn by a right angle and powers of two change no bit either. If the radii differ,
 !> coordinates are relative to the centre of P, and both crossings are computed on the edges of P: errors scale with P.
 !>
-!> There are no branches, so that the compiler handles several lanes at a time. A division by a difference that is zero
-!> or tiny only without a certificate has a least divisor, which changes no certified bit.
+!> Most lenses have at most one corner of each polygon, and near vertices. Loops over all lanes do what these need. The
+!> other lanes are *rare*: loops over them alone do the rest.
+!>
+!> Loops over all lanes have no branches, so that the compiler handles several lanes at a time. A division by a
+!> difference that is zero or tiny only without a certificate has a least divisor, which changes no certified bit.
 module polydem_lens_kernel
    use polydem_kinds, only: ip, wp
+   use polydem_lens_area, only: integrate_area
    use polydem_lens_effective_area, only: integrate_effective_area
-   use polydem_lens_work, only: lens_work_t
+   use polydem_lens_work, only: centre_of, cross, edge, from_centre, lens_work_t, placed
    use polydem_overlap_batch, only: column_length, overlap_batch_t, overlap_columns_t
-   use polydem_overlap_tolerances, only: far, no_length, sure_area, sure_at_edge, sure_in_fan
+   use polydem_overlap_tolerances, only: far, sure_at_edge, sure_in_fan
    use polydem_pair_memory, only: lens_bits, most_lens_corners
    implicit none
    private
@@ -33,7 +37,8 @@ module polydem_lens_kernel
 
    !> Added to a number that does not count in a minimum
    real(wp), parameter :: huge_number = 2.0_wp**(maxexponent(1.0_wp)/2)
-   real(wp), parameter :: third = 1.0_wp/3.0_wp
+   !> Coordinates up to this multiple of s are surely `far`
+   real(wp), parameter :: near = far - 0.5_wp
 
 contains
 
@@ -56,6 +61,7 @@ contains
       call gather_corners(n, lens%vertex, size(turned, 2, kind=ip), turned, lens%corner)
       call find_crossings(n, lens)
       call test_corners(n, lens)
+      call test_rare(lens)
       if (effective) then
          call integrate_effective_area(n, lens, columns)
       else
@@ -124,7 +130,7 @@ contains
       integer(ip), intent(in) :: n
       type(overlap_batch_t), intent(in) :: batch
       type(lens_work_t), intent(inout) :: lens
-      real(wp) :: half
+      real(wp) :: half, usual(column_length)
       integer(ip) :: i
 
       do i = 1_ip, n
@@ -138,9 +144,15 @@ contains
          lens%centre(i, 4) = batch%offset(i, 2) + lens%centre(i, 2)
          lens%some(i, 1) = real(min(1_ip, lens%inner(i, 1)), wp)
          lens%some(i, 2) = real(min(1_ip, lens%inner(i, 2)), wp)
-         lens%two(i, 1) = real(shiftr(lens%inner(i, 1), 1), wp)
-         lens%two(i, 2) = real(shiftr(lens%inner(i, 2), 1), wp)
          lens%certified(i) = real(lens%possible(i), wp)
+         usual(i) = min(real(1_ip - max(lens%inner(i, 1), lens%inner(i, 2)), wp), &
+                        (1.0_wp - half)*near*lens%radius(i, 1) &
+                        - (lens%radius(i, 2) + max(abs(lens%centre(i, 3)), abs(lens%centre(i, 4)))))
+      end do
+      lens%n_rare = 0_ip
+      do i = 1_ip, n
+         lens%rare(lens%n_rare + 1_ip) = i
+         lens%n_rare = lens%n_rare + merge(1_ip, 0_ip, usual(i) < 0.0_wp)
       end do
    end subroutine prepare
 
@@ -174,7 +186,7 @@ contains
       integer(ip), intent(in) :: n
       type(lens_work_t), intent(inout) :: lens
       complex(wp) :: p(4), q(4), e, f
-      real(wp) :: x(2), y(2), in_e(2), in_f(2), of_p, of_q, on_q, on_p, inner, across, share, reach
+      real(wp) :: x(2), y(2), in_e(2), in_f(2), of_p, of_q, on_q, on_p, inner, across, share
       integer(ip) :: i
 
       do i = 1_ip, n
@@ -210,51 +222,13 @@ contains
          share = inner/max(across, max(abs(inner), tiny(1.0_wp)))
          y(1) = (on_q*real(q(2), wp) + on_p*real(p(3), wp)) + share*(on_p*real(e, wp) - on_q*real(f, wp))
          y(2) = (on_q*aimag(q(2)) + on_p*aimag(p(3))) + share*(on_p*aimag(e) - on_q*aimag(f))
-         reach = max(max(max(extent(q(1)), extent(q(2))), max(extent(q(3)), extent(q(4)))), &
-                     lens%radius(i, 1) + max(abs(lens%centre(i, 1)), abs(lens%centre(i, 2))))
          lens%crossing(i, 1, 1) = x(1)
          lens%crossing(i, 2, 1) = x(2)
          lens%crossing(i, 1, 2) = y(1)
          lens%crossing(i, 2, 2) = y(2)
-         lens%certified(i) = min(min(lens%certified(i), min(of_p, of_q)), &
-                                  (1.0_wp - 0.5_wp*on_q)*far*lens%radius(i, 1) - reach)
+         lens%certified(i) = min(lens%certified(i), min(of_p, of_q))
       end do
    end subroutine find_crossings
-
-   !> A vertex of a polygon
-   pure complex(wp) function placed(lens, lane, k, body)
-      type(lens_work_t), intent(in) :: lens
-      integer(ip), intent(in) :: lane
-      integer, intent(in) :: k, body
-
-      placed = cmplx(lens%corner(lane, 1, k, body) + lens%centre(lane, 2*body - 1), &
-                     lens%corner(lane, 2, k, body) + lens%centre(lane, 2*body), wp)
-   end function placed
-
-   !> A vertex of a polygon relative to its centre
-   pure complex(wp) function from_centre(lens, lane, k, body)
-      type(lens_work_t), intent(in) :: lens
-      integer(ip), intent(in) :: lane
-      integer, intent(in) :: k, body
-
-      from_centre = cmplx(lens%corner(lane, 1, k, body), lens%corner(lane, 2, k, body), wp)
-   end function from_centre
-
-   !> Difference of two successive vertices
-   pure complex(wp) function edge(lens, lane, k, body)
-      type(lens_work_t), intent(in) :: lens
-      integer(ip), intent(in) :: lane
-      integer, intent(in) :: k, body
-
-      edge = from_centre(lens, lane, k + 1, body) - from_centre(lens, lane, k, body)
-   end function edge
-
-   !> Cross product of two vectors
-   pure real(wp) function cross(a, b)
-      complex(wp), intent(in) :: a, b
-
-      cross = real(a, wp)*aimag(b) - aimag(a)*real(b, wp)
-   end function cross
 
    !> Greater magnitude of both coordinates
    pure real(wp) function extent(a)
@@ -263,45 +237,76 @@ contains
       extent = max(abs(real(a, wp)), abs(aimag(a)))
    end function extent
 
-   !> Test whether the corners between the crossings are inside the other polygon.
+   !> Test whether a corner between the crossings is inside the fan of the other polygon. If it is the only one of its
+   !> polygon, the crossings show that it is inside the edges.
    pure subroutine test_corners(n, lens)
       integer(ip), intent(in) :: n
       type(lens_work_t), intent(inout) :: lens
-      complex(wp) :: p(4), q(4), e(3), f(3), g, h
-      real(wp) :: edges, middle, fan
+      complex(wp) :: p, q
+      real(wp) :: of_p, of_q
       integer(ip) :: i
 
       do i = 1_ip, n
-         p(1) = placed(lens, i, 1, 1)
-         p(2) = placed(lens, i, 2, 1)
-         p(3) = placed(lens, i, 3, 1)
-         q(1) = placed(lens, i, 1, 2)
-         q(2) = placed(lens, i, 2, 2)
-         q(3) = placed(lens, i, 3, 2)
-         e = [edge(lens, i, 1, 1), edge(lens, i, 2, 1), edge(lens, i, 3, 1)]
-         f = [edge(lens, i, 1, 2), edge(lens, i, 2, 2), edge(lens, i, 3, 2)]
-         ! The crossings show the first corner inside the edge where the other polygon leaves, the last one inside that
-         ! where it enters.
-         edges = min(cross(f(1), p(2) - q(1)), cross(f(3), p(3) - q(3)))
-         middle = min(cross(f(2), p(2) - q(2)), cross(f(2), p(3) - q(2)))
-         edges = min(edges, middle + ignored(lens%two(i, 2))) - sure_at_edge*lens%radius(i, 1)*lens%radius(i, 2)
-         g = p(2) - cmplx(lens%centre(i, 3), lens%centre(i, 4), wp)
-         h = p(3) - cmplx(lens%centre(i, 3), lens%centre(i, 4), wp)
-         fan = min(min(cross(from_centre(lens, i, 1, 2), g), cross(g, from_centre(lens, i, 4, 2))), &
-                   min(cross(from_centre(lens, i, 1, 2), h), cross(h, from_centre(lens, i, 4, 2)))) &
-               - sure_in_fan*lens%radius(i, 2)*lens%radius(i, 2)
-         lens%certified(i) = min(lens%certified(i), min(edges, fan) + ignored(lens%some(i, 1)))
-         edges = min(cross(e(1), q(2) - p(1)), cross(e(3), q(3) - p(3)))
-         middle = min(cross(e(2), q(2) - p(2)), cross(e(2), q(3) - p(2)))
-         edges = min(edges, middle + ignored(lens%two(i, 1))) - sure_at_edge*lens%radius(i, 1)*lens%radius(i, 1)
-         g = q(2) - cmplx(lens%centre(i, 1), lens%centre(i, 2), wp)
-         h = q(3) - cmplx(lens%centre(i, 1), lens%centre(i, 2), wp)
-         fan = min(min(cross(from_centre(lens, i, 1, 1), g), cross(g, from_centre(lens, i, 4, 1))), &
-                   min(cross(from_centre(lens, i, 1, 1), h), cross(h, from_centre(lens, i, 4, 1)))) &
-               - sure_in_fan*lens%radius(i, 1)*lens%radius(i, 1)
-         lens%certified(i) = min(lens%certified(i), min(edges, fan) + ignored(lens%some(i, 2)))
+         p = placed(lens, i, 2, 1) - centre_of(lens, i, 2)
+         q = placed(lens, i, 2, 2) - centre_of(lens, i, 1)
+         of_p = inside(from_centre(lens, i, 1, 2), p, from_centre(lens, i, 4, 2), lens%radius(i, 2))
+         of_q = inside(from_centre(lens, i, 1, 1), q, from_centre(lens, i, 4, 1), lens%radius(i, 1))
+         lens%certified(i) = min(lens%certified(i), min(of_p + ignored(lens%some(i, 1)), &
+                                                        of_q + ignored(lens%some(i, 2))))
       end do
    end subroutine test_corners
+
+   !> Positive if a point is surely between two vertices of a polygon, seen from its centre
+   pure real(wp) function inside(first, point, last, radius)
+      !> First vertex, point and last vertex relative to the centre
+      complex(wp), intent(in) :: first, point, last
+      !> Radius of the polygon
+      real(wp), intent(in) :: radius
+
+      inside = min(cross(first, point), cross(point, last)) - sure_in_fan*radius*radius
+   end function inside
+
+   !> Test what only rare lanes need: whether the vertices are near, and the corners where a polygon has two inside the
+   !> other.
+   pure subroutine test_rare(lens)
+      type(lens_work_t), intent(inout) :: lens
+      real(wp) :: reach
+      integer(ip) :: i, k
+
+      do k = 1_ip, lens%n_rare
+         i = lens%rare(k)
+         reach = max(max(max(extent(placed(lens, i, 1, 2)), extent(placed(lens, i, 2, 2))), &
+                         max(extent(placed(lens, i, 3, 2)), extent(placed(lens, i, 4, 2)))), &
+                     lens%radius(i, 1) + max(abs(lens%centre(i, 1)), abs(lens%centre(i, 2))))
+         lens%certified(i) = min(lens%certified(i), (1.0_wp - 0.5_wp*lens%equal(i))*far*lens%radius(i, 1) - reach)
+         if (lens%inner(i, 1) > 0_ip) call test_two(lens, i, 1, 2)
+         if (lens%inner(i, 2) > 0_ip) call test_two(lens, i, 2, 1)
+      end do
+   end subroutine test_rare
+
+   !> Test whether both corners of a body are inside the edges of the other, and the second one in its fan.
+   pure subroutine test_two(lens, i, body, other)
+      type(lens_work_t), intent(inout) :: lens
+      !> The lane
+      integer(ip), intent(in) :: i
+      integer, intent(in) :: body, other
+      complex(wp) :: p(2), f
+      real(wp) :: edges
+
+      p(1) = placed(lens, i, 2, body)
+      p(2) = placed(lens, i, 3, body)
+      ! The crossings show the first corner inside the edge where the other polygon leaves, the last one inside that
+      ! where it enters.
+      edges = min(cross(edge(lens, i, 1, other), p(1) - placed(lens, i, 1, other)), &
+                  cross(edge(lens, i, 3, other), p(2) - placed(lens, i, 3, other)))
+      f = edge(lens, i, 2, other)
+      if (lens%inner(i, other) > 1_ip) edges = min(edges, min(cross(f, p(1) - placed(lens, i, 2, other)), &
+                                                              cross(f, p(2) - placed(lens, i, 2, other))))
+      edges = edges - sure_at_edge*lens%radius(i, 1)*lens%radius(i, other)
+      lens%certified(i) = min(lens%certified(i), &
+                              min(edges, inside(from_centre(lens, i, 1, other), p(2) - centre_of(lens, i, other), &
+                                                from_centre(lens, i, 4, other), lens%radius(i, other))))
+   end subroutine test_two
 
    !> A great number if a test of corners does not count
    pure real(wp) function ignored(counts)
@@ -310,55 +315,5 @@ contains
 
       ignored = huge_number*(1.0_wp - counts)
    end function ignored
-
-   !> Area, its gradient, moments and centroid of all lenses.
-   pure subroutine integrate_area(n, lens, columns)
-      integer(ip), intent(in) :: n
-      type(lens_work_t), intent(inout) :: lens
-      type(overlap_columns_t), intent(inout) :: columns
-      real(wp) :: zx, zy, mx, my, v1x, v1y, v2x, v2y, w1x, w1y, w2x, w2y, part(4), arc_p, arc_q, twice, wx, wy, scale
-      integer(ip) :: i
-
-      do i = 1_ip, n
-         zx = lens%crossing(i, 1, 2) - lens%crossing(i, 1, 1)
-         zy = lens%crossing(i, 2, 2) - lens%crossing(i, 2, 1)
-         mx = 0.5_wp*(lens%crossing(i, 1, 1) + lens%crossing(i, 1, 2))
-         my = 0.5_wp*(lens%crossing(i, 2, 1) + lens%crossing(i, 2, 2))
-         v1x = lens%some(i, 1)*((lens%corner(i, 1, 2, 1) + lens%centre(i, 1)) - lens%crossing(i, 1, 1))
-         v1y = lens%some(i, 1)*((lens%corner(i, 2, 2, 1) + lens%centre(i, 2)) - lens%crossing(i, 2, 1))
-         v2x = lens%some(i, 1)*((lens%corner(i, 1, 3, 1) + lens%centre(i, 1)) - lens%crossing(i, 1, 1))
-         v2y = lens%some(i, 1)*((lens%corner(i, 2, 3, 1) + lens%centre(i, 2)) - lens%crossing(i, 2, 1))
-         w1x = lens%some(i, 2)*((lens%corner(i, 1, 2, 2) + lens%centre(i, 3)) - lens%crossing(i, 1, 2))
-         w1y = lens%some(i, 2)*((lens%corner(i, 2, 2, 2) + lens%centre(i, 4)) - lens%crossing(i, 2, 2))
-         w2x = lens%some(i, 2)*((lens%corner(i, 1, 3, 2) + lens%centre(i, 3)) - lens%crossing(i, 1, 2))
-         w2y = lens%some(i, 2)*((lens%corner(i, 2, 3, 2) + lens%centre(i, 4)) - lens%crossing(i, 2, 2))
-         ! Each arc with the chord, as a fan from its first crossing
-         part(1) = v1x*v2y - v1y*v2x
-         part(2) = v2x*zy - v2y*zx
-         part(3) = w1x*w2y - w1y*w2x
-         part(4) = w2y*zx - w2x*zy
-         arc_p = part(1) + part(2)
-         arc_q = part(3) + part(4)
-         twice = arc_p + arc_q
-         wx = (part(1)*(v1x + v2x) + part(2)*(v2x + zx)) + (part(3)*(w1x + w2x) + part(4)*(w2x - zx))
-         wy = (part(1)*(v1y + v2y) + part(2)*(v2y + zy)) + (part(3)*(w1y + w2y) + part(4)*(w2y - zy))
-         scale = 1.0_wp/max(twice, sure_area*lens%radius(i, 1)*lens%radius(i, 1))
-         wx = mx + scale*(0.5_wp*(arc_q - arc_p)*zx + third*wx)
-         wy = my + scale*(0.5_wp*(arc_q - arc_p)*zy + third*wy)
-         columns%area(i) = 0.5_wp*twice
-         columns%arm_first(i, 1) = wx - lens%centre(i, 1)
-         columns%arm_first(i, 2) = wy - lens%centre(i, 2)
-         columns%arm_second(i, 1) = wx - lens%centre(i, 3)
-         columns%arm_second(i, 2) = wy - lens%centre(i, 4)
-         columns%normal(i, 1) = zy
-         columns%normal(i, 2) = -zx
-         columns%length(i) = sqrt(zx*zx + zy*zy)
-         columns%moment(i, 1) = -(zx*(mx - lens%centre(i, 1)) + zy*(my - lens%centre(i, 2)))
-         columns%moment(i, 2) = -(zx*(mx - lens%centre(i, 3)) + zy*(my - lens%centre(i, 4)))
-         lens%certified(i) = min(lens%certified(i), &
-                                  min(columns%area(i) - sure_area*lens%radius(i, 1)*lens%radius(i, 1), &
-                                      zx*zx + zy*zy - 4.0_wp*no_length**2*columns%area(i)))
-      end do
-   end subroutine integrate_area
 
 end module polydem_lens_kernel

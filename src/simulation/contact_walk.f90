@@ -153,17 +153,19 @@ contains
       type(simulation_t), intent(inout) :: self
       type(contact_block_t), intent(in) :: block
       type(range_results_t), intent(inout) :: results
-      logical :: chosen(block_size)
+      logical :: chosen(block_size), some
       integer(ip) :: c
 
       call count_block(self, block, results)
       if (self%keeps_contacts) call append_rows(block, results%all, with_forces=.true.)
+      some = .false.
       do c = 1_ip, block%n
          chosen(c) = self%bodies%fixed(block%first(c)) .or. self%bodies%fixed(block%second(c))
+         some = some .or. chosen(c)
       end do
-      if (any(chosen(:block%n))) call append_rows(block, results%walls, with_forces=.true., chosen=chosen)
-      call test_block(self%contact_guard, self%bodies, block, self%history, chosen, results%passing_pair)
-      if (any(chosen(:block%n))) call append_rows(block, results%suspects, with_forces=.true., chosen=chosen)
+      if (some) call append_rows(block, results%walls, with_forces=.true., chosen=chosen)
+      call test_block(self%contact_guard, self%bodies, block, self%history, chosen, some, results%passing_pair)
+      if (some) call append_rows(block, results%suspects, with_forces=.true., chosen=chosen)
    end subroutine keep_contacts
 
    !> Count the contacts that this rank owns, and those without direction.
@@ -175,7 +177,7 @@ contains
 
       if (self%comm%size == 1_ip) then
          results%n_contacts = results%n_contacts + block%n
-         results%n_degenerate = results%n_degenerate + nint(sum(block%degenerate(:block%n)), ip)
+         results%n_degenerate = results%n_degenerate + count(block%degenerate(:block%n) > 0.0_wp, kind=ip)
          return
       end if
       do c = 1_ip, block%n

@@ -34,6 +34,8 @@ module polydem_passing
       !> Contacts deeper than this fraction of the thickness of the thinner body are suspects; huge: only degenerate
       !> ones
       real(wp) :: least_depth = huge(1.0_wp)
+      !> Contacts that are not deeper than this are surely none [m]
+      real(wp) :: shallow = 2.0_wp**(maxexponent(1.0_wp)/2)
       !> Column of the contact history with the directions of the last step; 0 if there is none
       integer :: column = 0
    end type contact_guard_t
@@ -52,11 +54,14 @@ contains
       guard%column = column
       if (settings%overlap /= 'off') guard%least_depth = settings%overlap_limit
       if (settings%passing /= 'off') guard%least_depth = min(guard%least_depth, least_depth)
-      if (guard%least_depth < huge(1.0_wp)) guard%thickness = thickness_of_bodies(bodies)
+      if (guard%least_depth < huge(1.0_wp)) then
+         guard%thickness = thickness_of_bodies(bodies)
+         guard%shallow = min(guard%shallow, 0.999_wp*guard%least_depth*minval(guard%thickness))
+      end if
    end subroutine new_contact_guard
 
    !> Test the contacts of a block, and store their directions.
-   subroutine test_block(guard, bodies, block, history, suspect, passing_pair)
+   subroutine test_block(guard, bodies, block, history, suspect, any_suspect, passing_pair)
       type(contact_guard_t), intent(in) :: guard
       !> Bodies with the positions of this step
       type(bodies_t), intent(in) :: bodies
@@ -64,21 +69,21 @@ contains
       type(contact_block_t), intent(in) :: block
       !> Contact history; the direction is read and set
       type(contact_history_t), intent(inout) :: history
-      !> Whether each contact is deep or degenerate
-      logical, intent(out) :: suspect(block_size)
+      !> Whether each contact is deep or degenerate; set if any is
+      logical, intent(inout) :: suspect(block_size)
+      !> Whether any may be
+      logical, intent(out) :: any_suspect
       !> Lowest index in the pair list of a contact whose bodies pass through each other; changes if there is one
       integer(ip), intent(inout) :: passing_pair
-      real(wp) :: before(block_size), now(block_size)
+      real(wp) :: before(block_size), now(block_size), deepest
       integer(ip) :: c
 
-      if (guard%least_depth < huge(1.0_wp)) then
-         do c = 1_ip, block%n
-            suspect(c) = block%degenerate(c) > 0.0_wp .or. block%area(c) > guard%least_depth*block%length(c) &
-               *min(guard%thickness(block%first(c)), guard%thickness(block%second(c)))
-         end do
-      else
-         suspect(:block%n) = block%degenerate(:block%n) > 0.0_wp
-      end if
+      deepest = -1.0_wp
+      do c = 1_ip, block%n
+         deepest = max(deepest, max(block%degenerate(c), block%area(c) - guard%shallow*block%length(c)))
+      end do
+      any_suspect = deepest > 0.0_wp
+      if (any_suspect) call find_suspects(guard, block, suspect)
       if (guard%column == 0) return
       do c = 1_ip, block%n
          now(c) = packed_direction(block%direction(c, 1), block%direction(c, 2))
@@ -89,11 +94,27 @@ contains
             stored(block%pair(c)) = now(c)
          end do
       end associate
+      if (.not. any_suspect) return
       do c = 1_ip, block%n
          if (.not. suspect(c)) cycle
          if (passes(guard, bodies, block, c, is_reversed(before(c), now(c)))) passing_pair = block%pair(c)
       end do
    end subroutine test_block
+
+   !> Find the contacts that are deep or degenerate.
+   pure subroutine find_suspects(guard, block, suspect)
+      type(contact_guard_t), intent(in) :: guard
+      type(contact_block_t), intent(in) :: block
+      logical, intent(inout) :: suspect(block_size)
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         suspect(c) = block%degenerate(c) > 0.0_wp
+         if (suspect(c) .or. .not. allocated(guard%thickness)) cycle
+         suspect(c) = block%area(c) > guard%least_depth*block%length(c) &
+            *min(guard%thickness(block%first(c)), guard%thickness(block%second(c)))
+      end do
+   end subroutine find_suspects
 
    !> Whether the bodies of a contact pass through each other
    pure logical function passes(guard, bodies, block, c, reversed)
