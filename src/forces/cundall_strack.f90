@@ -82,18 +82,14 @@ contains
       integer(ip) :: c
 
       call find_slip(block, slip)
-      mean(:block%n) = slip(:block%n)
-      if (self%midstep) call move_to_midstep(bodies, dt, block, mean)
-      do c = 1_ip, block%n
-         spring(c) = history%column(self%first_column)%value(block%pair(c))
-      end do
-      do c = 1_ip, block%n
-         limit = self%coefficient*max(0.0_wp, block%normal_force(c))
-         spring(c) = max(-limit, min(limit, spring(c) - self%stiffness*mean(c)*dt))
-      end do
-      do c = 1_ip, block%n
-         history%column(self%first_column)%value(block%pair(c)) = spring(c)
-      end do
+      associate (stored => history%column(self%first_column)%value)
+         if (self%midstep) then
+            call find_midstep_slip(bodies, dt, block, slip, mean)
+            call stretch(self, dt, block, mean, stored, spring)
+         else
+            call stretch(self, dt, block, slip, stored, spring)
+         end if
+      end associate
       if (self%damping > 0.0_wp) then
          call find_dashpots(self, bodies, block, root)
          do c = 1_ip, block%n
@@ -105,6 +101,31 @@ contains
          block%tangential_force(c) = block%tangential_force(c) + spring(c)
       end do
    end subroutine add
+
+   !> Change the spring forces by the slip of a step, up to Coulomb's limit, and store them.
+   pure subroutine stretch(self, dt, block, slip, stored, spring)
+      class(cundall_strack_t), intent(in) :: self
+      real(wp), intent(in) :: dt
+      type(contact_block_t), intent(in) :: block
+      real(wp), intent(in) :: slip(block_size)
+      !> Spring forces of all pairs
+      real(wp), intent(inout) :: stored(:)
+      !> Spring forces of the block [N/m]
+      real(wp), intent(inout) :: spring(block_size)
+      real(wp) :: limit
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         spring(c) = stored(block%pair(c))
+      end do
+      do c = 1_ip, block%n
+         limit = self%coefficient*max(0.0_wp, block%normal_force(c))
+         spring(c) = max(-limit, min(limit, spring(c) - self%stiffness*slip(c)*dt))
+      end do
+      do c = 1_ip, block%n
+         stored(block%pair(c)) = spring(c)
+      end do
+   end subroutine stretch
 
    !> Add the spring and its dashpot.
    subroutine stiffen(self, bodies, contacts, element)
@@ -140,14 +161,15 @@ contains
       end do
    end subroutine find_slip
 
-   !> Subtract half of the change of the slip velocity in a step. The centripetal acceleration of the arms does not
-   !> extend the spring and is left out.
-   pure subroutine move_to_midstep(bodies, dt, block, slip)
+   !> Find the slip velocity in the middle of the step: half of its change in a step is subtracted. The centripetal
+   !> acceleration of the arms does not extend the spring and is left out.
+   pure subroutine find_midstep_slip(bodies, dt, block, slip, mean)
       !> Bodies, for their accelerations
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: dt
       type(contact_block_t), intent(in) :: block
-      real(wp), intent(inout) :: slip(block_size)
+      real(wp), intent(in) :: slip(block_size)
+      real(wp), intent(inout) :: mean(block_size)
       real(wp) :: x, y
       integer(ip) :: c
 
@@ -157,9 +179,9 @@ contains
             x = (a(1, i) - b(i)*block%arm_first(c, 2)) - (a(1, j) - b(j)*block%arm_second(c, 2))
             y = (a(2, i) + b(i)*block%arm_first(c, 1)) - (a(2, j) + b(j)*block%arm_second(c, 1))
          end associate
-         slip(c) = slip(c) - 0.5_wp*dt*(block%direction(c, 1)*y - block%direction(c, 2)*x)
+         mean(c) = slip(c) - 0.5_wp*dt*(block%direction(c, 1)*y - block%direction(c, 2)*x)
       end do
-   end subroutine move_to_midstep
+   end subroutine find_midstep_slip
 
    !> Dashpots d sqrt(k_t m_t) of all contacts [N s/m2]
    pure subroutine find_dashpots(self, bodies, block, dashpot)

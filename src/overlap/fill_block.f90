@@ -51,22 +51,18 @@ contains
       !> Contacts; the columns that the force law fills are not changed
       type(contact_block_t), intent(inout) :: block
       type(overlap_batch_t) :: batch
-      logical :: exists(block_size)
-      integer(ip) :: c
+      logical :: all_certified
 
       call select_pairs(bodies, first, second, low, next, tested, history, block, batch)
       call copy_shapes(block%n, block%first, block%second, bodies%n, bodies%radius, bodies%vertex_start, batch)
       call copy_offsets(block%n, block%first, block%second, bodies%n, bodies%position, batch)
       call evaluate_batch(batch, block%n, bodies%turned, effective, isa, block%overlap_columns_t)
       block%degenerate(:block%n) = 0.0_wp
-      do c = 1_ip, block%n
-         exists(c) = batch%certified(c) > 0.0_wp
-         if (.not. exists(c)) call search(bodies, effective, c, history, block, exists(c))
-      end do
-      if (.not. all(exists(:block%n))) call remove_others(exists, block)
+      all_certified = count(batch%certified(:block%n) > 0.0_wp) == block%n
+      if (.not. all_certified) call search_others(bodies, effective, batch%certified, history, block)
       call copy_motion(bodies, block)
-      call find_rates(block)
-      call find_directions(bodies, block)
+      call find_rates_and_directions(block)
+      if (.not. all_certified) call direct_from_centres(bodies, block)
    end subroutine fill_block
 
    !> Select the next pairs that may be contacts: those that no remembered edge separates.
@@ -216,6 +212,23 @@ contains
       offset(2) = bodies%position(2, j) - bodies%position(2, i)
    end function offset_of
 
+   !> Search the overlaps of the pairs that are not certified, and remove those that are no contacts.
+   subroutine search_others(bodies, effective, certified, history, block)
+      type(bodies_t), intent(in) :: bodies
+      logical, intent(in) :: effective
+      real(wp), intent(in) :: certified(:)
+      type(contact_history_t), intent(inout) :: history
+      type(contact_block_t), intent(inout) :: block
+      logical :: exists(block_size)
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         exists(c) = certified(c) > 0.0_wp
+         if (.not. exists(c)) call search(bodies, effective, c, history, block, exists(c))
+      end do
+      if (.not. all(exists(:block%n))) call remove_others(exists, block)
+   end subroutine search_others
+
    !> Search the overlap of one pair without memory.
    subroutine search(bodies, effective, c, history, block, exists)
       type(bodies_t), intent(in) :: bodies
@@ -278,48 +291,37 @@ contains
       block%n = b
    end subroutine remove_others
 
-   !> Compute the rates of change of the areas.
-   pure subroutine find_rates(block)
+   !> Compute the rates of change of the areas, and find the directions from the second bodies to the first.
+   pure subroutine find_rates_and_directions(block)
       type(contact_block_t), intent(inout) :: block
+      real(wp) :: inverse
       integer(ip) :: c
 
       do c = 1_ip, block%n
          block%rate(c) = (block%normal(c, 1)*(block%velocity_first(c, 1) - block%velocity_second(c, 1)) &
                           + block%normal(c, 2)*(block%velocity_first(c, 2) - block%velocity_second(c, 2))) &
             + (block%moment(c, 1)*block%angular_velocity(c, 1) - block%moment(c, 2)*block%angular_velocity(c, 2))
-      end do
-   end subroutine find_rates
-
-   !> Find the directions from the second bodies to the first.
-   pure subroutine find_directions(bodies, block)
-      type(bodies_t), intent(in) :: bodies
-      type(contact_block_t), intent(inout) :: block
-      real(wp) :: inverse
-      integer(ip) :: c
-
-      do c = 1_ip, block%n
          inverse = -1.0_wp/max(block%length(c), tiny(inverse))
          block%direction(c, 1) = block%normal(c, 1)*inverse
          block%direction(c, 2) = block%normal(c, 2)*inverse
       end do
-      if (.not. any(block%degenerate(:block%n) > 0.0_wp)) return
-      do c = 1_ip, block%n
-         if (block%degenerate(c) > 0.0_wp) call direct_from_centres(bodies, c, block)
-      end do
-   end subroutine find_directions
+   end subroutine find_rates_and_directions
 
-   !> Give a degenerate contact the direction of the line of centres and the side of a square of its area.
-   pure subroutine direct_from_centres(bodies, c, block)
+   !> Give degenerate contacts the direction of the line of centres and the side of a square of their area.
+   pure subroutine direct_from_centres(bodies, block)
       type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: c
       type(contact_block_t), intent(inout) :: block
       real(wp) :: offset(2), distance
+      integer(ip) :: c
 
-      block%length(c) = sqrt(block%area(c))
-      block%direction(c, :) = [1.0_wp, 0.0_wp]
-      offset = offset_of(bodies, block%first(c), block%second(c))
-      distance = length_of(offset(1), offset(2))
-      if (distance > no_length*block%length(c)) block%direction(c, :) = -offset/distance
+      do c = 1_ip, block%n
+         if (.not. block%degenerate(c) > 0.0_wp) cycle
+         block%length(c) = sqrt(block%area(c))
+         block%direction(c, :) = [1.0_wp, 0.0_wp]
+         offset = offset_of(bodies, block%first(c), block%second(c))
+         distance = length_of(offset(1), offset(2))
+         if (distance > no_length*block%length(c)) block%direction(c, :) = -offset/distance
+      end do
    end subroutine direct_from_centres
 
    !> Length of a vector

@@ -34,13 +34,14 @@ contains
       real(wp), intent(in) :: dt
       !> Share of the time spent in the search for overlaps, in a walk of which some blocks were timed
       real(dp), intent(out) :: overlap_share
-      integer(ip) :: ends(0:most_ranges), last(most_ranges)
+      integer(ip) :: ends(0:most_ranges), last(0:most_ranges)
       integer(ip) :: n, r, k, low, high
 
       associate (pairs => self%neighbours%pairs)
          n = min(int(omp_get_max_threads(), ip), most_ranges)
          call divide_pairs(pairs%n, pairs%first, n, ends)
          call reserve_ranges(self, n)
+         last(0) = 0_ip
          do r = 1_ip, n - 1_ip
             last(r) = pairs%first(ends(r))
          end do
@@ -50,12 +51,7 @@ contains
       !$omp parallel num_threads(n) default(none) shared(self, dt, ends, last, n) private(r, k, low, high)
       !$omp do schedule(static, 1)
       do r = 1_ip, n
-         self%force_sums%value(:, share_of(self%bodies%n, r - 1_ip, n) + 1_ip:share_of(self%bodies%n, r, n)) = 0.0_wp
-      end do
-      !$omp end do
-      !$omp do schedule(static, 1)
-      do r = 1_ip, n
-         call walk_range(self, dt, ends(r - 1_ip:r), last(r), self%ranges(r))
+         call walk_range(self, dt, ends(r - 1_ip:r), last(r - 1_ip:r), self%ranges(r))
       end do
       !$omp end do
       ! Bodies beyond the first range share their late terms out evenly.
@@ -101,19 +97,20 @@ contains
       real(wp), intent(in) :: dt
       !> Index of the last pair before the range, and of its last pair
       integer(ip), intent(in) :: ends(2)
-      !> Last slot whose sums this thread may change
-      integer(ip), intent(in) :: last
+      !> Last slot of the range before, and last slot whose sums this thread may change; it sets those between
+      integer(ip), intent(in) :: last(2)
       type(range_results_t), intent(inout) :: results
       type(contact_block_t) :: block
       type(contact_terms_t) :: terms
       real(dp) :: clock(3)
-      integer(ip) :: next, tested, n_blocks
+      integer(ip) :: next, tested, n_blocks, low, high
       logical :: timed
 
       call start_results(self%contacts, results)
       next = ends(2)
       tested = next + 1_ip
       n_blocks = 0_ip
+      high = last(2)
       do while (next > ends(1))
          timed = mod(n_blocks, timed_blocks) == 0_ip
          n_blocks = n_blocks + 1_ip
@@ -125,12 +122,19 @@ contains
          if (timed) clock(2) = wall_seconds()
          call self%law%apply(self%bodies, dt, block, self%history)
          call terms_of_block(block, terms)
-         call add_terms(block, terms, last, self%force_sums, results%late)
+         ! Sums begin just before their first terms: no contact so far had a lower slot.
+         if (block%n > 0_ip) then
+            low = min(block%first(block%n), block%second(block%n))
+            self%force_sums%value(:, low:high) = 0.0_wp
+            high = min(high, low - 1_ip)
+         end if
+         call add_terms(block, terms, last(2), self%force_sums, results%late)
          call keep_contacts(self, block, results)
          if (.not. timed) cycle
          clock(3) = wall_seconds()
          results%seconds = results%seconds + (clock(2:3) - clock(1:2))
       end do
+      self%force_sums%value(:, last(1) + 1_ip:high) = 0.0_wp
    end subroutine walk_range
 
    !> Empty the results of a range.

@@ -141,7 +141,7 @@ contains
       type(late_terms_t), intent(inout) :: late
       integer(ip) :: c
 
-      if (all(block%first(:block%n) <= last) .and. all(block%second(:block%n) <= last)) then
+      if (max(maxval(block%first(:block%n)), maxval(block%second(:block%n))) <= last) then
          call add_pairs(block%n, block%first, block%second, terms%first, terms%torque_second, last, sums%value)
          return
       end if
