@@ -2,7 +2,6 @@
 module polydem_verbs
    use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_get_thread_limit, omp_set_num_threads
    use polydem_bench, only: run_bench
-   use polydem_bench_settings, only: bench_settings_t
    use polydem_build_info, only: git_revision, program_version
    use polydem_check, only: check_simulation
    use polydem_check_result, only: check_result
@@ -13,14 +12,13 @@ module polydem_verbs
    use polydem_kinds, only: dp, ip
    use polydem_oversubscription, only: oversubscription, oversubscription_text
    use polydem_process_limits, only: check_threads
-   use polydem_read_bench, only: read_bench
    use polydem_read_settings, only: read_settings
    use polydem_replay, only: replay_trace
    use polydem_result_info, only: describe_program, describe_result
    use polydem_run, only: attempt_t
    use polydem_run_simulation, only: run_simulation
    use polydem_screen, only: print_line, warn
-   use polydem_settings, only: settings_t
+   use polydem_settings, only: bench_settings_t, settings_t
    implicit none
    private
    public :: execute
@@ -64,7 +62,7 @@ contains
          call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error, &
                            int(command%steps, ip), command%samples, command%oracle)
       case ('bench')
-         call read_bench(command%file, command%overrides, bench, error)
+         call read_settings(command%file, command%overrides, bench, error)
          if (.not. allocated(error)) call check_threads(maxval(bench%threads), error)
          if (.not. allocated(error)) call run_bench(bench, error)
       case ('convert')

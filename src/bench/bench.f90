@@ -8,7 +8,6 @@ module polydem_bench
    use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_set_num_threads
    use polydem_bench_cases, only: bench_t, measure_scene, write_end
    use polydem_bench_scene, only: provide_result, read_scene, scene_t
-   use polydem_bench_settings, only: bench_settings_t
    use polydem_bench_summary, only: write_summary
    use polydem_clock, only: wall_seconds
    use polydem_errors, only: error_t
@@ -17,9 +16,11 @@ module polydem_bench
    use polydem_finder_variants, only: new_finder_or_variant
    use polydem_host, only: load_average
    use polydem_kinds, only: dp, ip
+   use polydem_origin, only: place_of
    use polydem_oversubscription, only: oversubscription_text
    use polydem_provenance, only: threads_are_bound
    use polydem_result_files, only: default_folder
+   use polydem_settings, only: bench_settings_t
    implicit none
    private
    public :: run_bench
@@ -71,12 +72,12 @@ contains
                settings%finders(k)%text, error)
          end do
          do k = 1, size(settings%prepare)
-            if (.not. allocated(error)) call read_scene(settings%prepare_place//": 'prepare' in &bench", &
-               settings%prepare(k)%text, first_runs(k), error)
+            if (.not. allocated(error)) call read_scene(place_of(settings, 'bench', 'prepare')// &
+               ": 'prepare' in &bench", settings%prepare(k)%text, first_runs(k), error)
          end do
          do k = 1, size(settings%scenes)
-            if (.not. allocated(error)) call read_scene(settings%scenes_place//": 'scenes' in &bench", &
-               settings%scenes(k)%text, scenes(k), error, settings%names(k)%text, &
+            if (.not. allocated(error)) call read_scene(place_of(settings, 'bench', 'scenes')// &
+               ": 'scenes' in &bench", settings%scenes(k)%text, scenes(k), error, settings%names(k)%text, &
                bench%folder//'/traces/'//settings%names(k)%text)
          end do
       end associate

@@ -1,7 +1,7 @@
-!> Communication between the ranks of a run: the interface that the serial and the MPI implementation share.
+!> Communication between the ranks of a run.
 !>
-!> There are two implementations: `serial_communicator_t` for one process, and `mpi_communicator_t` in builds with MPI.
-!> Callers use one interface; serial calls are copies or no-ops.
+!> `communicator_t` is the communicator of one process: its calls are copies or no-ops. `mpi_communicator_t` of builds
+!> with MPI overrides what needs messages. Callers use one interface.
 !>
 !> All procedures are collective except `exchange`, `receive_from_previous` and `send_to_next`: every rank of the
 !> communicator must call them in the same order. Only integers are summed, so a sum does not depend on the distribution
@@ -24,7 +24,7 @@ module polydem_communicator
    end type neighbour_ranks_t
 
    !> The ranks of a run
-   type, abstract :: communicator_t
+   type :: communicator_t
       !> Rank of this process, from 0; rank 0 is the root rank
       integer(ip) :: rank = 0_ip
       !> Number of ranks
@@ -34,105 +34,110 @@ module polydem_communicator
       !> Size of these messages [B]
       integer(lp) :: bytes = 0_lp
    contains
+      !> Replace numbers by their sums over all ranks, element by element
+      procedure :: all_reduce_sum => unchanged_longs
       !> Replace numbers by their maxima over all ranks, element by element
       generic :: all_reduce_max => all_reduce_max_longs, all_reduce_max_doubles
-      !> Replace numbers by their sums over all ranks, element by element
-      procedure(combine_longs), deferred :: all_reduce_sum
-      procedure(combine_longs), deferred :: all_reduce_max_longs
-      procedure(combine_doubles), deferred :: all_reduce_max_doubles
+      procedure :: all_reduce_max_longs => unchanged_longs
+      procedure :: all_reduce_max_doubles
       !> Copy values of the root rank to all ranks
       generic :: broadcast => broadcast_longs, broadcast_doubles, broadcast_text
-      procedure(combine_longs), deferred :: broadcast_longs
+      procedure :: broadcast_longs => unchanged_longs
       procedure :: broadcast_doubles
       procedure :: broadcast_text
       !> Collect the lists of all ranks on every rank
       generic :: gather => gather_longs, gather_doubles
-      procedure(gather_longs), deferred :: gather_longs
-      procedure :: gather_doubles
+      procedure :: gather_longs
+      procedure, private :: gather_doubles
       !> Send rows to all ranks and receive rows from all ranks
       generic :: all_to_all => all_to_all_longs, all_to_all_reals
-      procedure(all_to_all_longs), deferred :: all_to_all_longs
-      procedure :: all_to_all_reals
-      procedure(exchange), deferred :: exchange
-      procedure(relay), deferred :: receive_from_previous
-      procedure(relay), deferred :: send_to_next
-      procedure(finalize), deferred :: finalize
+      procedure :: all_to_all_longs
+      procedure, private :: all_to_all_reals
+      procedure :: exchange
+      !> Receive numbers from rank - 1, or send them to rank + 1. Nothing happens if that rank does not exist
+      procedure :: receive_from_previous => unchanged_longs
+      procedure :: send_to_next => unchanged_longs
+      procedure :: finalize
       procedure :: is_root
       procedure :: all_reduce_error
       procedure :: all_reduce_text
    end type communicator_t
 
-   abstract interface
-      !> Combine lists of the same length, element by element.
-      subroutine combine_longs(self, values)
-         import :: lp, communicator_t
-         class(communicator_t), intent(inout) :: self
-         !> Numbers of this rank; afterwards the same on all ranks
-         integer(lp), intent(inout), contiguous :: values(:)
-      end subroutine combine_longs
-
-      !> Combine lists of the same length, element by element.
-      subroutine combine_doubles(self, values)
-         import :: dp, communicator_t
-         class(communicator_t), intent(inout) :: self
-         !> Numbers of this rank; afterwards the same on all ranks
-         real(dp), intent(inout), contiguous :: values(:)
-      end subroutine combine_doubles
-
-      !> Collect the lists of all ranks, in the order of ranks, on every rank.
-      subroutine gather_longs(self, mine, all_of_them, counts)
-         import :: ip, lp, communicator_t
-         class(communicator_t), intent(inout) :: self
-         !> List of this rank, of any length
-         integer(lp), intent(in), contiguous :: mine(:)
-         !> The lists of all ranks, one after the other
-         integer(lp), allocatable, intent(out) :: all_of_them(:)
-         !> Lengths of the lists, (0:size - 1)
-         integer(ip), allocatable, intent(out) :: counts(:)
-      end subroutine gather_longs
-
-      !> Send rows to all ranks and receive rows from all ranks.
-      subroutine all_to_all_longs(self, rows, counts, received, counts_received)
-         import :: ip, lp, communicator_t
-         class(communicator_t), intent(inout) :: self
-         !> Rows to send, in the order of their destination ranks, (width, row)
-         integer(lp), intent(in), contiguous :: rows(:, :)
-         !> Number of rows to send to each rank, including this one, (0:size - 1)
-         integer(ip), intent(in) :: counts(0:)
-         !> Received rows, in the order of their source ranks, (width, row)
-         integer(lp), allocatable, intent(out) :: received(:, :)
-         !> Number of rows received from each rank, (0:size - 1)
-         integer(ip), allocatable, intent(out) :: counts_received(:)
-      end subroutine all_to_all_longs
-
-      !> Exchange rows with neighbour ranks. Both sides must have matching routes; other ranks take no part.
-      subroutine exchange(self, route, sent, received)
-         import :: neighbour_ranks_t, communicator_t, wp
-         class(communicator_t), intent(inout) :: self
-         !> Neighbour ranks, and the rows sent to and received from each
-         type(neighbour_ranks_t), intent(in) :: route
-         !> Rows to send, in the order of the route, (width, row)
-         real(wp), intent(in), contiguous, target :: sent(:, :)
-         !> Received rows, in the order of the route, (width, row)
-         real(wp), intent(inout), contiguous, target :: received(:, :)
-      end subroutine exchange
-
-      !> Receive numbers from rank - 1, or send them to rank + 1. Nothing happens if that rank does not exist.
-      subroutine relay(self, values)
-         import :: lp, communicator_t
-         class(communicator_t), intent(inout) :: self
-         !> The numbers
-         integer(lp), intent(inout), contiguous :: values(:)
-      end subroutine relay
-
-      !> End the communication. No other call is allowed afterwards.
-      subroutine finalize(self)
-         import :: communicator_t
-         class(communicator_t), intent(inout) :: self
-      end subroutine finalize
-   end interface
-
 contains
+
+   !> Combine lists of the same length, broadcast or relay numbers: unchanged, as there is only one rank.
+   subroutine unchanged_longs(self, values)
+      class(communicator_t), intent(inout) :: self
+      !> Numbers of this rank; afterwards the same on all ranks
+      integer(lp), intent(inout), contiguous :: values(:)
+
+      associate (unused => self%size, unused_values => values)
+      end associate
+   end subroutine unchanged_longs
+
+   !> Maxima: unchanged, as there is only one rank.
+   subroutine all_reduce_max_doubles(self, values)
+      class(communicator_t), intent(inout) :: self
+      !> Numbers of this rank; afterwards the same on all ranks
+      real(dp), intent(inout), contiguous :: values(:)
+
+      associate (unused => self%size, unused_values => values)
+      end associate
+   end subroutine all_reduce_max_doubles
+
+   !> Collect the lists of all ranks, in the order of ranks, on every rank.
+   subroutine gather_longs(self, mine, all_of_them, counts)
+      class(communicator_t), intent(inout) :: self
+      !> List of this rank, of any length
+      integer(lp), intent(in), contiguous :: mine(:)
+      !> The lists of all ranks, one after the other
+      integer(lp), allocatable, intent(out) :: all_of_them(:)
+      !> Lengths of the lists, (0:size - 1)
+      integer(ip), allocatable, intent(out) :: counts(:)
+
+      all_of_them = mine
+      allocate (counts(0:self%size - 1_ip))
+      counts = size(mine, kind=ip)
+   end subroutine gather_longs
+
+   !> Send rows to all ranks and receive rows from all ranks.
+   subroutine all_to_all_longs(self, rows, counts, received, counts_received)
+      class(communicator_t), intent(inout) :: self
+      !> Rows to send, in the order of their destination ranks, (width, row)
+      integer(lp), intent(in), contiguous :: rows(:, :)
+      !> Number of rows to send to each rank, including this one, (0:size - 1)
+      integer(ip), intent(in) :: counts(0:)
+      !> Received rows, in the order of their source ranks, (width, row)
+      integer(lp), allocatable, intent(out) :: received(:, :)
+      !> Number of rows received from each rank, (0:size - 1)
+      integer(ip), allocatable, intent(out) :: counts_received(:)
+
+      received = rows
+      allocate (counts_received(0:self%size - 1_ip))
+      counts_received = counts
+   end subroutine all_to_all_longs
+
+   !> Exchange rows with neighbour ranks. Both sides must have matching routes; other ranks take no part.
+   subroutine exchange(self, route, sent, received)
+      class(communicator_t), intent(inout) :: self
+      !> Neighbour ranks, and the rows sent to and received from each
+      type(neighbour_ranks_t), intent(in) :: route
+      !> Rows to send, in the order of the route, (width, row)
+      real(wp), intent(in), contiguous, target :: sent(:, :)
+      !> Received rows, in the order of the route, (width, row)
+      real(wp), intent(inout), contiguous, target :: received(:, :)
+
+      associate (unused => self%size, unused_route => route, unused_rows => sent, unused_values => received)
+      end associate
+   end subroutine exchange
+
+   !> End the communication. No other call is allowed afterwards.
+   subroutine finalize(self)
+      class(communicator_t), intent(inout) :: self
+
+      associate (unused => self%size)
+      end associate
+   end subroutine finalize
 
    !> Whether this is the root rank. The root rank writes to the screen and manages the result folder.
    pure logical function is_root(self)
@@ -249,14 +254,11 @@ contains
       values = transfer(words, values)
    end subroutine broadcast_doubles
 
-   !> Collect the lists of all ranks, in the order of ranks, on every rank.
+   !> Collect the lists of all ranks: `gather_longs` for real numbers.
    subroutine gather_doubles(self, mine, all_of_them, counts)
       class(communicator_t), intent(inout) :: self
-      !> List of this rank, of any length
       real(dp), intent(in), contiguous :: mine(:)
-      !> The lists of all ranks, one after the other
       real(dp), allocatable, intent(out) :: all_of_them(:)
-      !> Lengths of the lists, (0:size - 1)
       integer(ip), allocatable, intent(out) :: counts(:)
       integer(lp), allocatable :: words(:)
 
@@ -265,16 +267,12 @@ contains
       all_of_them = transfer(words, all_of_them, size(words))
    end subroutine gather_doubles
 
-   !> Send rows to all ranks and receive rows from all ranks.
+   !> Send rows to all ranks and receive rows from all ranks: `all_to_all_longs` for real numbers.
    subroutine all_to_all_reals(self, rows, counts, received, counts_received)
       class(communicator_t), intent(inout) :: self
-      !> Rows to send, in the order of their destination ranks, (width, row)
       real(wp), intent(in), contiguous :: rows(:, :)
-      !> Number of rows to send to each rank, including this one, (0:size - 1)
       integer(ip), intent(in) :: counts(0:)
-      !> Received rows, in the order of their source ranks, (width, row)
       real(wp), allocatable, intent(out) :: received(:, :)
-      !> Number of rows received from each rank, (0:size - 1)
       integer(ip), allocatable, intent(out) :: counts_received(:)
       integer(lp), allocatable :: words(:, :), words_received(:, :)
       integer :: k, width

@@ -1,6 +1,9 @@
-"""Make the Fortran sources that follow from the table of namelist entries: make_entries.py ENTRIES.txt FOLDER.
+"""Make what follows from the table of namelist entries.
 
-entry_table.f90: the table as constants; group_settings.f90: one type per group; fill_groups.f90: fills these types.
+make_entries.py ENTRIES.txt FOLDER: the Fortran sources entry_table.f90 (the table as constants), settings.f90 (one type
+per group) and fill_groups.f90 (fills these types).
+make_entries.py ENTRIES.txt README.md [--check]: the table of the manual, between the lines <!-- entries --> and
+<!-- /entries -->; with --check it must be there already.
 """
 
 import re
@@ -120,20 +123,29 @@ def component(row):
 
 
 def settings_module(groups, rows):
-    """One type per group, and one of all groups of a run."""
+    """One type per group, one of all groups of a run, and one of a bench."""
     body = ""
     for group, meaning in groups.items():
         components = "\n".join(component(row) for row in first_rows(rows, group))
         comment = textwrap.fill(f"Group &{group}" + (f": {meaning}" if meaning else ""), 110,
                                 initial_indent="   !> ", subsequent_indent="   !> ")
-        body += f"{comment}\n   type :: {group}_settings_t\n{components}\n   end type {group}_settings_t\n\n"
-    run = [group for group in groups if group != BENCH]
-    body += "   !> All groups of a run\n   type :: group_settings_t\n"
-    body += "".join(f"      !> Group &{group}\n      type({group}_settings_t) :: {group}\n" for group in run)
-    body += "   end type group_settings_t\n"
-    return module("group_settings", "Settings: one type per namelist group.",
-                  ["kinds, only: ip, wp", "strings, only: text_t"],
-                  ["group_settings_t", *(f"{group}_settings_t" for group in groups)], body)
+        base = ", extends(origin_t)" if group == BENCH else ""
+        body += f"{comment}\n   type{base} :: {group}_settings_t\n{components}\n   end type {group}_settings_t\n\n"
+    body += "   !> All settings of a run. They do not change after reading\n   type, extends(origin_t) :: settings_t\n"
+    body += "".join(f"      !> Group &{group}\n      type({group}_settings_t) :: {group}\n"
+                    for group in groups if group != BENCH)
+    body += "   end type settings_t\n"
+    return module("settings", "Settings of a run and of a bench: one type per namelist group.",
+                  ["kinds, only: ip, wp", "origin, only: origin_t", "strings, only: text_t"],
+                  ["settings_t", *(f"{group}_settings_t" for group in groups)], body)
+
+
+def assignment(row):
+    """Statement that copies the value of an entry to its component."""
+    values = {"real": "reals", "integer": "integers", "logical": "flag"}.get(row.type)
+    values = values or ("text" if row.count == 1 else "texts")
+    first = "(1)" if row.count == 1 and values in ("reals", "integers") else ""
+    return (f"      settings%{row.key} = &\n         values(row_of(values, '{row.group}', '{row.key}'))%{values}{first}\n")
 
 
 def fill_module(groups, rows):
@@ -141,33 +153,67 @@ def fill_module(groups, rows):
     run = [group for group in groups if group != BENCH]
     parts = ["   !> Fill all groups of a run.\n   pure subroutine fill_groups(values, settings)\n"
              "      !> Values, (row of the table)\n      type(value_t), intent(in) :: values(:)\n"
-             "      !> Settings to fill\n      type(group_settings_t), intent(inout) :: settings\n\n"
+             "      !> Settings to fill\n      type(settings_t), intent(inout) :: settings\n\n"
              + "".join(f"      call fill_{group}(values, settings%{group})\n" for group in run)
              + "   end subroutine fill_groups\n"]
     for group in groups:
-        calls = "".join(f"      call take(values, '{group}.{row.key}', settings%{row.key})\n"
-                        for row in first_rows(rows, group))
+        copies = "".join(assignment(row) for row in first_rows(rows, group))
         parts.append(f"   !> Fill group &{group}.\n   pure subroutine fill_{group}(values, settings)\n"
                      "      !> Values, (row of the table)\n      type(value_t), intent(in) :: values(:)\n"
                      f"      !> Settings to fill\n      type({group}_settings_t), intent(inout) :: settings\n\n"
-                     f"{calls}   end subroutine fill_{group}\n")
-    uses = ["group_settings, only: group_settings_t"]
-    uses += [f"group_settings, only: {group}_settings_t" for group in groups]
+                     f"{copies}   end subroutine fill_{group}\n")
+    uses = [f"settings, only: {group}_settings_t" for group in groups]
     return module("fill_groups", "Copies the values of the table of entries to the settings.",
-                  [*uses, "namelist_values, only: value_t", "take_entry, only: take"],
+                  ["entry_row, only: row_of", "namelist_values, only: value_t", "settings, only: settings_t", *uses],
                   ["fill_groups", f"fill_{BENCH}"], "", "\n".join(parts))
 
 
-def main(table, folder):
-    """Write the sources."""
+def manual(rows):
+    """The table of entries in Markdown."""
+    text = ("| group | key | type | unit | default | range | used with | meaning |\n"
+            "|---|---|---|---|---|---|---|---|\n")
+    for row in rows:
+        kind = f"{row.count} {row.type}s" if row.count > 1 else row.type + (" list" if row.count == 0 else "")
+        is_text = row.type in TEXTS and row.count > 0
+        default = f"`'{row.default}'`" if is_text and row.default != "required" else row.default
+        allowed = ", ".join(row.allowed.split()) if row.type == "word" else row.allowed
+        key, _, words = row.needs.rpartition(":")
+        used = ", ".join(words.split())
+        cells = [f"&{row.group}", f"`{row.key}`", kind, row.unit, default, allowed,
+                 f"{key} = {used}" if key not in ("", "name") else used, row.meaning]
+        text += "|" + "".join(f" {cell} |" if cell else " |" for cell in cells) + "\n"
+    return text
+
+
+def update_manual(readme, rows, checks):
+    """Replace the table in the manual, or check that it is there."""
+    path, opening, closing = Path(readme), "<!-- entries -->\n", "<!-- /entries -->\n"
+    before, _, rest = path.read_text(encoding="utf-8").partition(opening)
+    present, mark, after = rest.partition(closing)
+    if not mark:
+        sys.exit(f"{readme} has no lines {opening}and {closing}")
+    if present == manual(rows):
+        print(f"{readme} has the table of entries")
+    elif checks:
+        sys.exit(f"the table of entries in {readme} is not that of the code; "
+                 "cmake --build BUILD --target entries_manual makes it")
+    else:
+        path.write_text(before + opening + manual(rows) + closing + after, encoding="utf-8")
+        print(f"{readme} has a new table of entries")
+
+
+def main(table, target, *options):
+    """Write the sources or the manual."""
     try:
         groups, rows = read_table(Path(table).read_text(encoding="utf-8"))
     except TableError as error:
         sys.exit(f"{table}: {error}")
-    Path(folder).mkdir(parents=True, exist_ok=True)
-    for name, make in (("entry_table", table_module), ("group_settings", settings_module),
-                       ("fill_groups", fill_module)):
-        (Path(folder) / f"{name}.f90").write_text(make(groups, rows), encoding="utf-8")
+    if target.endswith(".md"):
+        update_manual(target, rows, "--check" in options)
+        return
+    Path(target).mkdir(parents=True, exist_ok=True)
+    for name, make in (("entry_table", table_module), ("settings", settings_module), ("fill_groups", fill_module)):
+        (Path(target) / f"{name}.f90").write_text(make(groups, rows), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -1,32 +1,34 @@
-!> Reads the settings of a run from a namelist file and the overrides of the command line. Both pass the same checks,
-!> which are based on the table of entries.
+!> Reads the settings of a run or a bench from a namelist file and the overrides of the command line. Both pass the same
+!> checks, which are based on the table of entries.
 !>
 !> polydem has its own namelist parser because the namelist input of compilers does not name the line of an error, does
 !> not detect keys given twice, and reports most errors as 'end of file'.
 module polydem_read_settings
+   use polydem_check_bench, only: check_bench
    use polydem_check_settings, only: check_settings
    use polydem_errors, only: error_t
    use polydem_exclusive_entries, only: resolve_exclusive_entries
-   use polydem_fill_groups, only: fill_groups
+   use polydem_fill_groups, only: fill_bench, fill_groups
    use polydem_namelist_tokens, only: source_t
    use polydem_namelist_values, only: value_t
+   use polydem_origin, only: origin_t
    use polydem_resolve_entries, only: resolve_entries, resolved_text
-   use polydem_settings, only: settings_t
+   use polydem_settings, only: bench_settings_t, settings_t
    use polydem_text_file, only: read_text_file
    implicit none
    private
-   public :: read_settings, read_settings_text, normalise_line_ends
+   public :: read_settings, read_settings_text
 
 contains
 
-   !> Read the settings of a run from a file.
+   !> Read settings from a file.
    subroutine read_settings(file, overrides, settings, error)
       !> Path of the namelist file
       character(len=*), intent(in) :: file
       !> Overrides of the command line, each 'group.key=value'; the last override of an entry applies
       character(len=*), intent(in) :: overrides(:)
-      !> Complete, checked settings
-      type(settings_t), intent(out) :: settings
+      !> Complete, checked settings: `settings_t` of a run, or `bench_settings_t`
+      class(origin_t), intent(inout) :: settings
       !> Error in the file or an override; its message starts with file:line or --set group.key=value
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
@@ -36,7 +38,7 @@ contains
       call read_settings_text(file, text, overrides, settings, error)
    end subroutine read_settings
 
-   !> Read the settings of a run from a text.
+   !> Read settings from a text.
    pure subroutine read_settings_text(file_name, text, overrides, settings, error)
       !> Name of the source in messages
       character(len=*), intent(in) :: file_name
@@ -44,35 +46,57 @@ contains
       character(len=*), intent(in) :: text
       !> Overrides of the command line, each 'group.key=value'; the last override of an entry applies
       character(len=*), intent(in) :: overrides(:)
-      !> Complete, checked settings
-      type(settings_t), intent(out) :: settings
+      !> Complete, checked settings: `settings_t` of a run, or `bench_settings_t`
+      class(origin_t), intent(inout) :: settings
       !> Error in the text or an override
       type(error_t), allocatable, intent(inout) :: error
-      type(source_t) :: source
       type(value_t), allocatable :: values(:)
+
+      select type (settings)
+      type is (settings_t)
+         call read_values(file_name, text, overrides, .false., settings%origin_t, values, error)
+         if (allocated(error)) return
+         call fill_groups(values, settings)
+         call check_settings(settings, values, error)
+      type is (bench_settings_t)
+         call read_values(file_name, text, overrides, .true., settings%origin_t, values, error)
+         if (allocated(error)) return
+         call fill_bench(values, settings)
+         call check_bench(settings, error)
+      end select
+   end subroutine read_settings_text
+
+   !> Read the values of all entries and their origin.
+   pure subroutine read_values(file_name, text, overrides, of_bench, origin, values, error)
+      character(len=*), intent(in) :: file_name, text, overrides(:)
+      !> Whether the text describes a bench
+      logical, intent(in) :: of_bench
+      type(origin_t), intent(inout) :: origin
+      !> Values, (row of the table)
+      type(value_t), allocatable, intent(out) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+      type(source_t) :: source
       integer :: k
 
       source%name = trim(file_name)
       source%text = text
-      call resolve_entries(source, .false., overrides, values, error)
+      call resolve_entries(source, of_bench, overrides, values, error)
       if (allocated(error)) return
       call resolve_exclusive_entries(values, error)
       if (allocated(error)) return
-      settings%file = trim(file_name)
-      settings%text = normalise_line_ends(text)
-      settings%resolved = resolved_text(values)
-      allocate (settings%places(size(values)))
+      origin%file = trim(file_name)
+      origin%text = normalise_line_ends(text)
+      origin%resolved = resolved_text(values)
+      if (allocated(origin%places)) deallocate (origin%places)
+      allocate (origin%places(size(values)))
       do k = 1, size(values)
-         settings%places(k)%text = settings%file
-         if (allocated(values(k)%place)) settings%places(k)%text = values(k)%place
+         origin%places(k)%text = origin%file
+         if (allocated(values(k)%place)) origin%places(k)%text = values(k)%place
       end do
-      call fill_groups(values, settings%group_settings_t)
-      call check_settings(settings, values, error)
-   end subroutine read_settings_text
+   end subroutine read_values
 
    !> Text without carriage returns and with a line end after the last line
    pure function normalise_line_ends(text) result(plain)
-      !> Text of any length
       character(len=*), intent(in) :: text
       character(len=:), allocatable :: plain
       character(len=*), parameter :: line_feed = achar(10), carriage_return = achar(13)

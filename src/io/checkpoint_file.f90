@@ -22,7 +22,6 @@ module polydem_checkpoint_file
    use polydem_kinds, only: dp, ip, lp
    use polydem_provenance, only: provenance_t, write_provenance, schema_version
    use polydem_result_files, only: unfinished
-   use polydem_serial_communicator, only: serial_communicator_t
    use polydem_serializer, only: serializer_t
    use polydem_strings, only: to_text
    implicit none
@@ -84,7 +83,7 @@ contains
       if (present(comm)) then
          allocate (self%comm, source=comm)
       else
-         allocate (serial_communicator_t :: self%comm)
+         allocate (communicator_t :: self%comm)
       end if
       if (self%comm%is_root()) call write_origin(self, provenance)
       call open_on_all_ranks(self%comm, self%file, path//unfinished, bytes, self%error)
@@ -140,7 +139,7 @@ contains
       self%path = path
       self%is_reading = .true.
       if (present(comm)) allocate (self%comm, source=comm)
-      if (.not. allocated(self%comm)) allocate (serial_communicator_t :: self%comm)
+      if (.not. allocated(self%comm)) allocate (communicator_t :: self%comm)
       if (self%comm%is_root()) call verify_checksum(path, problem)
       if (allocated(problem)) call raise(error, io_error, path//': is damaged: '//problem)
       call self%comm%all_reduce_error(error)

@@ -19,7 +19,6 @@ module polydem_trajectory_writer
    use polydem_named_values, only: named_values_t
    use polydem_provenance, only: provenance_t
    use polydem_result_files, only: open_suffix, segment_path
-   use polydem_serial_communicator, only: serial_communicator_t
    use polydem_time_limit, only: time_limit_t
    use polydem_trajectory_segment, only: add_contacts, add_frame, add_balance, add_walls, start_segment, write_bodies
    implicit none
@@ -77,7 +76,7 @@ contains
       if (present(comm)) then
          allocate (self%comm, source=comm)
       else
-         allocate (serial_communicator_t :: self%comm)
+         allocate (communicator_t :: self%comm)
       end if
       self%folder = folder
       self%capacity = max(1_ip, frames_per_segment)

@@ -13,7 +13,6 @@ module polydem_run_simulation
    use polydem_replacement, only: remove_replaced, restore_replaced
    use polydem_run, only: attempt_t, run_t, result_folder
    use polydem_run_output, only: choose_tables, end_step, finish
-   use polydem_serial_communicator, only: serial_communicator_t
    use polydem_settings, only: settings_t
    use polydem_start, only: open_output
    use polydem_strings, only: to_text
@@ -42,7 +41,7 @@ contains
       run%began = wall_seconds()
       if (present(attempt)) run%attempt = attempt
       if (present(comm)) allocate (run%comm, source=comm)
-      if (.not. allocated(run%comm)) allocate (serial_communicator_t :: run%comm)
+      if (.not. allocated(run%comm)) allocate (communicator_t :: run%comm)
       run%folder = result_folder(settings)
       if (run%attempt%continues) call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return

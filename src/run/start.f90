@@ -12,12 +12,11 @@ module polydem_start
    use polydem_run, only: run_t
    use polydem_run_output, only: frames_per_segment
    use polydem_scene, only: build_scene
-   use polydem_serial_communicator, only: serial_communicator_t
+   use polydem_scene_measures, only: measure_scene
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_start_simulation, only: start_with_bodies
    use polydem_strings, only: to_text
-   use polydem_scene_measures, only: measure_scene
    implicit none
    private
    public :: new_simulation, build_start, recall, open_output
@@ -36,7 +35,7 @@ contains
       class(communicator_t), allocatable :: ranks
 
       if (present(comm)) allocate (ranks, source=comm)
-      if (.not. allocated(ranks)) allocate (serial_communicator_t :: ranks)
+      if (.not. allocated(ranks)) allocate (communicator_t :: ranks)
       call check_law(settings, 1_ip, error)
       if (allocated(error)) return
       call build_scene(settings, self%bodies, self%motions, error, ranks%rank, ranks%size)

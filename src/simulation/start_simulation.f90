@@ -15,7 +15,6 @@ module polydem_start_simulation
    use polydem_prescribed_motion, only: motion_t
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
-   use polydem_serial_communicator, only: serial_communicator_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: stable_step_of_shapes
@@ -47,7 +46,7 @@ contains
 
       self%bodies = bodies
       self%motions = motions
-      call start_with_bodies(settings, serial_communicator_t(), self, error)
+      call start_with_bodies(settings, communicator_t(), self, error)
    end subroutine start_simulation
 
    !> Set up a simulation with the bodies that it has: all fixed bodies, and any share of the free bodies of the run.

@@ -5,7 +5,7 @@ module polydem_posix_processes
    implicit none
    private
    public :: c_attributes_init, c_attributes_stack, c_exit_now, c_free, c_getaffinity, c_getpid, c_getrandom, &
-      c_getrlimit, c_kill, c_malloc, c_pipe, c_pipe2, c_poll, c_read, c_sigaction, c_strdup, c_time, c_umask, &
+      c_getrlimit, c_kill, c_malloc, c_pipe2, c_poll, c_read, c_sigaction, c_strdup, c_time, c_umask, &
       c_user, event_t, gethostname, gmtime, isatty, limit_t, pthread_create, pthread_join, strftime, sysconf, &
       timer_create, timer_delete, timer_settime, times_t
 
@@ -161,12 +161,6 @@ module polydem_posix_processes
          integer(c_long), intent(inout) :: attributes(*)
          integer(c_size_t), value :: bytes
       end function c_attributes_stack
-
-      !> POSIX pipe(2)
-      integer(c_int) function c_pipe(ends) bind(C, name='pipe')
-         import :: c_int
-         integer(c_int), intent(out) :: ends(2)
-      end function c_pipe
 
       !> POSIX read(2); ssize_t is as wide as size_t
       integer(c_size_t) function c_read(descriptor, bytes, length) bind(C, name='read')

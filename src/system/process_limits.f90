@@ -10,7 +10,7 @@ module polydem_process_limits
    use polydem_file_system, only: errno_message, last_failure
    use polydem_kinds, only: ip, lp
    use polydem_posix, only: c_close
-   use polydem_posix_processes, only: c_attributes_init, c_attributes_stack, c_getaffinity, c_getrlimit, c_pipe, &
+   use polydem_posix_processes, only: c_attributes_init, c_attributes_stack, c_getaffinity, c_getrlimit, c_pipe2, &
       c_read, limit_t, pthread_create, pthread_join
    use polydem_strings, only: to_text
    implicit none
@@ -92,7 +92,7 @@ contains
       integer(c_int) :: status, ignored
       integer(ip) :: k, n
 
-      if (c_pipe(ends) /= 0_c_int) then
+      if (c_pipe2(ends, 0_c_int) /= 0_c_int) then
          call raise(error, input_error, 'cannot test whether the threads can be created: '//last_failure())
          return
       end if

@@ -5,7 +5,7 @@ import unittest
 
 sys.dont_write_bytecode = True
 sys.path.insert(0, sys.argv.pop(1))
-from make_entries import TableError, fill_module, read_table, settings_module, table_module  # noqa: E402
+from make_entries import TableError, fill_module, manual, read_table, settings_module, table_module  # noqa: E402
 
 GOOD = """# Comment
 list ways = slow fast
@@ -28,7 +28,10 @@ class TestMakeEntries(unittest.TestCase):
         self.assertIn("'Steps, don''t count'", table_module(*table))
         self.assertEqual(settings_module(*table).count(":: steps(2) = 0_ip"), 1)
         self.assertIn("type(text_t), allocatable :: names(:)", settings_module(*table))
-        self.assertEqual(fill_module(*table).count("'walk.steps', settings%steps"), 1)
+        self.assertEqual(fill_module(*table).count("settings%steps = &"), 1)
+        self.assertIn("values(row_of(values, 'walk', 'steps'))%integers\n", fill_module(*table))
+        self.assertIn("| &walk | `way` | word | | `'slow'` | slow, fast, none | | Way to go |\n", manual(table[1]))
+        self.assertIn("| 2 integers | m | required | > 0 | way = none | Steps |\n", manual(table[1]))
 
     def test_bad_rows_are_named(self):
         for old, new, message in (("| 1 | slow", "| slow", "line 4: 8 fields, not 9"),

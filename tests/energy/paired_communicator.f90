@@ -3,8 +3,8 @@
 !> In the first round each rank records the values that it contributes. In the second round they are the values of the
 !> other rank.
 module paired_communicator
+   use polydem_communicator, only: communicator_t
    use polydem_kinds, only: lp
-   use polydem_serial_communicator, only: serial_communicator_t
    implicit none
    private
    public :: paired_communicator_t
@@ -16,7 +16,7 @@ module paired_communicator
    end type words_t
 
    !> One of two ranks
-   type, extends(serial_communicator_t) :: paired_communicator_t
+   type, extends(communicator_t) :: paired_communicator_t
       !> Number of calls so far
       integer :: n_calls = 0
       !> Values of this rank in each call

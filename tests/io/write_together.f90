@@ -11,22 +11,21 @@ program write_together
    use compare_files, only: expect_equal_files
    use polydem_bodies, only: state_hash
    use polydem_checkpoint_file, only: checkpoint_file_t
+   use polydem_communicator, only: communicator_t
    use polydem_contacts, only: contacts_t
-   use polydem_global_hash, only: hash_all_bodies, hash_scene
    use polydem_errors, only: error_t, io_error, raise, run_error
+   use polydem_force_sums, only: select_walls
+   use polydem_global_hash, only: hash_all_bodies, hash_scene
+   use polydem_global_order, only: global_order_t
    use polydem_hdf5_file, only: start_library
-   use polydem_world_communicator, only: create_world
    use polydem_kinds, only: ip, lp, wp
    use polydem_named_values, only: named_values_t
-   use polydem_serial_communicator, only: serial_communicator_t
    use polydem_ownership, only: order_bodies, order_pairs
    use polydem_provenance, only: provenance_t
-   use polydem_global_order, only: global_order_t
    use polydem_strings, only: to_text
-   use polydem_communicator, only: communicator_t
    use polydem_trajectory_writer, only: trajectory_writer_t
-   use polydem_force_sums, only: select_walls
    use polydem_wall_forces, only: complete_wall_forces
+   use polydem_world_communicator, only: create_world
    use sample, only: sample_provenance, sample_row
    use spread_world, only: part_of_world, whole_world, world_t
    implicit none
@@ -74,7 +73,7 @@ contains
 
    subroutine write_both(error)
       type(error_t), allocatable, intent(inout) :: error
-      type(serial_communicator_t) :: alone
+      type(communicator_t) :: alone
       integer(ip) :: k
 
       if (comm%is_root()) call write_all(alone, folder//'_alone', error)
@@ -222,7 +221,7 @@ contains
 
    subroutine compare_hashes(error)
       type(error_t), allocatable, intent(inout) :: error
-      type(serial_communicator_t) :: alone
+      type(communicator_t) :: alone
       type(world_t) :: whole, world
       integer(lp) :: hash, expected
 

@@ -1,10 +1,10 @@
 !> Communicator for tests in one process, which acts as one rank after the other.
 module posed_communicator
+   use polydem_communicator, only: communicator_t
+   use polydem_errors, only: error_t
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_serial_communicator, only: serial_communicator_t
    use polydem_partition, only: partition_t
    use polydem_partition_factory, only: new_partition
-   use polydem_errors, only: error_t
    use polydem_random, only: new_random, random_t
    implicit none
    private
@@ -12,7 +12,7 @@ module posed_communicator
 
    !> A rank of a communicator. In a first round it records the lists of the ranks; the other ranks seem to have no
    !> bodies. In a second round it returns the lists of all ranks.
-   type, extends(serial_communicator_t) :: posed_communicator_t
+   type, extends(communicator_t) :: posed_communicator_t
       !> Whether the lists of all ranks are recorded
       logical :: is_complete = .false.
       !> Lists of the ranks, one after the other

@@ -2,7 +2,6 @@
 module polydem_world_communicator
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_serial_communicator, only: serial_communicator_t
    implicit none
    private
    public :: create_world, communicator_description
@@ -22,7 +21,7 @@ contains
       character(len=16) :: size
       integer :: k
 
-      allocate (serial_communicator_t :: comm)
+      allocate (communicator_t :: comm)
       do k = 1, ubound(size_variables, 1)
          call get_environment_variable(trim(size_variables(k)), size)
          if (size /= '' .and. size /= '1') call raise(error, input_error, trim(size)//' processes were started, '// &
