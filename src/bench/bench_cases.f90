@@ -12,10 +12,8 @@ module polydem_bench_cases
    use polydem_kinds, only: dp, ip, lp
    use polydem_log, only: log_t
    use polydem_provenance, only: collect_provenance, provenance_t
-   use polydem_reference, only: reference_t
    use polydem_reference_file, only: read_reference, write_reference
-   use polydem_replay, only: sample_path
-   use polydem_sample_file, only: case_t, sample_t, write_sample
+   use polydem_sample_file, only: case_t, sample_path, sample_t, write_sample
    use polydem_settings, only: bench_settings_t
    use polydem_strings, only: to_text
    use polydem_waiting_cost, only: measure_waiting
@@ -53,14 +51,13 @@ contains
       !> Allocated if a sample cannot be taken or a list is wrong
       type(error_t), allocatable, intent(inout) :: error
       type(subject_t) :: subject
-      type(reference_t) :: reference
       integer :: n_cases, c, k, r
 
       associate (settings => bench%settings)
          call announce(bench, scene)
          call load_subject(scene, settings%mode == 'live', settings%steps, subject, error)
          n_boxes = subject%case%boxes
-         if (.not. allocated(error)) call provide_reference(bench, subject, reference, error)
+         if (.not. allocated(error)) call provide_reference(bench, subject, error)
          n_cases = size(settings%finders)*size(settings%threads)
          do r = 0, settings%repeats
             do k = 0, n_cases - 1
@@ -69,7 +66,7 @@ contains
                subject%case%finder = settings%finders(1 + c/size(settings%threads))%text
                subject%case%threads = settings%threads(1 + mod(c, size(settings%threads)))
                subject%case%repeat = int(r, ip)
-               call measure_case(bench, subject, reference, error)
+               call measure_case(bench, subject, error)
             end do
          end do
       end associate
@@ -88,34 +85,31 @@ contains
    end subroutine announce
 
    !> Read the reference lists of pairs from disk, or compute and write them.
-   subroutine provide_reference(bench, subject, reference, error)
+   subroutine provide_reference(bench, subject, error)
       type(bench_t), intent(inout) :: bench
       type(subject_t), intent(inout) :: subject
-      type(reference_t), intent(out) :: reference
       type(error_t), allocatable, intent(inout) :: error
       type(provenance_t) :: provenance
       character(len=:), allocatable :: path
-      integer(lp) :: finish
 
       path = bench%folder//'/oracle/'//subject%case%scene//'.h5'
       if (exists(path)) then
-         call read_reference(path, subject%case%steps, subject%start, reference, finish, error)
+         call read_reference(path, subject%case%steps, subject%start, subject%reference, subject%finish, error)
       else
          call bench%log%show_line(subject%case%scene//': '//to_text(subject%case%boxes)//' boxes, '// &
             to_text(subject%case%steps)//' steps; comparing all pairs')
-         call find_reference(subject, bench%settings%finders(1)%text, reference, finish, error)
+         call find_reference(subject, bench%settings%finders(1)%text, error)
          if (allocated(error)) return
          call collect(bench, provenance)
-         call write_reference(path, reference, subject%start, finish, provenance, error)
+         call write_reference(path, subject%reference, subject%start, subject%finish, provenance, error)
       end if
-      if (.not. allocated(error)) call complete_case(reference, finish, subject)
+      if (.not. allocated(error)) call complete_case(subject)
    end subroutine provide_reference
 
    !> Take one sample, or check the one on disk.
-   subroutine measure_case(bench, subject, reference, error)
+   subroutine measure_case(bench, subject, error)
       type(bench_t), intent(inout) :: bench
       type(subject_t), intent(inout) :: subject
-      type(reference_t), intent(inout) :: reference
       type(error_t), allocatable, intent(inout) :: error
       type(sample_t) :: sample
       type(provenance_t) :: provenance
@@ -132,7 +126,7 @@ contains
          return
       end if
       if (sample%case%threads > 1_ip) call measure_waiting(sample%barrier_cost, sample%region_cost)
-      call take_sample(subject, reference, sample, error)
+      call take_sample(subject, sample, error)
       call bench%lock%check(is_lost, error)
       if (allocated(error)) return
       call write_sample(path, sample, phase_names, count_names, provenance, error)

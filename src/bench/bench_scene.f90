@@ -6,8 +6,7 @@ module polydem_bench_scene
    use polydem_read_settings, only: read_settings
    use polydem_replaced_result, only: holds_result
    use polydem_result_files, only: profile_name, trace_name
-   use polydem_run, only: result_folder
-   use polydem_run, only: attempt_t
+   use polydem_run, only: attempt_t, result_folder
    use polydem_run_simulation, only: run_simulation
    use polydem_settings, only: settings_t
    use polydem_strings, only: quoted

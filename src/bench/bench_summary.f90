@@ -4,8 +4,7 @@ module polydem_bench_summary
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip
    use polydem_log, only: log_t
-   use polydem_replay, only: sample_path
-   use polydem_sample_file, only: case_t
+   use polydem_sample_file, only: case_t, sample_path
    use polydem_settings, only: bench_settings_t
    use polydem_step_clock, only: median
    implicit none

@@ -9,11 +9,10 @@ module polydem_live_sample
    use polydem_finder_meter, only: finder_meter_t
    use polydem_finder_variants, only: new_finder_or_variant
    use polydem_hash, only: hexadecimal
-   use polydem_host, only: load_average, utc_now
    use polydem_kinds, only: dp, ip, lp
    use polydem_neighbours, only: neighbours_t
-   use polydem_reference, only: check_list, check_number, set_by_all_pairs, reference_t
-   use polydem_replay_sample, only: reserve_sample
+   use polydem_reference, only: set_by_all_pairs, reference_t
+   use polydem_replay_sample, only: begin_sample, check_step
    use polydem_sample_file, only: sample_t
    use polydem_simulation, only: simulation_t
    use polydem_step_clock, only: step_clock_t
@@ -49,8 +48,6 @@ contains
       integer(ip) :: s
 
       finish = 0_lp
-      sample%time_utc = utc_now()
-      sample%load = load_average()
       simulation = start
       simulation%timers = timers_t()
       call new_finder_or_variant(finder, sample%case%finder, error)
@@ -58,27 +55,17 @@ contains
       finder%isa = simulation%isa
       call simulation%neighbours%change_finder(finder, simulation%boxes)
       simulation%neighbours%finder%work%thorough = checked
-      call reserve_sample(sample%case%steps, checked, sample)
+      call begin_sample(sample%case%steps, checked, clock, sample)
       allocate (sample%stage(n_stages, sample%case%steps))
       call meter%read_seconds(simulation%neighbours%finder, sample%phase(:, 1))
       if (checked) call meter%read_all(simulation%neighbours%finder, sample%phase(:, 1), sample%count(:, 1))
-      call clock%calibrate()
-      sample%clock_cost = clock%processor_cost
       do s = 1_ip, sample%case%steps
          call time_step(clock, simulation, s, sample, error)
          if (allocated(error)) return
          if (present(by_oracle)) then
             if (by_oracle(s)) call set_by_all_pairs(reference, s, simulation%boxes, oracle, error)
          end if
-         associate (neighbours => simulation%neighbours)
-            if (checked) then
-               call meter%read_all(neighbours%finder, sample%phase(:, s), sample%count(:, s))
-               call check_list(reference, s, sample%case%finder, neighbours%pairs, error, sample%hash(s))
-            else
-               call meter%read_seconds(neighbours%finder, sample%phase(:, s))
-               call check_number(reference, s, sample%case%finder, neighbours%pairs, error)
-            end if
-         end associate
+         call check_step(simulation%neighbours, s, checked, meter, reference, sample, error)
          if (allocated(error)) return
       end do
       finish = state_hash(simulation%bodies)
@@ -102,7 +89,6 @@ contains
       call simulation%timers%end_step()
       sample%stage(:, s) = simulation%timers%total - before
       sample%elapsed(s) = sum(sample%stage(:, s))
-      sample%pairs(s) = simulation%neighbours%pairs%n
    end subroutine time_step
 
    !> Check that the last state is that of the other samples; a hash of 0 is not known yet.

@@ -10,7 +10,7 @@ module polydem_reference
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: reference_t, new_reference, all_pairs_steps, check_number, check_list, total_hash, set_by_all_pairs
+   public :: reference_t, new_reference, all_pairs_steps, check_list, total_hash, set_by_all_pairs
 
    !> Greatest number of boxes for which all pairs are compared at every step
    integer(ip), parameter :: few_boxes = 20000_ip
@@ -82,28 +82,9 @@ contains
       reference%by_oracle(step) = .true.
    end subroutine set_by_all_pairs
 
-   !> Compare the number of pairs with the reference, if that is known.
-   subroutine check_number(reference, step, finder, pairs, error)
-      type(reference_t), intent(in) :: reference
-      !> Number of the step, from 1
-      integer(ip), intent(in) :: step
-      !> Name of the finder
-      character(len=*), intent(in) :: finder
-      !> List of pairs of the finder
-      type(pair_list_t), intent(in) :: pairs
-      !> Allocated if they differ; names the step, counted from 0
-      type(error_t), allocatable, intent(inout) :: error
-
-      if (pairs%contradictions > 0_lp) call raise(error, run_error, 'step '//to_text(step - 1_ip)//': '//finder// &
-         ' reported changes that contradict its list')
-      if (.not. reference%has_number(step) .or. reference%pairs(step) == pairs%n) return
-      call raise(error, run_error, 'step '//to_text(step - 1_ip)//': '//finder//' found '//to_text(pairs%n)// &
-                 ' pairs, expected '//to_text(reference%pairs(step))//' as in '//source_of(reference, step))
-   end subroutine check_number
-
    !> Compare number and hash of the pairs with the reference. Where the reference is not known, the list becomes the
    !> reference.
-   subroutine check_list(reference, step, finder, pairs, error, hash)
+   subroutine check_list(reference, step, finder, pairs, error, hash, only_number)
       type(reference_t), intent(inout) :: reference
       !> Number of the step, from 1
       integer(ip), intent(in) :: step
@@ -115,17 +96,24 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Sum of the hashes of the pairs
       integer(lp), intent(out), optional :: hash
+      !> Whether to compare only the number, which takes no time; no if absent
+      logical, intent(in), optional :: only_number
       integer(lp) :: found
 
+      if (pairs%contradictions > 0_lp) call raise(error, run_error, 'step '//to_text(step - 1_ip)//': '//finder// &
+         ' reported changes that contradict its list')
+      if (reference%has_number(step) .and. reference%pairs(step) /= pairs%n) call raise(error, run_error, 'step '// &
+         to_text(step - 1_ip)//': '//finder//' found '//to_text(pairs%n)//' pairs, expected '// &
+         to_text(reference%pairs(step))//' as in '//source_of(reference, step))
+      if (present(only_number)) then
+         if (only_number) return
+      end if
       found = list_hash(pairs)
       if (present(hash)) hash = found
-      call check_number(reference, step, finder, pairs, error)
+      if (reference%has_hash(step) .and. reference%hash(step) /= found) call raise(error, run_error, 'step '// &
+         to_text(step - 1_ip)//': '//finder//' found as many pairs as '//source_of(reference, step)//' ('// &
+         to_text(pairs%n)//'), but other ones')
       if (allocated(error)) return
-      if (reference%has_hash(step) .and. reference%hash(step) /= found) then
-         call raise(error, run_error, 'step '//to_text(step - 1_ip)//': '//finder//' found as many pairs as '// &
-                    source_of(reference, step)//' ('//to_text(pairs%n)//'), but other ones')
-         return
-      end if
       reference%pairs(step) = pairs%n
       reference%hash(step) = found
       reference%has_number(step) = .true.

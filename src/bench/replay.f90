@@ -6,23 +6,20 @@
 !> fixed ones. The time is processor time for one thread, and elapsed time for more threads.
 module polydem_replay
    use omp_lib, only: omp_set_num_threads
-   use polydem_boxes, only: boxes_t
+   use polydem_bench_subject, only: compare_all_pairs, load_trace, subject_t, take_sample
    use polydem_errors, only: error_t
    use polydem_file_system, only: make_folder
    use polydem_finder_statistics, only: count_names, n_counts, n_phases, n_sums, phase_names
-   use polydem_hash, only: hexadecimal, mix_word
+   use polydem_hash, only: hexadecimal
    use polydem_kinds, only: dp, ip, lp
    use polydem_line_writer, only: line_writer_t
-   use polydem_neighbours, only: neighbours_t
    use polydem_provenance, only: collect_provenance, provenance_t
-   use polydem_reference, only: set_by_all_pairs, new_reference, reference_t, total_hash
-   use polydem_replay_sample, only: replay_sample, first_boxes
-   use polydem_sample_file, only: case_t, sample_t, write_sample
+   use polydem_reference, only: total_hash
+   use polydem_sample_file, only: sample_path, sample_t, write_sample
    use polydem_strings, only: printable, to_text
-   use polydem_trace_reader, only: read_trace, trace_t
    implicit none
    private
-   public :: replay_trace, describe_trace, set_by_trace, sample_path
+   public :: replay_trace
 
 contains
 
@@ -44,83 +41,59 @@ contains
       character(len=*), intent(in), optional :: samples
       !> Whether to check all lists against all_pairs even if the trace holds numbers of pairs; no if absent
       logical, intent(in), optional :: oracle
-      type(trace_t) :: trace
-      type(boxes_t) :: boxes
-      type(reference_t) :: reference
-      type(case_t) :: case
+      type(subject_t) :: subject
       type(sample_t) :: warm_up, best
       logical :: use_oracle
 
       call omp_set_num_threads(int(threads))
-      call read_trace(path, trace, error, steps)
+      call load_trace(path, subject, error, steps)
       if (allocated(error)) return
-      call first_boxes(trace, boxes)
-      call describe_trace(trace, boxes, case)
-      case%scene = stem(path)
-      case%trace = path
-      case%finder = finder
-      case%threads = threads
-      call new_reference(reference, trace%n_steps)
-      call set_by_trace(trace, reference)
-      use_oracle = .not. allocated(trace%n_pairs)
+      subject%case%scene = stem(path)
+      subject%case%trace = path
+      subject%case%finder = finder
+      subject%case%threads = threads
+      use_oracle = .not. allocated(subject%trace%n_pairs)
       if (present(oracle)) use_oracle = use_oracle .or. oracle
-      if (use_oracle) call expect_all_pairs(trace, boxes, reference, error)
+      if (use_oracle) call compare_all_pairs(subject, spread(.true., 1, int(subject%case%steps)), error)
       if (allocated(error)) return
-      case%checked = 'npairs'
-      if (use_oracle) case%checked = 'all_pairs '//to_text(trace%n_steps)//' steps'
-      call replay_all(trace, boxes, repeats, case, reference, warm_up, best, error, samples)
+      subject%case%checked = 'npairs'
+      if (use_oracle) subject%case%checked = 'all_pairs '//to_text(subject%case%steps)//' steps'
+      call replay_all(subject, repeats, warm_up, best, error, samples)
       if (.not. allocated(error)) call print_record(repeats, warm_up, best, error)
    end subroutine replay_trace
 
    !> Run the warm-up and all timed passes.
-   subroutine replay_all(trace, boxes, repeats, case, reference, warm_up, best, error, samples)
-      type(trace_t), intent(in) :: trace
-      type(boxes_t), intent(inout) :: boxes
+   subroutine replay_all(subject, repeats, warm_up, best, error, samples)
+      type(subject_t), intent(inout) :: subject
       integer(ip), intent(in) :: repeats
-      type(case_t), intent(inout) :: case
-      type(reference_t), intent(inout) :: reference
       !> Sample of the warm-up, and the shortest times of each step in the timed passes
       type(sample_t), intent(out) :: warm_up, best
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: samples
+      type(sample_t) :: sample
       integer(ip) :: k
 
-      warm_up%case = case
-      call replay_sample(trace, boxes, .true., reference, warm_up, error)
+      warm_up%case = subject%case
+      call take_sample(subject, warm_up, error)
       if (allocated(error)) return
-      case%pairs_total = sum(int(warm_up%pairs, lp))
-      case%pair_hash = total_hash(warm_up%hash)
-      warm_up%case = case
+      subject%case%pairs_total = sum(int(warm_up%pairs, lp))
+      subject%case%pair_hash = total_hash(warm_up%hash)
+      warm_up%case = subject%case
       call write_sample_file(warm_up, error, samples)
       do k = 1_ip, repeats
-         case%repeat = k
-         call replay_timed(trace, boxes, case, reference, best, error, samples)
+         sample = sample_t(case=subject%case)
+         sample%case%repeat = k
+         call take_sample(subject, sample, error)
          if (allocated(error)) return
+         call write_sample_file(sample, error, samples)
+         if (k > 1_ip) then
+            sample%elapsed = min(sample%elapsed, best%elapsed)
+            sample%processor = min(sample%processor, best%processor)
+            sample%phase = min(sample%phase, best%phase)
+         end if
+         best = sample
       end do
    end subroutine replay_all
-
-   !> Run one timed pass.
-   subroutine replay_timed(trace, boxes, case, reference, best, error, samples)
-      type(trace_t), intent(in) :: trace
-      type(boxes_t), intent(inout) :: boxes
-      type(case_t), intent(in) :: case
-      type(reference_t), intent(inout) :: reference
-      type(sample_t), intent(inout) :: best
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: samples
-      type(sample_t) :: sample
-
-      sample%case = case
-      call replay_sample(trace, boxes, .false., reference, sample, error)
-      if (allocated(error)) return
-      call write_sample_file(sample, error, samples)
-      if (case%repeat > 1_ip) then
-         sample%elapsed = min(sample%elapsed, best%elapsed)
-         sample%processor = min(sample%processor, best%processor)
-         sample%phase = min(sample%phase, best%phase)
-      end if
-      best = sample
-   end subroutine replay_timed
 
    !> Write a sample to the folder, if there is one.
    subroutine write_sample_file(sample, error, folder)
@@ -136,77 +109,6 @@ contains
       call collect_provenance(provenance, sample%case%trace, '', '', 0_ip)
       call write_sample(sample_path(folder, sample%case), sample, phase_names, count_names, provenance, error)
    end subroutine write_sample_file
-
-   !> Path of a sample: FOLDER/SCENE-FINDER-THREADS-REPEAT.h5
-   function sample_path(folder, case) result(path)
-      !> Folder of the samples
-      character(len=*), intent(in) :: folder
-      !> Case of the sample
-      type(case_t), intent(in) :: case
-      character(len=:), allocatable :: path
-
-      path = folder//'/'//case%scene//'-'//case%finder//'-'//to_text(case%threads)//'-'//to_text(case%repeat)//'.h5'
-   end function sample_path
-
-   !> Set the properties of a case that follow from its trace.
-   subroutine describe_trace(trace, boxes, case)
-      !> Recorded boxes
-      type(trace_t), intent(in) :: trace
-      !> Boxes of one step of the trace
-      type(boxes_t), intent(in) :: boxes
-      !> The case
-      type(case_t), intent(inout) :: case
-      integer(ip) :: b, k, s
-
-      case%mode = 'replay'
-      case%boxes = boxes%n
-      case%fixed = count(boxes%fixed, kind=ip)
-      case%bodies = boxes%n_bodies
-      case%steps = trace%n_steps
-      case%dt = trace%dt
-      case%input = trace%input
-      case%identity = 0_lp
-      do s = 1_ip, trace%n_steps
-         do b = 1_ip, boxes%n
-            do k = 1_ip, 4_ip
-               case%identity = mix_word(case%identity, transfer(real(trace%bounds(k, b, s), dp), 0_lp))
-            end do
-         end do
-      end do
-   end subroutine describe_trace
-
-   !> Set the reference lists from the numbers and hashes of pairs in the trace.
-   subroutine set_by_trace(trace, reference)
-      !> Recorded boxes
-      type(trace_t), intent(in) :: trace
-      type(reference_t), intent(inout) :: reference
-
-      reference%other = 'the trace'
-      if (allocated(trace%n_pairs)) then
-         reference%pairs = trace%n_pairs(:trace%n_steps)
-         reference%has_number = .true.
-      end if
-      if (allocated(trace%pair_hash)) then
-         reference%hash = trace%pair_hash(:trace%n_steps)
-         reference%has_hash = .true.
-      end if
-   end subroutine set_by_trace
-
-   !> Set all reference lists from the finder all_pairs.
-   subroutine expect_all_pairs(trace, boxes, reference, error)
-      type(trace_t), intent(in) :: trace
-      type(boxes_t), intent(inout) :: boxes
-      type(reference_t), intent(inout) :: reference
-      type(error_t), allocatable, intent(inout) :: error
-      type(neighbours_t) :: oracle
-      integer(ip) :: s
-
-      do s = 1_ip, trace%n_steps
-         boxes%bounds = trace%bounds(:, :, s)
-         call set_by_all_pairs(reference, s, boxes, oracle, error)
-         if (allocated(error)) return
-      end do
-   end subroutine expect_all_pairs
 
    !> Print the results as key=value lines.
    subroutine print_record(repeats, warm_up, best, error)

@@ -14,13 +14,13 @@ module polydem_replay_sample
    use polydem_host, only: load_average, utc_now
    use polydem_kinds, only: dp, ip, lp, min_parallel_size
    use polydem_neighbours, only: neighbours_t, start_neighbours
-   use polydem_reference, only: check_list, check_number, reference_t
+   use polydem_reference, only: check_list, reference_t
    use polydem_sample_file, only: sample_t
    use polydem_step_clock, only: step_clock_t
    use polydem_trace_reader, only: trace_t
    implicit none
    private
-   public :: replay_sample, reserve_sample, first_boxes
+   public :: replay_sample, begin_sample, check_step, first_boxes
 
 contains
 
@@ -44,30 +44,19 @@ contains
       type(step_clock_t) :: clock
       integer(ip) :: s
 
-      sample%time_utc = utc_now()
-      sample%load = load_average()
       call new_finder_or_variant(finder, sample%case%finder, error)
       if (allocated(error)) return
       call choose_instruction_set(finder%isa, error)
       if (allocated(error)) return
       call start_neighbours(neighbours, finder, boxes)
       neighbours%finder%work%thorough = checked
-      call reserve_sample(trace%n_steps, checked, sample)
-      call clock%calibrate()
-      sample%clock_cost = clock%processor_cost
+      call begin_sample(trace%n_steps, checked, clock, sample)
       do s = 1_ip, trace%n_steps
          call place_boxes(trace, s, boxes)
          call clock%start()
          call neighbours%update(boxes)
          call clock%stop(sample%elapsed(s), sample%processor(s))
-         sample%pairs(s) = neighbours%pairs%n
-         if (checked) then
-            call meter%read_all(neighbours%finder, sample%phase(:, s), sample%count(:, s))
-            call check_list(reference, s, sample%case%finder, neighbours%pairs, error, sample%hash(s))
-         else
-            call meter%read_seconds(neighbours%finder, sample%phase(:, s))
-            call check_number(reference, s, sample%case%finder, neighbours%pairs, error)
-         end if
+         call check_step(neighbours, s, checked, meter, reference, sample, error)
          if (allocated(error)) return
       end do
       if (.not. checked) call check_list(reference, trace%n_steps, sample%case%finder, neighbours%pairs, error)
@@ -89,21 +78,51 @@ contains
       !$omp end parallel do
    end subroutine place_boxes
 
-   !> Allocate the arrays of a sample.
-   subroutine reserve_sample(n_steps, checked, sample)
+   !> Record the finder statistics of a step, and check its list of pairs.
+   subroutine check_step(neighbours, s, checked, meter, reference, sample, error)
+      type(neighbours_t), intent(inout) :: neighbours
+      !> Number of the step, from 1
+      integer(ip), intent(in) :: s
+      !> Whether to compare the hash of the list and to record counts
+      logical, intent(in) :: checked
+      !> Statistics of the finder up to the previous step
+      type(finder_meter_t), intent(inout) :: meter
+      type(reference_t), intent(inout) :: reference
+      type(sample_t), intent(inout) :: sample
+      !> Allocated if the list is wrong
+      type(error_t), allocatable, intent(inout) :: error
+
+      sample%pairs(s) = neighbours%pairs%n
+      if (checked) then
+         call meter%read_all(neighbours%finder, sample%phase(:, s), sample%count(:, s))
+         call check_list(reference, s, sample%case%finder, neighbours%pairs, error, sample%hash(s))
+      else
+         call meter%read_seconds(neighbours%finder, sample%phase(:, s))
+         call check_list(reference, s, sample%case%finder, neighbours%pairs, error, only_number=.true.)
+      end if
+   end subroutine check_step
+
+   !> Record the state of the machine, allocate the arrays of a sample, and calibrate its clock.
+   subroutine begin_sample(n_steps, checked, clock, sample)
       !> Number of steps
       integer(ip), intent(in) :: n_steps
       !> Whether the sample has hashes and finder statistics
       logical, intent(in) :: checked
+      !> Clock of the steps
+      type(step_clock_t), intent(inout) :: clock
       type(sample_t), intent(inout) :: sample
 
+      sample%time_utc = utc_now()
+      sample%load = load_average()
+      call clock%calibrate()
+      sample%clock_cost = clock%processor_cost
       allocate (sample%elapsed(n_steps), sample%processor(n_steps), source=0.0_dp)
       allocate (sample%pairs(n_steps), source=0_ip)
       allocate (sample%phase(n_phases, n_steps), source=0.0_dp)
       if (.not. checked) return
       allocate (sample%hash(n_steps), source=0_lp)
       allocate (sample%count(n_counts, n_steps), source=0_lp)
-   end subroutine reserve_sample
+   end subroutine begin_sample
 
    !> Boxes of the first step of a trace
    subroutine first_boxes(trace, boxes)

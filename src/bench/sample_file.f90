@@ -10,10 +10,11 @@ module polydem_sample_file
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_provenance, only: provenance_t, write_provenance
+   use polydem_strings, only: to_text
    use polydem_timers, only: stage_names
    implicit none
    private
-   public :: case_t, sample_t, write_sample
+   public :: case_t, sample_t, sample_path, write_sample
 
    !> A case of a bench, and the number of the repeat
    type :: case_t
@@ -66,6 +67,17 @@ module polydem_sample_file
    end type sample_t
 
 contains
+
+   !> Path of a sample: FOLDER/SCENE-FINDER-THREADS-REPEAT.h5
+   pure function sample_path(folder, case) result(path)
+      !> Folder of the samples
+      character(len=*), intent(in) :: folder
+      !> Case of the sample
+      type(case_t), intent(in) :: case
+      character(len=:), allocatable :: path
+
+      path = folder//'/'//case%scene//'-'//case%finder//'-'//to_text(case%threads)//'-'//to_text(case%repeat)//'.h5'
+   end function sample_path
 
    !> Write a sample atomically: the file is complete or does not exist.
    subroutine write_sample(path, sample, phase_names, count_names, provenance, error)

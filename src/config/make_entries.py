@@ -145,7 +145,8 @@ def assignment(row):
     values = {"real": "reals", "integer": "integers", "logical": "flag"}.get(row.type)
     values = values or ("text" if row.count == 1 else "texts")
     first = "(1)" if row.count == 1 and values in ("reals", "integers") else ""
-    return (f"      settings%{row.key} = &\n         values(row_of(values, '{row.group}', '{row.key}'))%{values}{first}\n")
+    place = f"row_of(values, '{row.group}', '{row.key}')"
+    return f"      settings%{row.key} = &\n         values({place})%{values}{first}\n"
 
 
 def fill_module(groups, rows):
