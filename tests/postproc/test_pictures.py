@@ -145,6 +145,19 @@ def test_bodies_are_drawn_where_they_are_in_their_colour(run, tmp_path):
     assert found > 20
 
 
+@pytest.mark.parametrize("words", [["--limits", "-0.1,0.05,-.2,1e-1"], ["--limits=-0.1,0.05,-.2,1e-1"]])
+def test_limits_and_frames_may_begin_with_a_minus_sign(run, small_drum, tmp_path, words, monkeypatch):
+    seen = []
+    monkeypatch.setattr("polydem_post.plot.plot_frames",
+                        lambda run, numbers, look, *rest, **more: seen.append((numbers, look)) or plot_frames(
+                            run, numbers, look, *rest, **more))
+    out = str(tmp_path / "p.png")
+    assert main(["plot", str(small_drum), *words, "--frames", "-1,0", "-o", out, "--dpi", "40"]) == 0
+    (numbers, look), = seen
+    assert [number % len(run) for number in numbers] == [len(run) - 1, 0]
+    assert look.limits == (-0.1, 0.05, -0.2, 0.1)
+
+
 def test_frames_by_time_slice_and_file(run, small_drum, tmp_path, capsys):
     out = tmp_path / "f.pdf"
     assert main(["plot", str(small_drum), "--frames", "0:11:5", "--separate", "-o", str(out), "--dpi", "50"]) == 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import re
 import sys
 import warnings
 from dataclasses import fields, replace
@@ -24,6 +25,9 @@ INPUT_ERROR = 2
 #: Exit code of an error that no reader foresaw; after Ctrl-C; if nobody reads the output any more, as in shells
 UNFORESEEN, INTERRUPTED, CLOSED_PIPE = 1, 130, 141
 
+#: A list of numbers that begins with a minus sign, which argparse takes for an option
+NEGATIVE = re.compile(r"-[\d.][\d.eE+,:-]*")
+
 #: Help texts of the verbs
 HELP = Path(__file__).parent / "help"
 
@@ -36,7 +40,7 @@ TRACEBACK = "POLYDEM_TRACEBACK"
 
 def main(arguments: list[str] | None = None) -> int:
     """Do what the command line says; return the exit code."""
-    options = _parser().parse_args(arguments)
+    options = _parser().parse_args(join_numbers(sys.argv[1:] if arguments is None else arguments))
     warnings.showwarning = lambda message, *_: print(f"warning: {printable(str(message))}", file=sys.stderr)
     try:
         code = options.action(options) or 0
@@ -57,6 +61,17 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"error: {options.verb} cannot go on: {type(error).__name__}: {printable(words)[:300]}. A file may be "
               f"damaged; {TRACEBACK}=1 shows where", file=sys.stderr)
         return UNFORESEEN
+
+
+def join_numbers(arguments: list[str]) -> list[str]:
+    """Arguments in which a list of numbers that begins with a minus sign, like -1,1,0,2, belongs to its option."""
+    joined: list[str] = []
+    for word in arguments:
+        if NEGATIVE.fullmatch(word) and joined and joined[-1].startswith("--") and "=" not in joined[-1]:
+            joined[-1] += f"={word}"
+        else:
+            joined.append(word)
+    return joined
 
 
 def _end_quietly() -> int:

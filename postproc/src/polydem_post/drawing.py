@@ -33,8 +33,8 @@ WALL_COLOUR, PLAIN_COLOUR, UNKNOWN_COLOUR = "0.62", "#d9b98a", "0.85"
 FORCE_COLOUR, CONTACT_COLOUR, BOX_COLOUR, CELL_COLOUR = "#a01020", "#d55e00", "#0072b2", "#7a3db8"
 COMPRESSED_COLOUR, PULLED_COLOUR = "#a01020", "#0072b2"
 
-#: Width of the line of the largest force as a share of the median diameter of the free bodies
-WIDEST_FORCE = 0.45
+#: Width of the line of the largest force as a share of the median diameter of the free bodies, and greatest width [pt]
+WIDEST_FORCE, WIDEST_LINE = 0.45, 8.0
 
 #: Share of the forces and stresses that the scale of widths and lengths covers: those of a few impacts are greater
 COVERED_FORCES = 99.0
@@ -224,7 +224,7 @@ def fit_outlines(grains: Bodies, frame: Frame, scale: float) -> None:
 
 def force_width(frame: Frame, scale: float) -> float:
     """Width in points of the line of the greatest force."""
-    return max(WIDEST_FORCE * _typical_size(frame) * scale, 1.0)
+    return float(np.clip(WIDEST_FORCE * _typical_size(frame) * scale, 1.0, WIDEST_LINE))
 
 
 def _typical_size(frame: Frame) -> float:

@@ -91,6 +91,9 @@ class Trajectory:
             chosen.times, chosen.steps = self.times[index], self.steps[index]
             chosen._numbers = self._numbers[index]
         except IndexError as error:
+            if isinstance(index, np.ndarray) and index.dtype.kind == "i":
+                for number in index.ravel():
+                    self._whole_number(int(number))  # says which frame is not there
             raise NoFrame(f"{self.folder}: {error}") from error
         return chosen
 

@@ -1,0 +1,146 @@
+"""Runs on several ranks."""
+
+import os
+import shutil
+import signal
+import subprocess
+import time
+
+from toy import APT_GET, Toy
+
+
+class Ranks(Toy):
+    """Runs of several processes; what mpirun does, the made-up one only notes."""
+
+    def run_ranks(self, *arguments, **environment):
+        """Output, messages and the noted environment of a call that ends with 0."""
+        code, output, messages = self.call(*arguments, **environment)
+        self.assertEqual(code, 0, messages)
+        noted = dict(line.split("=", 1) for line in self.read("environment") if "=" in line)
+        return output.splitlines(), messages.splitlines(), noted
+
+    def test_ranks_are_taken_out_and_the_rest_goes_to_the_program_with_mpi(self):
+        cores = len(os.sched_getaffinity(0))
+        output, messages, noted = self.run_ranks("run", "my drum.nml", "--ranks", str(cores), "--set", "a.b=--ranks")
+        words = ["run", "--threads", "1", "my drum.nml", "--set", "a.b=--ranks"]
+        self.assertEqual(output, [f"{cores} ranks", *(f"<{word}>" for word in words)])
+        self.assertEqual(messages, ["polydem: building program in build/mpi"])
+        self.assertEqual((noted["OMPI_MCA_hwloc_base_binding_policy"], noted["OMP_PROC_BIND"]), ("none", "false"))
+        self.assertNotIn("OMPI_MCA_mpi_yield_when_idle", noted)
+        self.assertEqual(noted.get("OMPI_ALLOW_RUN_AS_ROOT"), "1" if os.getuid() == 0 else None)
+        output, _, _ = self.run_ranks("check", "--ranks=1", "--threads=1", "--", "--ranks")
+        self.assertEqual(output, ["1 ranks", "<check>", "<--threads=1>", "<-->", "<--ranks>"])
+        self.assertEqual(self.call("run", "--ranks", "2", "--version")[1], "<run>\n<--version>\n")
+        self.assertEqual(self.call("info", "--ranks", "2")[1], "<info>\n<--ranks>\n<2>\n")
+
+    def test_cores_are_shared_and_too_many_ranks_take_turns(self):
+        cores = len(os.sched_getaffinity(0))
+        output, messages, _ = self.run_ranks("run", "x", "--ranks", "1")
+        self.assertEqual(output[3], f"<{cores}>")
+        output, messages, noted = self.run_ranks("run", "x", "--ranks", str(2*cores), OMP_NUM_THREADS="3,1")
+        self.assertEqual(output[3], "<3>")
+        self.assertEqual(messages, [f"polydem: warning: {2*cores} ranks of 3 threads take turns on {cores} cores"])
+        self.assertEqual((noted["OMPI_MCA_rmaps_base_oversubscribe"], noted["OMPI_MCA_mpi_yield_when_idle"],
+                          noted["OMP_WAIT_POLICY"]), ("1", "1", "passive"))
+
+    def test_mpirun_that_went_after_the_build_is_installed_or_named(self):
+        self.call("--version", POLYDEM_PRESET="mpi")
+        machine = self.bare_machine()
+        commands = machine["COMMANDS"]
+        for name in ("gfortran", "cmake", "ninja", "git"):
+            os.symlink(shutil.which(name), os.path.join(commands, name))
+        for name in ("mpifort", "h5pfc"):
+            os.symlink(os.path.join(self.folder, "mpi", name), os.path.join(commands, name))
+        os.remove(os.path.join(commands, "apt-get"))
+        code, output, messages = self.call("run", "x", "--ranks", "1", **machine)
+        self.assertEqual((code, output), (1, ""))
+        self.assertEqual(messages, "polydem: missing Debian packages: openmpi-bin\n"
+                         "polydem: no apt-get here: please install them (or what they contain) yourself\n")
+        real = os.path.join(self.folder, "mpi", "mpirun")
+        self.write_command("apt-get", APT_GET + f'ln -sf "{real}" "$COMMANDS/mpirun"\n')
+        code, output, messages = self.call("run", "x", "--ranks", "1", "--threads", "1", **machine)
+        self.assertEqual((code, output.splitlines()[:2]), (0, ["1 ranks", "<run>"]), messages)
+        self.assertIn("missing Debian packages: openmpi-bin", messages)
+
+    def test_a_reader_who_stops_does_not_end_mpirun(self):
+        self.call("--version", POLYDEM_PRESET="mpi")
+        # As mpirun does, this one ends badly if it cannot write.
+        self.write("mpi/mpirun", "#!/bin/bash\nfor k in {1..20000}; do echo line $k || exit 9; done\n"
+                   'echo warning >&2 || exit 9\necho done >"$NOTES/done"\nexit 75\n')
+        for streams in ("", "2>&1"):
+            line = f"{{ '{self.launcher}' run x --ranks 1 --threads 1 {streams}; echo $? >'{self.folder}/code'; }}"
+            shown = subprocess.run(["bash", "-c", f"{line} | head -n 1"], capture_output=True, text=True,
+                                   env=self.environment, timeout=60, check=False)
+            self.assertEqual((shown.stdout, self.read("code"), self.read("done")), ("line 1\n", ["75"], ["done"]))
+            os.remove(os.path.join(self.folder, "done"))
+        code, output, messages = self.call("run", "x", "--ranks", "1", "--threads", "1")
+        self.assertEqual((code, len(output.splitlines()), messages), (75, 20000, "warning\n"))
+
+    def test_a_small_stack_is_named(self):
+        self.call("--version", POLYDEM_PRESET="mpi")
+        for size, expected in ((64, 2), (1023, 2), (1024, 0), (8192, 0)):
+            line = f"ulimit -s {size}; exec '{self.launcher}' run x --ranks 1 --threads 1"
+            shown = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False,
+                                   env=self.environment)
+            self.assertEqual(shown.returncode, expected, shown.stderr)
+            self.assertEqual(f"the stack may have {size} KiB only" in shown.stderr, expected == 2)
+
+    def test_a_binding_of_the_user_stays(self):
+        _, _, noted = self.run_ranks("run", "x", "--ranks", "1", "--threads", "1", OMP_PROC_BIND="close",
+                                     OMPI_MCA_rmaps_base_mapping_policy="slot:PE=1")
+        self.assertEqual(noted["OMP_PROC_BIND"], "close")
+        self.assertNotIn("OMPI_MCA_hwloc_base_binding_policy", noted)
+
+    def test_a_number_of_ranks_is_a_number(self):
+        for words in (["0"], ["-1"], ["two"], ["1000000"], ["2.5"], [""], []):
+            code, _, messages = self.call("run", "x.nml", "--ranks", *words)
+            self.assertEqual(code, 2)
+            self.assertIn("an integer from 1 to 999999 was expected", messages)
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
+
+    def test_under_mpirun_every_rank_becomes_the_program_with_mpi(self):
+        code, _, messages = self.call("run", "x.nml", OMPI_COMM_WORLD_SIZE="2")
+        self.assertEqual(code, 1)
+        self.assertIn("not built; call POLYDEM_PRESET=mpi ./polydem --version once outside mpirun", messages)
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
+        self.assertEqual(self.call("--version", POLYDEM_PRESET="mpi")[:2], (0, "<--version>\n"))
+        self.assertEqual(self.call("run", "x.nml", OMPI_COMM_WORLD_SIZE="2"), (0, "<run>\n<x.nml>\n", ""))
+        code, _, messages = self.call("run", "x.nml", "--ranks", "2", OMPI_COMM_WORLD_SIZE="2")
+        self.assertEqual(code, 2)
+        self.assertIn("--ranks does not go with mpirun", messages)
+
+    def begin(self, waits):
+        """A call whose mpirun waits for signals."""
+        for name in ("started", "heard"):
+            if os.path.exists(os.path.join(self.folder, name)):
+                os.remove(os.path.join(self.folder, name))
+        run = subprocess.Popen([self.launcher, "run", "x.nml", "--ranks", "1"], stdout=subprocess.PIPE,
+                               stderr=subprocess.PIPE, text=True, env={**self.environment, "MPIRUN_WAITS": waits})
+        self.addCleanup(run.communicate)
+        self.addCleanup(run.kill)
+        self.await_file("started")
+        return run
+
+    def await_file(self, name):
+        end = time.monotonic() + 60
+        while not os.path.exists(os.path.join(self.folder, name)):
+            self.assertLess(time.monotonic(), end)
+            time.sleep(0.02)
+
+    def test_the_first_signal_becomes_usr1_and_the_end_is_awaited(self):
+        self.call("--version", POLYDEM_PRESET="mpi")
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1):
+            run = self.begin("short")
+            run.send_signal(number)
+            self.assertEqual((run.wait(60), run.stderr.read()), (75, ""))
+            self.assertEqual(self.read("heard"), ["USR1"])
+
+    def test_the_second_signal_ends_all(self):
+        self.call("--version", POLYDEM_PRESET="mpi")
+        run = self.begin("long")
+        run.send_signal(signal.SIGTERM)
+        self.await_file("heard")
+        run.send_signal(signal.SIGINT)
+        self.assertEqual(run.wait(60), 128 + signal.SIGINT)
+        self.assertEqual(self.read("heard"), ["USR1", "TERM"])
+        self.assertIn("--continue goes on from the last checkpoint", run.stderr.read())
