@@ -78,7 +78,7 @@ def test_a_frame_that_is_not_there_is_an_index_error(run):
     for number in (len(run), -len(run) - 1):
         with pytest.raises(IndexError, match=f"there is no frame {number}, only {len(run)} frames"):
             run[number]
-    with pytest.raises(NoFrame, match="out of bounds"):
+    with pytest.raises(NoFrame, match=f"there is no frame 99, only {len(run)} frames"):
         run[[0, 99]]
 
 
