@@ -10,9 +10,10 @@
 !>
 !> * Sweeps of projected Gauss-Seidel find the contacts that stick. They start from the forces of the last step and
 !>   solve easy networks in a few sweeps, but a column of n blocks takes about n^2 sweeps.
-!> * When sweeps gain little, conjugate gradients, preconditioned with the mobilities, search among the contacts off
-!>   their bounds. The search starts again with the remaining contacts whenever some reach their bounds. It ends at the
-!>   minimum among them, or when releasing the contacts at their bounds gains much more. Then sweeps continue.
+!> * When sweeps gain little, conjugate gradients, preconditioned by an incomplete factor of the mobilities
+!>   (`polydem_friction_factor`), search among the contacts off their bounds. The search starts again with the
+!>   remaining contacts whenever some reach their bounds. It ends at the minimum among them, or when releasing the
+!>   contacts at their bounds gains much more. Then sweeps continue.
 !>
 !> This is the scheme of J.J. More & G. Toraldo, SIAM J. Optim. 1 (1991) 93, with sweeps in place of projected
 !> gradients, and with the release test of Z. Dostal, SIAM J. Optim. 7 (1997) 871. Every step lowers the function and
@@ -23,7 +24,8 @@
 module polydem_box_qp
    use omp_lib, only: omp_get_max_threads
    use polydem_contact_incidence, only: incidence_t
-   use polydem_friction_network, only: avoidable_slip, friction_network_t, measure_slip, push_bodies, &
+   use polydem_friction_factor, only: apply_factor, build_factor, friction_factor_t
+   use polydem_friction_network, only: friction_network_t, measure_slip, push_bodies, &
       slip_of_contacts, sweep_contacts, within, worth_sharing
    use polydem_kinds, only: ip, lp, wp
    implicit none
@@ -34,8 +36,8 @@ module polydem_box_qp
    type :: search_state_t
       !> Squared steepest descent of the contacts off their bounds, and of the contacts that would leave their bounds
       real(wp) :: descent = 0.0_wp, bound_descent = 0.0_wp
-      !> Curvature along the search direction, and step length to the first bound
-      real(wp) :: curvature = 0.0_wp, max_length = 0.0_wp
+      !> Decrease of the function along the search direction at its start, curvature, and step length to the first bound
+      real(wp) :: slope = 0.0_wp, curvature = 0.0_wp, max_length = 0.0_wp
       !> Greatest slip of the contacts off their bounds [m/s]
       real(wp) :: slip = 0.0_wp
    end type search_state_t
@@ -56,11 +58,15 @@ module polydem_box_qp
       real(wp) :: residual = 0.0_wp
       !> Numbers of sweeps, of searches by conjugate gradients and of their iterations so far
       integer(lp) :: n_sweeps = 0_lp, n_searches = 0_lp, n_iterations = 0_lp
-      !> Slip velocities, steepest descent, search direction and its slip, (contact)
-      real(wp), allocatable, private :: slip(:), steepest(:), direction(:), response(:)
+      !> Slip velocities, their negative off the bounds, and the changes of force that the factor yields, (contact)
+      real(wp), allocatable, private :: slip(:), residue(:), change(:)
+      !> Search direction and its slip, (contact)
+      real(wp), allocatable, private :: direction(:), response(:)
+      !> Approximate factor of the mobilities off the bounds
+      type(friction_factor_t), private :: factor
       !> Velocities of bodies due to the search direction, (3, slot)
       real(wp), allocatable, private :: push(:, :)
-      !> Sums, maxima or minima over each block of contacts, (5, block)
+      !> Sums, maxima or minima over each block of contacts, (6, block)
       real(wp), allocatable, private :: block_values(:, :)
       !> Slip below which a search ends [m/s]
       real(wp), private :: slip_tolerance = 0.0_wp
@@ -75,6 +81,8 @@ module polydem_box_qp
    real(wp), parameter :: sweep_ratio = 0.3_wp
    !> Contacts stay at their bounds until their squared descent is this multiple of that of the other contacts
    real(wp), parameter :: release_ratio = 10.0_wp
+   !> Rounds with the same factor; contacts that leave their bounds meanwhile are treated as if uncoupled
+   integer, parameter :: rounds_of_factor = 4
    !> Smaller shares of slip are rounding errors
    real(wp), parameter :: least_tolerance = 16.0_wp*epsilon(1.0_wp)
 
@@ -113,6 +121,7 @@ contains
             before = residual
          end do
          self%slip_tolerance = 0.5_wp*allowed
+         if (mod(round, rounds_of_factor) == 1) call build_factor(network, incidence, self%force, self%factor)
          call search(self, network, incidence)
          before = residual
       end do
@@ -175,26 +184,31 @@ contains
       type(friction_network_t), intent(in) :: network
       type(incidence_t), intent(in) :: incidence
       type(search_state_t) :: now
-      real(wp) :: share, descent
+      real(wp) :: slope
       logical :: is_blocked
-      integer(ip) :: iteration, b
+      integer(ip) :: iteration, b, low, high
 
       !$omp do schedule(static)
       do b = 1_ip, blocks_of(network)
-         call start_block(self, network, b)
+         low = (b - 1_ip)*block + 1_ip
+         high = min(b*block, network%n)
+         ! Until the end of a search, steps update the slip velocities, but not the velocities of bodies.
+         call slip_of_contacts(network, self%velocity, low, high, self%slip)
+         self%direction(low:high) = 0.0_wp
+         self%response(low:high) = 0.0_wp
       end do
       !$omp end do
       call take_step(self, network, 0.0_wp, now)
-      share = 0.0_wp
+      slope = huge(slope)
       is_blocked = .false.
       do iteration = 0_ip, network%n
          if (now%slip <= self%slip_tolerance .or. now%bound_descent > release_ratio*now%descent) exit
-         call set_direction(self, network, incidence, share, now)
-         is_blocked = .not. now%descent < now%curvature*now%max_length
+         call precondition(self, network, now)
+         call set_direction(self, network, incidence, now%slope/slope, now)
+         is_blocked = .not. now%slope < now%curvature*now%max_length
          if (is_blocked) exit
-         descent = now%descent
-         call take_step(self, network, now%descent/now%curvature, now)
-         share = now%descent/descent
+         slope = now%slope
+         call take_step(self, network, now%slope/now%curvature, now)
       end do
       !$omp single
       self%n_iterations = self%n_iterations + int(iteration, lp) + merge(1_lp, 0_lp, is_blocked)
@@ -203,18 +217,35 @@ contains
       !$omp end single
    end subroutine iterate
 
-   !> Take a step along the search direction, and find the steepest descent there.
+   !> Take a step along the search direction, and find the descent there.
    subroutine take_step(self, network, length, measures)
       type(box_qp_t), intent(inout) :: self
       type(friction_network_t), intent(in) :: network
       !> Step length in multiples of the search direction
       real(wp), intent(in) :: length
       type(search_state_t), intent(inout) :: measures
-      integer(ip) :: b
+      real(wp) :: descent, bound_descent, greatest, avoidable, is_off, is_bound
+      integer(ip) :: b, c
 
       !$omp do schedule(static)
       do b = 1_ip, blocks_of(network)
-         call step_in_block(self, network, length, b)
+         descent = 0.0_wp
+         bound_descent = 0.0_wp
+         greatest = 0.0_wp
+         do c = (b - 1_ip)*block + 1_ip, min(b*block, network%n)
+            associate (force => self%force(c), limit => network%limit(c), slip => self%slip(c))
+               force = max(-limit, min(limit, force + length*self%direction(c)))
+               slip = slip + length*self%response(c)
+               is_off = merge(1.0_wp, 0.0_wp, abs(force) < limit)
+               is_bound = merge(1.0_wp - is_off, 0.0_wp, limit > 0.0_wp)
+               self%residue(c) = -is_off*slip
+               avoidable = is_bound*max(0.0_wp, sign(1.0_wp, force)*slip)
+               descent = descent + is_off*slip**2*network%inverse_mobility(c)
+               bound_descent = bound_descent + avoidable**2*network%inverse_mobility(c)
+               greatest = max(greatest, is_off*abs(slip))
+            end associate
+         end do
+         self%block_values(1:3, b) = [descent, bound_descent, greatest]
       end do
       !$omp end do
       measures%descent = 0.0_wp
@@ -227,6 +258,31 @@ contains
       end do
    end subroutine take_step
 
+   !> Find the changes of force that the factor yields for the slip off the bounds.
+   subroutine precondition(self, network, measures)
+      type(box_qp_t), intent(inout) :: self
+      type(friction_network_t), intent(in) :: network
+      type(search_state_t), intent(inout) :: measures
+      real(wp) :: total
+      integer(ip) :: b, c
+
+      call apply_factor(self%factor, self%residue, self%change)
+      !$omp do schedule(static)
+      do b = 1_ip, blocks_of(network)
+         total = 0.0_wp
+         do c = (b - 1_ip)*block + 1_ip, min(b*block, network%n)
+            self%change(c) = merge(self%change(c), 0.0_wp, abs(self%force(c)) < network%limit(c))
+            total = total + self%residue(c)*self%change(c)
+         end do
+         self%block_values(6, b) = total
+      end do
+      !$omp end do
+      measures%slope = 0.0_wp
+      do b = 1_ip, blocks_of(network)
+         measures%slope = measures%slope + self%block_values(6, b)
+      end do
+   end subroutine precondition
+
    !> Set the next search direction, conjugate to the last one, and find the curvature and the nearest bound along it.
    subroutine set_direction(self, network, incidence, share, measures)
       type(box_qp_t), intent(inout) :: self
@@ -235,17 +291,31 @@ contains
       !> Share of the last direction in the next one
       real(wp), intent(in) :: share
       type(search_state_t), intent(inout) :: measures
-      integer(ip) :: b, c
+      real(wp) :: curvature, max_length, length
+      integer(ip) :: b, c, low, high
 
       !$omp do schedule(static)
       do c = 1_ip, network%n
-         self%direction(c) = self%steepest(c) + share*self%direction(c)
+         self%direction(c) = self%change(c) + share*self%direction(c)
       end do
       !$omp end do
       call push_bodies(network, incidence, self%direction, self%push)
       !$omp do schedule(static)
       do b = 1_ip, blocks_of(network)
-         call survey_block(self, network, b)
+         low = (b - 1_ip)*block + 1_ip
+         high = min(b*block, network%n)
+         call slip_of_contacts(network, self%push, low, high, self%response)
+         curvature = 0.0_wp
+         max_length = huge(max_length)
+         do c = low, high
+            associate (direction => self%direction(c))
+               curvature = curvature + direction*self%response(c)
+               length = (network%limit(c) - sign(self%force(c), self%force(c)*direction)) &
+                  /merge(abs(direction), 1.0_wp, abs(direction) > 0.0_wp)
+               max_length = min(max_length, merge(length, huge(length), abs(direction) > 0.0_wp))
+            end associate
+         end do
+         self%block_values(4:5, b) = [curvature, max_length]
       end do
       !$omp end do
       measures%curvature = 0.0_wp
@@ -255,72 +325,6 @@ contains
          measures%max_length = min(measures%max_length, self%block_values(5, b))
       end do
    end subroutine set_direction
-
-   !> Start a search in one block. Until its end, steps update the slip velocities, but not the velocities of bodies.
-   subroutine start_block(self, network, b)
-      type(box_qp_t), intent(inout) :: self
-      type(friction_network_t), intent(in) :: network
-      integer(ip), intent(in) :: b
-      integer(ip) :: low, high
-
-      low = (b - 1_ip)*block + 1_ip
-      high = min(b*block, network%n)
-      call slip_of_contacts(network, self%velocity, low, high, self%slip)
-      self%direction(low:high) = 0.0_wp
-      self%response(low:high) = 0.0_wp
-   end subroutine start_block
-
-   !> Take the step of `take_step` in one block.
-   subroutine step_in_block(self, network, length, b)
-      type(box_qp_t), intent(inout) :: self
-      type(friction_network_t), intent(in) :: network
-      real(wp), intent(in) :: length
-      integer(ip), intent(in) :: b
-      real(wp) :: descent, bound_descent, greatest, avoidable
-      integer(ip) :: c
-
-      descent = 0.0_wp
-      bound_descent = 0.0_wp
-      greatest = 0.0_wp
-      do c = (b - 1_ip)*block + 1_ip, min(b*block, network%n)
-         self%force(c) = within(network%limit(c), self%force(c) + length*self%direction(c))
-         self%slip(c) = self%slip(c) + length*self%response(c)
-         if (abs(self%force(c)) < network%limit(c)) then
-            self%steepest(c) = -self%slip(c)/network%mobility(c)
-            descent = descent - self%steepest(c)*self%slip(c)
-            greatest = max(greatest, abs(self%slip(c)))
-         else
-            self%steepest(c) = 0.0_wp
-            avoidable = avoidable_slip(self%force(c), network%limit(c), self%slip(c))
-            bound_descent = bound_descent + avoidable**2/network%mobility(c)
-         end if
-      end do
-      self%block_values(1:3, b) = [descent, bound_descent, greatest]
-   end subroutine step_in_block
-
-   !> Find curvature and nearest bound of `set_direction` in one block.
-   subroutine survey_block(self, network, b)
-      type(box_qp_t), intent(inout) :: self
-      type(friction_network_t), intent(in) :: network
-      integer(ip), intent(in) :: b
-      real(wp) :: curvature, max_length
-      integer(ip) :: c, low, high
-
-      low = (b - 1_ip)*block + 1_ip
-      high = min(b*block, network%n)
-      call slip_of_contacts(network, self%push, low, high, self%response)
-      curvature = 0.0_wp
-      max_length = huge(max_length)
-      do c = low, high
-         associate (direction => self%direction(c))
-            curvature = curvature + direction*self%response(c)
-            if (abs(direction) > 0.0_wp) &
-               max_length = min(max_length, &
-                                (network%limit(c) - sign(self%force(c), self%force(c)*direction))/abs(direction))
-         end associate
-      end do
-      self%block_values(4:5, b) = [curvature, max_length]
-   end subroutine survey_block
 
    !> Take a step where the minimum along the search direction lies beyond a bound. The full step, with all forces
    !> limited to their bounds, finds many bounds at once. The step to the first bound is taken if it lowers the function
@@ -333,19 +337,19 @@ contains
       integer(ip) :: b
 
       associate (n => network%n, max_length => self%last%max_length, curvature => self%last%curvature, &
-                 descent => self%last%descent)
-         at_first_bound = max_length*(0.5_wp*max_length*curvature - descent)
+                 slope => self%last%slope)
+         at_first_bound = max_length*(0.5_wp*max_length*curvature - slope)
          length = max_length
-         if (curvature > 0.0_wp) length = max(max_length, descent/curvature)
-         self%steepest(1:n) = within(network%limit(1:n), self%force(1:n) + length*self%direction(1:n)) - self%force(1:n)
-         call push_bodies(network, incidence, self%steepest, self%push)
+         if (curvature > 0.0_wp) length = max(max_length, slope/curvature)
+         self%change(1:n) = within(network%limit(1:n), self%force(1:n) + length*self%direction(1:n)) - self%force(1:n)
+         call push_bodies(network, incidence, self%change, self%push)
          call slip_of_contacts(network, self%push, 1_ip, n, self%response)
          beyond = 0.0_wp
          do b = 1_ip, n
-            beyond = beyond + self%steepest(b)*(self%slip(b) + 0.5_wp*self%response(b))
+            beyond = beyond + self%change(b)*(self%slip(b) + 0.5_wp*self%response(b))
          end do
          if (beyond < at_first_bound) then
-            self%force(1:n) = within(network%limit(1:n), self%force(1:n) + self%steepest(1:n))
+            self%force(1:n) = within(network%limit(1:n), self%force(1:n) + self%change(1:n))
          else
             self%force(1:n) = within(network%limit(1:n), self%force(1:n) + max_length*self%direction(1:n))
          end if
@@ -370,11 +374,11 @@ contains
       end if
       if (allocated(self%force)) then
          if (size(self%force) >= n_contacts) return
-         deallocate (self%force, self%slip, self%steepest, self%direction, self%response, self%block_values)
+         deallocate (self%force, self%slip, self%residue, self%change, self%direction, self%response, self%block_values)
       end if
       m = n_contacts + n_contacts/4_ip + 16_ip
-      allocate (self%force(m), self%slip(m), self%steepest(m), self%direction(m), self%response(m))
-      allocate (self%block_values(5, m/block + 1_ip))
+      allocate (self%force(m), self%slip(m), self%residue(m), self%change(m), self%direction(m), self%response(m))
+      allocate (self%block_values(6, m/block + 1_ip))
    end subroutine reserve_box_qp
 
    !> Number of blocks of contacts

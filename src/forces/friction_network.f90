@@ -19,7 +19,7 @@ module polydem_friction_network
    implicit none
    private
    public :: friction_network_t, build_network, free_velocities, push_bodies, sweep_contacts, slip_of_contacts
-   public :: avoidable_slip, measure_slip, within, worth_sharing
+   public :: measure_slip, within, worth_sharing
 
    !> Number of colours; contacts without a colour follow in one more group
    integer, parameter :: n_colours = 62
@@ -40,6 +40,8 @@ module polydem_friction_network
       real(wp), allocatable :: row(:, :)
       !> Change of the slip velocity by a unit force within a step, h W_cc, (contact) [m/s per N/m]
       real(wp), allocatable :: mobility(:)
+      !> Its reciprocal, (contact) [N/m per m/s]
+      real(wp), allocatable :: inverse_mobility(:)
       !> Greatest force mu F_n, (contact) [N/m]; 0 if the contact is under tension
       real(wp), allocatable :: limit(:)
       !> Slip velocity due to rounding errors of the forces on the bodies, (contact) [m/s]
@@ -109,8 +111,8 @@ contains
          network%mobility(c) = (network%inverse(1, i) + network%inverse(1, j)) &
             + (lever(1)**2*network%inverse(2, i) + lever(2)**2*network%inverse(2, j))
       end associate
-      network%limit(c) = coefficient*max(0.0_wp, contacts%normal_force(c))
-      if (is_degenerate(contacts, c)) network%limit(c) = 0.0_wp
+      network%inverse_mobility(c) = 1.0_wp/network%mobility(c)
+      network%limit(c) = merge(0.0_wp, coefficient*max(0.0_wp, contacts%normal_force(c)), is_degenerate(contacts, c))
       network%noise(c) = rounding*network%mobility(c)*abs(contacts%normal_force(c))
    end subroutine fill_contact
 
@@ -355,7 +357,7 @@ contains
       real(wp) :: before, change, g(2)
 
       before = force(c)
-      force(c) = within(network%limit(c), before - slip_of(network, c, velocity)/network%mobility(c))
+      force(c) = within(network%limit(c), before - slip_of(network, c, velocity)*network%inverse_mobility(c))
       change = force(c) - before
       if (.not. abs(change) > 0.0_wp) return
       associate (i => network%body(1, c), j => network%body(2, c))
@@ -387,12 +389,12 @@ contains
       if (.not. allocated(network%taken)) allocate (network%taken(n_bodies), network%inverse(2, n_bodies))
       if (allocated(network%body)) then
          if (size(network%body, 2) >= n_contacts) return
-         deallocate (network%body, network%row, network%mobility, network%limit, network%noise, network%order, &
-                     network%colour)
+         deallocate (network%body, network%row, network%mobility, network%inverse_mobility, network%limit, &
+                     network%noise, network%order, network%colour)
       end if
       m = n_contacts + n_contacts/4_ip + 16_ip
-      allocate (network%body(2, m), network%row(4, m), network%mobility(m), network%limit(m), network%noise(m), &
-                network%order(m), network%colour(m))
+      allocate (network%body(2, m), network%row(4, m), network%mobility(m), network%inverse_mobility(m), &
+                network%limit(m), network%noise(m), network%order(m), network%colour(m))
    end subroutine reserve
 
 end module polydem_friction_network

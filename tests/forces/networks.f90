@@ -10,7 +10,7 @@ module networks
    use polydem_random, only: random_t
    implicit none
    private
-   public :: scene_t, column_of, random_scene, dense_of, kkt_error
+   public :: scene_t, column_of, random_scene, lattice_of, dense_of, kkt_error
 
    !> Bodies with forces and velocities, and their contacts
    type :: scene_t
@@ -38,16 +38,11 @@ contains
       type(random_t), intent(inout) :: random
       !> The scene
       type(scene_t), intent(out) :: scene
-      integer(ip) :: c, i, j, s
+      integer(ip) :: c, i, j
       real(wp) :: angle, missing
 
-      call place_squares(n_bodies, n_fixed, scene)
-      do s = 1_ip, n_bodies
-         scene%bodies%velocity(:, s) = 1.0e-2_wp*[random%normal(), random%normal()]
-         scene%bodies%angular_velocity(s) = random%normal()
-         scene%bodies%force(:, s) = [random%normal(), random%normal()]
-         scene%bodies%torque(s) = 1.0e-2_wp*random%normal()
-      end do
+      call place_squares(n_bodies, n_fixed, n_bodies*(n_bodies - 1_ip)/2_ip, scene)
+      call push_at_random(random, scene)
       missing = real(n_contacts, wp)
       c = 0_ip
       do i = 1_ip, n_bodies
@@ -86,7 +81,7 @@ contains
       type(scene_t), intent(out) :: scene
       integer(ip) :: c
 
-      call place_squares(n_blocks + 1_ip, 1_ip, scene)
+      call place_squares(n_blocks + 1_ip, 1_ip, n_blocks, scene)
       do c = 1_ip, n_blocks
          scene%bodies%force(1, c + 1_ip) = 0.01_wp
          scene%bodies%torque(c + 1_ip) = 1.0e-4_wp*cos(real(c, wp))
@@ -95,6 +90,37 @@ contains
       end do
       call finish(scene, n_blocks)
    end subroutine column_of
+
+   !> A square lattice of squares with random forces and velocities. Each touches the next ones to the right, above and
+   !> above on the right; the first row is fixed.
+   subroutine lattice_of(n_columns, n_rows, random, scene)
+      !> Numbers of columns and rows
+      integer(ip), intent(in) :: n_columns, n_rows
+      !> Random numbers
+      type(random_t), intent(inout) :: random
+      !> The scene
+      type(scene_t), intent(out) :: scene
+      integer(ip) :: c, k, s, column, row, steps(2, 3)
+      real(wp) :: angle
+
+      call place_squares(n_columns*n_rows, n_columns, 3_ip*n_columns*n_rows, scene)
+      call push_at_random(random, scene)
+      steps = reshape([1_ip, 0_ip, 0_ip, 1_ip, 1_ip, 1_ip], [2, 3])
+      c = 0_ip
+      do s = 1_ip, n_columns*n_rows
+         column = mod(s - 1_ip, n_columns) + 1_ip
+         row = (s - 1_ip)/n_columns + 1_ip
+         do k = merge(2_ip, 1_ip, row == 1_ip), 3_ip
+            if (column + steps(1, k) > n_columns .or. row + steps(2, k) > n_rows) cycle
+            c = c + 1_ip
+            angle = 6.28_wp*random%uniform()
+            call set_contact(scene, c, s, s + steps(1, k) + n_columns*steps(2, k), [cos(angle), sin(angle)], &
+                             abs(random%normal()), 1.0e-2_wp*[random%normal(), random%normal()], &
+                             1.0e-2_wp*[random%normal(), random%normal()])
+         end do
+      end do
+      call finish(scene, c)
+   end subroutine lattice_of
 
    !> Matrix h W and slip velocities without friction, from their definition, the motion of contact points.
    subroutine dense_of(scene, dt, matrix, free_slip)
@@ -199,8 +225,22 @@ contains
       end associate
    end function kkt_error
 
-   subroutine place_squares(n_bodies, n_fixed, scene)
-      integer(ip), intent(in) :: n_bodies, n_fixed
+   !> Give all bodies random forces and velocities.
+   subroutine push_at_random(random, scene)
+      type(random_t), intent(inout) :: random
+      type(scene_t), intent(inout) :: scene
+      integer(ip) :: s
+
+      do s = 1_ip, scene%bodies%n
+         scene%bodies%velocity(:, s) = 1.0e-2_wp*[random%normal(), random%normal()]
+         scene%bodies%angular_velocity(s) = random%normal()
+         scene%bodies%force(:, s) = [random%normal(), random%normal()]
+         scene%bodies%torque(s) = 1.0e-2_wp*random%normal()
+      end do
+   end subroutine push_at_random
+
+   subroutine place_squares(n_bodies, n_fixed, n_contacts, scene)
+      integer(ip), intent(in) :: n_bodies, n_fixed, n_contacts
       type(scene_t), intent(inout) :: scene
       real(wp), parameter :: square(2, 4) = 0.005_wp*reshape( &
          [-1.0_wp, -1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp], [2, 4])
@@ -212,7 +252,7 @@ contains
          call list%append(square, density=1000.0_wp*real(1_ip + mod(s, 7_ip), wp), fixed=s <= n_fixed)
       end do
       call new_bodies(list, scene%bodies, error)
-      call reserve_contacts(scene%contacts, n_bodies*(n_bodies - 1_ip)/2_ip)
+      call reserve_contacts(scene%contacts, n_contacts)
    end subroutine place_squares
 
    subroutine set_contact(scene, c, i, j, direction, normal_force, arm_first, arm_second)
