@@ -161,7 +161,7 @@ class Build(Toy):
         self.assertEqual(judge("single", "quadruple")[:3], (1, ["single", "quadruple"], {"quadruple"}))
         code, output, messages = self.call("build", "single", "triple")
         self.assertEqual((code, output), (2, ""))
-        self.assertIn("there is no preset triple, but release", messages)
+        self.assertIn("there is no preset triple; choose from release", messages)
 
     def test_simultaneous_first_calls_build_once(self):
         calls = [subprocess.Popen([self.launcher, "info"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,

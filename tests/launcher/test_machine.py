@@ -36,7 +36,7 @@ class Stranger(Toy):
         code, output, messages = self.call_as_stranger("run", "x.nml")
         self.assertEqual((code, output), (1, ""))
         self.assertEqual(len(messages.splitlines()), 1, messages)
-        for part in (f"{self.folder} may not be written to", "copy the whole folder", "have its owner call"):
+        for part in (f"{self.folder} is not writable", "copy the whole folder", "have its owner call"):
             self.assertIn(part, messages)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
         # What is built already runs.
@@ -52,7 +52,7 @@ class Stranger(Toy):
             code, output, messages = self.call_as_stranger("info", mask=mask)
             self.assertEqual((code, output), (1, ""))
             self.assertEqual(len(messages.splitlines()), 1, messages)
-            self.assertIn(f"the umask {mask:04o} takes from you the rights", messages)
+            self.assertIn(f"the umask {mask:04o} removes your permissions", messages)
             self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
 
 

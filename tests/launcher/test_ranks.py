@@ -39,7 +39,8 @@ class Ranks(Toy):
         self.assertEqual(output[3], f"<{cores}>")
         output, messages, noted = self.run_ranks("run", "x", "--ranks", str(2*cores), OMP_NUM_THREADS="3,1")
         self.assertEqual(output[3], "<3>")
-        self.assertEqual(messages, [f"polydem: warning: {2*cores} ranks of 3 threads take turns on {cores} cores"])
+        self.assertEqual(messages, [f"polydem: warning: {2*cores} ranks of 3 threads take turns on {cores} cores, "
+                                    "which is slow"])
         self.assertEqual((noted["OMPI_MCA_rmaps_base_oversubscribe"], noted["OMPI_MCA_mpi_yield_when_idle"],
                           noted["OMP_WAIT_POLICY"]), ("1", "1", "passive"))
 
@@ -55,7 +56,7 @@ class Ranks(Toy):
         code, output, messages = self.call("run", "x", "--ranks", "1", **machine)
         self.assertEqual((code, output), (1, ""))
         self.assertEqual(messages, "polydem: missing Debian packages: openmpi-bin\n"
-                         "polydem: no apt-get here: please install them (or what they contain) yourself\n")
+                         "polydem: there is no apt-get: install these packages, or their programs, in another way\n")
         real = os.path.join(self.folder, "mpi", "mpirun")
         self.write_command("apt-get", APT_GET + f'ln -sf "{real}" "$COMMANDS/mpirun"\n')
         code, output, messages = self.call("run", "x", "--ranks", "1", "--threads", "1", **machine)
@@ -107,7 +108,7 @@ class Ranks(Toy):
         self.assertEqual(self.call("run", "x.nml", OMPI_COMM_WORLD_SIZE="2"), (0, "<run>\n<x.nml>\n", ""))
         code, _, messages = self.call("run", "x.nml", "--ranks", "2", OMPI_COMM_WORLD_SIZE="2")
         self.assertEqual(code, 2)
-        self.assertIn("--ranks does not go with mpirun", messages)
+        self.assertIn("--ranks cannot be combined with mpirun", messages)
 
     def begin(self, waits):
         """A call whose mpirun waits for signals."""
@@ -143,4 +144,4 @@ class Ranks(Toy):
         run.send_signal(signal.SIGINT)
         self.assertEqual(run.wait(60), 128 + signal.SIGINT)
         self.assertEqual(self.read("heard"), ["USR1", "TERM"])
-        self.assertIn("--continue goes on from the last checkpoint", run.stderr.read())
+        self.assertIn("--continue continues from the last checkpoint", run.stderr.read())

@@ -70,7 +70,7 @@ def test_an_interrupted_verb_ends_with_a_sentence(monkeypatch, capsys):
         (["plot", "RESULT", "--output", "no/such/folder/x.png"], "x.png: cannot be written (there is no folder no/"),
         (["plot", "RESULT", "--output", "x.unknown"], "x.unknown: cannot be written: the name must end with .pdf"),
         (["plot", "RESULT", "--output", "x.gif"], "./polydem movie makes films"),
-        (["plot", "RESULT", "--frames", "1,b"], "'b' is neither a number of a frame nor like FIRST:END:STEP"),
+        (["plot", "RESULT", "--frames", "1,b"], "'b' is neither the number of a frame nor a range FIRST:END:STEP"),
         (["plot", "RESULT", "--frames", "9:12"], "9:12 contains none of the 7 frames"),
         (["plot", "RESULT", "--times", "99"], "no frame near 99 s; the frames are from 0.5 to 3.5 s"),
         (["plot", "RESULT", "--colour", "sped"], "there is no colour sped; there are speed, velocity_x"),

@@ -87,7 +87,7 @@ def test_the_verb_writes_what_the_function_writes(run, exported, tmp_path, capsy
     if form != "vtkhdf":  # HDF5 files may differ in unused bytes
         assert output.read_bytes() == (exported / output.name).read_bytes()
     assert main(command) == 2
-    assert "is there already; --force replaces it" in capsys.readouterr().err
+    assert "exists already; --force replaces it" in capsys.readouterr().err
     assert main([*command, "--frames", "0,-1", "--no-contacts", "--force"]) == 0
 
 

@@ -140,21 +140,21 @@ def test_a_concave_outline_is_named_or_decomposed(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name, content, message", [
-    ("a.wkt", "POINT (1 2)", "a.wkt:1: is no POLYGON or MULTIPOLYGON of WKT: 'POINT (1 2)'"),
+    ("a.wkt", "POINT (1 2)", "a.wkt:1: is not a POLYGON or MULTIPOLYGON of WKT: 'POINT (1 2)'"),
     ("a.wkt", "POLYGON ((0 0, 1 0, x 1))", "a.wkt:1: a vertex is not a pair of numbers"),
-    ("a.wkt", "\nPOLYGON ((0 0, 1 0, 1 1)", "a.wkt:2: the brackets of the geometry do not fit"),
+    ("a.wkt", "\nPOLYGON ((0 0, 1 0, 1 1)", "a.wkt:2: the brackets of the geometry do not match"),
     ("a.wkt", "POLYGON ((0 0, 9 0, 9 9, 0 9), (1 1, 2 1, 2 2))", "a.wkt:1: the polygon has 1 hole"),
     ("a.wkt", "", "a.wkt: holds no polygons"),
-    ("a.json", "{", "a.json:1: is no JSON"),
+    ("a.json", "{", "a.json:1: is not JSON"),
     ("a.json", '{"type": "Point", "coordinates": [0, 0]}', "a.json: is a Point, not a Polygon or MultiPolygon"),
     ("a.json", '{"type": "Polygon", "coordinates": [[[0], [1, 0], [1, 1]]]}', "the vertices are not pairs of numbers"),
-    ("a.txt", "0 0\n1 0\n1 one\n", "a.txt:3: is no vertex like '0.1 0.2' nor the word fixed: '1 one'"),
+    ("a.txt", "0 0\n1 0\n1 one\n", "a.txt:3: is neither a vertex such as '0.1 0.2' nor the word fixed: '1 one'"),
     ("a.txt", "0 0\n1 0\n", "a.txt:1: the outline cannot be a body: it has 2 different vertices"),
     ("a.txt", "\n0 0\n1 0\n2 0\n", "a.txt:2: the outline cannot be a body: it has 2 different vertices"),
     ("a.txt", "0 0\n1 1\n1 0\n0 1\n", "a.txt:1: the outline cannot be a body"),
     ("a.txt", text([STAR[k] for k in (0, 4, 8, 2, 6)]), "its edges 1 and 3 cross"),
     ("a.txt", "0 0\n1 0\n1 1e999\n", "a coordinate is not a finite number"),
-    ("a.dxf", "0 0", "what the file holds does not follow from its name; give --from wkt, geojson, text"),
+    ("a.dxf", "0 0", "its name does not say the format; give --from wkt, geojson, text"),
 ])
 def test_errors_name_the_place(tmp_path, capsys, name, content, message):
     (tmp_path / name).write_text(content)
@@ -168,7 +168,7 @@ def test_nothing_is_replaced_unless_asked(tmp_path, capsys):
     (tmp_path / "out.h5").write_text("mine")
     command = ["import", str(tmp_path / "one.txt"), "-o", str(tmp_path / "out.h5")]
     assert main(command) == 2
-    assert "is there already; --force replaces it" in capsys.readouterr().err
+    assert "exists already; --force replaces it" in capsys.readouterr().err
     assert (tmp_path / "out.h5").read_text() == "mine"
     assert main([*command, "--force"]) == 0
     assert main([*command, "--force", "--fixed", "2"]) == 2

@@ -75,7 +75,7 @@ def test_a_gif_has_the_chosen_frames_and_their_time(small_drum, tmp_path):
     (["-o", "m.avi"], "m.avi: cannot be written: the name must end with .mp4 or .gif"),
     (["-o", "m.png"], "./polydem plot draws pictures"),
     (["--fps", "0"], "--fps takes a number from 0.1"),
-    (["--every", "0"], "--every and --processes take numbers from 1 on"),
+    (["--every", "0"], "--every and --processes take integers of at least 1"),
     (["--size", "100,2"], "--size takes a width and a height from 160"),
     (["--frames", "50:"], "50: contains none of the 1"),
     (["-o", "no/such/folder/m.gif"], "no/such/folder/m.gif: cannot be written (there is no folder no/such/folder)"),

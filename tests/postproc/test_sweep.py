@@ -216,7 +216,7 @@ def test_all_errors_of_a_table_and_of_lists_are_told_at_once(tmp_path, capsys):
 
 def test_does_not_mix_with_what_is_there(sweep_of):
     sweep_of(("a", "finish", ""))
-    with pytest.raises(ResultError, match="is there already"):
+    with pytest.raises(ResultError, match="exists already"):
         sweep_of(("b", "finish", ""))
 
 
@@ -322,7 +322,7 @@ def test_a_signal_ends_the_runs_early_and_the_next_call_goes_on(sweep_of, number
     said = process.communicate(timeout=60)[0]
     assert process.returncode == 75, said
     assert states(sweep) == {"a": "stopped", "b": "stopped", "c": "not run"}
-    assert said.splitlines()[-1] == "the same command goes on with what is left"
+    assert said.splitlines()[-1] == "the same command continues the remaining runs"
     assert "Traceback" not in said
     process = start(program, sweep, "--cores", "2")
     process.communicate(timeout=60)
@@ -362,7 +362,7 @@ def test_a_run_that_outlives_its_sweep_is_running_is_not_started_twice_and_count
     process = start(program, sweep, "--cores", "1")
     said = process.communicate(timeout=60)[0]
     assert process.returncode == 75, said
-    assert "a: left out, since another call has it, or has left it running" in said
+    assert "a: left out: another call runs it, or has left it running" in said
     assert states(sweep)["b"] == "finished"
     assert read_outcome(sweep, sweep.runs[0]).facts == {"state": "running", "attempts": 0}
     await_end(sweep.runs[0])

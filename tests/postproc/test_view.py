@@ -57,7 +57,7 @@ def test_positions_and_angles_are_rounded_as_stated(view, run):
     (["-o", "v.pdf"], "v.pdf: cannot be written: the name must end with .html"),
     (["--colour", "sped"], "there is no colour sped"),
     (["--colour", "load", "--no-contacts"], "there is no colour load in this page"),
-    (["--every", "0"], "--every takes a number from 1 on"),
+    (["--every", "0"], "--every takes an integer of at least 1"),
     (["-o", "no/such/folder/v.html"], "no/such/folder/v.html: cannot be written (there is no folder no/such/folder)"),
 ])
 def test_wrong_options_are_explained(small_drum, capsys, arguments, message):

@@ -61,7 +61,7 @@ def test_an_error_among_foreign_lines_is_ours(noisy, tmp_path):
 
 @pytest.mark.parametrize("line", (
     "polydem: scene.nml: no such file",
-    "polydem: warning: 3 ranks of 2 threads take turns on 2 cores",
+    "polydem: warning: 3 ranks of 2 threads take turns on 2 cores, which is slow",
     "At line 12 of file x.f90 (unit = 11, file = 'scene.nml')",
     "Fortran runtime error: End of file",
     "Error termination. Backtrace:",

@@ -65,7 +65,7 @@ def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[st
     columns = {name: _column(name, rows) for name in PROPERTIES if any(name in row for row in rows)}
     columns.setdefault("fixed", np.zeros(len(rows), dtype=np.int8))
     if path.exists() and not overwrite:
-        raise ResultError(f"{path}: is there already; --force replaces it")
+        raise ResultError(f"{path}: exists already; --force replaces it")
     _write(path, polygons, columns)
     return len(polygons)
 

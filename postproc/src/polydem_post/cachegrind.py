@@ -74,7 +74,7 @@ def finder_functions(sources: Path) -> re.Pattern:
     """What the compiled names of the functions of finders look like; `sources` is the folder of their files."""
     modules = sorted(path.stem for path in sources.glob("*.f90"))
     if not modules:
-        raise ResultError(f"{sources}: the sources of the finders are not there; they tell which functions to count")
+        raise ResultError(f"{sources}: the sources of the finders are not there; they name the functions to count")
     names = "|".join(map(re.escape, [*modules, *HELPERS]))
     return re.compile(rf"__polydem_(?:{names})(?:_inlined|_called|_o2)?_MOD_(?!(?:{REPORTS})(?:\W|$))")
 

@@ -160,7 +160,7 @@ def fit_law(counts: list[Count], shape: str, partition: str, margin: float) -> L
     """The law of one packing, partition and margin, from counts of at least SURROUNDED ranks."""
     mine = [count for count in counts if (count.shape, count.partition, count.margin) == (shape, partition, margin)]
     if not counts:
-        raise ResultError("the time on many ranks is reckoned from runs of several ranks, of which there are none")
+        raise ResultError("the time on many ranks is computed from runs of several ranks, but none is given")
     if not mine:
         known = sorted({f"{count.shape} {count.partition} {count.margin:g}" for count in counts})
         raise ResultError(f"nothing was counted for {shape} {partition} {margin:g}; there are {', '.join(known)}")
@@ -245,9 +245,9 @@ def _assumptions(law: Law, machine: Machine) -> str:
         f"redistribution every {machine.interval:g} steps that costs {machine.redistribution:g} steps of the own "
         "bodies, "
         f"{REDISTRIBUTION_CALLS} calls of all ranks, {REDISTRIBUTION_ROUNDS} rounds of messages to neighbours and "
-        f"{machine.redistributed_bytes:g} bytes per halo body, and tells all ranks all rectangles. Sums and calls take "
-        "a latency for each doubling of the ranks.",
+        f"{machine.redistributed_bytes:g} bytes per halo body, and sends all rectangles to all ranks. Sums and calls "
+        "take a latency for each doubling of the ranks.",
         "Messages follow one another and hide behind no work; every rank has neighbours on all sides, which is too "
         f"much below {SURROUNDED} ranks. Left out: contention in the network, that ranks of one machine share memory "
-        "and caches, output, and that space is divided anew.",
+        "and caches, output, and new decompositions of space.",
     ))

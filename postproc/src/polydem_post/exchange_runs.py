@@ -131,7 +131,8 @@ def read_run(folder) -> RunCount:
     try:
         margin = float(entries.get("margin", MARGIN))
     except ValueError as error:
-        raise ResultError(f"{folder}: its margin of decomposition is no number: {entries['margin'][:40]!r}") from error
+        text = entries["margin"][:40]
+        raise ResultError(f"{folder}: its margin of decomposition is not a number: {text!r}") from error
     partition = str(entries.get("partition", entries.get("cut", "bisection")))
     run = RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], partition=partition, margin=margin,
                    pairs=counters["pairs"], state_hash=result.state_hash,
@@ -178,7 +179,7 @@ def runs_tables(runs: list[RunCount]) -> list[Table]:
     heading = ("partition", "margin", "bodies", "ranks", "steps", "redistributions", "partitions", "migrations",
                "messages",
                "bytes", "bytes per halo body", "at the start", "messages", "bytes")
-    redistributing = Table("redistributing", "Exact counts of handing bodies out anew", heading, texts=1)
+    redistributing = Table("redistributing", "Exact counts of redistributions", heading, texts=1)
     order = sorted(runs, key=lambda run: (run.bodies, run.margin, run.partition, run.ranks))
     alone = {(run.bodies, run.steps): run.pairs for run in order if run.ranks == 1}
     for run in order:

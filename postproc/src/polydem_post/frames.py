@@ -283,7 +283,7 @@ def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:
 def _index_of(frame: Frame, identifiers: npt.NDArray[np.integer[Any]]) -> IntArray:
     index = np.minimum(np.searchsorted(frame.id, identifiers), max(len(frame) - 1, 0)).astype(np.int64)
     if len(identifiers) and (len(frame) == 0 or np.any(frame.id[index] != identifiers)):
-        raise ResultError(f"bodies that are not there are named at step {frame.step}")
+        raise ResultError(f"unknown bodies are named at step {frame.step}")
     return index
 
 
@@ -298,7 +298,7 @@ def sound_frame(path: Path, frame: Frame) -> Frame:
     masses = {"mass": frame.mass, "inertia": frame.inertia}
     insist(path, "bodies", masses, dict.fromkeys(masses, (n,)), finite=False)
     if np.isnan(frame.mass).any() or np.isnan(frame.inertia).any() or np.any(np.diff(frame.id) <= 0):
-        raise ResultError(f"{path}: bodies holds masses that are no numbers, or identifiers that do not ascend")
+        raise ResultError(f"{path}: bodies holds masses that are not numbers, or identifiers that do not ascend")
     start = frame.vertex_start
     if start[0] != 0 or start[-1] != vertices or np.any(np.diff(start) < 3):
         raise ResultError(f"{path}: bodies/vertex_start does not fit the vertices")

@@ -36,7 +36,7 @@ def read_outlines(path: Path, form: str = "") -> list[Outline]:
     """All outlines of a file; the format follows from the end of its name unless it is given."""
     form = form or FORMAT_OF_SUFFIX.get(path.suffix.lower(), "")
     if form not in READERS:
-        raise ResultError(f"{path}: what the file holds does not follow from its name; give --from "
+        raise ResultError(f"{path}: its name does not say the format; give --from "
                           f"{', '.join(READERS)}")
     try:
         text = path.read_text(encoding="utf-8-sig")
@@ -89,7 +89,7 @@ def _read_wkt(text: str, name: str) -> Iterator[Outline]:
             continue
         kind = re.match(r"(MULTIPOLYGON|POLYGON)\s*(?:Z|M|ZM)?\s*(\(.*\))$", words, re.IGNORECASE)
         if not kind:
-            raise ResultError(f"{place}: is no POLYGON or MULTIPOLYGON of WKT: {words[:60]!r}")
+            raise ResultError(f"{place}: is not a POLYGON or MULTIPOLYGON of WKT: {words[:60]!r}")
         inner = kind[2][1:-1].strip()
         groups = _groups(inner, place) if kind[1].upper() == "MULTIPOLYGON" else [inner]
         for group in groups:
@@ -100,7 +100,7 @@ def _read_wkt(text: str, name: str) -> Iterator[Outline]:
                     raise ResultError(f"{place}: a vertex is not a pair of numbers: ({ring[:60]})")
                 rings.append([[float(each) for each in point] for point in points])
             if re.sub(r"[\s,]", "", _RING.sub("", group)) or not rings:
-                raise ResultError(f"{place}: the brackets of the geometry do not fit")
+                raise ResultError(f"{place}: the brackets of the geometry do not match")
             yield _from_rings(rings, place)
 
 
@@ -116,7 +116,7 @@ def _groups(text: str, place: str) -> list[str]:
             if depth == 0:
                 found.append(text[begin:k])
     if depth != 0:
-        raise ResultError(f"{place}: the brackets of the geometry do not fit")
+        raise ResultError(f"{place}: the brackets of the geometry do not match")
     return found
 
 
@@ -125,12 +125,12 @@ def _read_geojson(text: str, name: str) -> Iterator[Outline]:
     try:
         content = json.loads(text)
     except json.JSONDecodeError as error:
-        raise ResultError(f"{name}:{error.lineno}: is no JSON ({error.msg})") from error
+        raise ResultError(f"{name}:{error.lineno}: is not JSON ({error.msg})") from error
     features = content.get("features", []) if isinstance(content, dict) and "features" in content else [content]
     for number, feature in enumerate(features, 1):
         place = f"{name}: feature {number}" if len(features) > 1 else name
         if not isinstance(feature, dict):
-            raise ResultError(f"{place}: is no object of GeoJSON")
+            raise ResultError(f"{place}: is not an object of GeoJSON")
         is_feature = feature.get("type") == "Feature"
         properties = (feature.get("properties") or {}) if is_feature else {}
         chosen = {key: properties[key] for key in PROPERTIES if properties.get(key) is not None}
@@ -170,7 +170,8 @@ def _read_text(text: str, name: str) -> Iterator[Outline]:
             elif len(words) == 2 and all(re.fullmatch(_NUMBER, word) for word in words):
                 points.append([float(word) for word in words])
             else:
-                raise ResultError(f"{name}:{number}: is no vertex like '0.1 0.2' nor the word fixed: {line[:60]!r}")
+                raise ResultError(f"{name}:{number}: is neither a vertex such as '0.1 0.2' nor the word fixed: "
+                                  f"{line[:60]!r}")
 
 
 #: Format -> its reader

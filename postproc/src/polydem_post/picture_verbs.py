@@ -118,7 +118,8 @@ def chosen_frames(text: str, count: int) -> list[int]:
             else:
                 numbers.append(int(word))
         except (ValueError, TypeError) as error:
-            raise ResultError(f"--frames: '{word}' is neither a number of a frame nor like FIRST:END:STEP") from error
+            raise ResultError(f"--frames: '{word}' is neither the number of a frame nor a range "
+                              "FIRST:END:STEP") from error
     if not numbers:
         raise ResultError(f"--frames: {text} contains none of the {count} frames")
     return numbers
@@ -152,7 +153,7 @@ def _plot(options: argparse.Namespace) -> None:
     if options.size is not None and not all(30.0 <= side <= 2000.0 for side in options.size):
         raise ResultError("--size takes a width and a height from 30 to 2000 mm")
     if not 10.0 <= options.dpi <= 2400.0 or (options.columns is not None and options.columns < 1):
-        raise ResultError("--dpi takes a number from 10 to 2400, --columns one from 1 on")
+        raise ResultError("--dpi takes a number from 10 to 2400, --columns an integer of at least 1")
     if options.output:
         check_form(options.output)
     trajectory = open_frames(options.result)
@@ -185,7 +186,7 @@ def _movie(options: argparse.Namespace) -> None:
     if not 0.1 <= options.fps <= 240.0:
         raise ResultError("--fps takes a number from 0.1 to 240")
     if options.every < 1 or (options.processes is not None and options.processes < 1):
-        raise ResultError("--every and --processes take numbers from 1 on")
+        raise ResultError("--every and --processes take integers of at least 1")
     trajectory = open_frames(options.result)
     numbers = chosen_frames(options.frames or ":", len(trajectory))[:: options.every]
     path = options.output or trajectory.folder / "movie.mp4"
@@ -200,7 +201,7 @@ def _view(options: argparse.Namespace) -> None:
     if options.colour != "none" and options.colour not in QUANTITIES:
         raise ResultError(f"there is no colour {options.colour}; there are {', '.join(QUANTITIES)} and none")
     if options.every < 1:
-        raise ResultError("--every takes a number from 1 on")
+        raise ResultError("--every takes an integer of at least 1")
     if options.output and options.output.suffix.lower() not in (".html", ".htm"):
         raise ResultError(f"{options.output}: cannot be written: the name must end with .html")
     trajectory = open_frames(options.result)

@@ -120,8 +120,8 @@ def _lay_out(figure: Figure) -> None:
             figure.draw_without_rendering()
         except UserWarning as warning:
             raise ResultError(f"the figure of {figure.get_figwidth() * INCH:.0f} mm x "
-                              f"{figure.get_figheight() * INCH:.0f} mm is too small for what it shall show; give a "
-                              "greater --size") from warning
+                              f"{figure.get_figheight() * INCH:.0f} mm is too small for its contents; give a "
+                              "larger --size") from warning
 
 
 def _fit_ticks(axis) -> None:

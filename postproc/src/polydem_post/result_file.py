@@ -109,7 +109,7 @@ def insist_on_own_data(path: Path, file: h5py.File) -> None:
         for name in group:
             seen += 1
             if depth >= DEEPEST or seen > MOST_OBJECTS:
-                raise ResultError(f"{path}: has groups in groups as no file of polydem has")
+                raise ResultError(f"{path}: has more nested or more numerous groups than any file of polydem")
             link = group.get(name, getlink=True)
             if not isinstance(link, h5py.HardLink):
                 raise ResultError(f"{path}: {place}/{name} is a link, perhaps to another file; polydem writes none")
@@ -133,7 +133,7 @@ def insist(path: Path, group: str, arrays: dict, shapes: dict, finite: bool = Tr
         if values.shape != shapes[name]:
             raise ResultError(f"{path}: {group}/{name} has the shape {values.shape}, not {shapes[name]}")
         if finite and values.dtype.kind == "f" and not np.isfinite(values).all():
-            raise ResultError(f"{path}: {group}/{name} holds what is no number (NaN or infinite)")
+            raise ResultError(f"{path}: {group}/{name} holds values that are not finite numbers")
 
 
 def plain(entry: h5py.Dataset):

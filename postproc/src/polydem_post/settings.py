@@ -87,7 +87,7 @@ def _parse(text: str) -> dict[str, dict[str, Value]]:
         elif words not in ("", "/"):
             key, equals, value = words.partition("=")
             if not (group and equals):
-                raise ResultError(f"line {number} of the stored input is no entry of a namelist: {words[:80]!r}")
+                raise ResultError(f"line {number} of the stored input is not an entry of a namelist: {words[:80]!r}")
             new_group, _, new_key = present(ENTRIES, f"{group}.{key.strip()}").partition(".")
             values = [_value(word) for word in _WORD.findall(value)]
             found.setdefault(new_group, {})[new_key] = values[0] if len(values) == 1 else values

@@ -257,7 +257,7 @@ def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = Non
     columns: list = []
     rows: list = []
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-        problems.append(f"{folder}: is there already; choose another folder")
+        problems.append(f"{folder}: exists already; choose another folder")
     if not base.is_file():
         problems.append(f"{base}: there is no such file")
     try:

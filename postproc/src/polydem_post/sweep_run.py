@@ -200,7 +200,7 @@ class Runner:
         elif run.result.exists():
             command.append("--force")
         if not slot.start(run, known, command, self.threads):
-            self.say(f"{run.name}: left out, since another call has it, or has left it running")
+            self.say(f"{run.name}: left out: another call runs it, or has left it running")
 
     def _verdict(self, runs: list[Run]) -> int:
         states = [state_of(run) for run in runs]
@@ -209,7 +209,7 @@ class Runner:
             return 0
         if all(state in (FINISHED, FAILING) for state in states):
             return FAILED
-        self.say("the same command goes on with what is left")
+        self.say("the same command continues the remaining runs")
         return STOPPED
 
     @contextmanager
@@ -218,7 +218,8 @@ class Runner:
 
         def stop(number, _):
             if not self.stopping:
-                self.say(f"{signal.Signals(number).name}: waiting for the runs to end; once more ends them at once")
+                self.say(f"{signal.Signals(number).name}: waiting for the runs to end; a second signal ends them "
+                         "at once")
             self.stopping = True
             for slot in self.slots:
                 slot.signal(signal.SIGUSR1 if self.continues else signal.SIGTERM)

@@ -43,7 +43,7 @@ def export_result(run: Trajectory, form: str, output: str | os.PathLike[str], *,
     targets = job.targets(form)
     standing = [target for target in targets.values() if target.exists()]
     if standing and not overwrite:
-        raise ResultError(f"{standing[0]}: is there already; --force replaces it")
+        raise ResultError(f"{standing[0]}: exists already; --force replaces it")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         return job.write(form, targets)
