@@ -113,7 +113,7 @@ def test_settings_are_those_of_the_namelist(run):
 def test_settings_print_as_a_namelist_that_reads_the_same(run):
     assert run.settings == Settings(repr(run.settings))
     assert Settings("&a\n   b = 'it''s, so'\n   c = 1, 2\n/")["a"]["b"] == "it's, so"
-    with pytest.raises(ResultError, match="line 2 of the stored input is no entry"):
+    with pytest.raises(ResultError, match="line 2 of the stored input is not an entry"):
         Settings("&a\n   what\n/")
 
 
