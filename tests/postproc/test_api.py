@@ -246,5 +246,5 @@ def test_frames_made_of_polygons_take_contacts():
     assert_array_equal(frame.coordination, [1, 1])
     with pytest.raises(ResultError, match="made without contacts"):
         _ = Frame.from_polygons([square]).contacts
-    with pytest.raises(ResultError, match="bodies that are not there"):
+    with pytest.raises(ResultError, match="unknown bodies are named"):
         frame.with_contacts([1], [3], [[0, 0]], [[0, 0]])
