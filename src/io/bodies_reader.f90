@@ -15,31 +15,25 @@
 !> Any other data set at the top level is an error, because it may be a misspelt name. Groups are ignored.
 module polydem_bodies_reader
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
+   use polydem_bodies_index, only: bodies_index_t, entry_text, read_index
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_file, only: hdf5_file_t
-   use polydem_hdf5_members, only: count_names, is_dataset, read_name
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_sort, only: sort_keys
-   use polydem_strings, only: to_text, quoted, suggestion
+   use polydem_strings, only: to_text
    implicit none
    private
    public :: read_bodies_file
 
-   !> Data sets that a bodies file may have
-   character(len=*), parameter :: known_names(9) = [character(len=16) :: 'vertex', 'vertex_start', 'fixed', &
-      'velocity', 'angular_velocity', 'density', 'mass', 'inertia', 'id']
+   !> Number of bodies that are read together
+   integer(ip), parameter :: block_size = 16384_ip
 
-   !> Contents of the file, with defaults filled in and checked
-   type :: table_t
-      !> Number of bodies
-      integer(ip) :: n = 0_ip
-      !> Vertices of all bodies in world coordinates, (2, vertex) [m]
+   !> A block of consecutive bodies, with defaults filled in and checked
+   type :: block_t
+      !> First and last body
+      integer(ip) :: first, last
+      !> Vertices in world coordinates, (2, vertex) [m]
       real(dp), allocatable :: vertex(:, :)
-      !> First vertex of each body, counted from 0, and the number of vertices, (n + 1)
-      integer(ip), allocatable :: vertex_start(:)
-      !> 1: fixed body, 0: free body, (body)
-      integer(ip), allocatable :: fixed(:)
       !> Velocities, (2, body) [m/s]
       real(dp), allocatable :: velocity(:, :)
       !> Angular velocities, (body) [rad/s]
@@ -50,13 +44,12 @@ module polydem_bodies_reader
       real(dp), allocatable :: mass(:)
       !> Moments of inertia, (body) [kg m]
       real(dp), allocatable :: inertia(:)
-      !> Identifiers, (body)
-      integer(ip), allocatable :: id(:)
-   end type table_t
+   end type block_t
 
 contains
 
-   !> Append the bodies of a file to a list.
+   !> Append the bodies of a file to a list. They are read block by block: beyond what the list keeps, this takes memory
+   !> for a block and some 40 bytes per body of the file.
    subroutine read_bodies_file(path, density, list, error)
       !> Path of the file
       character(len=*), intent(in) :: path
@@ -66,7 +59,7 @@ contains
       !> Names the file, the data set and the body
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
-      type(table_t) :: table
+      type(bodies_index_t) :: table
       integer :: bytes
       logical :: is_present
 
@@ -79,247 +72,119 @@ contains
       end if
       call file%open(path, error)
       if (allocated(error)) return
-      call check_names(file, path, error)
-      if (.not. allocated(error)) call read_table(file, path, real(density, dp), table, error)
+      call read_index(file, path, table, error)
+      if (.not. allocated(error)) call list_blocks(file, path, real(density, dp), table, list, error)
       call file%close(error)
-      if (allocated(error)) return
-      call list_table(table, list)
    end subroutine read_bodies_file
 
-   !> Reject data sets with unknown names, and groups or links with the name of a data set.
-   subroutine check_names(file, path, error)
+   !> Append the bodies of the file to a list, block by block.
+   subroutine list_blocks(file, path, density, table, list, error)
       type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: name
-      integer :: k, n
-
-      call count_names(file%location_of('/'), n, error)
-      do k = 1, n
-         call read_name(file%location_of('/'), k, name, error)
-         if (allocated(error)) return
-         if (any(known_names == name) .eqv. is_dataset(file%location_of(name))) cycle
-         if (any(known_names == name)) then
-            call raise(error, input_error, path//': '//name//' must be a data set, but is a group or a link')
-         else
-            call raise(error, input_error, path//': unknown data set '//quoted(name)//suggestion(name, known_names))
-         end if
-         return
-      end do
-   end subroutine check_names
-
-   !> Append the bodies of the table to a list.
-   subroutine list_table(table, list)
-      type(table_t), intent(in) :: table
-      type(body_list_t), intent(inout) :: list
-      integer(ip) :: k, first, last
-
-      do k = 1_ip, table%n
-         first = table%vertex_start(k) + 1_ip
-         last = table%vertex_start(k + 1_ip)
-         call list%append(real(table%vertex(:, first:last), wp), &
-                          fixed=table%fixed(k) == 1_ip, &
-                          density=real(table%density(k), wp), &
-                          velocity=real(table%velocity(:, k), wp), &
-                          angular_velocity=real(table%angular_velocity(k), wp), &
-                          id=table%id(k), &
-                          mass=real(table%mass(k), wp), &
-                          inertia=real(table%inertia(k), wp))
-      end do
-   end subroutine list_table
-
-   !> Read and check all data sets; absent ones get their defaults.
-   subroutine read_table(file, path, density, table, error)
-      type(hdf5_file_t), intent(inout) :: file
       character(len=*), intent(in) :: path
       real(dp), intent(in) :: density
-      type(table_t), intent(out) :: table
+      type(bodies_index_t), intent(in) :: table
+      type(body_list_t), intent(inout) :: list
       type(error_t), allocatable, intent(inout) :: error
+      type(block_t) :: block
+      integer(lp) :: rows(2)
+      integer(ip) :: k, v, w
 
-      call read_polygons(file, path, table, error)
-      call read_flags(file, path, table, error)
-      call read_identifiers(file, path, table, error)
-      call read_velocity(file, path, table, error)
-      call read_column(file, path, 'angular_velocity', table, 0.0_dp, -huge(1.0_dp), &
-                       table%angular_velocity, error)
-      call read_column(file, path, 'density', table, density, tiny(1.0_dp), table%density, error)
-      call read_column(file, path, 'mass', table, 0.0_dp, 0.0_dp, table%mass, error)
-      call read_column(file, path, 'inertia', table, 0.0_dp, 0.0_dp, table%inertia, error)
-   end subroutine read_table
-
-   !> Read the vertices and their distribution over bodies. Check that every body has at least one.
-   subroutine read_polygons(file, path, table, error)
-      type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path
-      type(table_t), intent(inout) :: table
-      type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: k, n_vertices
-
-      call file%read('vertex_start', table%vertex_start, error)
-      if (allocated(error)) return
-      table%n = size(table%vertex_start, kind=ip) - 1_ip
-      if (table%n < 1_ip) then
-         call raise(error, input_error, path//': vertex_start must have n + 1 entries for n bodies, with n '// &
-                    'at least 1')
-         return
-      end if
-      call file%read('vertex', table%vertex, error)
-      if (allocated(error)) return
-      n_vertices = size(table%vertex, 2, kind=ip)
-      if (size(table%vertex, 1) /= 2) then
-         call raise(error, input_error, path//': vertex must have two columns, x and y (shape in h5py: (n, 2))')
-      else if (table%vertex_start(1) /= 0_ip) then
-         call raise(error, input_error, path//': '//entry_text('vertex_start', 1_ip)//' is ' &
-                    //to_text(table%vertex_start(1))//', but must be 0')
-      else if (table%vertex_start(table%n + 1_ip) /= n_vertices) then
-         call raise(error, input_error, path//': '//entry_text('vertex_start', table%n + 1_ip)//' is ' &
-                    //to_text(table%vertex_start(table%n + 1_ip))//', but vertex has ' &
-                    //to_text(n_vertices)//' rows')
-      end if
-      do k = 1_ip, table%n
+      do k = 1_ip, table%n, block_size
+         block%first = k
+         block%last = min(k + block_size - 1_ip, table%n)
+         rows = int([k - 1_ip, block%last - k + 1_ip], lp)
+         v = table%vertex_start(block%first)
+         w = table%vertex_start(block%last + 1_ip)
+         call file%read('vertex', block%vertex, error, rows=int([v, w - v], lp))
+         call read_velocity(file, path, rows, block%velocity, error)
+         call read_column(file, path, 'angular_velocity', table, rows, 0.0_dp, -huge(1.0_dp), block%angular_velocity, &
+                          error)
+         call read_column(file, path, 'density', table, rows, density, tiny(1.0_dp), block%density, error)
+         call read_column(file, path, 'mass', table, rows, 0.0_dp, 0.0_dp, block%mass, error)
+         call read_column(file, path, 'inertia', table, rows, 0.0_dp, 0.0_dp, block%inertia, error)
          if (allocated(error)) return
-         if (table%vertex_start(k + 1_ip) <= table%vertex_start(k)) then
-            call raise(error, input_error, path//': '//entry_text('vertex_start', k + 1_ip)// &
-                       ' must be greater than the entry before it')
-         end if
+         call list_block(table, block, list)
       end do
-   end subroutine read_polygons
+   end subroutine list_blocks
 
-   !> Read the flags of fixed bodies.
-   subroutine read_flags(file, path, table, error)
+   !> Append the bodies of a block to a list.
+   subroutine list_block(table, block, list)
+      type(bodies_index_t), intent(in) :: table
+      type(block_t), intent(in) :: block
+      type(body_list_t), intent(inout) :: list
+      integer(ip) :: k, s, first, last
+
+      do k = 1_ip, block%last - block%first + 1_ip
+         s = block%first + k - 1_ip
+         first = table%vertex_start(s) - table%vertex_start(block%first) + 1_ip
+         last = table%vertex_start(s + 1_ip) - table%vertex_start(block%first)
+         call list%append(real(block%vertex(:, first:last), wp), &
+                          fixed=table%fixed(s) == 1_ip, &
+                          density=real(block%density(k), wp), &
+                          velocity=real(block%velocity(:, k), wp), &
+                          angular_velocity=real(block%angular_velocity(k), wp), &
+                          id=table%id(s), &
+                          mass=real(block%mass(k), wp), &
+                          inertia=real(block%inertia(k), wp))
+      end do
+   end subroutine list_block
+
+   !> Read the velocities of a block; default: zero.
+   subroutine read_velocity(file, path, rows, velocity, error)
       type(hdf5_file_t), intent(in) :: file
       character(len=*), intent(in) :: path
-      type(table_t), intent(inout) :: table
-      type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: k
-
-      if (allocated(error)) return
-      call file%read('fixed', table%fixed, error)
-      if (allocated(error)) return
-      call check_length(path, 'fixed', size(table%fixed, kind=ip), table%n, error)
-      do k = 1_ip, size(table%fixed, kind=ip)
-         if (allocated(error)) return
-         if (any(table%fixed(k) == [0_ip, 1_ip])) cycle
-         call raise(error, input_error, path//': '//entry_text('fixed', k)//' is ' &
-                    //to_text(table%fixed(k))//', but must be 0 or 1')
-      end do
-   end subroutine read_flags
-
-   !> Read the identifiers; number the bodies from 1 if the data set is absent.
-   subroutine read_identifiers(file, path, table, error)
-      type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path
-      type(table_t), intent(inout) :: table
-      type(error_t), allocatable, intent(inout) :: error
-      integer(lp), allocatable :: key(:), spare_key(:)
-      integer(ip), allocatable :: order(:), spare(:)
-      integer(ip) :: k
-
-      if (allocated(error)) return
-      allocate (order(table%n))
-      do k = 1_ip, table%n
-         order(k) = k
-      end do
-      if (.not. file%has('id')) then
-         table%id = order
-         return
-      end if
-      call file%read('id', table%id, error)
-      if (allocated(error)) return
-      call check_length(path, 'id', size(table%id, kind=ip), table%n, error)
-      if (allocated(error)) return
-      key = int(table%id, lp)
-      allocate (spare_key(table%n), spare(table%n))
-      call sort_keys(table%n, key, order, spare_key, spare)
-      do k = 1_ip, table%n
-         if (allocated(error)) return
-         if (key(k) < 0_lp) then
-            call raise(error, input_error, path//': '//entry_text('id', order(k))//' is '//to_text(key(k))// &
-                       ', but must not be negative')
-         else if (key(k) == key(max(k - 1_ip, 1_ip)) .and. k > 1_ip) then
-            call raise(error, input_error, path//': '//entry_text('id', order(k))//' is '//to_text(key(k))// &
-                       ', the same as '//entry_text('id', order(k - 1_ip))//'; identifiers must be unique')
-         end if
-      end do
-   end subroutine read_identifiers
-
-   !> Read the velocities; default: zero.
-   subroutine read_velocity(file, path, table, error)
-      type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path
-      type(table_t), intent(inout) :: table
+      !> Number of rows before the block, and number of its rows
+      integer(lp), intent(in) :: rows(2)
+      real(dp), allocatable, intent(inout) :: velocity(:, :)
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: k
 
       if (allocated(error)) return
       if (.not. file%has('velocity')) then
-         allocate (table%velocity(2, table%n), source=0.0_dp)
+         velocity = spread([0.0_dp, 0.0_dp], 2, int(rows(2)))
          return
       end if
-      call file%read('velocity', table%velocity, error)
+      call file%read('velocity', velocity, error, rows=rows)
       if (allocated(error)) return
-      if (size(table%velocity, 1) /= 2) then
-         call raise(error, input_error, path//': velocity must have two columns, x and y (shape in h5py: (n, 2))')
-      end if
-      call check_length(path, 'velocity', size(table%velocity, 2, kind=ip), table%n, error)
-      do k = 1_ip, size(table%velocity, 2, kind=ip)
+      do k = 1_ip, size(velocity, 2, kind=ip)
          if (allocated(error)) return
-         if (all(ieee_is_finite(table%velocity(:, k)))) cycle
-         call raise(error, input_error, path//': '//entry_text('velocity', k)//' is not finite')
+         if (all(ieee_is_finite(velocity(:, k)))) cycle
+         call raise(error, input_error, path//': '//entry_text('velocity', int(rows(1), ip) + k)//' is not finite')
       end do
    end subroutine read_velocity
 
-   !> Read one finite number per body, not below a lower bound. An absent data set yields the default.
-   subroutine read_column(file, path, name, table, default, least, values, error)
+   !> Read one finite number per body of a block, not below a lower bound. An absent data set yields the default.
+   subroutine read_column(file, path, name, table, rows, default, least, values, error)
       type(hdf5_file_t), intent(in) :: file
       character(len=*), intent(in) :: path, name
-      type(table_t), intent(in) :: table
+      type(bodies_index_t), intent(in) :: table
+      integer(lp), intent(in) :: rows(2)
       real(dp), intent(in) :: default, least
-      real(dp), allocatable, intent(out) :: values(:)
+      real(dp), allocatable, intent(inout) :: values(:)
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: k
+      integer(ip) :: k, s
 
       if (allocated(error)) return
       if (.not. file%has(name)) then
-         allocate (values(table%n), source=default)
+         values = spread(default, 1, int(rows(2)))
          return
       end if
-      call file%read(name, values, error)
+      call file%read(name, values, error, rows=rows)
       if (allocated(error)) return
-      call check_length(path, name, size(values, kind=ip), table%n, error)
       do k = 1_ip, size(values, kind=ip)
          if (allocated(error)) return
+         s = int(rows(1), ip) + k
          if (.not. ieee_is_finite(values(k))) then
-            call raise(error, input_error, path//': '//entry_text(name, k)//' is not finite')
+            call raise(error, input_error, path//': '//entry_text(name, s)//' is not finite')
          else if (values(k) < least) then
-            call raise(error, input_error, path//': '//entry_text(name, k)//' is '// &
+            call raise(error, input_error, path//': '//entry_text(name, s)//' is '// &
                        to_text(real(values(k), wp))//', but must '//bound_text(least))
          else if (least >= 0.0_dp .and. values(k) > 0.0_dp .and. real(values(k), wp) < tiny(1.0_wp)) then
-            call raise(error, input_error, path//': '//entry_text(name, k)//' of body '//to_text(table%id(k))// &
+            call raise(error, input_error, path//': '//entry_text(name, s)//' of body '//to_text(table%id(s))// &
                        ' is positive, but below the smallest normal number of the working precision')
          end if
       end do
    end subroutine read_column
-
-   !> Check that a data set has one row per body.
-   pure subroutine check_length(path, name, length, n, error)
-      character(len=*), intent(in) :: path, name
-      integer(ip), intent(in) :: length, n
-      type(error_t), allocatable, intent(inout) :: error
-
-      if (length == n) return
-      call raise(error, input_error, path//': '//name//' has '//to_text(length)//' rows, but '// &
-                 'vertex_start defines '//to_text(n)//' bodies')
-   end subroutine check_length
-
-   !> Name of an entry in Python notation, counted from 0
-   pure function entry_text(name, k) result(text)
-      character(len=*), intent(in) :: name
-      integer(ip), intent(in) :: k
-      character(len=:), allocatable :: text
-
-      text = name//'['//to_text(k - 1_ip)//']'
-   end function entry_text
 
    !> Text of a lower bound for an error message
    pure function bound_text(least) result(text)
