@@ -14,6 +14,7 @@ module polydem_box_maker
    use polydem_bodies, only: block_size, bodies_t, turn_block
    use polydem_body_pieces, only: cut_body, pieces_t
    use polydem_boxes, only: boxes_t
+   use polydem_elementary, only: sine_and_cosine
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_polygon, only: diameter
@@ -21,26 +22,38 @@ module polydem_box_maker
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: box_maker_t, new_box_maker, turn_and_bound, update_boxes, diameters_of
+   public :: box_maker_t, new_box_maker, turn_and_bound, turn_and_bound_block, update_boxes, diameters_of
 
    !> Allowance for rounding, in units of epsilon times the diameter of a body
    real(wp), parameter :: roundings = 64.0_wp
    !> Greatest number of pieces of all cut bodies together
    integer(ip), parameter :: most_pieces = 200000_ip
 
+   !> A body that is cut into pieces
+   type :: cut_body_t
+      !> Its first box and its first piece; the others follow
+      integer(ip) :: first_box, first_piece
+      !> Number of its pieces
+      integer(ip) :: n
+      !> Padding of its boxes on each side [m]
+      real(wp) :: padding
+   end type cut_body_t
+
    !> Constant data for the boxes of bodies: pieces and paddings
    type :: box_maker_t
       private
       !> Median diameter of the free bodies; huge if there is none [m]
       real(wp), public :: median_diameter = huge(1.0_wp)
-      !> First box of each body, (bodies + 1)
-      integer(ip), allocatable :: first_box(:)
-      !> First vertex of the piece of each box, (boxes + 1); the box of a whole body has no vertices here
+      !> Padding of the boxes of whole bodies on each side [m]
+      real(wp) :: margin = 0.0_wp
+      !> Box of each whole body, (body); for a body that is cut, minus its index in `cut`
+      integer(ip), allocatable :: box(:)
+      !> Bodies that are cut
+      type(cut_body_t), allocatable :: cut(:)
+      !> First vertex of each piece, (pieces + 1)
       integer(ip), allocatable :: piece_start(:)
       !> Vertices of the pieces in the body frame, (2, vertex) [m]
       real(wp), allocatable :: piece(:, :)
-      !> Padding of each box on each side [m]
-      real(wp), allocatable :: padding(:)
    end type box_maker_t
 
 contains
@@ -62,57 +75,67 @@ contains
       !> Median diameter of the free bodies of the run, for ranks with a part of the bodies; by default that of `bodies`
       !> [m]
       real(wp), intent(in), optional :: median_diameter
-      integer(ip) :: s, all_slots(bodies%n)
+      integer(ip) :: s
 
       if (present(median_diameter)) maker%median_diameter = median_diameter
       if (.not. present(median_diameter)) maker%median_diameter = median_of_diameters(bodies)
-      call cut_bodies(maker, bodies, largest_ratio, error)
+      maker%margin = margin
+      call cut_bodies(maker, bodies, largest_ratio, boxes%n, error)
       if (allocated(error)) return
-      boxes%n = maker%first_box(bodies%n + 1_ip) - 1_ip
       boxes%n_bodies = bodies%n
       boxes%one_to_one = boxes%n == bodies%n
       allocate (boxes%bounds(4, boxes%n), boxes%body(boxes%n), boxes%fixed(boxes%n), boxes%passive(boxes%n), &
                 boxes%reach(boxes%n))
-      allocate (maker%padding(boxes%n))
       do s = 1_ip, bodies%n
-         all_slots(s) = s
-         boxes%body(maker%first_box(s):maker%first_box(s + 1_ip) - 1_ip) = s
-         boxes%fixed(maker%first_box(s):maker%first_box(s + 1_ip) - 1_ip) = bodies%fixed(s)
-         boxes%passive(maker%first_box(s):maker%first_box(s + 1_ip) - 1_ip) = bodies%fixed(s) .or. bodies%in_halo(s)
-         call set_reach(maker, s, body_shape(bodies, s), margin, boxes%reach)
+         call describe_boxes(maker, bodies, s, boxes)
+         call update_box(maker, bodies, s, boxes)
       end do
-      call update_boxes(maker, bodies, all_slots, boxes)
    end subroutine new_box_maker
 
-   !> Cut the bodies that are too large. Each of the others has one piece without vertices.
-   subroutine cut_bodies(maker, bodies, largest_ratio, error)
+   !> Cut the bodies that are too large. Each of the others has one box and no piece.
+   subroutine cut_bodies(maker, bodies, largest_ratio, n_boxes, error)
       type(box_maker_t), intent(inout) :: maker
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: largest_ratio
+      !> Number of boxes of all bodies
+      integer(ip), intent(out) :: n_boxes
       type(error_t), allocatable, intent(inout) :: error
+      type(cut_body_t), allocatable :: longer(:)
       type(pieces_t) :: pieces
-      real(wp) :: none(2, 0)
-      integer(ip) :: s, room
+      integer(ip) :: s, room, n_cut, known
+      real(wp) :: length
       logical :: fits
 
       room = most_pieces
-      allocate (maker%first_box(bodies%n + 1_ip))
-      maker%first_box(1) = 1_ip
+      n_boxes = 0_ip
+      n_cut = 0_ip
+      allocate (maker%box(bodies%n), maker%cut(8))
       do s = 1_ip, bodies%n
+         known = pieces%n
          call cut_body(body_shape(bodies, s), maker%median_diameter, largest_ratio, room, pieces, fits)
          if (.not. fits) then
             call refuse(bodies%id(s), diameter(body_shape(bodies, s))/maker%median_diameter, error)
             return
          end if
-         room = room - (pieces%n + 1_ip - maker%first_box(s))
-         if (pieces%n < maker%first_box(s)) call pieces%append(none)
-         maker%first_box(s + 1_ip) = pieces%n + 1_ip
+         if (pieces%n == known) then
+            n_boxes = n_boxes + 1_ip
+            maker%box(s) = n_boxes
+            cycle
+         end if
+         room = room - (pieces%n - known)
+         n_cut = n_cut + 1_ip
+         if (n_cut > size(maker%cut)) then
+            allocate (longer(2_ip*n_cut))
+            longer(:n_cut - 1_ip) = maker%cut
+            call move_alloc(longer, maker%cut)
+         end if
+         length = diameter(body_shape(bodies, s))
+         maker%cut(n_cut) = cut_body_t(first_box=n_boxes + 1_ip, first_piece=known + 1_ip, n=pieces%n - known, &
+                                       padding=maker%margin + roundings*epsilon(1.0_wp)*length)
+         maker%box(s) = -n_cut
+         n_boxes = n_boxes + (pieces%n - known)
       end do
-      if (bodies%n == 0_ip) then
-         maker%piece_start = [1_ip]
-         maker%piece = none
-         return
-      end if
+      if (n_cut == 0_ip) return
       maker%piece_start = pieces%start(1:pieces%n + 1_ip)
       maker%piece = pieces%vertices(:, 1:pieces%start(pieces%n + 1_ip) - 1_ip)
    end subroutine cut_bodies
@@ -130,26 +153,43 @@ contains
                  'to keep it whole')
    end subroutine refuse
 
-   !> Set the padding and the reach of the boxes of a body.
-   pure subroutine set_reach(maker, s, vertices, margin, reach)
-      type(box_maker_t), intent(inout) :: maker
+   !> Set all but the bounds of the boxes of a body.
+   pure subroutine describe_boxes(maker, bodies, s, boxes)
+      type(box_maker_t), intent(in) :: maker
+      type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
-      real(wp), intent(in) :: vertices(:, :), margin
-      !> Reach of all boxes [m]
-      real(wp), intent(inout) :: reach(:)
-      real(wp) :: length, part
+      type(boxes_t), intent(inout) :: boxes
       integer(ip) :: b, first, last
 
-      length = diameter(vertices)
-      do b = maker%first_box(s), maker%first_box(s + 1_ip) - 1_ip
-         first = maker%piece_start(b)
-         last = maker%piece_start(b + 1_ip) - 1_ip
-         maker%padding(b) = margin + merge(roundings*epsilon(1.0_wp)*length, 0.0_wp, last >= first)
-         part = length
-         if (last >= first) part = diameter(maker%piece(:, first:last))
-         reach(b) = (0.5_wp*part + maker%padding(b))*(1.0_wp + roundings*epsilon(1.0_wp))
-      end do
-   end subroutine set_reach
+      b = maker%box(s)
+      if (b > 0_ip) then
+         call describe_box(bodies, s, diameter(body_shape(bodies, s)), maker%margin, b, boxes)
+         return
+      end if
+      associate (cut => maker%cut(-b))
+         do b = 0_ip, cut%n - 1_ip
+            first = maker%piece_start(cut%first_piece + b)
+            last = maker%piece_start(cut%first_piece + b + 1_ip) - 1_ip
+            call describe_box(bodies, s, diameter(maker%piece(:, first:last)), cut%padding, cut%first_box + b, boxes)
+         end do
+      end associate
+   end subroutine describe_boxes
+
+   !> Set all but the bounds of a box.
+   pure subroutine describe_box(bodies, s, length, padding, b, boxes)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      !> Diameter of the body or piece, and padding of the box [m]
+      real(wp), intent(in) :: length, padding
+      !> Index of the box
+      integer(ip), intent(in) :: b
+      type(boxes_t), intent(inout) :: boxes
+
+      boxes%body(b) = s
+      boxes%fixed(b) = bodies%fixed(s)
+      boxes%passive(b) = bodies%fixed(s) .or. bodies%in_halo(s)
+      boxes%reach(b) = (0.5_wp*length + padding)*(1.0_wp + roundings*epsilon(1.0_wp))
+   end subroutine describe_box
 
    !> Turn bodies to their angles and update their boxes in one pass: the same as `turn_bodies` and then `update_boxes`.
    subroutine turn_and_bound(maker, moving, isa, bodies, boxes)
@@ -159,24 +199,42 @@ contains
       integer(ip), intent(in) :: moving(:)
       !> Instruction set of the kernels
       integer, intent(in) :: isa
-      !> Bodies; only `direction` and `turned` change
+      !> Bodies; only `turned` changes
       type(bodies_t), intent(inout) :: bodies
       !> Boxes; only `bounds` changes
       type(boxes_t), intent(inout) :: boxes
-      real(wp) :: extent(4, block_size)
-      integer(ip) :: low, high, k
+      integer(ip) :: low
 
       !$omp parallel do if (size(moving) > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(maker, moving, isa, bodies, boxes) private(low, high, k, extent)
+      !$omp    shared(maker, moving, isa, bodies, boxes) private(low)
       do low = 1_ip, size(moving, kind=ip), block_size
-         high = min(low + block_size - 1_ip, size(moving, kind=ip))
-         call turn_block(bodies, moving(low:high), isa, extent)
-         do k = low, high
-            call bound_body(maker, bodies, moving(k), extent(:, k - low + 1_ip), boxes)
-         end do
+         call turn_and_bound_block(maker, moving(low:min(low + block_size - 1_ip, size(moving, kind=ip))), isa, &
+                                   bodies, boxes)
       end do
       !$omp end parallel do
    end subroutine turn_and_bound
+
+   !> Turn up to `block_size` bodies to their angles and update their boxes. Several threads may call it for different
+   !> bodies.
+   subroutine turn_and_bound_block(maker, slots, isa, bodies, boxes)
+      !> From `new_box_maker`
+      type(box_maker_t), intent(in) :: maker
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Instruction set of the kernels
+      integer, intent(in) :: isa
+      !> Bodies; only `turned` changes
+      type(bodies_t), intent(inout) :: bodies
+      !> Boxes; only `bounds` changes
+      type(boxes_t), intent(inout) :: boxes
+      real(wp) :: extent(4, block_size), direction(2, block_size)
+      integer(ip) :: k
+
+      call turn_block(bodies, slots, isa, extent, direction)
+      do k = 1_ip, size(slots, kind=ip)
+         call bound_body(maker, bodies%position(:, slots(k)), slots(k), extent(:, k), direction(:, k), boxes)
+      end do
+   end subroutine turn_and_bound_block
 
    !> Update the boxes of the given bodies to their positions. The boxes of other bodies do not change.
    subroutine update_boxes(maker, bodies, moving, boxes)
@@ -193,35 +251,52 @@ contains
       !$omp parallel do if (size(moving) > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(maker, bodies, moving, boxes) private(k)
       do k = 1_ip, size(moving, kind=ip)
-         associate (s => moving(k))
-            call bound_body(maker, bodies, s, &
-                            extent_of(bodies%turned(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip)), &
-                            boxes)
-         end associate
+         call update_box(maker, bodies, moving(k), boxes)
       end do
       !$omp end parallel do
    end subroutine update_boxes
 
-   !> Update the boxes of a body.
-   pure subroutine bound_body(maker, bodies, s, extent, boxes)
+   !> Update the boxes of a body that is turned to its angle.
+   pure subroutine update_box(maker, bodies, s, boxes)
       type(box_maker_t), intent(in) :: maker
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
+      type(boxes_t), intent(inout) :: boxes
+      real(wp) :: extent(4), direction(2)
+
+      extent = extent_of(bodies%turned(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))
+      direction = 0.0_wp
+      if (maker%box(s) < 0_ip) call sine_and_cosine(bodies%angle(s), direction(2), direction(1))
+      call bound_body(maker, bodies%position(:, s), s, extent, direction, boxes)
+   end subroutine update_box
+
+   !> Update the boxes of a body.
+   pure subroutine bound_body(maker, position, s, extent, direction, boxes)
+      type(box_maker_t), intent(in) :: maker
+      !> Centre of the body [m]
+      real(wp), intent(in) :: position(2)
+      !> Slot of the body
+      integer(ip), intent(in) :: s
       !> Extent of the turned vertices of the whole body [m]
       real(wp), intent(in) :: extent(4)
+      !> Cosine and sine of its angle
+      real(wp), intent(in) :: direction(2)
       type(boxes_t), intent(inout) :: boxes
-      integer(ip) :: b
+      integer(ip) :: b, first, last
 
-      b = maker%first_box(s)
-      if (maker%piece_start(b + 1_ip) == maker%piece_start(b)) then
-         call place_box(extent, maker%padding(b), bodies%position(:, s), boxes%bounds(:, b))
+      b = maker%box(s)
+      if (b > 0_ip) then
+         call place_box(extent, maker%margin, position, boxes%bounds(:, b))
          return
       end if
-      do b = maker%first_box(s), maker%first_box(s + 1_ip) - 1_ip
-         call place_box(extent_of(turn(maker%piece(:, maker%piece_start(b):maker%piece_start(b + 1_ip) - 1_ip), &
-                                       bodies%direction(:, s))), &
-                        maker%padding(b), bodies%position(:, s), boxes%bounds(:, b))
-      end do
+      associate (cut => maker%cut(-b))
+         do b = 0_ip, cut%n - 1_ip
+            first = maker%piece_start(cut%first_piece + b)
+            last = maker%piece_start(cut%first_piece + b + 1_ip) - 1_ip
+            call place_box(extent_of(turn(maker%piece(:, first:last), direction)), cut%padding, position, &
+                           boxes%bounds(:, cut%first_box + b))
+         end do
+      end associate
    end subroutine bound_body
 
    !> Box of vertices with an extent. The padding is applied before the position is added: rounding then remains

@@ -131,7 +131,7 @@ contains
       allocate (bodies%mass(n), bodies%inertia(n), bodies%inverse_mass(n), bodies%inverse_inertia(n), bodies%angle(n), &
                 bodies%angular_velocity(n), bodies%angular_acceleration(n), bodies%torque(n), source=0.0_wp)
       allocate (bodies%position(2, n), bodies%velocity(2, n), bodies%acceleration(2, n), bodies%force(2, n), &
-                bodies%direction(2, n), source=0.0_wp)
+                source=0.0_wp)
       allocate (bodies%shape(2, n_vertices), bodies%turned(2, n_vertices), source=0.0_wp)
       bodies%vertex_start(1) = 1_ip
    end subroutine allocate_columns

@@ -26,36 +26,44 @@ module polydem_body_contributions
 
 contains
 
-   !> Add the powers of the elastic, damping and tangential forces on a body, times a weight, to its channels.
-   pure subroutine add_powers(bodies, forces, weight, s, channels)
+   !> Add the powers of the elastic, damping and tangential forces on some bodies, times a weight, to their channels.
+   pure subroutine add_powers(bodies, forces, weight, first, last, channels)
       type(bodies_t), intent(in) :: bodies
       !> Sums of the forces on each body
       type(force_sums_t), intent(in) :: forces
       !> Factor of what is added
       real(wp), intent(in) :: weight
-      !> Slot of the body
-      integer(ip), intent(in) :: s
-      !> Channels of the body [W/m]
-      real(wp), intent(inout) :: channels(n_channels)
+      !> First and last slot; only the free bodies of this rank count
+      integer(ip), intent(in) :: first, last
+      !> Channels of all bodies, (n_channels, slot) [W/m]
+      real(wp), intent(inout), contiguous :: channels(:, :)
+      integer(ip) :: s
 
-      channels = channels + weight*powers_of_term(bodies, forces%value(:, s), s)
+      do s = first, last
+         if (bodies%fixed(s) .or. bodies%in_halo(s)) cycle
+         call add_term(bodies, s, forces%value(:, s), weight, channels(:, s))
+      end do
    end subroutine add_powers
 
-   !> Powers of the elastic, damping and tangential rows of a term on a body [W/m]
-   pure function powers_of_term(bodies, term, s) result(power)
+   !> Add the powers of the elastic, damping and tangential rows of a term on a body, times a weight.
+   pure subroutine add_term(bodies, s, term, weight, channels)
       type(bodies_t), intent(in) :: bodies
-      real(wp), intent(in) :: term(n_terms)
+      !> Slot of the body on which the term acts
       integer(ip), intent(in) :: s
-      real(wp) :: power(n_channels), x, y, w
+      real(wp), intent(in) :: term(n_terms)
+      !> Factor of what is added
+      real(wp), intent(in) :: weight
+      !> Channels [W/m]
+      real(wp), intent(inout) :: channels(n_channels)
       integer, parameter :: e = sum_elastic, n = sum_normal, f = sum_tangential
 
-      x = bodies%velocity(1, s)
-      y = bodies%velocity(2, s)
-      w = bodies%angular_velocity(s)
-      power(1) = (term(e + 1)*x + term(e + 2)*y) + term(e + 3)*w
-      power(2) = ((term(n + 1) - term(e + 1))*x + (term(n + 2) - term(e + 2))*y) + (term(n + 3) - term(e + 3))*w
-      power(3) = (term(f + 1)*x + term(f + 2)*y) + term(f + 3)*w
-   end function powers_of_term
+      associate (x => bodies%velocity(1, s), y => bodies%velocity(2, s), w => bodies%angular_velocity(s))
+         channels(1) = channels(1) + weight*((term(e + 1)*x + term(e + 2)*y) + term(e + 3)*w)
+         channels(2) = channels(2) + weight*(((term(n + 1) - term(e + 1))*x + (term(n + 2) - term(e + 2))*y) &
+                                             + (term(n + 3) - term(e + 3))*w)
+         channels(3) = channels(3) + weight*((term(f + 1)*x + term(f + 2)*y) + term(f + 3)*w)
+      end associate
+   end subroutine add_term
 
    !> Add the action of a fixed body on a free one: its terms of the powers, and the wall channels.
    pure subroutine add_wall(bodies, wall, term, weight, channels, wall_channels)
@@ -72,7 +80,7 @@ contains
       real(wp), intent(inout) :: wall_channels(n_wall_channels)
       real(wp) :: fx, fy, twist, torque
 
-      channels = channels + weight*powers_of_term(bodies, term, wall)
+      call add_term(bodies, wall, term, weight, channels)
       fx = term(sum_normal + 1) + term(sum_tangential + 1)
       fy = term(sum_normal + 2) + term(sum_tangential + 2)
       twist = term(sum_normal + 3) + term(sum_tangential + 3)

@@ -164,8 +164,8 @@ contains
       do s = first, last
          if (bodies%fixed(s) .or. bodies%in_halo(s)) cycle
          sums%torque(s) = sums%torque(s) + weight*torque_of(gravity, bodies, s)
-         call add_powers(bodies, forces, weight, s, sums%power_sum(:, s))
       end do
+      call add_powers(bodies, forces, weight, first, last, sums%power_sum)
    end subroutine accumulate_bodies
 
    !> Accumulate the action of fixed bodies in one step, after the rates of all bodies of this step.

@@ -250,7 +250,7 @@ contains
          found = findloc(s%suspects%pair(:s%suspects%n), s%passing_pair, dim=1)
          place = place_of(s%bodies, s%suspects%first(found), s%suspects%second(found))
          call monitor%passing%respond(s%settings%guards%passing, 'step '//to_text(s%step)//': '// &
-                                    passing_text(s%bodies, s%suspects, s%guard%radius, found), error, &
+                                    passing_text(s%bodies, s%suspects, s%bodies%radius, found), error, &
                                     -real(place, dp))
          if (allocated(error)) error%place = place
       end associate

@@ -91,7 +91,7 @@ contains
          if (slot > 0_ip) measures%farthest = int(s%bodies%id(slot), lp)
          call keep_greatest(comm, measures%move, measures%farthest)
          do k = 1, size(s%motions)
-            measures%wall_speed = max(measures%wall_speed, greatest_speed(s%motions(k), s%guard%radius))
+            measures%wall_speed = max(measures%wall_speed, greatest_speed(s%motions(k), s%bodies%radius))
          end do
          gravity = hypotenuse(s%settings%forces%gravity(1), s%settings%forces%gravity(2))
          if (gravity > 0.0_wp) then

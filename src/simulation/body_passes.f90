@@ -22,25 +22,25 @@ contains
       type(simulation_t), intent(inout) :: self
       !> Names a body with an invalid pose
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: low, high, first, last, k
+      integer(ip) :: n, k, next, high, first, last
       logical :: good
 
+      n = size(self%bodies%free, kind=ip)
       good = .true.
-      !$omp parallel do if (self%bodies%n > min_parallel_size) schedule(static) default(none) shared(self) &
-      !$omp    private(low, high, first, last) reduction(.and.:good)
-      do low = 1_ip, self%bodies%n, block_size
-         high = min(low + block_size - 1_ip, self%bodies%n)
-         last = low - 1_ip
-         do
-            call find_run(self%bodies, last + 1_ip, high, first, last)
-            if (first > high) exit
+      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(self, n) &
+      !$omp    private(next, high, first, last) reduction(.and.:good)
+      do k = 1_ip, n, block_size
+         high = min(k + block_size - 1_ip, n)
+         next = k
+         do while (next <= high)
+            call find_run(self%bodies%free, high, next, first, last)
             call self%integrator%predict(self%dt, first, last, self%bodies)
             good = good .and. have_valid_poses(self%bodies, first, last)
          end do
       end do
       !$omp end parallel do
       call move_walls(self, time_of(self))
-      do k = size(self%bodies%free, kind=ip) + 1_ip, size(self%guard%moving, kind=ip)
+      do k = n + 1_ip, size(self%guard%moving, kind=ip)
          good = good .and. have_valid_poses(self%bodies, self%guard%moving(k), self%guard%moving(k))
       end do
       if (.not. good) call check_poses(self%guard, self%bodies, self%step, error)
@@ -53,48 +53,62 @@ contains
       type(simulation_t), intent(inout) :: self
       !> Names a body that moves too far
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: low, high, first, last, k
+      integer(ip) :: n, k, high, next, done, first, last
       logical :: good
 
+      n = size(self%bodies%free, kind=ip)
       good = .true.
-      !$omp parallel do if (self%bodies%n > min_parallel_size) schedule(static) default(none) shared(self) &
-      !$omp    private(low, high, first, last) reduction(.and.:good)
-      do low = 1_ip, self%bodies%n, block_size
-         high = min(low + block_size - 1_ip, self%bodies%n)
-         call total_forces(self%settings%forces%gravity, self%force_sums, low, high, self%bodies)
-         last = low - 1_ip
-         do
-            call find_run(self%bodies, last + 1_ip, high, first, last)
-            if (first > high) exit
+      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(self, n) &
+      !$omp    private(high, next, done, first, last) reduction(.and.:good)
+      do k = 1_ip, n, block_size
+         high = min(k + block_size - 1_ip, n)
+         done = 0_ip
+         if (k > 1_ip) done = self%bodies%free(k - 1_ip)
+         next = k
+         do while (next <= high)
+            call find_run(self%bodies%free, high, next, first, last)
+            call total_forces(self%settings%forces%gravity, self%force_sums, done + 1_ip, last, self%bodies)
             call self%integrator%correct(self%dt, first, last, self%bodies)
             good = good .and. move_within_limit(self%guard, self%bodies, first, last, self%dt)
+            if (self%settings%output%energy_balance) &
+               call accumulate_bodies(self%energy_balance, 1.0_wp, self%settings%forces%gravity, self%bodies, &
+                                      self%force_sums, first, last)
+            done = last
          end do
-         if (self%settings%output%energy_balance) &
-            call accumulate_bodies(self%energy_balance, 1.0_wp, self%settings%forces%gravity, self%bodies, &
-                                   self%force_sums, low, high)
       end do
       !$omp end parallel do
+      done = 0_ip
+      if (n > 0_ip) done = self%bodies%free(n)
+      call total_forces(self%settings%forces%gravity, self%force_sums, done + 1_ip, self%bodies%n, self%bodies)
       if (self%settings%output%energy_balance) call accumulate_walls(self%energy_balance, self%bodies, self%walls)
-      do k = size(self%bodies%free, kind=ip) + 1_ip, size(self%guard%moving, kind=ip)
+      do k = n + 1_ip, size(self%guard%moving, kind=ip)
          good = good .and. move_within_limit(self%guard, self%bodies, self%guard%moving(k), self%guard%moving(k), &
                                              self%dt)
       end do
       if (.not. good) call check_motion(self%guard, self%bodies, self%step, self%dt, error)
    end subroutine complete_step
 
-   !> Find the next run of free bodies that this rank moves.
-   pure subroutine find_run(bodies, low, high, first, last)
-      type(bodies_t), intent(in) :: bodies
-      !> First and last slot to search
-      integer(ip), intent(in) :: low, high
-      !> First and last slot of the run; `first` is greater than `high` if there is none
+   !> Find the next run of consecutive slots in a list.
+   pure subroutine find_run(slots, high, next, first, last)
+      !> Ascending slots
+      integer(ip), intent(in) :: slots(:)
+      !> Index of the last slot that may belong to the run
+      integer(ip), intent(in) :: high
+      !> Index of the first slot of the run; on return that of the slot after the run
+      integer(ip), intent(inout) :: next
+      !> First and last slot of the run
       integer(ip), intent(out) :: first, last
 
-      do first = low, high
-         if (.not. (bodies%fixed(first) .or. bodies%in_halo(first))) exit
-      end do
-      do last = first, high - 1_ip
-         if (bodies%fixed(last + 1_ip) .or. bodies%in_halo(last + 1_ip)) exit
+      first = slots(next)
+      last = first
+      if (slots(high) - first == high - next) then
+         last = slots(high)
+         next = high + 1_ip
+         return
+      end if
+      do next = next + 1_ip, high
+         if (slots(next) /= last + 1_ip) exit
+         last = slots(next)
       end do
    end subroutine find_run
 

@@ -22,8 +22,6 @@ module polydem_guards
       character(len=:), allocatable :: choice
       !> Warnings of too large displacements
       type(warning_t) :: warning
-      !> Greatest distance of a vertex from the centre of each body, (slot) [m]
-      real(wp), allocatable :: radius(:)
       !> Slots of the bodies that may move
       integer(ip), allocatable :: moving(:)
    end type motion_guard_t
@@ -41,16 +39,16 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Slots of the bodies that may move
       integer(ip), intent(in) :: moving(:)
-      real(wp) :: thickness
+      real(wp) :: thickness, radius
       integer(ip) :: s
 
       guard%choice = settings%displacement
       guard%moving = moving
       guard%limit = huge(1.0_wp)
-      allocate (guard%radius(bodies%n))
+      if (guard%choice == 'off') return
       do s = 1_ip, bodies%n
-         call measure_body(bodies, s, thickness, guard%radius(s))
-         if (guard%choice /= 'off') guard%limit = min(guard%limit, settings%displacement_limit*thickness)
+         call measure_body(bodies, s, thickness, radius)
+         guard%limit = min(guard%limit, settings%displacement_limit*thickness)
       end do
    end subroutine new_motion_guard
 
@@ -60,12 +58,13 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> First and last slot
       integer(ip), intent(in) :: first, last
-      integer(ip) :: s
+      integer(ip) :: s, n_invalid
 
-      have_valid_poses = .true.
+      n_invalid = 0_ip
       do s = first, last
-         have_valid_poses = have_valid_poses .and. has_valid_pose(bodies, s)
+         n_invalid = n_invalid + merge(0_ip, 1_ip, has_valid_pose(bodies, s))
       end do
+      have_valid_poses = n_invalid == 0_ip
    end function have_valid_poses
 
    !> Stop if a body has an invalid pose, before boxes and neighbours are computed from it.
@@ -110,12 +109,13 @@ contains
       integer(ip), intent(in) :: first, last
       !> Time step [s]
       real(wp), intent(in) :: dt
-      integer(ip) :: s
+      integer(ip) :: s, n_beyond
 
-      move_within_limit = .true.
+      n_beyond = 0_ip
       do s = first, last
-         move_within_limit = move_within_limit .and. moves_within_limit(guard, bodies, s, dt)
+         n_beyond = n_beyond + merge(0_ip, 1_ip, moves_within_limit(guard, bodies, s, dt))
       end do
+      move_within_limit = n_beyond == 0_ip
    end function move_within_limit
 
    !> Stop if the state of a body is not finite. Stop or warn if a body moves too far in a step.
@@ -136,7 +136,7 @@ contains
       do k = 1_ip, size(guard%moving, kind=ip)
          s = guard%moving(k)
          if (moves_within_limit(guard, bodies, s, dt)) cycle
-         if (.not. is_finite(guard, bodies, s, dt)) then
+         if (.not. is_finite(bodies, s, dt)) then
             call raise(error, run_error, motion_text(guard, bodies, s, step))
          else if (is_first) then
             call guard%warning%respond(guard%choice, motion_text(guard, bodies, s, step), error, weight_of(bodies, s))
@@ -210,17 +210,16 @@ contains
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: dt
 
-      moves_within_limit = is_finite(guard, bodies, s, dt) .and. move_of(guard, bodies, s, dt) <= guard%limit
+      moves_within_limit = is_finite(bodies, s, dt) .and. move_of(bodies, s, dt) <= guard%limit
    end function moves_within_limit
 
    !> Whether position, angle and velocities of a body are finite
-   pure logical function is_finite(guard, bodies, s, dt)
-      type(motion_guard_t), intent(in) :: guard
+   pure logical function is_finite(bodies, s, dt)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: dt
 
-      is_finite = abs(move_of(guard, bodies, s, dt) &
+      is_finite = abs(move_of(bodies, s, dt) &
                       + (bodies%position(1, s) + bodies%position(2, s) + bodies%angle(s))) <= huge(dt)
    end function is_finite
 
@@ -239,21 +238,20 @@ contains
       move = 0.0_wp
       slot = 0_ip
       do k = 1_ip, size(guard%moving, kind=ip)
-         if (.not. move_of(guard, bodies, guard%moving(k), dt) > move) cycle
+         if (.not. move_of(bodies, guard%moving(k), dt) > move) cycle
          slot = guard%moving(k)
-         move = move_of(guard, bodies, slot, dt)
+         move = move_of(bodies, slot, dt)
       end do
    end subroutine greatest_displacement
 
    !> Upper bound of the displacement of a point of a body in a step [m]
-   pure real(wp) function move_of(guard, bodies, s, dt)
-      type(motion_guard_t), intent(in) :: guard
+   pure real(wp) function move_of(bodies, s, dt)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: dt
 
       move_of = dt*(abs(bodies%velocity(1, s)) + abs(bodies%velocity(2, s)) &
-                    + guard%radius(s)*abs(bodies%angular_velocity(s)))
+                    + bodies%radius(s)*abs(bodies%angular_velocity(s)))
    end function move_of
 
    !> Compare the time step with the stable time step of the contacts: warning above one half of it, error above it.

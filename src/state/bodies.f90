@@ -63,8 +63,6 @@ module polydem_bodies
       real(wp), allocatable :: force(:, :)
       !> Sum of the torques about the centre of mass [N]
       real(wp), allocatable :: torque(:)
-      !> Cosine and sine of the angle, (2, slot)
-      real(wp), allocatable :: direction(:, :)
       !> First vertex of each body, (n + 1)
       integer(ip), allocatable :: vertex_start(:)
       !> Vertices in the body frame, (2, vertex) [m]
@@ -77,21 +75,21 @@ module polydem_bodies
 
 contains
 
-   !> Update `direction` and `turned` of the given bodies to their angles.
+   !> Update `turned` of the given bodies to their angles.
    subroutine turn_bodies(bodies, slots, isa)
-      !> Bodies; only `direction` and `turned` change
+      !> Bodies; only `turned` changes
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies that may have turned
       integer(ip), intent(in) :: slots(:)
       !> Instruction set of the kernels
       integer, intent(in) :: isa
-      real(wp) :: extent(4, block_size)
+      real(wp) :: extent(4, block_size), direction(2, block_size)
       integer(ip) :: low
 
       !$omp parallel do if (size(slots) > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(bodies, slots, isa) private(low, extent)
+      !$omp    shared(bodies, slots, isa) private(low, extent, direction)
       do low = 1_ip, size(slots, kind=ip), block_size
-         call turn_block(bodies, slots(low:min(low + block_size - 1_ip, size(slots, kind=ip))), isa, extent)
+         call turn_block(bodies, slots(low:min(low + block_size - 1_ip, size(slots, kind=ip))), isa, extent, direction)
       end do
       !$omp end parallel do
    end subroutine turn_bodies
@@ -114,11 +112,9 @@ contains
       end do
    end subroutine measure_radii
 
-   !> Update `direction` and `turned` of up to `block_size` bodies to their angles.
-   !>
-   !> No other procedure of the program takes the sine or cosine of the angle of a body.
-   subroutine turn_block(bodies, slots, isa, extent)
-      !> Bodies; only `direction` and `turned` of these bodies change
+   !> Update `turned` of up to `block_size` bodies to their angles.
+   subroutine turn_block(bodies, slots, isa, extent, direction)
+      !> Bodies; only `turned` of these bodies changes
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in) :: slots(:)
@@ -126,6 +122,8 @@ contains
       integer, intent(in) :: isa
       !> Least x and y and greatest x and y of the turned vertices of each body, (4, body) [m]
       real(wp), intent(out) :: extent(4, block_size)
+      !> Cosine and sine of the angle of each body, (2, body)
+      real(wp), intent(out) :: direction(2, block_size)
       real(wp) :: angle(block_size), cosine(block_size), sine(block_size)
       integer(ip) :: k, n
 
@@ -135,12 +133,10 @@ contains
       end do
       call sines_and_cosines(isa, angle(1:n), sine(1:n), cosine(1:n))
       do k = 1_ip, n
-         associate (s => slots(k))
-            bodies%direction(:, s) = [cosine(k), sine(k)]
-            associate (first => bodies%vertex_start(s), last => bodies%vertex_start(s + 1_ip) - 1_ip)
-               call turn_vertices(last - first + 1_ip, bodies%shape(:, first:last), cosine(k), sine(k), &
-                                  bodies%turned(:, first:last), extent(:, k))
-            end associate
+         direction(:, k) = [cosine(k), sine(k)]
+         associate (first => bodies%vertex_start(slots(k)), last => bodies%vertex_start(slots(k) + 1_ip) - 1_ip)
+            call turn_vertices(last - first + 1_ip, bodies%shape(:, first:last), cosine(k), sine(k), &
+                               bodies%turned(:, first:last), extent(:, k))
          end associate
       end do
    end subroutine turn_block

@@ -221,7 +221,7 @@ contains
                 bodies%inverse_mass(n), bodies%inverse_inertia(n), bodies%position(2, n), &
                 bodies%angle(n), bodies%velocity(2, n), bodies%angular_velocity(n), &
                 bodies%acceleration(2, n), bodies%angular_acceleration(n), bodies%force(2, n), &
-                bodies%torque(n), bodies%direction(2, n), bodies%vertex_start(n + 1_ip))
+                bodies%torque(n), bodies%vertex_start(n + 1_ip))
       bodies%angle = 0.0_wp
       bodies%acceleration = 0.0_wp
       bodies%angular_acceleration = 0.0_wp

@@ -47,7 +47,7 @@ contains
       bodies%angular_velocity = [(real(k, wp) + t/4.0_wp, k=1_ip, 3_ip)]
       bodies%force = reshape([t, 2.0_wp*t, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], [2, 3])
       bodies%torque = [-t, 0.0_wp, 0.0_wp]
-      allocate (bodies%direction(2, 3), bodies%turned(2, 11))
+      allocate (bodies%turned(2, 11))
       call turn_bodies(bodies, [1_ip, 2_ip, 3_ip], isa_base)
    end subroutine sample_bodies
 
