@@ -42,8 +42,8 @@ contains
       self%everywhere(3:4, :) = 0.5_wp*huge(1.0_wp)
    end subroutine start_filter
 
-   !> Append a candidate; it is active.
-   pure subroutine add(self, a, b, overlap)
+   !> Add a candidate; it is active.
+   pure subroutine add(self, a, b, overlap, k)
       class(filtered_candidates_t), intent(inout) :: self
       !> First box
       integer(ip), intent(in) :: a
@@ -51,18 +51,20 @@ contains
       integer(ip), intent(in) :: b
       !> Whether they overlap
       logical, intent(in) :: overlap
+      !> Its number
+      integer(ip), intent(out) :: k
 
-      call self%candidates_t%add(a, b, overlap)
-      if (self%filtered) call self%filter%active%activate(self%n, self)
+      call self%candidates_t%add(a, b, overlap, k)
+      if (self%filtered) call self%filter%active%activate(k, self)
    end subroutine add
 
-   !> Remove one candidate; the last candidate is moved to its place.
+   !> Remove a candidate.
    pure subroutine drop(self, k)
       class(filtered_candidates_t), intent(inout) :: self
       !> Number of the candidate
       integer(ip), intent(in) :: k
 
-      if (self%filtered) call self%filter%active%forget(k, self%n)
+      if (self%filtered) call self%filter%active%forget(k)
       call self%candidates_t%drop(k)
    end subroutine drop
 

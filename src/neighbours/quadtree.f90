@@ -44,7 +44,7 @@ module polydem_quadtree
    !> (measured)
    real(dp), parameter :: typical_share = 1.2_dp
    !> Number of boxes above which the search is parallel. The search for one box takes about two microseconds
-   integer(ip), parameter :: worth_searching = 16_ip
+   integer(ip), parameter :: worth_searching = 8_ip
    !> Largest number of levels below that level
    integer, parameter :: most_levels = 12
 
@@ -54,6 +54,8 @@ module polydem_quadtree
       type(index_list_t) :: outside
       !> Boxes of new candidates, two entries for each candidate
       type(index_list_t) :: found
+      !> Candidates to remove
+      type(index_list_t) :: separated
       !> Number of visited nodes
       integer(lp) :: visits = 0_lp
    end type worker_t
@@ -123,6 +125,7 @@ contains
       do w = 1, size(self%worker)
          self%worker(w)%outside%n = 0_ip
          self%worker(w)%found%n = 0_ip
+         self%worker(w)%separated%n = 0_ip
          self%worker(w)%visits = 0_lp
       end do
    end subroutine prepare_workers
@@ -296,10 +299,10 @@ contains
       end do
       !$omp end parallel do
       call self%changes%join(changes)
-      call self%work%add(count_tests, int(self%candidates%n, lp))
+      call self%work%add(count_tests, int(self%candidates%n_pairs(), lp))
    end subroutine compare_candidates
 
-   !> Find the new candidates of all boxes whose leaf changed.
+   !> Find the new candidates of all boxes whose leaf changed, and those that are candidates no longer.
    subroutine search_changed(self, boxes)
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -313,6 +316,7 @@ contains
          do k = low, high
             call search(self%tree, self%padded, boxes, self%tree%changed(k), self%worker(w)%found, &
                         self%worker(w)%visits)
+            call self%candidates%list_separated(self%tree%changed(k), self%padded%now, self%worker(w)%separated)
          end do
       end do
       !$omp end parallel do
@@ -325,25 +329,27 @@ contains
       end do
    end subroutine search_changed
 
-   !> Remove the pairs that are not candidates any longer, and add the new candidates of all threads in the order of the
-   !> threads.
+   !> Remove the pairs that are not candidates any longer, and add the new candidates, in the reverse order of the
+   !> threads: the new candidates of a box fill the holes that its former ones have left.
    subroutine replace_candidates(self, boxes, changes)
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       type(pair_changes_t), intent(inout) :: changes
-      integer(ip) :: k, i, j, dropped
+      integer(ip) :: k, i, j, number
       integer :: w
       logical :: overlap
 
-      do k = 1_ip, self%tree%n_changed
-         call self%candidates%remove_separated(self%tree%changed(k), self%padded%now, dropped)
-      end do
       do w = 1, size(self%worker)
-         do k = 1_ip, self%worker(w)%found%n, 2_ip
-            i = self%worker(w)%found%at(k)
-            j = self%worker(w)%found%at(k + 1_ip)
+         do k = 1_ip, self%worker(w)%separated%n
+            call self%candidates%drop(self%worker(w)%separated%at(k))
+         end do
+      end do
+      do w = size(self%worker), 1, -1
+         do k = self%worker(w)%found%n, 1_ip, -2_ip
+            i = self%worker(w)%found%at(k - 1_ip)
+            j = self%worker(w)%found%at(k)
             overlap = overlapping(boxes%bounds(:, i), boxes%bounds(:, j))
-            call self%candidates%add(i, j, overlap)
+            call self%candidates%add(i, j, overlap, number)
             if (overlap) call changes%record(boxes%body(i), boxes%body(j), 1_ip)
          end do
       end do
@@ -354,7 +360,7 @@ contains
       class(quadtree_t), intent(inout) :: self
 
       if (.not. allocated(self%padded%now)) return
-      self%work%value(count_candidates) = int(self%candidates%n, lp)
+      self%work%value(count_candidates) = int(self%candidates%n_pairs(), lp)
       self%work%value(count_nodes) = int(self%tree%n_nodes, lp)
       self%work%value(count_depth) = int(self%tree%depth(), lp)
       self%work%value(count_bytes) = self%tree%bytes() + self%candidates%bytes() + self%candidates%filter%bytes() + &

@@ -164,13 +164,15 @@ contains
       type(pair_list_t), intent(in) :: self
       integer(lp), intent(in) :: key
       integer(ip), intent(in) :: from
-      integer(ip) :: high, middle
+      integer(ip) :: high, middle, first, second
 
+      first = int(shiftr(key, 32), ip)
+      second = int(iand(key, int(huge(1_ip), lp)), ip)
       place_of = from
       high = self%n + 1_ip
       do while (place_of < high)
          middle = place_of + (high - place_of)/2_ip
-         if (pair_key(self%first(middle), self%second(middle)) < key) then
+         if (self%first(middle) < first .or. (self%first(middle) == first .and. self%second(middle) < second)) then
             place_of = middle + 1_ip
          else
             high = middle

@@ -96,26 +96,22 @@ contains
       end do
    end subroutine activate_all
 
-   !> Take a candidate out of the active ones before it is removed; the last candidate gets its number.
-   pure subroutine forget(self, k, last)
+   !> Take a candidate out of the active ones before it is removed.
+   pure subroutine forget(self, k)
       class(active_pairs_t), intent(inout) :: self
-      !> Number of the candidate, and of the last candidate
-      integer(ip), intent(in) :: k, last
+      !> Number of the candidate
+      integer(ip), intent(in) :: k
       integer(ip) :: p
 
-      call self%reserve_places(last)
+      call self%reserve_places(k)
       p = self%place(k)
-      if (p /= 0_ip) then
-         self%box(:, p) = self%box(:, self%n)
-         self%overlap(p) = self%overlap(self%n)
-         self%owner(p) = self%owner(self%n)
-         self%n = self%n - 1_ip
-         self%place(self%owner(p)) = p
-      end if
-      self%place(k) = self%place(last)
-      if (k == last) self%place(k) = 0_ip
-      if (self%place(k) /= 0_ip) self%owner(self%place(k)) = k
-      self%place(last) = 0_ip
+      if (p == 0_ip) return
+      self%place(k) = 0_ip
+      self%box(:, p) = self%box(:, self%n)
+      self%overlap(p) = self%overlap(self%n)
+      self%owner(p) = self%owner(self%n)
+      if (p < self%n) self%place(self%owner(p)) = p
+      self%n = self%n - 1_ip
    end subroutine forget
 
    !> Make room for the places of n candidates; new ones are not active.

@@ -132,11 +132,14 @@ contains
       integer(ip), intent(in) :: i
       !> Bounds xmin, ymin, xmax, ymax [m]
       real(wp), intent(in) :: bounds(4)
-      integer(ip) :: n, stray(2)
+      real(wp) :: from(4), to(4), widths(2)
 
-      call list_strays(1_ip, 1_ip, [real(self%drawn(i), wp), real(self%length, wp)], tube(self), 1_ip, bounds, &
-                       self%place(:, i), self%speed(:, i), n, stray)
-      stays_inside = n == 0_ip
+      widths = tube(self)
+      from = self%place(:, i) + real(self%speed(:, i), wp)*real(self%drawn(i), wp)
+      to = self%place(:, i) + real(self%speed(:, i), wp)*real(self%length, wp)
+      stays_inside = all(min(from(1:2), to(1:2)) >= bounds(1:2) + widths(1)) .and. &
+         all(max(from(3:4), to(3:4)) <= bounds(3:4) - widths(1)) .and. &
+         all(abs(self%place(:, i)) + abs(real(self%speed(:, i), wp)*real(self%length, wp)) <= widths(2))
    end function stays_inside
 
    !> Half width of the tubes around the lines in which the boxes on their lines are, and L as in the head of

@@ -1,8 +1,10 @@
 !> Candidates: pairs of boxes that may overlap, and whether they overlapped at the last comparison.
 !>
-!> The list is unordered and dense, so the comparison of all candidates is one loop over plain arrays. The candidates of
-!> each box also form a doubly linked list. Element (s, k) of `next` and `previous` belongs to box s (1 or 2) of
-!> candidate k; its number 2(k - 1) + s is its *link*. Removing and adding a candidate cost O(1).
+!> The comparison of all candidates is one loop over plain arrays. The candidates of each box also form a doubly linked
+!> list. Element (s, k) of `next` and `previous` belongs to box s (1 or 2) of candidate k; its number 2(k - 1) + s is
+!> its *link*. Removing and adding a candidate cost O(1). A candidate that is removed leaves a *hole*, a box with itself,
+!> and new candidates fill the last holes first. So candidates of near boxes stay near each other in the list, and
+!> threads that compare different parts of it share few boxes.
 module polydem_candidates
    use polydem_kinds, only: bp, dp, ip, lp, wp
    use polydem_pair_changes, only: pair_changes_t
@@ -12,30 +14,6 @@ module polydem_candidates
 
    !> Number of candidates that are compared at once
    integer(ip), parameter :: block_size = 128_ip
-
-   !> Candidates 1..n
-   type :: candidates_t
-      !> Number of candidates
-      integer(ip) :: n = 0_ip
-      !> Boxes of each candidate, (2, candidate)
-      integer(ip), allocatable :: box(:, :)
-      !> 1 if the boxes overlapped at the last comparison, else 0, (candidate)
-      integer(bp), allocatable :: overlap(:)
-      !> First link of each box, (box); 0: none
-      integer(ip), allocatable :: first(:)
-      !> Next link of the same box, (2, candidate), 0: none
-      integer(ip), allocatable :: next(:, :)
-      !> Previous link of the same box, (2, candidate), 0: none
-      integer(ip), allocatable :: previous(:, :)
-   contains
-      procedure :: start
-      procedure :: add
-      procedure :: compare
-      procedure :: drop
-      procedure :: remove_separated
-      procedure :: append_candidates_of
-      procedure :: bytes
-   end type candidates_t
 
    !> List of integers that grows
    type :: index_list_t
@@ -47,6 +25,33 @@ module polydem_candidates
       procedure :: push
       procedure :: reserve => reserve_entries
    end type index_list_t
+
+   !> Candidates and holes 1..n
+   type :: candidates_t
+      !> Number of candidates and holes
+      integer(ip) :: n = 0_ip
+      !> Boxes of each candidate, (2, candidate)
+      integer(ip), allocatable :: box(:, :)
+      !> 1 if the boxes overlapped at the last comparison, else 0, (candidate)
+      integer(bp), allocatable :: overlap(:)
+      !> First link of each box, (box); 0: none
+      integer(ip), allocatable :: first(:)
+      !> Next link of the same box, (2, candidate), 0: none
+      integer(ip), allocatable :: next(:, :)
+      !> Previous link of the same box, (2, candidate), 0: none
+      integer(ip), allocatable :: previous(:, :)
+      !> Holes
+      type(index_list_t), private :: hole
+   contains
+      procedure :: start
+      procedure :: add
+      procedure :: compare
+      procedure :: drop
+      procedure :: n_pairs
+      procedure :: list_separated
+      procedure :: append_candidates_of
+      procedure :: bytes
+   end type candidates_t
 
 contains
 
@@ -61,8 +66,8 @@ contains
       call reserve(self, 8_ip*n_boxes)
    end subroutine start
 
-   !> Append a candidate.
-   pure subroutine add(self, a, b, overlap)
+   !> Add a candidate.
+   pure subroutine add(self, a, b, overlap, k)
       class(candidates_t), intent(inout) :: self
       !> First box
       integer(ip), intent(in) :: a
@@ -70,19 +75,27 @@ contains
       integer(ip), intent(in) :: b
       !> Whether they overlap
       logical, intent(in) :: overlap
+      !> Its number
+      integer(ip), intent(out) :: k
       integer(ip) :: s, link, other
 
-      call reserve(self, self%n + 1_ip)
-      self%n = self%n + 1_ip
-      self%box(:, self%n) = [a, b]
-      self%overlap(self%n) = merge(1_bp, 0_bp, overlap)
+      if (self%hole%n > 0_ip) then
+         k = self%hole%at(self%hole%n)
+         self%hole%n = self%hole%n - 1_ip
+      else
+         call reserve(self, self%n + 1_ip)
+         self%n = self%n + 1_ip
+         k = self%n
+      end if
+      self%box(:, k) = [a, b]
+      self%overlap(k) = merge(1_bp, 0_bp, overlap)
       do s = 1_ip, 2_ip
-         link = 2_ip*(self%n - 1_ip) + s
-         other = self%first(self%box(s, self%n))
-         self%next(s, self%n) = other
-         self%previous(s, self%n) = 0_ip
+         link = 2_ip*(k - 1_ip) + s
+         other = self%first(self%box(s, k))
+         self%next(s, k) = other
+         self%previous(s, k) = 0_ip
          if (other /= 0_ip) self%previous(side(other), place(other)) = link
-         self%first(self%box(s, self%n)) = link
+         self%first(self%box(s, k)) = link
       end do
    end subroutine add
 
@@ -109,7 +122,7 @@ contains
                             size(bounds, 2, ip), bounds, differ, any_differ)
          if (.not. any_differ) cycle
          do k = from, to
-            if (differ(k - from + 1_ip) == 0_bp) cycle
+            if (differ(k - from + 1_ip) == 0_bp .or. self%box(1, k) == self%box(2, k)) cycle
             self%overlap(k) = 1_bp - self%overlap(k)
             call changes%record(body(self%box(1, k)), body(self%box(2, k)), &
                                 2_ip*int(self%overlap(k), ip) - 1_ip)
@@ -140,33 +153,30 @@ contains
       any_differ = some /= 0_bp
    end subroutine compare_block
 
-   !> Remove the candidates of a box whose padded boxes do not overlap any longer.
-   pure subroutine remove_separated(self, i, padded, n_dropped)
-      class(candidates_t), intent(inout) :: self
+   !> Number of candidates
+   pure integer(ip) function n_pairs(self)
+      class(candidates_t), intent(in) :: self
+
+      n_pairs = self%n - self%hole%n
+   end function n_pairs
+
+   !> Append the candidates of a box whose padded boxes do not overlap any longer to a list.
+   pure subroutine list_separated(self, i, padded, list)
+      class(candidates_t), intent(in) :: self
       !> Box whose padded box changed
       integer(ip), intent(in) :: i
       !> Padded boxes, (4, box)
       real(dp), intent(in), contiguous :: padded(:, :)
-      !> Number of candidates removed
-      integer(ip), intent(out) :: n_dropped
-      integer(ip) :: link, next, moved
+      !> Numbers of candidates
+      type(index_list_t), intent(inout) :: list
+      integer(ip) :: link
 
-      n_dropped = 0_ip
       link = self%first(i)
       do while (link /= 0_ip)
-         next = self%next(side(link), place(link))
-         if (.not. meet(padded(:, i), padded(:, self%box(3_ip - side(link), place(link))))) then
-            ! The last candidate is moved to the place of this one, and may be the next candidate of the loop.
-            moved = place(link)
-            if (next /= 0_ip) then
-               if (place(next) == self%n) next = 2_ip*(moved - 1_ip) + side(next)
-            end if
-            call self%drop(moved)
-            n_dropped = n_dropped + 1_ip
-         end if
-         link = next
+         if (.not. meet(padded(:, i), padded(:, self%box(3_ip - side(link), place(link))))) call list%push(place(link))
+         link = self%next(side(link), place(link))
       end do
-   end subroutine remove_separated
+   end subroutine list_separated
 
    !> Append the candidates of a box to a list.
    pure subroutine append_candidates_of(self, i, list)
@@ -194,41 +204,34 @@ contains
                int(storage_size(self%overlap), lp)*size(self%overlap, kind=lp))/8_lp
    end function bytes
 
-   !> Remove one candidate; the last candidate is moved to its place.
+   !> Remove a candidate, unless it is a hole.
    pure subroutine drop(self, k)
       class(candidates_t), intent(inout) :: self
       !> Number of the candidate
       integer(ip), intent(in) :: k
       integer(ip) :: s
 
+      if (self%box(1, k) == self%box(2, k)) return
       do s = 1_ip, 2_ip
-         call point_at(self, self%box(s, k), self%previous(s, k), self%next(s, k), 0_ip)
+         call unlink(self, self%box(s, k), self%previous(s, k), self%next(s, k))
       end do
-      if (k /= self%n) then
-         do s = 1_ip, 2_ip
-            self%box(s, k) = self%box(s, self%n)
-            self%next(s, k) = self%next(s, self%n)
-            self%previous(s, k) = self%previous(s, self%n)
-            call point_at(self, self%box(s, k), self%previous(s, k), self%next(s, k), 2_ip*(k - 1_ip) + s)
-         end do
-         self%overlap(k) = self%overlap(self%n)
-      end if
-      self%n = self%n - 1_ip
+      self%box(2, k) = self%box(1, k)
+      self%overlap(k) = 1_bp
+      call self%hole%push(k)
    end subroutine drop
 
-   !> Set the pointers of two neighbours in the linked list of a box to a link between them, or to each other if the
-   !> link is 0.
-   pure subroutine point_at(self, box, previous, next, link)
+   !> Set the pointers of two neighbours in the linked list of a box to each other.
+   pure subroutine unlink(self, box, previous, next)
       class(candidates_t), intent(inout) :: self
-      integer(ip), intent(in) :: box, previous, next, link
+      integer(ip), intent(in) :: box, previous, next
 
       if (previous == 0_ip) then
-         self%first(box) = merge(next, link, link == 0_ip)
+         self%first(box) = next
       else
-         self%next(side(previous), place(previous)) = merge(next, link, link == 0_ip)
+         self%next(side(previous), place(previous)) = next
       end if
-      if (next /= 0_ip) self%previous(side(next), place(next)) = merge(previous, link, link == 0_ip)
-   end subroutine point_at
+      if (next /= 0_ip) self%previous(side(next), place(next)) = previous
+   end subroutine unlink
 
    !> Box of the candidate to which a link belongs: 1 or 2
    pure integer(ip) function side(link)

@@ -209,6 +209,7 @@ contains
          call list_differences(to - from + 1_ip, kind, candidates%overlap(from:to), n, listed)
          do m = 1_ip, n
             k = from + listed(m) - 1_ip
+            if (candidates%box(1, k) == candidates%box(2, k)) cycle
             if (kind(listed(m)) /= active) then
                candidates%overlap(k) = kind(listed(m))
                call changes%record(body(candidates%box(1, k)), body(candidates%box(2, k)), &

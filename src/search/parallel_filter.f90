@@ -12,7 +12,7 @@ module polydem_parallel_filter
    public :: parallel_filter_t
 
    !> Number of boxes above which the review of their candidates is parallel; a box takes about 100 ns
-   integer(ip), parameter :: worth_reviewing = 32_ip
+   integer(ip), parameter :: worth_reviewing = 128_ip
 
    !> Results of one thread
    type :: worker_t
