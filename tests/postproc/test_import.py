@@ -148,6 +148,12 @@ def test_a_concave_outline_is_named_or_decomposed(tmp_path, capsys):
     ("a.json", "{", "a.json:1: is not JSON"),
     ("a.json", '{"type": "Point", "coordinates": [0, 0]}', "a.json: is a Point, not a Polygon or MultiPolygon"),
     ("a.json", '{"type": "Polygon", "coordinates": [[[0], [1, 0], [1, 1]]]}', "the vertices are not pairs of numbers"),
+    ("a.json", json.dumps({"features": [{"type": "Feature", "properties": properties, "geometry": {
+        "type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1]]]}} for properties in ({}, {"velocity": "fast"})]}),
+     "a.json: feature 2: the velocity is 'fast', not 2 number(s)"),
+    ("a.json", json.dumps({"features": [{"type": "Feature", "properties": properties, "geometry": {
+        "type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1]]]}} for properties in ({"id": 3}, {})]}),
+     "a.json: feature 2: has no id, which other polygons have"),
     ("a.txt", "0 0\n1 0\n1 one\n", "a.txt:3: is neither a vertex such as '0.1 0.2' nor the word fixed: '1 one'"),
     ("a.txt", "0 0\n1 0\n", "a.txt:1: the outline cannot be a body: it has 2 different vertices"),
     ("a.txt", "\n0 0\n1 0\n2 0\n", "a.txt:2: the outline cannot be a body: it has 2 different vertices"),

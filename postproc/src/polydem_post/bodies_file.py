@@ -53,6 +53,7 @@ def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[st
         raise ResultError(f"the scale is {scale}, but must be a number above 0")
     polygons: list[FloatArray] = []
     rows: list[dict[str, Any]] = []
+    places: list[str] = []
     for number, outline in enumerate(given, 1):
         pieces = _pieces(outline, scale, decomposed)
         properties = {**outline.properties, **({"fixed": True} if number in held else {})}
@@ -60,9 +61,10 @@ def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[st
             raise ResultError(f"{outline.place}: a mass, an inertia or an id cannot be divided among its pieces")
         polygons += pieces
         rows += [properties] * len(pieces)
+        places += [outline.place] * len(pieces)
     if not polygons:
         raise ResultError(f"{path}: there are no bodies to write")
-    columns = {name: _column(name, rows) for name in PROPERTIES if any(name in row for row in rows)}
+    columns = {name: _column(name, rows, places) for name in PROPERTIES if any(name in row for row in rows)}
     columns.setdefault("fixed", np.zeros(len(rows), dtype=np.int8))
     if path.exists() and not overwrite:
         raise ResultError(f"{path}: exists already; --force replaces it")
@@ -89,19 +91,19 @@ def _pieces(outline: Outline, scale: float, decomposed: bool) -> list[FloatArray
     return pieces
 
 
-def _column(name: str, rows: list[dict[str, Any]]) -> Any:
+def _column(name: str, rows: list[dict[str, Any]], places: list[str]) -> Any:
     """A data set of a bodies file; a body without a value has the default of the file format."""
-    if name == "id" and not all("id" in row for row in rows):
-        raise ResultError("some polygons have an id and some have none")
-    if name == "density" and not all("density" in row for row in rows):
-        raise ResultError("some polygons have a density and some have none")
+    if name in ("id", "density"):
+        for place, row in zip(places, rows):
+            if name not in row:
+                raise ResultError(f"{place}: has no {name}, which other polygons have")
     width = WIDE.get(name, 1)
     values = []
-    for row in rows:
+    for place, row in zip(places, rows):
         try:
             value = np.array(row.get(name, np.zeros(width)), dtype=float).reshape(width)
         except (TypeError, ValueError) as error:
-            raise ResultError(f"the {name} of a polygon is {row[name]!r}, not {width} number(s)") from error
+            raise ResultError(f"{place}: the {name} is {row[name]!r}, not {width} number(s)") from error
         values.append(value)
     column = np.array(values)
     if name in ("fixed", "id"):
