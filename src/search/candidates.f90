@@ -2,9 +2,9 @@
 !>
 !> The comparison of all candidates is one loop over plain arrays. The candidates of each box also form a doubly linked
 !> list. Element (s, k) of `next` and `previous` belongs to box s (1 or 2) of candidate k; its number 2(k - 1) + s is
-!> its *link*. Removing and adding a candidate cost O(1). A candidate that is removed leaves a *hole*, a box with itself,
-!> and new candidates fill the last holes first. So candidates of near boxes stay near each other in the list, and
-!> threads that compare different parts of it share few boxes.
+!> its *link*. Removing and adding a candidate cost O(1). A candidate that is removed leaves a *hole*, a box with
+!> itself, and new candidates fill the last holes first. So candidates of near boxes stay near each other in the list,
+!> and threads that compare different parts of it share few boxes.
 module polydem_candidates
    use polydem_kinds, only: bp, dp, ip, lp, wp
    use polydem_pair_changes, only: pair_changes_t
