@@ -24,6 +24,7 @@
 !> Loops over all lanes have no branches, so that the compiler handles several lanes at a time. A division by a
 !> difference that is zero or tiny only without a certificate has a least divisor, which changes no certified bit.
 module polydem_lens_kernel
+   use polydem_gather_corners, only: gather_corners
    use polydem_kinds, only: ip, wp
    use polydem_lens_area, only: integrate_area
    use polydem_lens_effective_area, only: integrate_effective_area
@@ -58,7 +59,7 @@ contains
 
       call unpack_lenses(n, batch, lens)
       call prepare(n, batch, lens)
-      call gather_corners(n, lens%vertex, size(turned, 2, kind=ip), turned, lens%corner)
+      call gather_corners(n, 8_ip, lens%vertex, size(turned, 2, kind=ip), turned, lens%corner)
       call find_crossings(n, lens)
       call test_corners(n, lens)
       call test_rare(lens)
@@ -155,28 +156,6 @@ contains
          lens%n_rare = lens%n_rare + merge(1_ip, 0_ip, usual(i) < 0.0_wp)
       end do
    end subroutine prepare
-
-   !> Copy the vertices that the lanes name, four lanes at a time: it is stores that take the time.
-   pure subroutine gather_corners(n, vertex, n_vertices, turned, corner)
-      integer(ip), intent(in) :: n
-      integer(ip), intent(inout) :: vertex(column_length, 8)
-      integer(ip), intent(in) :: n_vertices
-      real(wp), intent(in) :: turned(2, n_vertices)
-      real(wp), intent(inout) :: corner(column_length, 2, 8)
-      integer(ip) :: i, k
-
-      do k = 1_ip, 8_ip
-         vertex(n + 1_ip:n + 3_ip, k) = vertex(n, k)
-      end do
-      do i = 1_ip, n, 4_ip
-         do k = 1_ip, 8_ip
-            corner(i:i + 3, 1, k) = [turned(1, vertex(i, k)), turned(1, vertex(i + 1, k)), &
-                                     turned(1, vertex(i + 2, k)), turned(1, vertex(i + 3, k))]
-            corner(i:i + 3, 2, k) = [turned(2, vertex(i, k)), turned(2, vertex(i + 1, k)), &
-                                     turned(2, vertex(i + 2, k)), turned(2, vertex(i + 3, k))]
-         end do
-      end do
-   end subroutine gather_corners
 
    !> Find the crossings, and test whether the edges cross properly and are near.
    !>

@@ -1,6 +1,7 @@
 !> Test of a remembered separating edge.
 module polydem_separation
    use polydem_exact_cross, only: exact_cross
+   use polydem_gather_corners, only: gather_corners
    use polydem_kinds, only: ip, wp
    use polydem_overlap_batch, only: column_length, lanes, overlap_batch_t
    use polydem_overlap_tolerances, only: far, surely_apart
@@ -41,11 +42,13 @@ contains
       real(wp), intent(in) :: turned(2, n_vertices)
       !> Whether the polygons of a lane are apart
       logical, intent(out) :: apart(lanes)
-      real(wp) :: sure(column_length)
-      integer(ip) :: vertex(column_length, 5), i
+      real(wp) :: sure(column_length), vertex(column_length, 2, 5)
+      integer(ip) :: place(column_length, 5), i
 
-      call unpack_edges(batch, n, vertex, sure)
-      call test_corners(batch, n, vertex, n_vertices, turned, sure)
+      if (n == 0_ip) return
+      call unpack_edges(batch, n, place, sure)
+      call gather_corners(n, 5_ip, place, n_vertices, turned, vertex)
+      call test_corners(batch, n, vertex, sure)
       do i = 1_ip, n
          apart(i) = sure(i) > 0.0_wp
          if (apart(i)) cycle
@@ -88,27 +91,25 @@ contains
 
    !> Test the remembered corners: `sure` stays positive if the corner is near, outside of the edge, and nearer to its
    !> line than both its neighbours.
-   pure subroutine test_corners(batch, n, vertex, n_vertices, turned, sure)
+   pure subroutine test_corners(batch, n, vertex, sure)
       type(overlap_batch_t), intent(in) :: batch
       integer(ip), intent(in) :: n
-      integer(ip), intent(in) :: vertex(column_length, 5)
-      integer(ip), intent(in) :: n_vertices
-      real(wp), intent(in) :: turned(2, n_vertices)
+      !> Vertices as in `unpack_edges`, (lane, x or y, vertex)
+      real(wp), intent(in) :: vertex(column_length, 2, 5)
       real(wp), intent(inout) :: sure(column_length)
       real(wp) :: edge(2), from(2), to(2), of_p, of_q, nearer
       integer(ip) :: i
 
       do i = 1_ip, n
-         of_q = merge(1.0_wp, 0.0_wp, btest(not(batch%memory(i)), 0))
+         of_q = real(iand(not(batch%memory(i)), 1_ip), wp)
          of_p = 1.0_wp - of_q
-         edge(1) = turned(1, vertex(i, 2)) - turned(1, vertex(i, 1))
-         edge(2) = turned(2, vertex(i, 2)) - turned(2, vertex(i, 1))
-         from(1) = turned(1, vertex(i, 1)) + of_q*batch%offset(i, 1)
-         from(2) = turned(2, vertex(i, 1)) + of_q*batch%offset(i, 2)
-         to(1) = turned(1, vertex(i, 3)) + of_p*batch%offset(i, 1)
-         to(2) = turned(2, vertex(i, 3)) + of_p*batch%offset(i, 2)
-         nearer = min(lead(edge, turned(:, vertex(i, 3)), turned(:, vertex(i, 4))), &
-                      lead(edge, turned(:, vertex(i, 3)), turned(:, vertex(i, 5))))
+         edge(1) = vertex(i, 1, 2) - vertex(i, 1, 1)
+         edge(2) = vertex(i, 2, 2) - vertex(i, 2, 1)
+         from(1) = vertex(i, 1, 1) + of_q*batch%offset(i, 1)
+         from(2) = vertex(i, 2, 1) + of_q*batch%offset(i, 2)
+         to(1) = vertex(i, 1, 3) + of_p*batch%offset(i, 1)
+         to(2) = vertex(i, 2, 3) + of_p*batch%offset(i, 2)
+         nearer = min(lead(edge, vertex(i, :, 3), vertex(i, :, 4)), lead(edge, vertex(i, :, 3), vertex(i, :, 5)))
          sure(i) = min(min(sure(i), nearer), &
                        min(far*batch%radius(i, 1) - max(max(abs(from(1)), abs(from(2))), max(abs(to(1)), abs(to(2)))), &
                            -surely_apart*batch%radius(i, 1)*(abs(edge(1)) + abs(edge(2))) &
