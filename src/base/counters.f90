@@ -4,6 +4,7 @@
 !> one addition and no search by name.
 module polydem_counters
    use polydem_kinds, only: lp
+   use polydem_strings, only: index_of
    implicit none
    private
    public :: counters_t, counter_name_length, at_end, at_start, over_steps, greatest_step
@@ -49,13 +50,12 @@ contains
       padded = name
       belongs_to = at_end
       if (present(scope)) belongs_to = scope
-      do k = 1, size(self%name)
-         if (self%name(k) == padded) then
-            self%value(k) = value
-            self%scope(k) = belongs_to
-            return
-         end if
-      end do
+      k = index_of(name, self%name)
+      if (k > 0) then
+         self%value(k) = value
+         self%scope(k) = belongs_to
+         return
+      end if
       self%name = [self%name, padded]
       self%value = [self%value, value]
       self%scope = [self%scope, belongs_to]
@@ -70,9 +70,8 @@ contains
 
       get = 0_lp
       if (.not. allocated(self%name)) return
-      do k = 1, size(self%name)
-         if (self%name(k) == name) get = self%value(k)
-      end do
+      k = index_of(name, self%name)
+      if (k > 0) get = self%value(k)
    end function get
 
 end module polydem_counters

@@ -2,6 +2,7 @@
 !> which they were first set.
 module polydem_named_values
    use polydem_kinds, only: dp, wp
+   use polydem_strings, only: index_of
    implicit none
    private
    public :: named_values_t
@@ -49,12 +50,11 @@ contains
       padded_name = name
       padded_unit = unit
       padded_meaning = meaning
-      do k = 1, size(self%name)
-         if (self%name(k) == padded_name) then
-            self%value(k) = real(value, dp)
-            return
-         end if
-      end do
+      k = index_of(name, self%name)
+      if (k > 0) then
+         self%value(k) = real(value, dp)
+         return
+      end if
       self%name = [self%name, padded_name]
       self%unit = [self%unit, padded_unit]
       self%meaning = [self%meaning, padded_meaning]

@@ -1,10 +1,10 @@
 !> Text for messages and logs: numbers as text, safe display of untrusted text, lists of words, suggestions.
 module polydem_strings
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: dp, ip, lp, wp
    implicit none
    private
-   public :: to_text, counted, join, printable, text_t, lower_case, quoted, count_words, split_words, suggestion
+   public :: to_text, decimal, counted, join, printable, text_t, lower_case, quoted, count_words, split_words, suggestion, index_of
 
    !> Text of a number without blanks
    interface to_text
@@ -72,6 +72,20 @@ contains
       write (buffer, form) number
       text = trim(adjustl(buffer))
    end function text_wp
+
+   !> Number with the given count of decimal places
+   pure function decimal(number, digits) result(text)
+      !> Number to write
+      real(dp), intent(in) :: number
+      !> Decimal places
+      integer, intent(in) :: digits
+      character(len=:), allocatable :: text
+      character(len=32) :: form, buffer
+
+      write (form, '(a,i0,a)') '(f32.', digits, ')'
+      write (buffer, form) number
+      text = trim(adjustl(buffer))
+   end function decimal
 
    !> Words joined by a separator
    pure function join(words, separator) result(text)
@@ -278,22 +292,22 @@ contains
       if (best > 0) then
          text = '; did you mean '//quoted(trim(candidates(best)))//'?'
       else
-         text = '; choose from '//listed(candidates)
+         text = '; choose from '//join(candidates, ', ')
       end if
    end function suggestion
 
-   !> Words separated by commas
-   pure function listed(words) result(text)
+   !> Index of a word in a list; 0 if the list does not contain it
+   pure integer function index_of(word, words)
+      !> The word
+      character(len=*), intent(in) :: word
+      !> The list
       character(len=*), intent(in) :: words(:)
-      character(len=:), allocatable :: text
-      integer :: k
 
-      text = ''
-      do k = 1, size(words)
-         if (k > 1) text = text//', '
-         text = text//trim(words(k))
+      do index_of = 1, size(words)
+         if (words(index_of) == word) return
       end do
-   end function listed
+      index_of = 0
+   end function index_of
 
    !> Smallest number of single-letter changes and swaps of neighbours that turn one word into the other
    pure integer function edit_distance(a, b)

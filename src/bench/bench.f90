@@ -21,6 +21,7 @@ module polydem_bench
    use polydem_provenance, only: threads_are_bound
    use polydem_result_files, only: default_folder
    use polydem_settings, only: bench_settings_t
+   use polydem_strings, only: decimal
    implicit none
    private
    public :: run_bench
@@ -87,7 +88,6 @@ contains
    subroutine write_warnings(bench)
       type(bench_t), intent(inout) :: bench
       character(len=:), allocatable :: warning
-      character(len=12) :: number
       real(dp) :: load
       logical :: bound
 
@@ -95,9 +95,8 @@ contains
          warning = oversubscription_text(maxval(threads), int(omp_get_num_procs(), ip))
          if (warning /= '') call log%write_line(warning//'; timings are unreliable')
          load = load_average()
-         write (number, '(f12.2)') load
          if (load > quiet_load) call log%write_line('warning: this machine is busy: its load average is '// &
-            trim(adjustl(number))//' over the last minute')
+            decimal(load, 2)//' over the last minute')
          bound = threads_are_bound()
          if (maxval(threads) > 1_ip .and. .not. bound) call log%write_line('warning: threads are not bound to '// &
             'processors; set OMP_PROC_BIND=close OMP_PLACES=cores')

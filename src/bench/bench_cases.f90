@@ -15,7 +15,7 @@ module polydem_bench_cases
    use polydem_reference_file, only: read_reference, write_reference
    use polydem_sample_file, only: case_t, sample_path, sample_t, write_sample
    use polydem_settings, only: bench_settings_t
-   use polydem_strings, only: to_text
+   use polydem_strings, only: decimal, to_text
    use polydem_waiting_cost, only: measure_waiting
    implicit none
    private
@@ -161,10 +161,8 @@ contains
    function elapsed_text(bench) result(text)
       type(bench_t), intent(in) :: bench
       character(len=:), allocatable :: text
-      character(len=16) :: number
 
-      write (number, '(f16.1)') wall_seconds() - bench%began
-      text = trim(adjustl(number))//' s'
+      text = decimal(wall_seconds() - bench%began, 1)//' s'
    end function elapsed_text
 
    !> Collect the provenance of a sample.

@@ -11,11 +11,7 @@ module polydem_finder_variants
    use polydem_sort_and_sweep_o2, only: sort_and_sweep_o2_t => sort_and_sweep_t
    implicit none
    private
-   public :: new_finder_or_variant, variant_names
-
-   !> Names of the variants
-   character(len=*), parameter :: variant_names(*) = &
-      [character(len=17) :: 'quadtree_called', 'quadtree_o2', 'sort_and_sweep_o2']
+   public :: new_finder_or_variant
 
 contains
 
@@ -23,7 +19,7 @@ contains
    subroutine new_finder_or_variant(finder, name, error)
       !> The new finder
       class(finder_t), allocatable, intent(out) :: finder
-      !> Name as in &neighbours, or one of `variant_names`
+      !> Name as in &neighbours, or that of a variant
       character(len=*), intent(in) :: name
       !> Allocated if there is no finder of this name
       type(error_t), allocatable, intent(inout) :: error

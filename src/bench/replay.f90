@@ -15,8 +15,9 @@ module polydem_replay
    use polydem_line_writer, only: line_writer_t
    use polydem_provenance, only: collect_provenance, provenance_t
    use polydem_reference, only: total_hash
+   use polydem_result_files, only: stem
    use polydem_sample_file, only: sample_path, sample_t, write_sample
-   use polydem_strings, only: printable, to_text
+   use polydem_strings, only: decimal, printable, to_text
    implicit none
    private
    public :: replay_trace
@@ -163,23 +164,9 @@ contains
       character(len=*), intent(in) :: key
       real(dp), intent(in) :: step_seconds(:)
       integer(ip), intent(in) :: n_boxes
-      character(len=24) :: number
 
       if (size(step_seconds) == 0) return
-      write (number, '(f24.3)') 1.0e9_dp*sum(step_seconds)/real(size(step_seconds), dp)/real(n_boxes, dp)
-      call screen%put_line(key//trim(adjustl(number)))
+      call screen%put_line(key//decimal(1.0e9_dp*sum(step_seconds)/real(size(step_seconds), dp)/real(n_boxes, dp), 3))
    end subroutine print_time
-
-   !> Name of a file without path and suffix
-   pure function stem(path)
-      character(len=*), intent(in) :: path
-      character(len=:), allocatable :: stem
-      integer :: first, last
-
-      first = index(path, '/', back=.true.) + 1
-      last = index(path, '.', back=.true.) - 1
-      if (last < first) last = len(path)
-      stem = path(first:last)
-   end function stem
 
 end module polydem_replay

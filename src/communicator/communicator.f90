@@ -11,7 +11,7 @@ module polydem_communicator
    use polydem_kinds, only: dp, ip, lp, wp
    implicit none
    private
-   public :: communicator_t, neighbour_ranks_t
+   public :: communicator_t, neighbour_ranks_t, choose_communicator
 
    !> Neighbour ranks of a halo exchange, and the rows sent to and received from each; constant between redistributions
    type :: neighbour_ranks_t
@@ -39,11 +39,11 @@ module polydem_communicator
       !> Replace numbers by their maxima over all ranks, element by element
       generic :: all_reduce_max => all_reduce_max_longs, all_reduce_max_doubles
       procedure :: all_reduce_max_longs => unchanged_longs
-      procedure :: all_reduce_max_doubles
+      procedure, private :: all_reduce_max_doubles
       !> Copy values of the root rank to all ranks
       generic :: broadcast => broadcast_longs, broadcast_doubles, broadcast_text
       procedure :: broadcast_longs => unchanged_longs
-      procedure :: broadcast_doubles
+      procedure, private :: broadcast_doubles
       procedure :: broadcast_text
       !> Collect the lists of all ranks on every rank
       generic :: gather => gather_longs, gather_doubles
@@ -74,16 +74,6 @@ contains
       associate (unused => self%size, unused_values => values)
       end associate
    end subroutine unchanged_longs
-
-   !> Maxima: unchanged, as there is only one rank.
-   subroutine all_reduce_max_doubles(self, values)
-      class(communicator_t), intent(inout) :: self
-      !> Numbers of this rank; afterwards the same on all ranks
-      real(dp), intent(inout), contiguous :: values(:)
-
-      associate (unused => self%size, unused_values => values)
-      end associate
-   end subroutine all_reduce_max_doubles
 
    !> Collect the lists of all ranks, in the order of ranks, on every rank.
    subroutine gather_longs(self, mine, all_of_them, counts)
@@ -138,6 +128,20 @@ contains
       associate (unused => self%size)
       end associate
    end subroutine finalize
+
+   !> Copy a communicator, or make that of one process.
+   subroutine choose_communicator(chosen, comm)
+      !> The copy
+      class(communicator_t), allocatable, intent(out) :: chosen
+      !> Communicator of the ranks that work together; absent: this rank works alone
+      class(communicator_t), intent(in), optional :: comm
+
+      if (present(comm)) then
+         allocate (chosen, source=comm)
+      else
+         allocate (communicator_t :: chosen)
+      end if
+   end subroutine choose_communicator
 
    !> Whether this is the root rank. The root rank writes to the screen and manages the result folder.
    pure logical function is_root(self)
@@ -240,6 +244,22 @@ contains
       call self%broadcast(codes)
       text = text_of(codes)
    end subroutine broadcast_text
+
+   !> Maxima of real numbers over all ranks, element by element. Finite numbers have the order of the integers whose bits
+   !> are theirs, with the bits behind the sign inverted in negative ones.
+   subroutine all_reduce_max_doubles(self, values)
+      class(communicator_t), intent(inout) :: self
+      !> Numbers of this rank; afterwards the same on all ranks
+      real(dp), intent(inout), contiguous :: values(:)
+      integer(lp), allocatable :: words(:)
+
+      if (self%size == 1_ip) return
+      words = transfer(values, [0_lp])
+      where (words < 0_lp) words = ieor(words, huge(0_lp))
+      call self%all_reduce_max(words)
+      where (words < 0_lp) words = ieor(words, huge(0_lp))
+      values = transfer(words, values)
+   end subroutine all_reduce_max_doubles
 
    !> Broadcast numbers of the root rank.
    subroutine broadcast_doubles(self, values)

@@ -21,7 +21,7 @@ module polydem_hdf5_dataset
    implicit none
    private
    public :: start_library, library_version
-   public :: write_dataset, create_dataset, append_rows_to, read_dataset, dataset_shape, has_link
+   public :: write_dataset, append_rows_to, read_dataset, dataset_shape, has_link
    public :: holds_reals, holds_integers, double_type, integer_type, long_type, byte_type
 
    !> Accepted types: real numbers or integers

@@ -14,7 +14,7 @@
 !> and sends them to the ranks that own them, or it reads the rows that `choose_rows` names.
 module polydem_checkpoint_file
    use polydem_atomic_file, only: begin_file, complete_file, open_on_all_ranks
-   use polydem_communicator, only: communicator_t
+   use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_checksum, only: verify_checksum
    use polydem_global_order, only: component, global_order_t
@@ -79,12 +79,7 @@ contains
       self%path = path
       self%is_reading = .false.
       self%is_spread = .false.
-      if (allocated(self%comm)) deallocate (self%comm)
-      if (present(comm)) then
-         allocate (self%comm, source=comm)
-      else
-         allocate (communicator_t :: self%comm)
-      end if
+      call choose_communicator(self%comm, comm)
       if (self%comm%is_root()) call write_origin(self, provenance)
       call open_on_all_ranks(self%comm, self%file, path//unfinished, bytes, self%error)
    end subroutine create
@@ -138,8 +133,7 @@ contains
 
       self%path = path
       self%is_reading = .true.
-      if (present(comm)) allocate (self%comm, source=comm)
-      if (.not. allocated(self%comm)) allocate (communicator_t :: self%comm)
+      call choose_communicator(self%comm, comm)
       if (self%comm%is_root()) call verify_checksum(path, problem)
       if (allocated(problem)) call raise(error, io_error, path//': is damaged: '//problem)
       call self%comm%all_reduce_error(error)

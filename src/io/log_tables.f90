@@ -4,7 +4,7 @@ module polydem_log_tables
    use polydem_kinds, only: dp, ip, lp
    use polydem_log, only: line_width, log_t
    use polydem_provenance, only: provenance_t
-   use polydem_strings, only: printable, to_text
+   use polydem_strings, only: decimal, printable, to_text
    use polydem_timers, only: n_stages, stage_names, timers_t
    implicit none
    private
@@ -133,18 +133,6 @@ contains
       write (line, '(a14,54x,f14.3,f9.1,a)') padded, part, share(part, whole), '%'
       call log%write_line(trim(line))
    end subroutine write_sum
-
-   !> Number with the given count of decimal places
-   pure function decimal(number, digits) result(text)
-      real(dp), intent(in) :: number
-      integer, intent(in) :: digits
-      character(len=:), allocatable :: text
-      character(len=32) :: form, buffer
-
-      write (form, '(a,i0,a)') '(f32.', digits, ')'
-      write (buffer, form) number
-      text = trim(adjustl(buffer))
-   end function decimal
 
    !> Share of a part in the whole [%]; 0 if the whole is not positive
    pure real(dp) function share(part, whole)

@@ -288,14 +288,21 @@ contains
       class(manifest_t), intent(in) :: self
       !> Final name of the file
       character(len=*), intent(in) :: name
-      integer :: k
 
-      place_of = 0
-      do k = self%n, 1, -1
-         if (self%entry(k)%name == name) place_of = k
-         if (place_of > 0) exit
+      do place_of = self%n, 1, -1
+         if (self%entry(place_of)%name == name) return
       end do
    end function place_of
+
+   !> Index of the entry of a file if a line about it can be written; else 0
+   pure integer function writable_entry(self, path, error) result(k)
+      type(manifest_t), intent(in) :: self
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(in) :: error
+
+      k = 0
+      if (self%is_active .and. .not. allocated(error)) k = self%place_of(name_in(path))
+   end function writable_entry
 
    !> Add a file to the result, before the file is created. A no-op if the result already owns it.
    subroutine add_file(self, path, error)
@@ -326,8 +333,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 
-      k = self%place_of(name_in(path))
-      if (k == 0 .or. .not. self%is_active .or. allocated(error)) return
+      k = writable_entry(self, path, error)
+      if (k == 0) return
       if (self%entry(k)%is_closed) call append(self, 'owns '//name_in(path), error)
       if (.not. allocated(error)) self%entry(k) = entry_t(name=name_in(path))
    end subroutine reopen
@@ -344,8 +351,8 @@ contains
       character(len=:), allocatable :: problem
       integer :: k
 
-      k = self%place_of(name_in(path))
-      if (k == 0 .or. .not. self%is_active .or. allocated(error)) return
+      k = writable_entry(self, path, error)
+      if (k == 0) return
       entry = entry_t(name=name_in(path), is_closed=.true.)
       if (.not. link_exists(self%folder//'/'//trim(entry%name))) return
       if (present(frames)) entry%frames = frames
@@ -385,8 +392,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 
-      k = self%place_of(name_in(path))
-      if (k == 0 .or. .not. self%is_active .or. allocated(error)) return
+      k = writable_entry(self, path, error)
+      if (k == 0) return
       call append(self, 'removed '//name_in(path), error)
       if (.not. allocated(error)) call drop_entry(self, k)
    end subroutine remove_entry

@@ -19,7 +19,7 @@ module polydem_result_files
    implicit none
    private
    public :: segment_path, checkpoint_path, log_name, overlaps_name, profile_name, steps_name, trace_name
-   public :: default_folder, n_checkpoints, open_suffix, unfinished, name_in, segment_number, last_segment, &
+   public :: default_folder, n_checkpoints, open_suffix, unfinished, name_in, stem, segment_number, last_segment, &
       manifest_name, forms_of, complete_name, conflict_text
 
    !> Suffix of the temporary name of an incomplete file other than a segment
@@ -41,13 +41,22 @@ contains
       !> Path of the namelist file
       character(len=*), intent(in) :: input_file
       character(len=:), allocatable :: folder
+
+      folder = 'results/'//stem(input_file)
+   end function default_folder
+
+   !> Name of a file without path and suffix
+   pure function stem(path)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: stem
       integer :: first, last
 
-      first = index(input_file, '/', back=.true.) + 1
-      last = index(input_file, '.', back=.true.) - 1
-      if (last < first) last = len(input_file)
-      folder = 'results/'//input_file(first:last)
-   end function default_folder
+      first = index(path, '/', back=.true.) + 1
+      last = index(path, '.', back=.true.) - 1
+      if (last < first) last = len(path)
+      stem = path(first:last)
+   end function stem
 
    !> Path of a checkpoint
    pure function checkpoint_path(folder, number) result(path)

@@ -9,7 +9,7 @@
 module polydem_trajectory_writer
    use polydem_atomic_file, only: check_file_length, reserve_on_all_ranks, open_on_all_ranks
    use polydem_bodies, only: bodies_t
-   use polydem_communicator, only: communicator_t
+   use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_file_system, only: make_folder, rename_file, sync_file
@@ -72,12 +72,7 @@ contains
       !> Communicator of the run; absent: this rank writes alone
       class(communicator_t), intent(in), optional :: comm
 
-      if (allocated(self%comm)) deallocate (self%comm)
-      if (present(comm)) then
-         allocate (self%comm, source=comm)
-      else
-         allocate (communicator_t :: self%comm)
-      end if
+      call choose_communicator(self%comm, comm)
       self%folder = folder
       self%capacity = max(1_ip, frames_per_segment)
       self%provenance = provenance

@@ -18,7 +18,7 @@ module polydem_checkpoint_schedule
    use polydem_signals, only: await_signals, caught_signal, release_signals
    use polydem_simulation, only: simulation_t
    use polydem_simulation_counters, only: collect_counts
-   use polydem_strings, only: to_text
+   use polydem_strings, only: decimal, to_text
    use polydem_time_limit, only: time_limit_t
    use polydem_wall_forces, only: complete_wall_forces
    implicit none
@@ -175,17 +175,8 @@ contains
 
       call release_signals()
       if (self%n > 0_ip) call log%write_line('checkpoints: '//to_text(self%n)//', '// &
-         milliseconds(self%seconds/real(self%n, dp))//' each, at most '//milliseconds(self%longest))
+         decimal(1.0e3_dp*(self%seconds/real(self%n, dp)), 1)//' ms each, at most '// &
+         decimal(1.0e3_dp*self%longest, 1)//' ms')
    end subroutine close_checkpoints
-
-   !> A time in milliseconds as text
-   function milliseconds(seconds) result(text)
-      real(dp), intent(in) :: seconds
-      character(len=:), allocatable :: text
-      character(len=24) :: buffer
-
-      write (buffer, '(f20.1)') 1.0e3_dp*seconds
-      text = trim(adjustl(buffer))//' ms'
-   end function milliseconds
 
 end module polydem_checkpoint_schedule

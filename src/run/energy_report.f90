@@ -1,7 +1,6 @@
 !> The energy and momentum balance of a simulation as lines of the log.
 module polydem_energy_report
    use polydem_energy_balance, only: balance_t
-   use polydem_kinds, only: wp
    use polydem_log, only: log_t
    use polydem_simulation, only: simulation_t, compute_balance
    use polydem_strings, only: to_text
@@ -22,17 +21,10 @@ contains
       call log%write_line('work [J/m]: elastic '//to_text(balance%elastic_work, 4)//', damping '// &
                           to_text(balance%damping_work, 4)//', friction '//to_text(balance%friction_work, 4)// &
                           ', walls '//to_text(balance%wall_work, 4))
-      call log%write_line('residuals: energy '//percent(balance%relative_energy_residual)//', momentum '// &
+      call log%write_line('residuals: energy '//to_text(balance%relative_energy_residual, 2)// &
+                          ' of the largest kinetic energy or work so far, momentum '// &
                           to_text(balance%relative_momentum_residual, 2)//', angular momentum '// &
                           to_text(balance%relative_angular_residual, 2))
    end subroutine write_energy_report
-
-   !> A fraction of the energy scale of the balance as text
-   function percent(share) result(text)
-      real(wp), intent(in) :: share
-      character(len=:), allocatable :: text
-
-      text = to_text(share, 2)//' of the largest kinetic energy or work so far'
-   end function percent
 
 end module polydem_energy_report

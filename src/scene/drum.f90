@@ -13,7 +13,7 @@ module polydem_drum
    use polydem_settings, only: scene_settings_t
    implicit none
    private
-   public :: list_drum, choose_drum_size, draw_ring, draw_segments
+   public :: list_drum, draw_segments
 
    !> Length of a segment over the mean long axis of the grains. The segment is short enough for a single box
    real(wp), parameter :: segment_length = 3.15_wp

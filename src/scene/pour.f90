@@ -40,8 +40,6 @@ contains
       random = new_random(scene%seed)
       if (scene%packing /= '') then
          call pack_grains(scene, outline, grains, centres, error)
-      else if (scene%size_ratio > 1.0_wp) then
-         call pour_sizes(scene, outline, random, grains, centres, error)
       else
          call pour_loosely(scene, outline, random, grains, centres, error)
       end if
@@ -53,7 +51,7 @@ contains
       call append_grains(list, scene, grains, centres, velocities, spins)
    end subroutine place_grains
 
-   !> Place loose grains on a lattice, from the bottom up.
+   !> Place loose grains from the bottom up: on a lattice, or in cells of an upright rectangle if they differ in size.
    subroutine pour_loosely(scene, outline, random, grains, centres, error)
       type(scene_settings_t), intent(in) :: scene
       real(wp), intent(in) :: outline(:, :)
@@ -61,9 +59,17 @@ contains
       type(grains_t), intent(out) :: grains
       real(wp), intent(out) :: centres(:, :)
       type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: spread
       integer(ip) :: n, n_found
 
       n = size(centres, 2, kind=ip)
+      if (scene%size_ratio > 1.0_wp) then
+         call draw_grains(scene, random, n, grains, draw_sizes(scene%size_ratio, n))
+         call fit_cells(outline, loose_spacing_ratio*grains%length, random, centres, spread)
+         if (.not. spread > 0.0_wp) call raise(error, input_error, 'the container has no room for grains of such '// &
+            'different sizes; enlarge the container or reduce the number of grains')
+         return
+      end if
       call fill_lattice(outline, loose_spacing(scene), centres, n_found)
       if (n_found < n) then
          call raise(error, input_error, 'the container has room for '//to_text(n_found)//' loose grains, not for ' &
@@ -73,26 +79,6 @@ contains
       call draw_grains(scene, random, n, grains)
       call displace_randomly(random, loose_spacing(scene) - scene%long_axis_max, centres)
    end subroutine pour_loosely
-
-   !> Place loose grains of many sizes in an upright rectangle.
-   subroutine pour_sizes(scene, outline, random, grains, centres, error)
-      type(scene_settings_t), intent(in) :: scene
-      real(wp), intent(in) :: outline(:, :)
-      type(random_t), intent(inout) :: random
-      type(grains_t), intent(out) :: grains
-      real(wp), intent(out) :: centres(:, :)
-      type(error_t), allocatable, intent(inout) :: error
-      real(wp) :: spread
-
-      associate (n => size(centres, 2, kind=ip))
-         call draw_grains(scene, random, n, grains, draw_sizes(scene%size_ratio, n))
-      end associate
-      call fit_cells(outline, loose_spacing_ratio*grains%length, random, centres, spread)
-      if (.not. spread > 0.0_wp) then
-         call raise(error, input_error, 'the container has no room for grains of such different sizes; enlarge the '// &
-                    'container or reduce the number of grains')
-      end if
-   end subroutine pour_sizes
 
    !> Distance of the centres of loose grains on the lattice [m]
    pure real(wp) function loose_spacing(scene)

@@ -3,6 +3,7 @@ module polydem_host
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_null_ptr, c_size_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_posix_processes, only: c_time, gethostname, gmtime, isatty, strftime, sysconf
+   use polydem_strings, only: decimal, to_text
    implicit none
    private
    public :: host_name, processor_name, processor_clock, processor_has, cache_sizes, memory_size, frequency_governor
@@ -41,7 +42,6 @@ contains
    !> Current clock rate of the first processor, like '2.596 GHz'
    function processor_clock() result(text)
       character(len=:), allocatable :: text
-      character(len=12) :: number
       real(dp) :: megahertz
       integer :: status
 
@@ -51,8 +51,7 @@ contains
          text = unknown
          return
       end if
-      write (number, '(f12.3)') 1.0e-3_dp*megahertz
-      text = trim(adjustl(number))//' GHz'
+      text = decimal(1.0e-3_dp*megahertz, 3)//' GHz'
    end function processor_clock
 
    !> Whether the first processor has a feature of /proc/cpuinfo, like 'avx2'. Linux lists only what it supports itself:
@@ -111,7 +110,6 @@ contains
    function memory_size() result(text)
       character(len=:), allocatable :: text
       character(len=line_length) :: line
-      character(len=16) :: number
       integer :: kibibytes, status
 
       text = unknown
@@ -119,8 +117,7 @@ contains
       if (index(line, 'MemTotal:') /= 1) return
       read (line(10:), *, iostat=status) kibibytes
       if (status /= 0) return
-      write (number, '(i0)') kibibytes/1024
-      text = trim(number)//' MiB'
+      text = to_text(kibibytes/1024)//' MiB'
    end function memory_size
 
    !> Frequency governor of the first processor, like 'performance', from /sys

@@ -15,7 +15,7 @@ module polydem_time_limit
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: time_limit_t, patience_variable
+   public :: time_limit_t
 
    !> Name of the environment variable that sets the time limit without the time for writing [s]
    character(len=*), parameter :: patience_variable = 'POLYDEM_PATIENCE'

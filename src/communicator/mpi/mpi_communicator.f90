@@ -5,10 +5,10 @@
 !> the procedure that starts it.
 module polydem_mpi_communicator
    use mpi_f08, only: mpi_allgather, mpi_allgatherv, mpi_allreduce, mpi_alltoall, mpi_bcast, mpi_byte, mpi_comm_world, &
-      mpi_double_precision, mpi_finalize, mpi_in_place, mpi_integer, mpi_integer8, mpi_irecv, mpi_isend, mpi_max, &
+      mpi_finalize, mpi_in_place, mpi_integer, mpi_integer8, mpi_irecv, mpi_isend, mpi_max, &
       mpi_recv, mpi_request, mpi_send, mpi_statuses_ignore, mpi_status_ignore, mpi_sum, mpi_waitall
    use polydem_communicator, only: neighbour_ranks_t, communicator_t
-   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_kinds, only: ip, lp, wp
    implicit none
    private
    public :: mpi_communicator_t
@@ -18,7 +18,6 @@ module polydem_mpi_communicator
    contains
       procedure :: all_reduce_sum
       procedure :: all_reduce_max_longs
-      procedure :: all_reduce_max_doubles
       procedure :: broadcast_longs
       procedure :: gather_longs
       procedure :: all_to_all_longs
@@ -50,15 +49,6 @@ contains
       if (self%size == 1_ip) return
       call mpi_allreduce(mpi_in_place, values, size(values), mpi_integer8, mpi_max, mpi_comm_world)
    end subroutine all_reduce_max_longs
-
-   !> Replace numbers by their maxima over all ranks.
-   subroutine all_reduce_max_doubles(self, values)
-      class(mpi_communicator_t), intent(inout) :: self
-      real(dp), intent(inout), contiguous :: values(:)
-
-      if (self%size == 1_ip) return
-      call mpi_allreduce(mpi_in_place, values, size(values), mpi_double_precision, mpi_max, mpi_comm_world)
-   end subroutine all_reduce_max_doubles
 
    !> Broadcast numbers of the root rank.
    subroutine broadcast_longs(self, values)
