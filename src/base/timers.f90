@@ -60,11 +60,8 @@ contains
       class(timers_t), intent(inout) :: self
       !> stage_boxes, ..., stage_output
       integer, intent(in) :: stage
-      real(dp) :: now
 
-      now = wall_seconds()
-      self%current(stage) = max(self%current(stage), 0.0_dp) + (now - self%began)
-      self%began = now
+      self%current(stage) = max(self%current(stage), 0.0_dp) + next_lap(self)
    end subroutine lap
 
    !> Add the time since the last lap to two stages that alternate.
@@ -74,12 +71,11 @@ contains
       integer, intent(in) :: stage, other
       !> Share of the first stage
       real(dp), intent(in) :: share
-      real(dp) :: now
+      real(dp) :: seconds
 
-      now = wall_seconds()
-      self%current(stage) = max(self%current(stage), 0.0_dp) + share*(now - self%began)
-      self%current(other) = max(self%current(other), 0.0_dp) + (1.0_dp - share)*(now - self%began)
-      self%began = now
+      seconds = next_lap(self)
+      self%current(stage) = max(self%current(stage), 0.0_dp) + share*seconds
+      self%current(other) = max(self%current(other), 0.0_dp) + (1.0_dp - share)*seconds
    end subroutine divide_lap
 
    !> End the step: add its times to the totals, and update the shortest and longest times per step.
@@ -103,11 +99,18 @@ contains
       class(timers_t), intent(inout) :: self
       !> stage_boxes, ..., stage_output
       integer, intent(in) :: stage
+
+      self%total(stage) = self%total(stage) + next_lap(self)
+   end subroutine add_to_total
+
+   !> Time since the last lap [s]. A new lap begins.
+   real(dp) function next_lap(self)
+      type(timers_t), intent(inout) :: self
       real(dp) :: now
 
       now = wall_seconds()
-      self%total(stage) = self%total(stage) + (now - self%began)
+      next_lap = now - self%began
       self%began = now
-   end subroutine add_to_total
+   end function next_lap
 
 end module polydem_timers
