@@ -4,7 +4,8 @@ module polydem_strings
    use polydem_kinds, only: dp, ip, lp, wp
    implicit none
    private
-   public :: to_text, decimal, counted, join, printable, text_t, lower_case, quoted, count_words, split_words, suggestion, index_of
+   public :: to_text, decimal, counted, join, printable, text_t, lower_case, quoted, count_words, split_words, &
+      suggestion, index_of
 
    !> Text of a number without blanks
    interface to_text

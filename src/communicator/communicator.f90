@@ -245,8 +245,8 @@ contains
       text = text_of(codes)
    end subroutine broadcast_text
 
-   !> Maxima of real numbers over all ranks, element by element. Finite numbers have the order of the integers whose bits
-   !> are theirs, with the bits behind the sign inverted in negative ones.
+   !> Maxima of real numbers over all ranks, element by element. Numbers have the order of the integers that have their
+   !> bits, if the bits behind the sign are inverted in negative ones.
    subroutine all_reduce_max_doubles(self, values)
       class(communicator_t), intent(inout) :: self
       !> Numbers of this rank; afterwards the same on all ranks

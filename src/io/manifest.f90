@@ -112,12 +112,10 @@ contains
       character(len=*), intent(in) :: text
       character(len=:), allocatable, intent(inout) :: problem
       character(len=:), allocatable :: line
-      integer(lp) :: chain
       integer(ip) :: number
       integer :: first, last
 
-      chain = 0_lp
-      call chain_line(first_text, chain, line)
+      call chain_line(first_text, self%chain, line)
       self%is_foreign = text(:min(len(text), len(beginning))) /= beginning(:min(len(text), len(beginning)))
       if (self%is_foreign) then
          problem = 'this file is not a polydem manifest'
@@ -125,7 +123,6 @@ contains
          problem = 'the first line is not '//line//': the file was changed, or written by another version of polydem'
       end if
       if (allocated(problem)) return
-      self%chain = chain
       first = len(line) + 2
       number = 1_ip
       do
