@@ -15,7 +15,7 @@ PAIRS = [
     ("quadtree_search_{}_MOD_search", "is_new"),
     ("quadtree_search_{}_MOD_search", "candidates_{}_MOD_meet"),
     ("quadtree_search_{}_MOD_search", "ancestor_around"),
-    ("candidates_{}_MOD_remove_separated", "candidates_{}_MOD_meet"),
+    ("candidates_{}_MOD_list_separated", "candidates_{}_MOD_meet"),
     ("quadtree_nodes_{}_MOD_move", "quadtree_cells_{}_MOD_holds"),
 ]
 
