@@ -218,6 +218,22 @@ def test_a_comparison_that_was_killed_goes_on_where_it_was(tmp_path):
     assert {path: after[path] for path in before} == before and len(after) > len(before)
 
 
+def test_nothing_goes_on_beside_a_call_after_one_that_was_killed_at_once(tmp_path):
+    folder = tmp_path / "paper"
+    environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
+    with subprocess.Popen(command(folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+                          env=environment) as process:
+        while not list((folder / "quick" / "drums" / "samples").glob("*-1-0.h5")):
+            assert process.poll() is None
+            time.sleep(0.02)
+        process.kill()
+    before = samples_of(folder)
+    code, said = call(folder)
+    assert code == 0 and said.count(" finished after ") == 4, said
+    after = samples_of(folder)
+    assert {path: after[path] for path in before} == before and len(after) > len(before)
+
+
 def test_a_folder_of_somebody_else_is_left_alone(tmp_path):
     place = tmp_path / "quick"
     place.mkdir()
@@ -227,6 +243,21 @@ def test_a_folder_of_somebody_else_is_left_alone(tmp_path):
     assert (place / "thesis.tex").read_text(encoding="utf-8") == "years"
     code, said = call(tmp_path / "nowhere", "--report-only")
     assert code == 2 and "nothing to report" in said
+
+
+def test_a_piece_that_fails_does_not_lose_the_others(tmp_path):
+    shutil.copytree(PLAN.parent, tmp_path / "plan")
+    gases = tmp_path / "plan" / "bench_gases.nml"
+    gases.write_text(gases.read_text(encoding="utf-8").replace("'verlet'", "'no_such_finder'"), encoding="utf-8")
+    plan = tmp_path / "plan" / "plan.json"
+    listed = json.loads(plan.read_text(encoding="utf-8"))
+    del listed["threads"]
+    plan.write_text(json.dumps({"gases": listed.pop("gases"), **listed}), encoding="utf-8")
+    code, said = call(tmp_path / "paper", plan=plan)
+    assert code == 0 and "gases: failed" in said and "no_such_finder" not in said, said
+    with (tmp_path / "paper" / "tables" / "pieces.csv").open(newline="", encoding="utf-8") as file:
+        states = {row["piece"]: row["state"] for row in csv.DictReader(file)}
+    assert states == {"gases": "failed", "drums": "finished", "verification": "finished"}
 
 
 @pytest.mark.parametrize("text", ["", "[]", '{"a": {}}', '{"a": {"bench": "no_such_file.nml"}}', '{"a": 3}'])

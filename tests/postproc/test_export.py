@@ -103,7 +103,7 @@ def test_some_frames_are_exported(run, tmp_path, frames, numbers):
 @pytest.mark.parametrize("words, message", [
     (["--to", "vtkhdf", "-o", "x.h5"], "the name of a file for --to vtkhdf ends with .vtkhdf"),
     (["--to", "csv", "-o", "file/x.csv"], "file/x.csv: cannot be written"),
-    (["--to", "csv", "--frames", "99"], "99 is out of bounds"),
+    (["--to", "csv", "--frames", "99"], "there is no frame 99, only 4 frames"),
 ])
 def test_errors_are_sentences(run, capsys, words, message, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)

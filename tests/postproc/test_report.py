@@ -214,6 +214,32 @@ def test_scenes_of_ones_own_have_a_figure_of_time_over_size_and_what_is_missing_
     assert 'figure_09_total,figure,"rotating drums' in text and "\nC1,claim," in text
 
 
+@pytest.mark.parametrize("options, told", [({"mode": "live"}, "whole time steps"), ({"threads": 2}, "2 threads")])
+@pytest.mark.parametrize("kind", ["drum", "other"])
+def test_whole_steps_and_samples_on_several_threads_alone_have_figures_too(tmp_path, kind, options, told):
+    for boxes in (500, 2000):
+        write_sample(tmp_path, f"{kind}_{boxes}", "verlet", truths()["quadtree"], boxes,
+                     made_by=input_of(kind, boxes), **options)
+    drawn = {each.name: each for each in own_drawings(read_bench([tmp_path]))}
+    assert set(drawn) == {"own_over_size", "all_scenes"}
+    assert all(told in each.caption for each in drawn.values())
+    (axis,) = [each for each in drawn["own_over_size"].figure.axes if each.get_xlabel()]
+    assert len(axis.containers[0].lines[0].get_xdata()) == 2
+
+
+def test_whole_steps_stand_beside_the_replay_in_figure_9(tmp_path):
+    finders = {name: truths()[name] for name in ("quadtree", "sort_and_sweep")}
+    write_drums(tmp_path / "a", finders, sizes=SIZES, repeats=2, threads=(1,))
+    few, many = ([tmp_path / "a", tmp_path / name] for name in ("few", "many"))
+    write_drums(few[1], finders, sizes=SIZES[:2], repeats=2, threads=(1,), mode="live")
+    write_drums(many[1], finders, sizes=SIZES[:3], repeats=2, threads=(1,), mode="live")
+    for folders, there in ((few, False), (many, True)):
+        (drawing,) = [each for each in paper_drawings(read_bench(folders)) if each.name == "figure_09_total"]
+        labels = " ".join(text.get_text() for axis in drawing.figure.axes if axis.get_legend()
+                          for text in axis.get_legend().get_texts())
+        assert ("with boxes" in labels) is there and ("Open:" in drawing.caption) is there
+
+
 def test_no_two_finders_look_alike():
     text = (Path(os.environ["POLYDEM_SOURCE_DIR"]) / "src" / "config" / "entries.txt").read_text(encoding="utf-8")
     lists = dict(re.findall(r"^list (\w+) = (.*)$", text, re.MULTILINE))

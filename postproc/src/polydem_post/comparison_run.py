@@ -6,6 +6,7 @@ again. A call that was killed goes on where it was: benches keep every sample, a
 
 from __future__ import annotations
 
+import ctypes
 import hashlib
 import json
 import os
@@ -292,7 +293,8 @@ class Comparison:
         words = [os.path.abspath(command[0]), *command[1:]]  # a link to Python in .venv must stay one
         with log.open("w", encoding="utf-8") as file:
             process = subprocess.Popen(words, cwd=place, stdout=file, stderr=subprocess.STDOUT,
-                                       stdin=subprocess.DEVNULL, env={**environment(), **variables})
+                                       stdin=subprocess.DEVNULL, env={**environment(), **variables},
+                                       preexec_fn=end_with_parent)  # noqa: PLW1509  there are no threads
             try:
                 while process.poll() is None:
                     left = self._left()
@@ -310,6 +312,12 @@ class Comparison:
                     except subprocess.TimeoutExpired:
                         process.kill()
                         process.wait()
+
+
+def end_with_parent() -> None:
+    """Get SIGTERM when the parent is killed (Linux), so that this process does not go on beside the next call."""
+    set_parent_death_signal = 1
+    getattr(ctypes.CDLL(None), "prctl", lambda *_: None)(set_parent_death_signal, signal.SIGTERM)
 
 
 def environment() -> dict:

@@ -17,7 +17,7 @@ from .figure_style import (
     shared_legend,
     style_of,
 )
-from .own_scenes import families, family_name
+from .own_scenes import families, family_name, way_of
 from .statistics import typical
 
 #: Most families of scenes in one figure, and most panels side by side
@@ -54,14 +54,16 @@ def own_over_size(bench: Bench) -> Drawing | None:
     shared_legend(below, axes[: len(found)], columns=4 if columns > 1 else 3)
     return Drawing(
         "own_over_size", figure,
-        "Time per box and step over the number of boxes, one thread, first step excluded: scenes that are no rotating "
-        "drums, one panel for scenes that differ in their size alone. Median and 95 % interval.",
+        f"Time per box and step over the number of boxes ({way_of(bench).text}), first step excluded: one panel for "
+        "scenes that differ in their size alone; drums on one thread are in figures of their own, scenes of one "
+        "size in `all_scenes` if others have several. Median and 95 % interval.",
     )
 
 
 def all_scenes(bench: Bench) -> Drawing | None:
     """All scenes with all finders: which one suits what."""
-    cases = [case for case in bench.select(threads=1, mode="replay") if case.time()]
+    way = way_of(bench)
+    cases = [case for case in bench.select(threads=way.threads, mode=way.mode) if case.time()]
     scenes = list(dict.fromkeys(case.scene for case in sorted(cases, key=lambda case: (series.kind(case), case.boxes))))
     finders = sorted({case.finder for case in cases}, key=_rank)
     if not scenes:
@@ -82,7 +84,7 @@ def all_scenes(bench: Bench) -> Drawing | None:
     shared_legend(below, [axis], columns=4)
     return Drawing(
         "all_scenes", figure,
-        "Time per box and step of all finders on all scenes, by kind and size, one thread, first step excluded: "
+        f"Time per box and step of all finders on all scenes, by kind and size ({way.text}), first step excluded: "
         "medians. Within a row "
         "the finders are shifted, so that none hides another.",
     )

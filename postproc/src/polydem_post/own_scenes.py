@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from . import series
 from .bench import Bench, Case
 from .claims import NOT_MEASURED
@@ -23,16 +25,41 @@ NEEDED = {
     "work_over_size": "counts of rotating drums, one thread",
     "fine_grained": "quadtree and partitioned_sweep on one scene with one thread and with several",
     "fine_grained_limits": "a scene on which partitioned_sweep loses to quadtree, measured or by the model",
-    "own_over_size": "scenes that are no drums, one thread",
-    "all_scenes": "any scene, one thread",
+    "own_over_size": "scenes that are no rotating drums, or samples that are not of a replay on one thread",
+    "all_scenes": "samples of two steps or more",
 }
 
 
+@dataclass(frozen=True)
+class Way:
+    """How scenes were measured: by replay or in whole time steps, with how many threads."""
+
+    mode: str
+    threads: int
+
+    @property
+    def text(self) -> str:
+        """For captions."""
+        how = "replay of recorded boxes" if self.mode == "replay" else "stage `neighbours` of whole time steps"
+        return f"{how}, {'one thread' if self.threads == 1 else f'{self.threads} threads'}"
+
+
+#: What most figures show
+USUAL = Way("replay", 1)
+
+
+def way_of(bench: Bench) -> Way:
+    """How the figures of all scenes are measured: the usual way if there are such samples, else the next to it."""
+    ways = {Way(case.mode, case.threads) for case in bench.select() if case.time()}
+    return min(ways, key=lambda way: (way.mode != USUAL.mode, way.threads), default=USUAL)
+
+
 def families(bench: Bench) -> list[list[Case]]:
-    """Cases on one thread but those of drums, by what their scenes have in common but for their size; most first."""
+    """Cases by what their scenes have in common but for their size, most first; no drums that other figures show."""
     found: dict[tuple, list] = {}
-    for case in bench.select(threads=1, mode="replay"):
-        if case.time() and series.kind(case) != "drum":
+    way = way_of(bench)
+    for case in bench.select(threads=way.threads, mode=way.mode):
+        if case.time() and (way != USUAL or series.kind(case) != "drum"):
             found.setdefault(family_of(case.settings), []).append(case)
     return sorted(found.values(), key=lambda cases: -len({case.boxes for case in cases}))
 

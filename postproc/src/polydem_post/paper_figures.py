@@ -98,7 +98,7 @@ def looks_of_machines():
 
 def total(bench: Bench) -> Drawing | None:
     """Fig. 9: all of the neighbourhood, tree and sweep."""
-    return _two_finders(
+    drawing = _two_finders(
         bench,
         series.total_time,
         "figure_09_total",
@@ -107,6 +107,9 @@ def total(bench: Bench) -> Drawing | None:
         paper.TOTAL_RATIO,
         "0.9",
     )
+    if drawing and series.whole_steps(bench, TREE) and series.whole_steps(bench, SWEEP):
+        drawing.caption += " Open: within whole steps, the making of the boxes included, as in the paper's figure."
+    return drawing
 
 
 def update(bench: Bench) -> Drawing | None:
@@ -151,6 +154,8 @@ def _two_finders(bench: Bench, quantity, name: str, what: str, slopes: dict, rat
         label="tree / sweep, these samples",
     )
     right.plot(paper.SIZES, (ratio, ratio), label=f"paper: about {ratio_text}", **PAPER)
+    if quantity is series.total_time:
+        _draw_whole_steps(left, right, bench)
     over_size(left, TIME)
     over_size(right, "tree / sweep", logarithmic=False)
     right.set_ylim(bottom=0.0)
@@ -163,6 +168,22 @@ def _two_finders(bench: Bench, quantity, name: str, what: str, slopes: dict, rat
         "paper gives, through the middle of our solid lines; right: ratio of the two. Fixed boxes count. The making of "
         "the boxes is not in.",
     )
+
+
+def _draw_whole_steps(left, right, bench: Bench) -> None:
+    """Open markers: the times of whole steps, with the making of the boxes."""
+    whole = {finder: series.whole_steps(bench, finder) for finder in (TREE, SWEEP)}
+    for finder, found in whole.items():
+        law = series.law_of_paper(found)
+        if law:
+            draw_estimates(left, [c.boxes for c in found], _per_step(found), markerfacecolor="none",
+                           label=f"{finder}, with boxes: {law.exponent.text()}",
+                           **{**style_of(finder), "linestyle": "none"})
+    both = series.pairs_of(whole[TREE], whole[SWEEP])
+    if both:
+        draw_estimates(right, [tree.boxes for tree, _ in both], [series.ratio(*pair) for pair in both], color="black",
+                       marker="o", markerfacecolor="none", linestyle="--", markersize=4.5,
+                       label="tree / sweep, with boxes")
 
 
 def _draw_paper_slope(axis, law: series.Law, slope: float) -> None:

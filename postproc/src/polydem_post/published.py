@@ -48,7 +48,9 @@ def published_table(bench: Bench) -> Table:
         table.add(point.figure, point.quantity, point.finder, point.boxes, point.value, _ours(here, point),
                   point.stated_in)
     table.note = (
-        f"{point.source}; '-': not measured, or not measurable here. The paper gives its curves without numbers."
+        f"{point.source}; '-': not measured, or not measurable here. The paper gives its curves without numbers. "
+        "Fig. 9: whole steps with the making of the boxes, or the replay if these were measured at fewer than three "
+        "sizes."
     )
     return table
 
@@ -57,10 +59,11 @@ def _ours(bench: Bench, point: Point) -> str:
     """The same quantity of these samples."""
     structure = "update" in point.quantity
     quantity = series.structure_time if structure else series.total_time
+    cases_of = series.as_published if point.figure == "Fig. 9" else series.over_size
     if point.quantity.startswith("exponent"):
-        law = series.law_of_paper(series.over_size(bench, point.finder), quantity)
+        law = series.law_of_paper(cases_of(bench, point.finder), quantity)
         return law.exponent.text() if law else "-"
     if point.finder == f"{TREE} / {SWEEP}":
-        both = series.pairs_of(series.of_paper(series.over_size(bench, TREE)), series.over_size(bench, SWEEP))
+        both = series.pairs_of(series.of_paper(cases_of(bench, TREE)), cases_of(bench, SWEEP))
         return series.pooled_ratio(both, quantity).text() if both else "-"
     return "-"

@@ -90,6 +90,11 @@ def whole_steps(bench: Bench, finder: str) -> list:
     return cases if len(cases) >= 3 else []
 
 
+def as_published(bench: Bench, finder: str) -> list:
+    """Drums of the paper's sizes whose times hold what those of its Fig. 9 hold, or of the replay if there are few."""
+    return whole_steps(bench, finder) or of_paper(over_size(bench, finder))
+
+
 def structure_time(case: Case) -> dict:
     """Repeat -> time per box and step to update the structure [ns]."""
     return case.phase("structure")
