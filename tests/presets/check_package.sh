@@ -1,9 +1,9 @@
 #!/usr/bin/env bash
 # The Debian package, installed in a clean Debian 12: check_package.sh BUILD
 #
-# Makes the package of a build folder with cpack, a Debian 12 in a temporary folder with debootstrap, installs the package
-# there with its dependencies and runs the program. Needs root, debootstrap and the mirror of Debian that apt uses; takes
-# some minutes, so it is run by hand.
+# Makes the package of a build folder with cpack and a Debian 12 in a temporary folder with debootstrap, installs the
+# package there with its dependencies and runs the program. Needs root, debootstrap and the mirror of Debian that apt
+# uses; takes some minutes, so it is run by hand.
 set -euo pipefail
 
 build=$(readlink -f "$1")

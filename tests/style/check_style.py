@@ -9,10 +9,11 @@ import sys
 
 from fortran_source import Source, split_commas
 
-WIDEST = {".pf": 124}  # columns; 124: what pFUnit can take
+WIDEST = {".pf": 124, **dict.fromkeys((".js", ".css", ".html", ".sh", ""), 120)}  # columns; 124: what pFUnit can take
 LONGEST_FILE = 400
 LONGEST_PROCEDURE = 60
-TEXTS = (".f90", ".in", ".pf", ".py", ".cmake", ".txt", ".md", ".json", ".toml", ".nml", ".cff")
+TEXTS = (".f90", ".in", ".pf", ".py", ".cmake", ".txt", ".md", ".json", ".toml", ".nml", ".cff", ".js", ".css", ".html",
+         ".sh", ".yaml")
 TREES = ("src", "tests", "postproc", "inputs")
 REAL_LITERAL = re.compile(r"(?<![\w.])(?:\d+\.\d*|\.\d+)(?:[ed][+-]?\d+)?(?![\w.])|(?<![\w.])\d+[ed][+-]?\d+\b")
 

@@ -160,6 +160,11 @@ class Rules(unittest.TestCase):
                 self.assertEqual(len(found), 1)
                 self.assertIn(words, found[0][1])
 
+    def test_scripts_and_pages_of_the_viewer_are_not_wider_than_sources(self):
+        for path in ("polydem", "a.js", "a.html", "a.css", "a.sh"):
+            self.assertEqual(list(check_lines(path, [120*"a", ""])), [])
+            self.assertEqual([line for line, _ in check_lines(path, ["a", 121*"a", ""])], [2])
+
     def test_what_a_room_alone_may_do(self):
         self.assertEqual(found_in(GOOD.replace("polydem_kinds, only", "hdf5, only"), "hdf5"), [])
         self.assertEqual(found_in(GOOD.replace("self%length + by", "by\n      if (by < 0.0_wp) stop"), "app"), [])

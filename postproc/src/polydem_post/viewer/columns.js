@@ -43,5 +43,6 @@ function numbersOf(run, i) {
 /** A number with four digits. */
 function number(value) {
   if (!Number.isFinite(value)) return "–";
-  return value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e5) ? value.toExponential(3) : String(+value.toPrecision(4));
+  const size = Math.abs(value);
+  return value !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(3) : String(+value.toPrecision(4));
 }

@@ -5,7 +5,9 @@ class Curve {
   constructor(parent, facts, name, go) {
     this.facts = facts;
     this.choice = document.createElement("select");
-    for (const each of Object.keys(facts.curves)) this.choice.add(new Option(each.replaceAll("_", " "), each, false, each === name));
+    for (const each of Object.keys(facts.curves)) {
+      this.choice.add(new Option(each.replaceAll("_", " "), each, false, each === name));
+    }
     this.choice.setAttribute("aria-label", "curve");
     const plot = document.createElement("div");
     plot.className = "curve";

@@ -1,7 +1,7 @@
 "use strict";
 
-// What is laid over the bodies, as texels of four numbers: a segment has two, x and y of an end relative to the origin and
-// the width [m]; a box has one, x and y of two corners.
+// What is laid over the bodies, as texels of four numbers. A segment has two texels: x and y of an end relative to the
+// origin, and the width [m]. A box has one: x and y of two corners.
 
 /** Texels in one row of a texture. */
 const ROW = 2048;
@@ -25,7 +25,8 @@ function widestForce(run) { return 0.45 * run.facts.diameter; }
 
 /** Lines from the centres of two bodies to their contact point, as wide as the force; to a wall none. */
 function forceSegments(run, list) {
-  const t = run.contacts(), widest = widestForce(run), factor = widest / run.facts.contacts.covered, least = 0.002 * widest;
+  const t = run.contacts(), widest = widestForce(run), least = 0.002 * widest;
+  const factor = widest / run.facts.contacts.covered;
   const [originX, originY] = run.origin, {state, fixed} = run;
   list.clear(4 * t.n);
   const {data} = list;

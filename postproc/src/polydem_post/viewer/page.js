@@ -190,7 +190,9 @@ class Viewer {
 async function begin() {
   const message = document.getElementById("message");
   try {
-    if (!window.DecompressionStream) throw new Error("This browser cannot inflate data (no DecompressionStream): it is too old.");
+    if (!window.DecompressionStream) {
+      throw new Error("This browser cannot inflate data (no DecompressionStream): it is too old.");
+    }
     window.viewer = new Viewer(await Run.read());
     message.remove();
   } catch (error) {

@@ -169,7 +169,8 @@ class Painter {
     const gl = this.gl, texture = gl.createTexture();
     gl.activeTexture(gl.TEXTURE0 + unit);
     gl.bindTexture(gl.TEXTURE_2D, texture);
-    for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     return texture;
   }
 
@@ -207,7 +208,7 @@ class Painter {
     return [this.shown.x + (left - 0.5 * width) * step, this.shown.y - (top - 0.5 * height) * step];
   }
 
-  /** Draw the present frame: name of a quantity (another: all alike), names of overlays, and the body that is chosen. */
+  /** Draw the present frame: name of a quantity (another: all alike), names of overlays, and the chosen body. */
   draw(colour, overlays, chosen) {
     const {gl, run, width, height} = this, [originX, originY] = run.origin, step = this.shown.height / height;
     gl.viewport(0, 0, width, height);
@@ -297,7 +298,10 @@ class Painter {
 
   drawChosen(i, width) {
     const {run, outline} = this, {shape, start} = run, [x, y, cosine, sine] = run.state.subarray(4 * i, 4 * i + 4);
-    const place = (v) => [x + cosine * shape[2 * v] - sine * shape[2 * v + 1], y + sine * shape[2 * v] + cosine * shape[2 * v + 1]];
+    const place = (v) => {
+      const [across, up] = shape.subarray(2 * v, 2 * v + 2);
+      return [x + cosine * across - sine * up, y + sine * across + cosine * up];
+    };
     outline.texels.clear(2 * (start[i + 1] - start[i]));
     for (let v = start[i], w = start[i + 1] - 1; v < start[i + 1]; w = v++) {
       outline.texels.data.set([...place(w), width, 0, ...place(v), 0, 0], 4 * outline.texels.n);

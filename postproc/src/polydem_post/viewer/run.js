@@ -51,14 +51,16 @@ class Run {
     for (let k = 0; k < this.frames; k++) {
       for (let b = 0; b < bytes; b++) {
         present[b] ^= changed[k * bytes + b];
-        for (let bits = present[b]; bits; bits &= bits - 1) this.contactPair[c++] = 8 * b + 31 - Math.clz32(bits & -bits);
+        for (let bits = present[b]; bits; bits &= bits - 1) {
+          this.contactPair[c++] = 8 * b + 31 - Math.clz32(bits & -bits);
+        }
       }
     }
     this.cosines = Float64Array.from({length: 256}, (_, k) => Math.cos(2 * Math.PI * k / 256));
     this.sines = Float64Array.from({length: 256}, (_, k) => Math.sin(2 * Math.PI * k / 256));
     const most = facts.count.reduce((a, b) => Math.max(a, b), 0), numbers = () => new Float64Array(most);
-    this.table = {n: 0, frame: -1, first: new Uint32Array(most), second: new Uint32Array(most), x: numbers(), y: numbers(),
-      fx: numbers(), fy: numbers(), size: numbers()};
+    this.table = {n: 0, frame: -1, first: new Uint32Array(most), second: new Uint32Array(most),
+      x: numbers(), y: numbers(), fx: numbers(), fy: numbers(), size: numbers()};
     const sums = () => new Float64Array(this.n);
     this.sums = {frame: -1, fx: sums(), fy: sums(), load: sums(), count: sums(), xx: sums(), yy: sums(), xy: sums()};
   }
@@ -115,8 +117,8 @@ class Run {
   }
 
   /**
-   * Sums over the contacts of each body in the present frame: force, magnitudes of forces, number, and the symmetric part
-   * of arm times force.
+   * Sums over the contacts of each body in the present frame: force, magnitudes of forces, number, and the symmetric
+   * part of arm times force.
    */
   contactSums() {
     const {sums} = this;
