@@ -156,3 +156,21 @@ def test_help_is_the_text_of_the_verb(capsys, monkeypatch):
     with pytest.raises(SystemExit):
         main(["plot"])
     assert capsys.readouterr().err.startswith("usage: polydem_post plot RESULT [OPTIONS]\n")
+
+
+@pytest.mark.parametrize("verb, name", [("plot", "a.png"), ("plot", "a.pdf"), ("plot", "a.svg"), ("movie", "a.gif"),
+                                        ("movie", "a.mp4"), ("view", "a.html")])
+def test_only_own_pictures_are_replaced(finished, tmp_path, capsys, verb, name):
+    path = tmp_path / name
+    if name.endswith(".mp4"):
+        pytest.importorskip("imageio_ffmpeg")
+    path.write_text("a file of others")
+    assert main([verb, str(finished), "-o", str(path)]) == 2
+    assert f"{path}: exists, and this version of polydem did not make it" in capsys.readouterr().err
+    assert path.read_text() == "a file of others"
+    path.unlink()
+    assert main([verb, str(finished), "-o", str(path)]) == 0
+    first = path.read_bytes()
+    assert main([verb, str(finished), "-o", str(path)]) == 0
+    assert path.read_bytes() == first
+    assert [each.name for each in tmp_path.iterdir()] == [name]

@@ -1,6 +1,9 @@
 """Exported files: what is in them, and the verb; test_export_readers.py reads them by other libraries."""
 
 import csv
+import os
+import shutil
+from xml.etree import ElementTree
 
 import h5py
 import numpy as np
@@ -17,8 +20,6 @@ def run(heap_with_contacts):
 
 
 def test_the_list_of_frames_names_times_and_files(run, exported):
-    from xml.etree import ElementTree
-
     for name in ("heap", "heap_contacts"):
         rows = ElementTree.parse(exported / f"{name}.pvd").findall("Collection/DataSet")
         assert [float(row.get("timestep")) for row in rows] == list(run.times)
@@ -124,3 +125,41 @@ def test_nothing_is_left_of_an_export_that_fails(run, tmp_path, monkeypatch):
         with pytest.raises(ResultError, match="no space"):
             export_result(run, form, tmp_path / f"x{FORMATS[form]}")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_killed_export_does_not_hinder_the_next(run, tmp_path):
+    (tmp_path / ".x_vtp.unfinished").mkdir()
+    (tmp_path / ".x_vtp.unfinished" / "bodies_00000.vtp").touch()
+    export_result(run, "vtp", tmp_path / "x.pvd")
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_only_files_of_exports_are_replaced(run, tmp_path):
+    export_result(run, "vtp", tmp_path / "x.pvd")
+    export_result(run[:1], "vtp", tmp_path / "x.pvd", overwrite=True)
+    assert sorted(path.name for path in (tmp_path / "x_vtp").iterdir()) == ["bodies_00000.vtp", "contacts_00000.vtp"]
+    (tmp_path / "x_vtp" / "view.pvsm").write_text("mine")
+    (tmp_path / "x.csv").mkdir()
+    shutil.copy(run.folder / "profile.h5", tmp_path / "profile.h5")
+    before = sorted(tmp_path.rglob("*"))
+    for form, name, message in (("vtp", "x.pvd", "holds view.pvsm, which no export made"),
+                                ("csv", "x.csv", "is a folder, which an export does not replace"),
+                                ("xdmf", "profile.xdmf", "is a file of a run")):
+        with pytest.raises(ResultError, match=message):
+            export_result(run, form, tmp_path / name, overwrite=True)
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.parametrize("form", [form for form in FORMATS if form != "gsd"])
+def test_names_may_have_any_letters_of_unicode(run, tmp_path, form):
+    output = tmp_path / f"a b'\"<&>:%s{{name}}ü\n{FORMATS[form]}"
+    paths = export_result(run, form, output)
+    assert all(path.exists() for path in paths)
+    for path in paths:
+        if path.suffix in (".pvd", ".xdmf"):
+            tree = ElementTree.parse(path)
+            named = [each.get("file") for each in tree.iter("DataSet")]
+            named += [each.text.rpartition(":/")[0] for each in tree.iter("DataItem")]
+            assert named and all((tmp_path / name).exists() for name in named)
+    with pytest.raises(ResultError, match="is no name in UTF-8"):
+        export_result(run, form, tmp_path / os.fsdecode(b"\xff" + FORMATS[form].encode()))

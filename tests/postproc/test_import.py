@@ -183,3 +183,10 @@ def test_nothing_is_replaced_unless_asked(tmp_path, capsys):
 
 def test_arrays_become_bodies(tmp_path):
     assert write_bodies([np.array(SQUARE), FLOOR], tmp_path / "out.h5", fixed=[2]) == 2
+    with h5py.File(tmp_path / "out.h5") as file:
+        assert list(file["fixed"]) == [0, 1]
+    write_bodies([np.array(SQUARE), FLOOR], tmp_path / "out.h5", fixed=np.array([True, False]), overwrite=True)
+    with h5py.File(tmp_path / "out.h5") as file:
+        assert list(file["fixed"]) == [1, 0]
+    with pytest.raises(ResultError, match="one truth value for each of 2 outlines"):
+        write_bodies([np.array(SQUARE), FLOOR], tmp_path / "out.h5", fixed=[True], overwrite=True)

@@ -1,8 +1,11 @@
 """The page of the viewer as a file: its data are those of the run, rounded as stated."""
 
 import base64
+import html
 import json
+import os
 import re
+import shutil
 import zlib
 from pathlib import Path
 
@@ -69,3 +72,12 @@ def test_without_contacts_the_page_is_smaller(small_drum, view, tmp_path):
     path = tmp_path / "bare.html"
     assert main(["view", str(small_drum), "-o", str(path), "--no-contacts", "--every", "2"]) == 0
     assert path.stat().st_size < view.stat().st_size
+
+
+@pytest.mark.parametrize("name", ["{style}{name}", "<b>&", "a\nb", os.fsdecode(b"\xff")])
+def test_any_name_of_a_result_is_shown_as_it_is(small_drum, tmp_path, name):
+    shutil.copytree(small_drum, tmp_path / name)
+    path = tmp_path / "v.html"
+    assert main(["view", str(tmp_path / name), "-o", str(path), "--every", "5"]) == 0
+    title = re.search("<title>(.*?): polydem</title>", path.read_text(encoding="utf-8"), re.DOTALL)[1]
+    assert html.unescape(title) == name.encode("utf-8", "replace").decode()

@@ -12,6 +12,7 @@ import h5py
 import numpy as np
 
 from .convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
+from .new_file import new_file
 from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
 from .polygons import FloatArray, join
 from .result_file import ResultError, cannot_write
@@ -41,12 +42,16 @@ def import_shapely(geometries: Any, output: str | os.PathLike[str], **options: A
 
 
 def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[str], *, scale: float = 1.0,
-                 fixed: Iterable[int] = (), decomposed: bool = False, overwrite: bool = False) -> int:
-    """Write outlines, or arrays (k, 2) of vertices, as a bodies file; return the number of bodies."""
+                 fixed: Iterable[int] | Iterable[bool] = (), decomposed: bool = False,
+                 overwrite: bool = False) -> int:
+    """Write outlines, or arrays (k, 2) of vertices [1/scale m], as a bodies file; return the number of bodies.
+
+    `fixed` has the numbers of the outlines, from 1, that become fixed bodies, or one truth value per outline.
+    """
     path = Path(output)
     given = [each if isinstance(each, Outline) else Outline(np.asarray(each, dtype=float), f"outline {number}")
              for number, each in enumerate(outlines, 1)]
-    held = set(fixed)
+    held = _numbers(list(fixed), len(given))
     if held - set(range(1, len(given) + 1)):
         raise ResultError(f"there is no outline {min(held - set(range(1, len(given) + 1)))}, only {len(given)}")
     if not (np.isfinite(scale) and scale > 0.0):
@@ -70,6 +75,16 @@ def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[st
         raise ResultError(f"{path}: exists already; --force replaces it")
     _write(path, polygons, columns)
     return len(polygons)
+
+
+def _numbers(fixed: list[Any], count: int) -> set[int]:
+    """Numbers of outlines, also where they are given by one truth value per outline."""
+    if not any(isinstance(each, (bool, np.bool_)) for each in fixed):
+        return set(fixed)
+    if len(fixed) != count or not all(isinstance(each, (bool, np.bool_)) for each in fixed):
+        raise ResultError(f"fixed has {len(fixed)} values, but must have one truth value for each of {count} outlines, "
+                          "or numbers of outlines")
+    return {number for number, each in enumerate(fixed, 1) if each}
 
 
 def _pieces(outline: Outline, scale: float, decomposed: bool) -> list[FloatArray]:
@@ -113,14 +128,11 @@ def _column(name: str, rows: list[dict[str, Any]], places: list[str]) -> Any:
 
 def _write(path: Path, polygons: list[FloatArray], columns: dict[str, Any]) -> None:
     vertex, start = join(polygons)
-    unfinished = path.with_name(f".{path.name}.unfinished")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with h5py.File(unfinished, "w") as file:
-            file["vertex"], file["vertex_start"] = vertex, start
-            for name, values in columns.items():
-                file[name] = values
-        os.replace(unfinished, path)
     except OSError as error:
-        unfinished.unlink(missing_ok=True)
         raise cannot_write(path, error) from error
+    with new_file(path) as part, h5py.File(part, "w") as file:
+        file["vertex"], file["vertex_start"] = vertex, start
+        for name, values in columns.items():
+            file[name] = values

@@ -7,9 +7,7 @@ and not the copies that compilers leave to the C library. Simulated counts are t
 
 from __future__ import annotations
 
-import csv
-import os
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import h5py
@@ -17,6 +15,7 @@ import h5py
 from .cachegrind import Model, count_hardware, finder_functions, simulate
 from .complexity import SOURCES
 from .records import read_records as read_all
+from .records import write_records
 from .trajectory import UNREADABLE, ResultError, insist_on_own_data
 
 #: Name of the file in a bench folder
@@ -88,7 +87,7 @@ def count_misses(
             known = [r for r in records if (r.scene, r.finder, r.model) == (scene, finder, model.text)]
             if not known:
                 records.append(count_one(scene, path, program, finder, model, steps, branches))
-                _write(folder / FILE, records)
+                write_records(folder / FILE, records)
                 known = records[-1:]
             say(
                 f"{scene} {finder}: {known[0].first_level:.3f} D1 and {known[0].last_level:.3f} LL misses per "
@@ -153,13 +152,3 @@ def _extent(trace: Path) -> tuple:
             return int(steps), int(boxes)
     except UNREADABLE as error:
         raise ResultError(f"{trace}: is not a trace ({error})") from error
-
-
-def _write(path: Path, records: list) -> None:
-    """Write all records, so that an interruption leaves the old file or the new one."""
-    new = path.with_suffix(".csv.unfinished")
-    with new.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(asdict(records[0]))
-        writer.writerows(astuple(record) for record in records)
-    os.replace(new, path)

@@ -13,16 +13,15 @@ Times of forces differ also because the model changes what happens; in so few st
 
 from __future__ import annotations
 
-import csv
 import os
 import re
 import subprocess
-from dataclasses import asdict, astuple, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from .cachegrind import SAME_PLACES, simulate
 from .emit import FORMATS, SUFFIXES, Table
-from .records import read_records
+from .records import read_records, write_records
 from .statistics import Estimate, median, median_of_ratios, number
 from .trajectory import ResultError, Trajectory
 
@@ -203,7 +202,7 @@ def measure_costs(study: Study, repeats: int, say=print) -> list[Sample]:
             sample = study.sample(model, kind, repeat)
             _compare(study.output / FILE, samples, sample)
             samples.append(sample)
-            _write(study.output / FILE, samples)
+            write_records(study.output / FILE, samples)
         say(f"{kind} {repeat}: done")
     return samples
 
@@ -229,16 +228,6 @@ def read_samples(path: Path) -> list[Sample]:
             raise ResultError(f"{path}: line {number_of_line}: bodies, steps, threads and time of a step must be "
                               f"above 0")
     return samples
-
-
-def _write(path: Path, samples: list) -> None:
-    """Write all samples, so that an interruption leaves the old file or the new one."""
-    new = path.with_suffix(".csv.unfinished")
-    with new.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(asdict(samples[0]))
-        writer.writerows(astuple(sample) for sample in samples)
-    os.replace(new, path)
 
 
 def share_of_step(samples: list, model: Model) -> Estimate:

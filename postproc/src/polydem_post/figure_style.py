@@ -13,13 +13,15 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from . import series
+from .new_file import MARK
 from .result_file import cannot_write
 
 # Fonts for symbols that no figure has may be missing.
 logging.getLogger("matplotlib.font_manager").setLevel(logging.ERROR)
 
 #: Forms in which every figure is written, and what keeps the time of writing out of each
-FORMS = {"pdf": {"CreationDate": None}, "svg": {"Date": None}, "png": {"Software": None}}
+FORMS = {"pdf": {"CreationDate": None, "Creator": MARK}, "svg": {"Date": None, "Creator": MARK},
+         "png": {"Software": MARK}}
 
 #: Finder -> colour (Okabe & Ito 2008, told apart by the colour-blind), marker and line; no two have the same marker,
 #: and lines differ in print without colours

@@ -12,12 +12,13 @@ from pathlib import Path
 
 from PIL import Image
 
+from .new_file import MARK
 from .result_file import ResultError
 
 #: H.264 with 4:2:0 colours, which every player reads, and the index at the start of the file; at quality 18 no losses
 #: are visible
 MP4 = ["-an", "-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-preset", "fast", "-movflags", "+faststart",
-       "-fflags", "+bitexact", "-flags:v", "+bitexact"]
+       "-fflags", "+bitexact", "-flags:v", "+bitexact", "-metadata", f"comment={MARK}"]
 
 
 def write_mp4(path: Path, size: tuple[int, int], fps: float, frames: Iterable[bytes]) -> None:
@@ -63,7 +64,8 @@ def write_gif(path: Path, size: tuple[int, int], fps: float, frames: Iterable[by
             yield Image.frombytes("RGB", size, frame).quantize(palette=palette, dither=Image.Dither.NONE)
 
     first.quantize(palette=palette, dither=Image.Dither.NONE).save(
-        path, save_all=True, append_images=rest(), duration=max(10 * round(100.0 / fps), 20), loop=0, optimize=False)
+        path, save_all=True, append_images=rest(), duration=max(10 * round(100.0 / fps), 20), loop=0, optimize=False,
+        comment=MARK.encode())
 
 
 def _palette(images: list[Image.Image]) -> Image.Image:

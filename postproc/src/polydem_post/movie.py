@@ -19,8 +19,9 @@ from matplotlib.figure import Figure
 from . import drawing
 from .drawing import Look, SettledLook
 from .film_files import write_gif, write_mp4
+from .new_file import insist_on_own, new_file
 from .plot import add_scale, finish_axes, prepare
-from .result_file import ResultError, cannot_write
+from .result_file import ResultError
 from .trajectory import Trajectory
 
 #: Ends of the names of films, and what writes them
@@ -91,20 +92,16 @@ def make_movie(trajectory: Trajectory, numbers: list[int], path: Path, look: Loo
                size: tuple | None = None, processes: int | None = None) -> Film:
     """Write the frames of these numbers as a film; the end of its name says in which form."""
     write = FORMS[check_film(path)]
+    insist_on_own(path)
     processes = max(1, min(processes or len(os.sched_getaffinity(0)), len(numbers) // FRAMES_PER_PROCESS))
     progress = _Progress(len(numbers))
     progress.say("measuring the frames")
     settled = drawing.settle(trajectory, numbers, look)
     film = Film(settled, _even(size or _fitting(settled)), _digits(trajectory.times[numbers]), _arrows(settled))
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
     try:
-        with _Frames(trajectory, numbers, film, processes) as frames:
+        with new_file(path) as part, _Frames(trajectory, numbers, film, processes) as frames:
             write(part, film.size, fps, progress.count(frames))
-        os.replace(part, path)
-    except OSError as error:
-        raise cannot_write(path, error) from error
     finally:
-        part.unlink(missing_ok=True)
         progress.end()
     return film
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import warnings
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from . import drawing
 from .drawing import Look, SettledLook
 from .figure_style import FORMS, SETTINGS
 from .frames import Frame
+from .new_file import insist_on_own, new_file
 from .result_file import ResultError, cannot_write
 from .trajectory import Trajectory
 
@@ -141,16 +141,13 @@ def _legend_columns(figure: Figure, lines: list) -> int:
 def save(figure: Figure, path: Path, dpi: float = DPI, tight: bool = False) -> None:
     """Write a figure without anything in it that changes from run to run; `tight`: without empty margins."""
     form = check_form(path)
-    part = path.with_name(f".{path.stem}.part{path.suffix}")
-    try:
-        with matplotlib.rc_context(SETTINGS):
+    insist_on_own(path)
+    with new_file(path) as part, matplotlib.rc_context(SETTINGS):
+        try:
             figure.savefig(part, dpi=dpi, metadata=FORMS[form], bbox_inches="tight" if tight else None,
                            pad_inches=0.05)
-        os.replace(part, path)
-    except (OSError, ValueError) as error:
-        raise cannot_write(path, error) from error
-    finally:
-        part.unlink(missing_ok=True)
+        except ValueError as error:
+            raise cannot_write(path, error) from error
 
 
 def check_form(path: Path) -> str:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import csv
 import math
-from dataclasses import MISSING, fields
+from dataclasses import MISSING, asdict, astuple, fields
 from pathlib import Path
 
 from .former_names import COLUMNS, present
+from .new_file import new_file
 from .result_file import cannot_read
 from .trajectory import ResultError
 
@@ -67,3 +68,11 @@ def read_records(path: Path, record, maker: str, unfinished: tuple = ()) -> list
             values[each.name] = value
         found.append(record(**values))
     return found
+
+
+def write_records(path: Path, records: list) -> None:
+    """Write records of one data class as CSV; an interruption leaves the former file or the new one."""
+    with new_file(path) as part, part.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(asdict(records[0]))
+        writer.writerows(astuple(record) for record in records)

@@ -65,8 +65,12 @@ def reason(error: Exception) -> str:
     return inner.group(1) if inner else words or type(error).__name__
 
 
-def open_file(path: Path) -> h5py.File:
-    """Open a file, also one that a run is still writing or has just closed and renamed."""
+def open_file(path: Path, known: dict[Path, tuple[int, ...]] | None = None) -> h5py.File:
+    """Open a file, also one that a run is still writing or has just closed and renamed.
+
+    A file that `known` lists as it is now was looked through before, and is not looked through again.
+    """
+    identity = _identity(path)
     try:
         try:
             file = _open_hdf5(path)
@@ -80,7 +84,10 @@ def open_file(path: Path) -> h5py.File:
         version = int(file.attrs.get("schema_version", 0))
         if not 1 <= version <= SCHEMA_VERSION:
             raise ResultError(f"{path}: is not a file of polydem, or of a newer version than this reader")
-        insist_on_own_data(path, file)
+        if known is None or identity is None or known.get(path) != identity:
+            insist_on_own_data(path, file)
+            if known is not None and identity is not None:
+                known[path] = identity
     except UNREADABLE as error:
         file.close()
         raise cannot_read(path, error) from error
@@ -90,10 +97,19 @@ def open_file(path: Path) -> h5py.File:
     return file
 
 
+def is_of_run(path: Path) -> bool:
+    """Whether a file is one of those that a run writes."""
+    try:
+        with _open_hdf5(path) as file:
+            return "schema_version" in file.attrs
+    except UNREADABLE:
+        return False
+
+
 @contextmanager
-def reading(path: Path):
-    """A file to read; whatever is wrong with what it holds is told in a sentence."""
-    with open_file(path) as file:
+def reading(path: Path, known: dict[Path, tuple[int, ...]] | None = None):
+    """A file to read; whatever is wrong with what it holds is told in a sentence. `known` as for `open_file`."""
+    with open_file(path, known) as file:
         try:
             yield file
         except UNREADABLE as error:
@@ -147,6 +163,15 @@ def present_path(path: Path) -> Path:
     if path.name.endswith(OPEN_SUFFIX) and not path.exists():
         return path.with_suffix("")
     return path
+
+
+def _identity(path: Path) -> tuple[int, ...] | None:
+    """What changes when a file does; nothing if there is none."""
+    try:
+        state = path.stat()
+    except OSError:
+        return None
+    return state.st_dev, state.st_ino, state.st_size, state.st_mtime_ns, state.st_ctime_ns
 
 
 def _open_hdf5(path: Path) -> h5py.File:

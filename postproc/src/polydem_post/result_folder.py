@@ -38,6 +38,8 @@ class ResultFolder:
             raise ResultError(f"{path}: holds no result (neither trajectory_0001.h5 nor profile.h5){_nearby(path)}")
         self._manifest: Manifest | None = None
         self._unchecked: dict[str, int] = {}
+        #: Files that were looked through, as they were then
+        self._known: dict[Path, tuple[int, ...]] = {}
         if check:
             self._check_manifest(path.is_dir())
 
@@ -93,7 +95,7 @@ class ResultFolder:
     def open_segment(self, segment: Segment) -> Iterator[h5py.File]:
         """A segment to read, after its check."""
         self._check_bytes(segment.name)
-        with reading(segment.path) as file:
+        with reading(segment.path, self._known) as file:
             yield file
 
     @contextmanager
@@ -102,7 +104,7 @@ class ResultFolder:
         if not self.profile_path.exists():
             raise ResultError(f"{self.profile_path}: there is no such file; it is written when a run ends")
         self._check_bytes(self.profile_path.name)
-        with reading(self.profile_path) as file:
+        with reading(self.profile_path, self._known) as file:
             yield file
 
     @contextmanager
@@ -110,7 +112,7 @@ class ResultFolder:
         """A file with the provenance of the run: the profile, or the first segment."""
         path = self.profile_path if self.profile_path.exists() else self.segments[0].path
         self._check_bytes(path.name.removesuffix(OPEN_SUFFIX))
-        with reading(path) as file:
+        with reading(path, self._known) as file:
             yield file
 
     def locate(self, number: int) -> tuple[Segment, int]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import csv
-import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import h5py
 import numpy as np
 
+from .new_file import new_file
 from .result_file import cannot_write
 from .sweep import NAME, Run, Sweep
 from .sweep_run import FAILING, FINISHED, RUNNING, describe, last_words, state_of
@@ -63,8 +63,10 @@ def collect_sweep(sweep: Sweep, say=print) -> list[Outcome]:
         if outcomes[-1].facts["state"] != FINISHED:
             say(describe(run))
     try:
-        _replace(sweep.folder / CSV_FILE, lambda path: _write_csv(path, sweep, outcomes))
-        _replace(sweep.folder / HDF5_FILE, lambda path: _write_hdf5(path, sweep, outcomes))
+        with new_file(sweep.folder / CSV_FILE) as path:
+            _write_csv(path, sweep, outcomes)
+        with new_file(sweep.folder / HDF5_FILE) as path:
+            _write_hdf5(path, sweep, outcomes)
     except OSError as error:
         raise cannot_write(sweep.folder, error) from error
     finished = sum(outcome.facts["state"] == FINISHED for outcome in outcomes)
@@ -106,13 +108,6 @@ def read_outcome(sweep: Sweep, run: Run) -> Outcome:
 def _all_names(outcomes: list[Outcome], group: str) -> list[str]:
     """Columns of a group that any run has, in the order in which they occur."""
     return list(dict.fromkeys(name for outcome in outcomes for name in outcome.groups()[group]))
-
-
-def _replace(path: Path, write) -> None:
-    """Write a file so that an interruption leaves the former one or the new one."""
-    new = path.with_name(path.name + ".unfinished")
-    write(new)
-    os.replace(new, path)
 
 
 def _write_csv(path: Path, sweep: Sweep, outcomes: list[Outcome]) -> None:

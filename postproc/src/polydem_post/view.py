@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import html
 import json
-import os
 import sys
 from pathlib import Path
 
-from .result_file import ResultError, cannot_write
+from .new_file import MARK, insist_on_own, new_file
+from .result_file import ResultError
 from .trajectory import Trajectory
 from .view_data import Packed, pack_run
 
@@ -20,6 +20,7 @@ SCRIPTS = ("decode.js", "run.js", "columns.js", "tree.js", "overlays.js", "paint
 def write_view(trajectory: Trajectory, numbers: list[int], path: Path, contacts: bool = True,
                colour: str = "speed") -> Packed:
     """Write the page of these frames."""
+    insist_on_own(path)
     done = [0]
 
     def progress() -> None:
@@ -33,27 +34,20 @@ def write_view(trajectory: Trajectory, numbers: list[int], path: Path, contacts:
         raise ResultError(f"there is no colour {colour} in this page; there are "
                           f"{', '.join(packed.facts['quantities'])} and none")
     packed.facts["colour"] = colour
-    part = path.with_name(f".{path.name}.part")
-    try:
-        with part.open("w", encoding="utf-8") as file:
-            for piece in page(packed):
-                file.write(piece)
-        os.replace(part, path)
-    except OSError as error:
-        raise cannot_write(path, error) from error
-    finally:
-        part.unlink(missing_ok=True)
+    with new_file(path) as part, part.open("w", encoding="utf-8") as file:
+        for piece in page(packed):
+            file.write(piece)
     return packed
 
 
 def page(packed: Packed):
     """The pieces of the page: style, data and scripts in their places."""
-    text = (SOURCES / "page.html").read_text(encoding="utf-8")
-    text = text.replace("{name}", html.escape(packed.facts["name"]))
-    before, rest = text.split("{style}")
-    middle, rest = rest.split("{data}")
+    text = (SOURCES / "page.html").read_text(encoding="utf-8").replace("{mark}", MARK)
+    head, rest = text.split("{style}")
+    body, rest = rest.split("{data}")
     end, after = rest.split("{scripts}")
-    yield before + (SOURCES / "style.css").read_text(encoding="utf-8") + middle
+    style, name = (SOURCES / "style.css").read_text(encoding="utf-8"), html.escape(packed.facts["name"])
+    yield "".join([head.replace("{name}", name), style, body.replace("{name}", name)])
     facts = json.dumps(packed.facts, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
     yield f'<script type="application/json" id="facts">{facts}</script>\n'
     for name, block in packed.blocks.items():

@@ -73,18 +73,21 @@ class _Contacts:
     def pack(self, packed: Packed, reach: float) -> None:
         """Write the list of pairs, which of them each frame has, and arms and forces of these."""
         pairs = np.unique(np.concatenate(self.keys))
-        present = np.zeros((len(self.keys), len(pairs)), dtype=bool)
-        for row, keys in zip(present, self.keys):
-            row[np.searchsorted(pairs, keys)] = True
-        changed = present.copy()
-        changed[1:] ^= present[:-1]
+        changed = np.zeros((len(self.keys), -(-len(pairs) // 8)), dtype=np.uint8)
+        before = changed[0]
+        for row, keys in zip(changed, self.keys):
+            present = np.zeros(len(pairs), dtype=bool)
+            present[np.searchsorted(pairs, keys)] = True
+            bits = np.packbits(present, bitorder="little")
+            row[:] = bits ^ before
+            before = bits
         arms, forces = np.concatenate(self.arms), np.concatenate(self.forces)
         size = np.hypot(forces[:, 0], forces[:, 1])
         greatest = float(size.max(initial=0.0)) or 1.0
         direction = np.rint(np.arctan2(forces[:, 1], forces[:, 0]) * (DIRECTION_STEPS / (2.0 * np.pi)))
         packed.add("pair_first", (pairs // self.bodies).astype(np.uint32))
         packed.add("pair_second", (pairs % self.bodies).astype(np.uint32))
-        packed.add("present", np.packbits(changed, axis=1, bitorder="little"))
+        packed.add("present", changed)
         packed.add("arm_x", np.clip(np.rint(arms[:, 0] * (ARM_STEPS / reach)), -127, 127).astype(np.int8))
         packed.add("arm_y", np.clip(np.rint(arms[:, 1] * (ARM_STEPS / reach)), -127, 127).astype(np.int8))
         packed.add("force", np.rint(np.sqrt(size / greatest) * FORCE_STEPS).astype(np.uint8))
@@ -165,7 +168,7 @@ def _describe(packed: Packed, trajectory: Trajectory, numbers: list[int], values
     facts = packed.facts
     facts["times"] = [float(time) for time in trajectory.times[numbers]]
     facts["frames"] = [int(number) % len(trajectory) for number in numbers]
-    facts["name"] = trajectory.folder.resolve().name
+    facts["name"] = trajectory.folder.resolve().name.encode("utf-8", "replace").decode()
     facts["overlays"] = {name: OVERLAYS[name] for name in ("forces", "contacts", "boxes", "cells")
                          if "contacts" in facts or name in ("boxes", "cells")}
     facts["quantities"], maps = {}, {}

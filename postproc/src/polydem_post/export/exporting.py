@@ -8,13 +8,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..frames import Frame
-from ..result_file import ResultError, cannot_write
+from ..result_file import ResultError, cannot_write, is_of_run
 from ..trajectory import Trajectory
 from .csv_tables import write_balance_csv, write_bodies_csv, write_contacts_csv, write_vertices_csv
 from .gsd_file import write_gsd
 from .meshes import Mesh, body_mesh, contact_mesh, filled_contact_mesh
 from .vtkhdf import VtkhdfFile
-from .vtp import VtpFiles
+from .vtp import VTP_NAME, VtpFiles
 from .xdmf import XdmfFile
 
 #: Format -> end of the name of its first file
@@ -41,14 +41,43 @@ def export_result(run: Trajectory, form: str, output: str | os.PathLike[str], *,
         raise ResultError(f"{run.folder}: holds no frames")
     job = _Job(run, path, contacts and run.has_contacts, report)
     targets = job.targets(form)
-    standing = [target for target in targets.values() if target.exists()]
-    if standing and not overwrite:
-        raise ResultError(f"{standing[0]}: exists already; --force replaces it")
+    for name, target in targets.items():
+        _insist_on_free_place(name, target, overwrite)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         return job.write(form, targets)
     except OSError as error:
         raise cannot_write(path, error) from error
+
+
+def _insist_on_free_place(name: str, target: Path, overwrite: bool) -> None:
+    """Refuse to replace what exists, unless that is wished, and what no export can have made in any case."""
+    try:
+        str(target).encode()
+    except UnicodeEncodeError as error:
+        raise ResultError(f"{target}: is no name in UTF-8, which the files of an export must have; choose one with "
+                          "--output") from error
+    if not target.exists():
+        return
+    if not overwrite:
+        raise ResultError(f"{target}: exists already; --force replaces it")
+    if target.is_dir() != (name == "folder"):
+        raise ResultError(f"{target}: is {'a folder' if target.is_dir() else 'a file'}, which an export does not "
+                          "replace; choose another name")
+    if name == "folder":
+        others = [path.name for path in target.iterdir() if not VTP_NAME.fullmatch(path.name)]
+        if others:
+            raise ResultError(f"{target}: holds {others[0]}, which no export made; choose another name or remove it")
+    elif target.suffix == ".h5" and is_of_run(target):
+        raise ResultError(f"{target}: is a file of a run, which an export does not replace; choose another name")
+
+
+def _remove(path: Path) -> None:
+    """Remove a file or a folder, if it is there."""
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 class _Job:
@@ -80,6 +109,8 @@ class _Job:
     def write(self, form: str, targets: dict[str, Path]) -> list[Path]:
         """Write all files of a format."""
         unfinished = {name: path.with_name(f".{path.name}.unfinished") for name, path in targets.items()}
+        for path in unfinished.values():  # of an export that was killed
+            _remove(path)
         try:
             if form in ("vtkhdf", "vtp", "xdmf"):
                 self._write_meshes(form, targets, unfinished)
@@ -88,15 +119,11 @@ class _Job:
             else:
                 self._write_csv(unfinished)
             for name, path in targets.items():
-                if path.is_dir():
-                    shutil.rmtree(path)
+                _remove(path)
                 os.replace(unfinished[name], path)
         finally:
             for path in unfinished.values():
-                if path.is_dir():
-                    shutil.rmtree(path)
-                elif path.exists():
-                    path.unlink()
+                _remove(path)
         return list(targets.values())
 
     def _write_csv(self, files: dict[str, Path]) -> None:

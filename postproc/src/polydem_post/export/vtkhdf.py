@@ -22,6 +22,35 @@ KINDS = ("Vertices", "Lines", "Polygons", "Strips")
 CHUNK = 2**16
 
 
+class _Rows:
+    """A growing data set. Rows wait until they fill a chunk, which is deflated once."""
+
+    def __init__(self, group: h5py.Group, name: str, first: npt.NDArray[Any]):
+        rows = max(1, CHUNK // max(1, first.dtype.itemsize * int(np.prod(first.shape[1:]))))
+        self._entry = group.create_dataset(name, (0, *first.shape[1:]), first.dtype, maxshape=(None, *first.shape[1:]),
+                                           chunks=(rows, *first.shape[1:]), compression="gzip", compression_opts=1)
+        self._waiting: list[npt.NDArray[Any]] = []
+        self._bytes = 0
+        self.count = 0
+
+    def append(self, values: npt.NDArray[Any]) -> None:
+        """Add rows."""
+        self._waiting.append(values)
+        self._bytes += values.nbytes
+        self.count += len(values)
+        if self._bytes >= CHUNK:
+            self.write()
+
+    def write(self) -> None:
+        """Write the rows that wait."""
+        written = len(self._entry)
+        self._entry.resize(self.count, axis=0)
+        if self.count > written:
+            self._entry[written:] = np.concatenate(self._waiting)
+        self._waiting.clear()
+        self._bytes = 0
+
+
 class VtkhdfFile:
     """A VTKHDF file to which meshes are added step by step."""
 
@@ -32,6 +61,7 @@ class VtkhdfFile:
         self._root.attrs.create("Type", b"PolyData", dtype=h5py.string_dtype("ascii", 8))
         #: Array -> its last rows and where they begin
         self._last: dict[str, tuple[npt.NDArray[Any], int]] = {}
+        self._rows: dict[str, _Rows] = {}
         self._steps = 0
         self._parts = 0
         self._part: tuple[int, dict[str, int]] = (0, {})
@@ -83,21 +113,17 @@ class VtkhdfFile:
         return begin
 
     def _size(self, name: str) -> int:
-        return len(self._root[name]) if name in self._root else 0
+        return self._rows[name].count if name in self._rows else 0
 
     def _append(self, name: str, values: npt.NDArray[Any]) -> None:
-        if name not in self._root:
-            rows = max(1, CHUNK // max(1, values.dtype.itemsize * int(np.prod(values.shape[1:]))))
-            self._root.create_dataset(name, data=values, maxshape=(None, *values.shape[1:]),
-                                      chunks=(rows, *values.shape[1:]), compression="gzip", compression_opts=1)
-            return
-        entry = self._root[name]
-        entry.resize(len(entry) + len(values), axis=0)
-        if len(values):
-            entry[-len(values) :] = values
+        if name not in self._rows:
+            self._rows[name] = _Rows(self._root, name, values)
+        self._rows[name].append(values)
 
     def close(self) -> None:
         """End the file."""
+        for rows in self._rows.values():
+            rows.write()
         if "Steps" in self._root:
             self._root["Steps"].attrs["NSteps"] = np.int64(self._steps)
         self._file.close()

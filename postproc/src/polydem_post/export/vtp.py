@@ -6,6 +6,7 @@ Numbers are inline, in base64 and not compressed, since some readers take no oth
 from __future__ import annotations
 
 import base64
+import re
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -17,6 +18,10 @@ from .meshes import Mesh
 
 #: Names of numpy types in VTK files
 TYPES = {"int32": "Int32", "int64": "Int64", "float64": "Float64"}
+
+
+#: Names of the files of frames
+VTP_NAME = re.compile(r"(bodies|contacts)_\d{5,}\.vtp")
 
 
 class VtpFiles:

@@ -18,6 +18,9 @@ from .meshes import Mesh
 #: Number of polygons in a mixed topology
 POLYGON = 3
 
+#: Bytes up to which an array is not deflated: the index of its chunks would be larger than what is gained
+LEAST_PACKED = 4096
+
 
 class XdmfFile:
     """An XDMF file and the HDF5 file with its arrays, to which meshes are added step by step."""
@@ -50,7 +53,8 @@ class XdmfFile:
     def _item(self, name: str, number: int, values: npt.NDArray[Any]) -> str:
         if name not in self._last or not np.array_equal(self._last[name][0], values):
             place = f"{name}/{number}"
-            self._file.create_dataset(place, data=values, compression="gzip", compression_opts=1)
+            packing = {"compression": "gzip", "compression_opts": 1} if values.nbytes > LEAST_PACKED else {}
+            self._file.create_dataset(place, data=values, **packing)
             self._last[name] = (values, place)
         place = self._last[name][1]
         kind, size = ("Float", 8) if values.dtype.kind == "f" else ("Int", values.dtype.itemsize)
