@@ -42,7 +42,9 @@ def test_a_failed_profile_leaves_no_part_of_it(tmp_path):
 
 @pytest.mark.parametrize("verb, name", [
     (["plot", "--dpi", "600"], "a.png"), (["movie", "--size", "640,480"], "a.mp4"),
-    (["movie", "--size", "640,480"], "a.gif"), (["view"], "a.html"), (["export", "--to", "csv"], "a.csv")])
+    (["movie", "--size", "640,480"], "a.gif"), (["view"], "a.html"), (["export", "--to", "csv"], "a.csv"),
+    (["export", "--to", "vtkhdf"], "a.vtkhdf"), (["export", "--to", "vtp"], "a.pvd"),
+    (["export", "--to", "xdmf"], "a.xdmf"), (["export", "--to", "gsd"], "a.gsd")])
 def test_a_verb_without_room_leaves_nothing_but_a_sentence(small_drum, tmp_path, verb, name):
     def small_files():
         resource.setrlimit(resource.RLIMIT_FSIZE, (8000, 8000))

@@ -8,11 +8,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from .convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
-from .new_file import new_file
+from .new_file import NewHdf5, new_file
 from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
 from .polygons import FloatArray, join
 from .result_file import ResultError, cannot_write
@@ -132,7 +131,7 @@ def _write(path: Path, polygons: list[FloatArray], columns: dict[str, Any]) -> N
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise cannot_write(path, error) from error
-    with new_file(path) as part, h5py.File(part, "w") as file:
+    with new_file(path) as part, NewHdf5(part) as file:
         file["vertex"], file["vertex_start"] = vertex, start
         for name, values in columns.items():
             file[name] = values

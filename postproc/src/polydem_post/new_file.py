@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
+
+import h5py
 
 from .result_file import ResultError, cannot_write
 
@@ -45,3 +49,50 @@ def insist_on_own(path: Path) -> None:
     if ends and MARK.encode() not in ends:
         raise ResultError(f"{path}: exists, and this version of polydem did not make it; choose another name or remove "
                           "it")
+
+
+class NewHdf5(h5py.File):
+    """An HDF5 file that is written. If there is no room for it, `check` and `close` raise the error of the system.
+
+    The HDF5 library itself can neither go on nor close a file after a failed write.
+    """
+
+    def __init__(self, path: Path):
+        self._bytes = _Bytes(path, "w+")
+        super().__init__(self._bytes, "w")
+
+    def check(self) -> None:
+        """Raise the error of a failed write."""
+        if self._bytes.failure:
+            raise self._bytes.failure
+
+    def close(self) -> None:
+        """Write what is not yet written, and close the file."""
+        super().close()
+        self._bytes.close()
+        self.check()
+
+
+class _Bytes(io.FileIO):
+    """The bytes of a file; a failed write is kept, and the following ones are left out."""
+
+    failure: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        """Write all bytes."""
+        rest = memoryview(data)
+        count = rest.nbytes
+        try:
+            while self.failure is None and rest.nbytes:
+                rest = rest[super().write(rest) or 0 :]
+        except OSError as error:
+            self.failure = error
+        return count
+
+    def truncate(self, size: int | None = None) -> int:
+        """Set the size."""
+        try:
+            return super().truncate(size) if self.failure is None else size or 0
+        except OSError as error:
+            self.failure = error
+            return size or 0

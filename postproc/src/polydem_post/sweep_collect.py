@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .new_file import new_file
+from .new_file import NewHdf5, new_file
 from .result_file import cannot_write
 from .sweep import NAME, Run, Sweep
 from .sweep_run import FAILING, FINISHED, RUNNING, describe, last_words, state_of
@@ -123,7 +123,7 @@ def _write_csv(path: Path, sweep: Sweep, outcomes: list[Outcome]) -> None:
 
 
 def _write_hdf5(path: Path, sweep: Sweep, outcomes: list[Outcome]) -> None:
-    with h5py.File(path, "w") as file:
+    with NewHdf5(path) as file:
         file.attrs["content"] = "results of a sweep of polydem, one value per run"
         file.attrs["schema_version"] = 1
         _put(file, NAME, [outcome.name for outcome in outcomes], "1", "name of the run")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 
 from ..frames import Frame
@@ -141,7 +142,7 @@ class _Job:
         if form == "vtp":
             files["folder"].mkdir()
         writers: dict[str, VtkhdfFile | VtpFiles | XdmfFile] = {}
-        try:
+        with ExitStack() as stack:
             for name in makers:
                 if name not in files:
                     continue
@@ -152,10 +153,8 @@ class _Job:
                 else:
                     data = f"{name}_data"
                     writers[name] = XdmfFile(files[name], files[data], targets[data].name)
+                stack.callback(writers[name].close)
             for done, frame in enumerate(self.run, 1):
                 for name, writer in writers.items():
                     writer.add(frame.time, makers[name](frame))
                 self.report(done, len(self.run))
-        finally:
-            for writer in writers.values():
-                writer.close()

@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
+from ..new_file import NewHdf5
 from .meshes import Mesh
 
 #: Kinds of cells of poly data, in the order of the columns of offsets
@@ -55,7 +56,7 @@ class VtkhdfFile:
     """A VTKHDF file to which meshes are added step by step."""
 
     def __init__(self, path: Path):
-        self._file = h5py.File(path, "w")
+        self._file = NewHdf5(path)
         self._root = self._file.create_group("VTKHDF")
         self._root.attrs["Version"] = np.array([2, 0], dtype=np.int64)
         self._root.attrs.create("Type", b"PolyData", dtype=h5py.string_dtype("ascii", 8))
@@ -80,6 +81,7 @@ class VtkhdfFile:
         for name, values in mesh.data.items():
             self._append(f"Steps/CellDataOffsets/{name}", np.array([self._reuse(f"CellData/{name}", values)]))
         self._steps += 1
+        self._file.check()
 
     def _add_topology(self, mesh: Mesh) -> tuple[int, dict[str, int]]:
         """Number of the part that has the topology of a mesh, and where its cells begin; a new part if none has."""

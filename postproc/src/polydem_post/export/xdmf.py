@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import escape
 
-import h5py
 import numpy as np
 import numpy.typing as npt
 
+from ..new_file import NewHdf5
 from .meshes import Mesh
 
 #: Number of polygons in a mixed topology
@@ -27,7 +27,7 @@ class XdmfFile:
 
     def __init__(self, path: Path, data: Path, data_name: str):
         self._path, self._data_name = path, data_name
-        self._file = h5py.File(data, "w")
+        self._file = NewHdf5(data)
         self._grids: list[str] = []
         #: Array -> its last values, and where they are
         self._last: dict[str, tuple[npt.NDArray[Any], str]] = {}
@@ -49,6 +49,7 @@ class XdmfFile:
             lines += [f'<Attribute Name="{name}" AttributeType="{kind}" Center="Cell">',
                       self._item(name, number, values), "</Attribute>"]
         self._grids.append("\n".join([*lines, "</Grid>"]))
+        self._file.check()
 
     def _item(self, name: str, number: int, values: npt.NDArray[Any]) -> str:
         if name not in self._last or not np.array_equal(self._last[name][0], values):
