@@ -110,7 +110,7 @@ def test_geometries_of_shapely(tmp_path):
     assert import_shapely([shapely.Point(0, 0).buffer(1.0), *both.geoms], tmp_path / "more.h5") == 3
     with pytest.raises(ResultError, match="geometry 1: is a LineString, not a polygon"):
         import_shapely(shapely.LineString(SQUARE), tmp_path / "line.h5")
-    with pytest.raises(ResultError, match="geometry 1: the polygon has 1 hole"):
+    with pytest.raises(ResultError, match="geometry 1: the polygon has a hole"):
         import_shapely(shapely.Polygon(FLOOR, [[(0, -2e-3), (1e-3, -2e-3), (0, -4e-3)]]), tmp_path / "hole.h5")
 
 
@@ -143,9 +143,12 @@ def test_a_concave_outline_is_named_or_decomposed(tmp_path, capsys):
     ("a.wkt", "POINT (1 2)", "a.wkt:1: is not a POLYGON or MULTIPOLYGON of WKT: 'POINT (1 2)'"),
     ("a.wkt", "POLYGON ((0 0, 1 0, x 1))", "a.wkt:1: a vertex is not a pair of numbers"),
     ("a.wkt", "\nPOLYGON ((0 0, 1 0, 1 1)", "a.wkt:2: the brackets of the geometry do not match"),
-    ("a.wkt", "POLYGON ((0 0, 9 0, 9 9, 0 9), (1 1, 2 1, 2 2))", "a.wkt:1: the polygon has 1 hole"),
+    ("a.wkt", "POLYGON ((0 0, 9 0, 9 9, 0 9), (1 1, 2 1, 2 2))", "a.wkt:1: the polygon has a hole"),
     ("a.wkt", "", "a.wkt: holds no polygons"),
+    ("a.wkt", "POLYGON ((0 0, 1e200 0, 0 1))", "a.wkt:1: the outline cannot be a body: a coordinate is beyond 1e+50 m"),
     ("a.json", "{", "a.json:1: is not JSON"),
+    ("a.json", "[" * 100000, "a.json: its lists are nested too deeply"),
+    ("a.json", '{"type": "Feature", "geometry": null}', "a.json: has no geometry"),
     ("a.json", '{"type": "Point", "coordinates": [0, 0]}', "a.json: is a Point, not a Polygon or MultiPolygon"),
     ("a.json", '{"type": "Polygon", "coordinates": [[[0], [1, 0], [1, 1]]]}', "the vertices are not pairs of numbers"),
     ("a.json", json.dumps({"features": [{"type": "Feature", "properties": properties, "geometry": {
@@ -176,6 +179,8 @@ def test_nothing_is_replaced_unless_asked(tmp_path, capsys):
     assert main(command) == 2
     assert "exists already; --force replaces it" in capsys.readouterr().err
     assert (tmp_path / "out.h5").read_text() == "mine"
+    assert main(["import", str(tmp_path / "one.txt"), "-o", str(tmp_path / "one.txt"), "--force"]) == 2
+    assert "one.txt: is the file that is imported" in capsys.readouterr().err
     assert main([*command, "--force"]) == 0
     assert main([*command, "--force", "--fixed", "2"]) == 2
     assert "there is no outline 2, only 1" in capsys.readouterr().err

@@ -31,6 +31,8 @@ def import_bodies(path: str | os.PathLike[str], output: str | os.PathLike[str], 
     Coordinates are multiplied by `scale` to give metres. `fixed` are numbers of outlines in the file, from 1. A concave
     outline is an error, or with `decomposed` becomes several bodies with a warning.
     """
+    if Path(output).exists() and Path(output).samefile(path):
+        raise ResultError(f"{output}: is the file that is imported; choose another name")
     return write_bodies(read_outlines(Path(path), form), output, scale=scale, fixed=fixed, decomposed=decomposed,
                         overwrite=overwrite)
 
@@ -41,8 +43,7 @@ def import_shapely(geometries: Any, output: str | os.PathLike[str], **options: A
 
 
 def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[str], *, scale: float = 1.0,
-                 fixed: Iterable[int] | Iterable[bool] = (), decomposed: bool = False,
-                 overwrite: bool = False) -> int:
+                 fixed: Iterable[int] | Iterable[bool] = (), decomposed: bool = False, overwrite: bool = False) -> int:
     """Write outlines, or arrays (k, 2) of vertices [1/scale m], as a bodies file; return the number of bodies.
 
     `fixed` has the numbers of the outlines, from 1, that become fixed bodies, or one truth value per outline.

@@ -9,6 +9,9 @@ from .polygons import FloatArray, area_of
 #: Deviations of an outline that count as none, relative to its size
 ROUNDOFF = 1e-12
 
+#: Greatest coordinate [m]: areas and moments of inertia of greater polygons overflow
+GREATEST = 1e50
+
 
 class OutlineError(Exception):
     """What is wrong with an outline, without its name."""
@@ -20,6 +23,8 @@ def tidy(points: FloatArray) -> FloatArray:
         raise OutlineError("its vertices are not pairs of x and y")
     if not np.isfinite(points).all():
         raise OutlineError("a coordinate is not a finite number")
+    if np.abs(points).max(initial=0.0) > GREATEST:
+        raise OutlineError(f"a coordinate is beyond {GREATEST:g} m")
     outline = points - points.mean(axis=0) if len(points) else points
     size = float(np.abs(outline).max()) if len(points) else 0.0
     kept = list(range(len(outline)))

@@ -77,4 +77,5 @@ def _import(options: argparse.Namespace) -> None:
         raise ResultError("--scale takes a number above 0")
     n = import_bodies(options.file, options.output, form=options.form or "", scale=options.scale, fixed=options.fixed,
                       decomposed=options.decompose, overwrite=options.force)
-    print(f"{options.output}: {n} bodies; in the namelist: &scene name = 'file', bodies_file = '{options.output}'")
+    bodies, quoted = "1 body" if n == 1 else f"{n} bodies", str(options.output).replace("'", "''")
+    print(f"{options.output}: {bodies}; in the namelist: &scene name = 'file', bodies_file = '{quoted}'")

@@ -40,7 +40,9 @@ def read_outlines(path: Path, form: str = "") -> list[Outline]:
                           f"{', '.join(READERS)}")
     try:
         text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise ResultError(f"{path}: is not text in UTF-8 (byte {error.start})") from error
+    except OSError as error:
         raise cannot_read(path, error) from error
     outlines = list(READERS[form](text, str(path)))
     if not outlines:
@@ -68,7 +70,8 @@ def _of_shapely(geometry: Any, place: str) -> Iterator[Outline]:
 def _from_rings(rings: list[Any], place: str, properties: dict[str, Any] | None = None) -> Outline:
     """The outline of a polygon; the last point of a ring repeats the first one."""
     if len(rings) != 1:
-        raise ResultError(f"{place}: the polygon has {len(rings) - 1} hole(s)" if rings
+        holes = "a hole" if len(rings) == 2 else f"{len(rings) - 1} holes"
+        raise ResultError(f"{place}: the polygon has {holes}, but a body has none" if rings
                           else f"{place}: the polygon is empty")
     try:
         points = np.array([point[:2] for point in rings[0]], dtype=float)
@@ -126,6 +129,8 @@ def _read_geojson(text: str, name: str) -> Iterator[Outline]:
         content = json.loads(text)
     except json.JSONDecodeError as error:
         raise ResultError(f"{name}:{error.lineno}: is not JSON ({error.msg})") from error
+    except RecursionError as error:
+        raise ResultError(f"{name}: its lists are nested too deeply for GeoJSON") from error
     features = content.get("features", []) if isinstance(content, dict) and "features" in content else [content]
     for number, feature in enumerate(features, 1):
         place = f"{name}: feature {number}" if len(features) > 1 else name
@@ -150,7 +155,7 @@ def _of_geojson(geometry: Any, place: str, properties: dict[str, Any]) -> Iterat
         for rings in polygons:
             yield _from_rings(rings, place, properties)
     else:
-        raise ResultError(f"{place}: is a {kind}, not a Polygon or MultiPolygon")
+        raise ResultError(f"{place}: {f'is a {kind}' if kind else 'has no geometry'}, not a Polygon or MultiPolygon")
 
 
 def _read_text(text: str, name: str) -> Iterator[Outline]:
