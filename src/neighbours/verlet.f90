@@ -172,6 +172,7 @@ contains
       integer(lp) :: tests
 
       self%age = 0_lp
+      if (self%candidates%n > 0_ip) call self%candidates%update_states(boxes, self%padded, self%changes%of)
       self%padded(1:2, :) = boxes%bounds(1:2, 1:boxes%n) - 0.5_wp*self%thickness
       self%padded(3:4, :) = boxes%bounds(3:4, 1:boxes%n) + 0.5_wp*self%thickness
       call self%grids%build(boxes%n, self%padded)

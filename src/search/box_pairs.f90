@@ -61,7 +61,7 @@ contains
       call move_alloc(longer, self%box)
    end subroutine reserve_found
 
-   !> Put the lower box of each pair first, and remove pairs of the same body and pairs of two passive bodies.
+   !> Remove pairs of the same body and pairs of two passive bodies.
    pure subroutine remove_invalid_pairs(self, body, passive)
       class(found_pairs_t), intent(inout) :: self
       !> Body of each box, (box)
@@ -72,8 +72,8 @@ contains
 
       kept = 0_ip
       do k = 1_ip, self%n
-         a = min(self%box(1, k), self%box(2, k))
-         b = max(self%box(1, k), self%box(2, k))
+         a = self%box(1, k)
+         b = self%box(2, k)
          self%box(1, kept + 1_ip) = a
          self%box(2, kept + 1_ip) = b
          kept = kept + merge(1_ip, 0_ip, body(a) /= body(b) .and. .not. (passive(a) .and. passive(b)))
@@ -103,7 +103,7 @@ contains
    !> Replace the list by the pairs of all threads. The rows are not sorted yet.
    pure subroutine gather(self, found)
       class(box_pairs_t), intent(inout) :: self
-      !> Pairs of each thread with the lower box first, (thread)
+      !> Pairs of each thread, (thread)
       type(found_pairs_t), intent(in) :: found(:)
       integer(ip) :: k, row, place, total
       integer :: w
@@ -112,7 +112,7 @@ contains
       self%first = 0_ip
       do w = 1, size(found)
          do k = 1_ip, found(w)%n
-            row = found(w)%box(1, k)
+            row = minval(found(w)%box(:, k))
             self%first(row + 2_ip) = self%first(row + 2_ip) + 1_ip
          end do
          total = total + found(w)%n
@@ -125,9 +125,9 @@ contains
       ! first(row + 1) is the next free index of the row, and at the end the index behind the row.
       do w = 1, size(found)
          do k = 1_ip, found(w)%n
-            row = found(w)%box(1, k) + 1_ip
+            row = minval(found(w)%box(:, k)) + 1_ip
             place = self%first(row)
-            self%partner(place) = found(w)%box(2, k)
+            self%partner(place) = maxval(found(w)%box(:, k))
             self%first(row) = place + 1_ip
          end do
       end do

@@ -1,38 +1,37 @@
-!> Candidates in rows: one row per box with its candidates of higher number, in ascending order.
+!> Candidates in rows: one row per box with the candidates that its search in cells found, in the order of the cells.
 !>
-!> A search in cells replaces all rows at once. The states of the pairs that are in both lists are copied; a pair that
-!> overlapped and is no longer a candidate has separated.
+!> A search replaces all rows at once. Before it, all former candidates are compared, which records their changes. A
+!> pair that overlaps and was no candidate has then begun. One of its boxes has left its padded box, since all boxes
+!> inside theirs overlap only candidates. So only the pairs of those boxes are looked up in the former rows.
 module polydem_candidate_rows
-   use polydem_box_pairs, only: box_pairs_t, found_pairs_t
+   use polydem_box_pairs, only: found_pairs_t
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t, index_list_t
-   use polydem_kinds, only: bp, ip, lp, min_parallel_size
+   use polydem_candidates, only: candidates_t, find_states, index_list_t, overlapping
+   use polydem_kinds, only: bp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
    use polydem_thread_changes, only: part
    implicit none
    private
    public :: candidate_rows_t
 
-   !> Candidates in ascending order, lower box first; more candidates can follow the rows
+   !> Candidates in rows, the box of the row first; more candidates can follow the rows
    type, extends(candidates_t) :: candidate_rows_t
-      !> Present and previous rows, in alternating order
-      type(box_pairs_t), private :: list(2)
-      !> Index of the present rows in `list`
-      integer, private :: now = 1
-      !> 1 if a candidate of the previous rows overlapped, else 0, (candidate)
-      integer(bp), allocatable, private :: overlap_before(:)
-      !> Place in `of_higher` of the first candidate in which each box is the higher one, and behind the last box,
+      !> First candidate and number of candidates of the row of each box, (2, box)
+      integer(ip), allocatable, private :: row(:, :)
+      !> Place in `of_second` of the first candidate in which each box is the second one, and behind the last box,
       !> (boxes + 2); the last element is work space
-      integer(ip), allocatable, private :: first_of_higher(:)
-      !> Candidates of the rows in the order of their higher box
-      integer(ip), allocatable, private :: of_higher(:)
+      integer(ip), allocatable, private :: first_of_second(:)
+      !> Candidates of the rows in the order of their second box
+      integer(ip), allocatable, private :: of_second(:)
+      !> 1 if a box was outside its padded box when the states were last updated, else 0, (box)
+      integer(bp), allocatable, private :: outside(:)
    contains
       procedure :: start => start_rows
+      procedure :: update_states
       procedure :: replace
       procedure :: append
-      procedure :: list_by_higher
-      procedure :: append_row_candidates_of
-      procedure :: place_of
+      procedure :: list_by_second
+      procedure :: append_candidates_of => append_row_candidates_of
       procedure :: bytes => bytes_of_rows
    end type candidate_rows_t
 
@@ -44,82 +43,121 @@ contains
       !> Number of boxes
       integer(ip), intent(in) :: n_boxes
 
-      call self%list(1)%start(n_boxes)
-      call self%list(2)%start(n_boxes)
       self%n = 0_ip
-      allocate (self%box(2, 0), self%overlap(0), self%overlap_before(0))
+      allocate (self%box(2, 0), self%overlap(0), self%of_second(0))
+      allocate (self%row(2, n_boxes), source=0_ip)
+      allocate (self%first_of_second(n_boxes + 2_ip), source=1_ip)
+      allocate (self%outside(n_boxes), source=1_bp)
    end subroutine start_rows
 
-   !> Replace all candidates. The pairs that were behind the rows must not overlap, or be carried over by the caller.
-   subroutine replace(self, found, boxes, changes)
+   !> Compare all candidates before they are replaced, and find the boxes outside their padded boxes.
+   subroutine update_states(self, boxes, padded, changes)
       class(candidate_rows_t), intent(inout) :: self
-      !> New candidates as each thread of the search found them, lower box first, (thread)
-      type(found_pairs_t), intent(in) :: found(:)
-      !> Boxes; only their number and bodies are used
+      !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
-      !> Changes of each thread; pairs that overlapped and are no longer candidates are appended, (thread)
+      !> Padded boxes, (4, box) [m]
+      real(wp), intent(in), contiguous :: padded(:, :)
+      !> Changes of each thread; appended, (thread)
       type(pair_changes_t), intent(inout) :: changes(:)
-      integer(bp), allocatable :: spare(:)
-      integer(ip) :: low, high
+      integer(ip) :: low, high, i
       integer :: w
 
-      self%now = 3 - self%now
-      call self%list(self%now)%gather(found)
-      call move_alloc(self%overlap_before, spare)
-      call move_alloc(self%overlap, self%overlap_before)
-      call move_alloc(spare, self%overlap)
-      self%n = self%list(self%now)%n()
-      call reserve(self)
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes, changes) private(w, low, high)
+      !$omp    shared(self, boxes, padded, changes) private(w, low, high, i)
       do w = 1, size(changes)
+         call part(self%n, size(changes), w, low, high)
+         call self%compare(low, high, boxes%bounds, boxes%body, changes(w))
          call part(boxes%n, size(changes), w, low, high)
-         call self%list(self%now)%sort_rows(low, high)
-         call carry_over(self%list(3 - self%now), self%overlap_before, self%list(self%now), low, high, boxes%body, &
-                         self%box, self%overlap, changes(w))
+         do i = low, high
+            self%outside(i) = merge(0_bp, 1_bp, lies_inside(boxes%bounds(:, i), padded(:, i)))
+         end do
+      end do
+      !$omp end parallel do
+   end subroutine update_states
+
+   !> Whether a box lies inside another one; false for NaN
+   pure logical function lies_inside(box, other)
+      real(wp), intent(in) :: box(4), other(4)
+
+      lies_inside = box(1) >= other(1) .and. box(2) >= other(2) .and. box(3) <= other(3) .and. box(4) <= other(4)
+   end function lies_inside
+
+   !> Replace all candidates, and record the pairs that begin to overlap. `update_states` must have been called, unless
+   !> there are no candidates yet.
+   subroutine replace(self, found, boxes, changes)
+      class(candidate_rows_t), intent(inout) :: self
+      !> New candidates as each thread of the search found them, row by row, (thread)
+      type(found_pairs_t), intent(in) :: found(:)
+      !> Boxes of this step
+      type(boxes_t), intent(in) :: boxes
+      !> Changes of each thread; appended, (thread)
+      type(pair_changes_t), intent(inout) :: changes(:)
+      integer :: w
+
+      if (any(self%outside /= 0_bp)) then
+         !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
+         !$omp    shared(self, found, boxes, changes) private(w)
+         do w = 1, size(found)
+            call record_begun(self, found(w), boxes, changes(w))
+         end do
+         !$omp end parallel do
+      end if
+      self%n = sum(found%n)
+      call reserve(self)
+      self%row = 0_ip
+      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
+      !$omp    shared(self, found, boxes) private(w)
+      do w = 1, size(found)
+         call fill_rows(self, sum(found(1:w - 1)%n), found(w), boxes%bounds)
       end do
       !$omp end parallel do
    end subroutine replace
 
-   !> Fill a range of rows of the candidates. The state of a candidate is copied from the previous list; new candidates
-   !> did not overlap. Pairs that overlapped and are no longer candidates are recorded as separated.
-   pure subroutine carry_over(before, overlap_before, now, low, high, body, box, overlap, changes)
-      !> Previous list, and 1 where its candidates overlapped
-      type(box_pairs_t), intent(in) :: before
-      integer(bp), intent(in) :: overlap_before(:)
-      !> New list
-      type(box_pairs_t), intent(in) :: now
-      !> First and last row
-      integer(ip), intent(in) :: low, high
-      !> Body of each box, (box)
-      integer(ip), intent(in) :: body(:)
-      !> Candidates to fill, (2, candidate), and 1 where they overlapped
-      integer(ip), intent(inout) :: box(:, :)
-      integer(bp), intent(inout) :: overlap(:)
+   !> Record the pairs found that overlap and were no candidates.
+   subroutine record_begun(self, found, boxes, changes)
+      class(candidate_rows_t), intent(in) :: self
+      type(found_pairs_t), intent(in) :: found
+      type(boxes_t), intent(in) :: boxes
       type(pair_changes_t), intent(inout) :: changes
-      integer(ip) :: row, old, k
+      type(index_list_t) :: known
+      integer(ip) :: m, i, j
 
-      do row = low, high
-         old = before%first(row)
-         do k = now%first(row), now%first(row + 1_ip) - 1_ip
-            box(1, k) = row
-            box(2, k) = now%partner(k)
-            overlap(k) = 0_bp
-            do while (old < before%first(row + 1_ip))
-               if (before%partner(old) >= now%partner(k)) exit
-               if (overlap_before(old) /= 0_bp) call changes%record(body(row), body(before%partner(old)), -1_ip)
-               old = old + 1_ip
-            end do
-            if (old == before%first(row + 1_ip)) cycle
-            if (before%partner(old) /= now%partner(k)) cycle
-            overlap(k) = overlap_before(old)
-            old = old + 1_ip
-         end do
-         do old = old, before%first(row + 1_ip) - 1_ip
-            if (overlap_before(old) /= 0_bp) call changes%record(body(row), body(before%partner(old)), -1_ip)
-         end do
+      do m = 1_ip, found%n
+         i = found%box(1, m)
+         j = found%box(2, m)
+         if (max(self%outside(i), self%outside(j)) == 0_bp) cycle
+         if (.not. overlapping(boxes%bounds(:, i), boxes%bounds(:, j))) cycle
+         known%n = 0_ip
+         call self%append_candidates_of(i, known)
+         call self%append_candidates_of(j, known)
+         if (any(sum(self%box(:, known%at(1:known%n)), 1) == i + j .and. &
+                 abs(self%box(1, known%at(1:known%n)) - self%box(2, known%at(1:known%n))) == abs(i - j))) cycle
+         call changes%record(boxes%body(i), boxes%body(j), 1_ip)
       end do
-   end subroutine carry_over
+   end subroutine record_begun
+
+   !> Copy the pairs of a thread to their rows, with their states.
+   pure subroutine fill_rows(self, offset, found, bounds)
+      type(candidate_rows_t), intent(inout) :: self
+      !> Number of candidates before those of this thread
+      integer(ip), intent(in) :: offset
+      type(found_pairs_t), intent(in) :: found
+      !> Bounds of the boxes, (4, box) [m]
+      real(wp), intent(in), contiguous :: bounds(:, :)
+      integer(ip) :: m, i, last
+
+      last = 0_ip
+      do m = 1_ip, found%n
+         i = found%box(1, m)
+         self%box(1, offset + m) = i
+         self%box(2, offset + m) = found%box(2, m)
+         if (i /= last) self%row(1, i) = offset + m
+         last = i
+         self%row(2, i) = self%row(2, i) + 1_ip
+      end do
+      call find_states(found%n, self%box(:, offset + 1_ip:offset + found%n), size(bounds, 2, ip), bounds, &
+                       self%overlap(offset + 1_ip:offset + found%n))
+   end subroutine fill_rows
 
    !> Append a candidate behind the rows.
    pure subroutine append(self, lower, higher, overlap)
@@ -132,101 +170,78 @@ contains
       integer(bp), allocatable :: longer(:)
       integer(ip) :: m
 
-      m = self%n + self%n/4_ip + 64_ip
       if (size(self%overlap) == self%n) then
-         allocate (longer(m))
-         longer(1:self%n) = self%overlap(1:self%n)
-         call move_alloc(longer, self%overlap)
-      end if
-      if (size(self%box, 2) == self%n) then
-         allocate (box(2, m))
+         m = self%n + self%n/4_ip + 64_ip
+         allocate (box(2, m), longer(m))
          box(:, 1:self%n) = self%box(:, 1:self%n)
+         longer(1:self%n) = self%overlap(1:self%n)
          call move_alloc(box, self%box)
+         call move_alloc(longer, self%overlap)
       end if
       self%n = self%n + 1_ip
       self%box(:, self%n) = [lower, higher]
       self%overlap(self%n) = merge(1_bp, 0_bp, overlap)
    end subroutine append
 
-   !> List the candidates of the rows by their higher box, by counting.
-   pure subroutine list_by_higher(self)
+   !> List the candidates of the rows by their second box, by counting.
+   pure subroutine list_by_second(self)
       class(candidate_rows_t), intent(inout) :: self
-      integer(ip) :: k, j, n
+      integer(ip) :: k, j
 
-      n = self%list(self%now)%n_rows
-      if (.not. allocated(self%of_higher)) allocate (self%of_higher(0), self%first_of_higher(n + 2_ip))
-      if (size(self%of_higher) < self%n) then
-         deallocate (self%of_higher)
-         allocate (self%of_higher(self%n + self%n/4_ip + 64_ip))
+      if (size(self%of_second) < self%n) then
+         deallocate (self%of_second)
+         allocate (self%of_second(self%n + self%n/4_ip + 64_ip))
       end if
-      associate (first => self%first_of_higher)
+      associate (first => self%first_of_second)
          first = 0_ip
          do k = 1_ip, self%n
             first(self%box(2, k) + 2_ip) = first(self%box(2, k) + 2_ip) + 1_ip
          end do
          first(1:2) = 1_ip
-         do j = 1_ip, n
+         do j = 1_ip, size(self%row, 2, ip)
             first(j + 2_ip) = first(j + 1_ip) + first(j + 2_ip)
          end do
          ! first(j + 1) is the next free place of box j, and at the end the first place of the next box.
          do k = 1_ip, self%n
             j = self%box(2, k) + 1_ip
-            self%of_higher(first(j)) = k
+            self%of_second(first(j)) = k
             first(j) = first(j) + 1_ip
          end do
       end associate
-   end subroutine list_by_higher
+   end subroutine list_by_second
 
-   !> Append the candidates of a box in the rows to a list. `list_by_higher` must have been called.
+   !> Append the candidates of a box in the rows to a list, without those in other rows before `list_by_second`.
    pure subroutine append_row_candidates_of(self, i, list)
       class(candidate_rows_t), intent(in) :: self
       !> Box
       integer(ip), intent(in) :: i
       !> Numbers of candidates
       type(index_list_t), intent(inout) :: list
-      integer(ip) :: from, low, k, n_row, n_higher
+      integer(ip) :: low, k, n_row, n_second
 
-      from = self%list(self%now)%first(i)
-      n_row = self%list(self%now)%first(i + 1_ip) - from
-      low = self%first_of_higher(i)
-      n_higher = self%first_of_higher(i + 1_ip) - low
-      call list%reserve(list%n + n_row + n_higher)
+      n_row = self%row(2, i)
+      low = self%first_of_second(i)
+      n_second = self%first_of_second(i + 1_ip) - low
+      call list%reserve(list%n + n_row + n_second)
       do k = 1_ip, n_row
-         list%at(list%n + k) = from + k - 1_ip
+         list%at(list%n + k) = self%row(1, i) + k - 1_ip
       end do
       list%n = list%n + n_row
-      do k = 1_ip, n_higher
-         list%at(list%n + k) = self%of_higher(low + k - 1_ip)
+      do k = 1_ip, n_second
+         list%at(list%n + k) = self%of_second(low + k - 1_ip)
       end do
-      list%n = list%n + n_higher
+      list%n = list%n + n_second
    end subroutine append_row_candidates_of
-
-   !> Candidate of two boxes, 0 if the rows do not contain them
-   pure integer(ip) function place_of(self, lower, higher)
-      class(candidate_rows_t), intent(in) :: self
-      !> The lower and the higher of the two boxes
-      integer(ip), intent(in) :: lower, higher
-      integer(ip) :: k
-
-      place_of = 0_ip
-      do k = self%list(self%now)%first(lower), self%list(self%now)%first(lower + 1_ip) - 1_ip
-         if (self%box(2, k) == higher) place_of = k
-      end do
-   end function place_of
 
    !> Allocate memory for the candidates; their old values are lost.
    pure subroutine reserve(self)
       type(candidate_rows_t), intent(inout) :: self
       integer(ip) :: n
 
+      if (size(self%overlap) >= self%n) return
       n = self%n + self%n/4_ip + 64_ip
-      if (size(self%overlap) < self%n) then
-         deallocate (self%overlap)
-         allocate (self%overlap(n))
-      end if
-      if (size(self%box, 2) >= self%n) return
-      deallocate (self%box)
-      allocate (self%box(2, n))
+      deallocate (self%box, self%overlap)
+      allocate (self%box(2, n), self%overlap(n))
    end subroutine reserve
 
    !> Allocated memory [B]
@@ -235,11 +250,9 @@ contains
 
       bytes = 0_lp
       if (.not. allocated(self%box)) return
-      bytes = self%list(1)%bytes() + self%list(2)%bytes() + &
-         (int(storage_size(self%box), lp)*size(self%box, kind=lp) + &
-          int(storage_size(self%overlap), lp)*(size(self%overlap, kind=lp) + size(self%overlap_before, kind=lp)))/8_lp
-      if (allocated(self%of_higher)) bytes = bytes + int(storage_size(self%of_higher)/8, lp)* &
-         (size(self%first_of_higher, kind=lp) + size(self%of_higher, kind=lp))
+      bytes = (int(storage_size(self%box), lp)*(size(self%box, kind=lp) + size(self%row, kind=lp) + &
+                                                size(self%first_of_second, kind=lp) + size(self%of_second, kind=lp)) + &
+               int(storage_size(self%overlap), lp)*(size(self%overlap, kind=lp) + size(self%outside, kind=lp)))/8_lp
    end function bytes_of_rows
 
 end module polydem_candidate_rows

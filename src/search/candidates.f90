@@ -10,7 +10,7 @@ module polydem_candidates
    use polydem_pair_changes, only: pair_changes_t
    implicit none
    private
-   public :: candidates_t, index_list_t, meet, overlapping
+   public :: candidates_t, index_list_t, find_states, meet, overlapping
 
    !> Number of candidates that are compared at once
    integer(ip), parameter :: block_size = 128_ip
@@ -142,9 +142,7 @@ contains
       integer(ip) :: k
       integer(bp) :: some
 
-      do k = 1_ip, n
-         differ(k) = merge(1_bp, 0_bp, overlapping(bounds(:, box(1, k)), bounds(:, box(2, k))))
-      end do
+      call find_states(n, box, n_boxes, bounds, differ)
       some = 0_bp
       do k = 1_ip, n
          differ(k) = ieor(differ(k), overlap(k))
@@ -152,6 +150,23 @@ contains
       end do
       any_differ = some /= 0_bp
    end subroutine compare_block
+
+   !> Find which pairs overlap.
+   pure subroutine find_states(n, box, n_boxes, bounds, state)
+      !> Number of pairs and of boxes
+      integer(ip), intent(in) :: n, n_boxes
+      !> Boxes of each pair, (2, pair)
+      integer(ip), intent(in) :: box(2, n)
+      !> Bounds of the boxes, (4, box) [m]
+      real(wp), intent(in) :: bounds(4, n_boxes)
+      !> 1 if the boxes overlap, else 0, (pair)
+      integer(bp), intent(out) :: state(n)
+      integer(ip) :: k
+
+      do k = 1_ip, n
+         state(k) = merge(1_bp, 0_bp, overlapping(bounds(:, box(1, k)), bounds(:, box(2, k))))
+      end do
+   end subroutine find_states
 
    !> Number of candidates
    pure integer(ip) function n_pairs(self)

@@ -57,7 +57,7 @@ module polydem_cell_grids
       type(cell_order_t), private :: order
       !> Cell of each box, (box)
       integer(ip), allocatable, private :: cell_of(:)
-      !> Pairs of each thread in the last search, lower box first, (thread)
+      !> Pairs of each thread in the last search, (thread); those of a search for one box are adjacent, this box first
       type(found_pairs_t), allocatable :: found(:)
       !> Counts summed over all searches
       type(tally_t) :: total
@@ -186,22 +186,20 @@ contains
       type(tally_t), intent(inout) :: tally
       type(found_pairs_t) :: mine
       type(tally_t) :: my_tally
-      integer(ip) :: low, high
+      integer(ip) :: low, high, k
       integer :: l, other
 
       ! The local variables are on the stack of the thread. Those of other threads would be on the same cache lines.
       call move_alloc(found%box, mine%box)
       call mine%reserve(64_ip)
-      do l = 1, self%n_levels
+      do l = 1, self%n_levels + 1
          call part_of_level(self%grid(l), m, w, low, high)
-         call search_own_grid(self, self%grid(l), low, high, mine, my_tally)
-         do other = l + 1, self%n_levels
-            call search_other_grid(self, self%grid(other), low, high, mine, my_tally)
+         do k = low, high
+            if (l <= self%n_levels) call search_own_grid(self, self%grid(l), k, mine, my_tally)
+            do other = merge(1, l + 1, l > self%n_levels), self%n_levels
+               call search_other_grid(self, self%grid(other), k, mine, my_tally)
+            end do
          end do
-      end do
-      call part_of_level(self%grid(l), m, w, low, high)
-      do other = 1, self%n_levels
-         call search_other_grid(self, self%grid(other), low, high, mine, my_tally)
       end do
       call move_alloc(mine%box, found%box)
       found%n = mine%n
@@ -219,54 +217,52 @@ contains
       high = grid%first_box + high - 1_ip
    end subroutine part_of_level
 
-   !> Compare boxes with later boxes of their own grid.
-   subroutine search_own_grid(self, grid, low, high, found, tally)
+   !> Compare a box with later boxes of its own grid.
+   subroutine search_own_grid(self, grid, k, found, tally)
       type(cell_grids_t), intent(in) :: self
       type(cell_grid_t), intent(in) :: grid
-      integer(ip), intent(in) :: low, high
+      !> Index of the box in the order of cells
+      integer(ip), intent(in) :: k
       type(found_pairs_t), intent(inout) :: found
       type(tally_t), intent(inout) :: tally
-      integer(ip) :: k, cell, beside, from, to, more
+      integer(ip) :: cell, beside, from, to, more
 
-      do k = low, high
-         cell = self%order%cell(k)
-         beside = self%first(cell + 2_ip) - 1_ip
-         from = self%first(cell + grid%stride - 1_ip)
-         to = self%first(cell + grid%stride + 2_ip) - 1_ip
-         more = (beside - k) + (to - from + 1_ip)
-         tally%tests = tally%tests + int(more, lp)
-         if (size(found%box, 2) < found%n + more + 1_ip) call found%reserve(more + 1_ip)
-         call self%order%compare(k, k + 1_ip, beside, found%n, found%box)
-         call self%order%compare(k, from, to, found%n, found%box)
-      end do
-      tally%visits = tally%visits + 5_lp*int(high - low + 1_ip, lp)
-      tally%searches = tally%searches + int(high - low + 1_ip, lp)
+      cell = self%order%cell(k)
+      beside = self%first(cell + 2_ip) - 1_ip
+      from = self%first(cell + grid%stride - 1_ip)
+      to = self%first(cell + grid%stride + 2_ip) - 1_ip
+      more = (beside - k) + (to - from + 1_ip)
+      if (size(found%box, 2) < found%n + more + 1_ip) call found%reserve(more + 1_ip)
+      call self%order%compare(k, k + 1_ip, beside, found%n, found%box)
+      call self%order%compare(k, from, to, found%n, found%box)
+      tally%tests = tally%tests + int(more, lp)
+      tally%visits = tally%visits + 5_lp
+      tally%searches = tally%searches + 1_lp
    end subroutine search_own_grid
 
-   !> Compare boxes with the boxes of another grid.
-   subroutine search_other_grid(self, grid, low, high, found, tally)
+   !> Compare a box with the boxes of another grid.
+   subroutine search_other_grid(self, grid, k, found, tally)
       type(cell_grids_t), intent(in) :: self
       type(cell_grid_t), intent(in) :: grid
-      integer(ip), intent(in) :: low, high
+      !> Index of the box in the order of cells
+      integer(ip), intent(in) :: k
       type(found_pairs_t), intent(inout) :: found
       type(tally_t), intent(inout) :: tally
-      integer(ip) :: k, r, left, right, from, to
+      integer(ip) :: r, left, right, from, to
 
       if (grid%last_box < grid%first_box) return
-      do k = low, high
-         left = max(column(grid, self%order%xmin(k)) - 1_ip, 0_ip)
-         right = column(grid, self%order%xmax(k))
-         do r = max(row(grid, self%order%ymin(k)) - 1_ip, 0_ip), row(grid, self%order%ymax(k))
-            from = self%first(grid%offset + r*grid%stride + left + 1_ip)
-            to = self%first(grid%offset + r*grid%stride + right + 2_ip) - 1_ip
-            tally%visits = tally%visits + int(right - left + 1_ip, lp)
-            if (to < from) cycle
-            tally%tests = tally%tests + int(to - from + 1_ip, lp)
-            if (size(found%box, 2) < found%n + to - from + 2_ip) call found%reserve(to - from + 2_ip)
-            call self%order%compare(k, from, to, found%n, found%box)
-         end do
+      left = max(column(grid, self%order%xmin(k)) - 1_ip, 0_ip)
+      right = column(grid, self%order%xmax(k))
+      do r = max(row(grid, self%order%ymin(k)) - 1_ip, 0_ip), row(grid, self%order%ymax(k))
+         from = self%first(grid%offset + r*grid%stride + left + 1_ip)
+         to = self%first(grid%offset + r*grid%stride + right + 2_ip) - 1_ip
+         tally%visits = tally%visits + int(right - left + 1_ip, lp)
+         if (to < from) cycle
+         tally%tests = tally%tests + int(to - from + 1_ip, lp)
+         if (size(found%box, 2) < found%n + to - from + 2_ip) call found%reserve(to - from + 2_ip)
+         call self%order%compare(k, from, to, found%n, found%box)
       end do
-      tally%searches = tally%searches + int(high - low + 1_ip, lp)
+      tally%searches = tally%searches + 1_lp
    end subroutine search_other_grid
 
    !> List the boxes that overlap a window.

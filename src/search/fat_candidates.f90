@@ -152,19 +152,14 @@ contains
       class(box_lines_t), intent(in) :: lines
       !> Number of candidates that overlap or may overlap soon
       integer(ip), intent(in) :: n_wanted
-      !> Changes of each thread; pairs that overlapped and are no longer candidates are appended, (thread)
+      !> Changes of each thread; appended, (thread)
       type(pair_changes_t), intent(inout) :: changes(:)
-      type(index_list_t) :: extras
-      integer(ip) :: low, high, k
+      integer(ip) :: low, high
       integer :: w
 
       call adapt_margin(self, boxes%n, n_wanted)
       call reset(self)
-      do k = self%n_listed + 1_ip, self%n
-         if (self%overlap(k) == 0_bp) cycle
-         call extras%push(self%box(1, k))
-         call extras%push(self%box(2, k))
-      end do
+      if (self%searched) call self%update_states(boxes, self%fat, changes)
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes, lines, changes) private(w, low, high)
       do w = 1, size(changes)
@@ -176,12 +171,9 @@ contains
       call self%grids%search(boxes)
       call self%replace(self%grids%found, boxes, changes)
       self%n_listed = self%n
-      do k = 1_ip, extras%n, 2_ip
-         call carry_extra(self, extras%at(k), extras%at(k + 1_ip), boxes%body, changes(1))
-      end do
       self%searched = .true.
       self%first_link = 0_ip
-      call self%list_by_higher()
+      call self%list_by_second()
    end subroutine search_all
 
    !> Set the margin from the costs of the last list. The first list was made without velocities, so its life says
@@ -212,22 +204,6 @@ contains
       end do
       self%moved%n = 0_ip
    end subroutine reset
-
-   !> Copy the state of an overlapping pair that was behind the former rows.
-   pure subroutine carry_extra(self, lower, higher, body, changes)
-      type(fat_candidates_t), intent(inout) :: self
-      integer(ip), intent(in) :: lower, higher
-      integer(ip), intent(in) :: body(:)
-      type(pair_changes_t), intent(inout) :: changes
-      integer(ip) :: k
-
-      k = self%place_of(lower, higher)
-      if (k > 0_ip) then
-         self%overlap(k) = 1_bp
-      else
-         call changes%record(body(lower), body(higher), -1_ip)
-      end if
-   end subroutine carry_extra
 
    !> Make the fat boxes low to high.
    pure subroutine fatten(self, low, high, bounds, lines)
@@ -321,7 +297,7 @@ contains
       type(index_list_t), intent(inout) :: list
       integer(ip) :: link, k
 
-      call self%append_row_candidates_of(i, list)
+      call self%candidate_rows_t%append_candidates_of(i, list)
       link = self%first_link(i)
       do while (link /= 0_ip)
          k = shiftr(link + 1_ip, 1)

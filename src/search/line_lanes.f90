@@ -11,8 +11,10 @@ module polydem_line_lanes
 
    !> Classes of candidates; the sure ones are also their states in `polydem_candidates`
    integer(bp), parameter :: separate = 0_bp, overlapping = 1_bp, active = 2_bp
-   !> Number of boxes that are compared with their lines at once, of their sides, and of sums that count these
-   integer(ip), parameter :: box_block = 16_ip, n_sides = 4_ip*box_block, n_sums = 8_ip
+   !> Number of boxes that are compared with their lines at once, of their sides, and of integers that join these
+   integer(ip), parameter :: box_block = 16_ip, n_sides = 4_ip*box_block, n_rooms = 8_ip
+   !> Kind of an integer with as many bits as a number of the working precision
+   integer, parameter :: bits = selected_int_kind(merge(38, merge(18, 9, digits(1.0_wp) > 24), digits(1.0_wp) > 53))
    !> Largest number of pairs that are classified at once, and of boxes whose room is found at once
    integer(ip), parameter :: pair_block = 128_ip
 
@@ -38,30 +40,31 @@ contains
       integer(ip), intent(out) :: n_off
       !> The list
       integer(ip), intent(out) :: off(high - low + 2_ip)
-      real(wp) :: on(n_sides), sums(n_sums)
+      real(wp) :: on(n_sides)
+      integer(bits) :: rooms(n_rooms), whole
       integer(ip) :: from, to, sides, i, k, l
 
       n_off = 0_ip
+      whole = transfer(tolerance, whole)
       do from = low, high, box_block
          to = min(from + box_block - 1_ip, high)
          sides = 4_ip*(from - 1_ip)
          if (to - from == box_block - 1_ip) then
-            sums = 0.0_wp
-            do k = 0_ip, n_sides - n_sums, n_sums
-               do l = 1_ip, n_sums
-                  on(k + l) = merge(1.0_wp, 0.0_wp, abs(bounds(sides + k + l) - (place(sides + k + l) + &
-                                    real(speed(sides + k + l), wp)*step)) <= tolerance)
-                  sums(l) = sums(l) + on(k + l)
+            ! The bits of numbers that are not negative, as integers, are in the order of the numbers, and NaN is last. So
+            ! the difference is negative exactly where a side is off, and the sign of the disjunction shows this.
+            rooms = 0_bits
+            do k = 0_ip, n_sides - n_rooms, n_rooms
+               do l = 1_ip, n_rooms
+                  rooms(l) = ior(rooms(l), whole - transfer(abs(bounds(sides + k + l) - (place(sides + k + l) + &
+                                    real(speed(sides + k + l), wp)*step)), whole))
                end do
             end do
-            if (((sums(1) + sums(2)) + (sums(3) + sums(4))) + ((sums(5) + sums(6)) + (sums(7) + sums(8))) > &
-                real(n_sides, wp) - 0.5_wp) cycle
-         else
-            do k = 1_ip, 4_ip*(to - from + 1_ip)
-               on(k) = merge(1.0_wp, 0.0_wp, abs(bounds(sides + k) - (place(sides + k) + &
-                             real(speed(sides + k), wp)*step)) <= tolerance)
-            end do
+            if (iany(rooms) >= 0_bits) cycle
          end if
+         do k = 1_ip, 4_ip*(to - from + 1_ip)
+            on(k) = merge(1.0_wp, 0.0_wp, abs(bounds(sides + k) - (place(sides + k) + &
+                          real(speed(sides + k), wp)*step)) <= tolerance)
+         end do
          do i = from, to
             k = 4_ip*(i - from)
             off(n_off + 1_ip) = i
