@@ -50,8 +50,8 @@ contains
          to = min(from + box_block - 1_ip, high)
          sides = 4_ip*(from - 1_ip)
          if (to - from == box_block - 1_ip) then
-            ! The bits of numbers that are not negative, as integers, are in the order of the numbers, and NaN is last. So
-            ! the difference is negative exactly where a side is off, and the sign of the disjunction shows this.
+            ! Bits of numbers that are not negative, as integers, are in the order of the numbers, and NaN is last. So a
+            ! difference is negative exactly where a side is off, and the sign of the disjunction shows this.
             rooms = 0_bits
             do k = 0_ip, n_sides - n_rooms, n_rooms
                do l = 1_ip, n_rooms
