@@ -1,5 +1,6 @@
 """Measures of granular matter on configurations with known answers."""
 
+import dataclasses
 import inspect
 
 import numpy as np
@@ -27,6 +28,7 @@ from polydem_post.analysis import (
     solid_fraction,
     stress_tensor,
 )
+from polydem_post.columns import columns_of, field_names
 
 SQUARE = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
@@ -406,5 +408,11 @@ def test_every_measure_says_what_it_is(name):
     assert text and not text.startswith(f"{name}(")
     if name in ("solid_fraction", "fabric_tensor", "anisotropy", "stress_tensor", "body_stress", "coarse_grain", "lucy",
                 "free_surface", "flow_rate", "lacey_index", "mean_squared_displacement", "force_distribution",
-                "rattlers"):
+                "rattlers", "coordination_number", "profile"):
         assert any(f"({year})" in text for year in range(1900, 2027)) or "1927" in text, "no source"
+    if dataclasses.is_dataclass(entry):
+        columns = columns_of(entry)
+        assert set(field_names(entry)) <= set(columns)
+        properties = {key for key, value in vars(entry).items() if isinstance(value, property)}
+        assert properties <= set(columns)
+        assert {column.unit for key, column in columns.items() if "stress" in key} <= {"N/m2"}

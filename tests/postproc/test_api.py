@@ -2,8 +2,10 @@
 
 import inspect
 import os
+import re
 import subprocess
 import sys
+from functools import cached_property
 
 import numpy as np
 import pytest
@@ -234,6 +236,31 @@ def test_help_shows_every_field_with_its_unit(kind):
     for name, column in columns.items():
         assert column.unit and column.meaning, name
         assert name in text or f"[{column.unit}]" in inspect.getdoc(inspect.getattr_static(kind, name))
+
+
+@pytest.mark.parametrize("kind", [Trajectory, Frame, Contacts, Walls, Settings])
+def test_help_explains_every_member(kind):
+    for name, entry in vars(kind).items():
+        public = not name.startswith("_") or name in ("__len__", "__getitem__", "__iter__")
+        if public and (callable(entry) or isinstance(entry, (property, cached_property, classmethod))):
+            text = inspect.getdoc(entry)
+            assert text, f"{kind.__name__}.{name} has no help"
+            getter = getattr(entry, "fget", None) or getattr(entry, "func", None)
+            kept = str(getter.__annotations__.get("return", "")) if getter else ""
+            if kept.endswith("Array") or kept.startswith("npt.NDArray"):
+                assert re.search(r"\[[^]]+\]", text) and re.search(r"\((n|nv|m|w|frames)[,)]| \(n \+ 1\)", text), (
+                    f"{kind.__name__}.{name}: unit or shape is missing: {text}")
+    for column in columns_of(kind).values():
+        if kind in (Contacts, Walls) or (kind is Frame and column.name not in ("step", "time", "number")):
+            assert re.search(r"\((n|nv|m|w)( \+ 1)?(, \d)?\)|vectors|list of", column.meaning), column
+
+
+def test_reprs_are_one_line(run):
+    for entry in (run, run[-1], run[-1].contacts, run[-1].walls, run[:0]):
+        text = repr(entry)
+        assert re.match(f"<{type(entry).__name__}[ :]", text)
+        assert len(text.splitlines()) == 1
+    assert "greatest force" in repr(run[-1].walls) and len(run[-1].walls) == run[-1].fixed.sum()
 
 
 def test_frames_made_of_polygons_take_contacts():

@@ -52,9 +52,11 @@ class Contacts:
     with_fixed: npt.NDArray[np.bool_]
 
     def __len__(self) -> int:
+        """Number of contacts."""
         return len(self.first)
 
     def __repr__(self) -> str:
+        """Number of contacts and the greatest force."""
         greatest = f", greatest force {self.force_magnitude.max():.4g} N/m" if len(self) else ""
         return f"<Contacts: {len(self)} pairs{greatest}>"
 
@@ -117,7 +119,7 @@ class Contacts:
         return contact_table(self)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Walls:
     """What acts on the fixed bodies at one time: w fixed bodies; SI units with unit depth.
 
@@ -131,3 +133,12 @@ class Walls:
     id: npt.NDArray[np.integer[Any]]
     force: FloatArray
     torque: FloatArray
+
+    def __len__(self) -> int:
+        """Number of fixed bodies."""
+        return len(self.id)
+
+    def __repr__(self) -> str:
+        """Number of fixed bodies and the greatest force."""
+        greatest = f", greatest force {np.hypot(*self.force.T).max():.4g} N/m" if len(self) else ""
+        return f"<Walls: {len(self)} fixed bodies{greatest}>"

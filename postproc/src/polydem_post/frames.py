@@ -75,9 +75,11 @@ class Frame:
     _source: FrameSource | None = field(default=None)
 
     def __len__(self) -> int:
+        """Number of bodies."""
         return len(self.id)
 
     def __repr__(self) -> str:
+        """Number, time, step and bodies."""
         return (f"<Frame {self.number}: t = {self.time:.6g} s, step {self.step}, {len(self)} bodies "
                 f"({int(self.free.sum())} free)>")
 
@@ -86,8 +88,9 @@ class Frame:
                       angular_velocity: Any = None, density: float = 2500.0, time: float = 0.0) -> Frame:
         """A frame of bodies with the given outlines in the world [m], each (k, 2); identifiers are 1 to n.
 
-        For analyses of data of other programs. Masses and inertias follow from the density [kg/m3]; those of fixed
-        bodies are infinite.
+        For analyses of data of other programs. `fixed` has a truth value per body, `velocity` [m/s] is (n, 2),
+        `angular_velocity` [rad/s] is (n); without them all bodies are free and at rest. Masses and inertias follow from
+        the density [kg/m3]; those of fixed bodies are infinite. `time` is in s.
         """
         vertex, start = join([np.asarray(outline, dtype=float) for outline in outlines])
         area, centre, second = moments(vertex, start)
@@ -103,9 +106,10 @@ class Frame:
 
     def with_contacts(self, first: Any, second: Any, force: Any, point: Any, normal: Any = None,
                       area: Any = None) -> Frame:
-        """The same frame with contacts of these identifiers, forces on the first body [N/m] and points [m].
+        """The same frame with contacts of these identifiers, (m) each.
 
-        The normal [m] is that of the line of centres with length 1, and the area [m2] is 0, unless given.
+        `force` on the first body [N/m] and `point` [m] are (m, 2). `normal` [m], (m, 2), is the unit vector of the line
+        of centres and `area` [m2], (m), is 0, unless they are given.
         """
         names = np.asarray(first), np.asarray(second)
         index = [_index_of(self, each) for each in names]
@@ -120,12 +124,12 @@ class Frame:
 
     @cached_property
     def contacts(self) -> Contacts:
-        """The contacts of this frame, read when they are first asked for; the run needs output.contacts = .true."""
+        """The contacts of this frame, m rows; the run needs output.contacts = .true. Read when first asked for."""
         return self._given_source("contacts").contacts_of(self)
 
     @cached_property
     def walls(self) -> Walls:
-        """Forces and torques on the fixed bodies, read when they are first asked for."""
+        """Forces and torques on the fixed bodies, w rows. Read when first asked for."""
         return self._given_source("walls").walls_of(self)
 
     def _given_source(self, what: str) -> FrameSource:
@@ -245,11 +249,11 @@ class Frame:
                 + np.bincount(self.contacts.second_index, minlength=n)).astype(np.int64)
 
     def index_of(self, identifiers: Any) -> IntArray:
-        """Indices of bodies in the columns of this frame from their identifiers."""
+        """Indices of bodies in the columns of this frame from their k identifiers [1], (k)."""
         return _index_of(self, np.atleast_1d(identifiers))
 
     def to_pandas(self) -> Any:
-        """The bodies as a pandas table with the identifiers as index; vectors become two columns."""
+        """The bodies as a pandas table with the identifiers as index; vectors become two columns (position_x)."""
         from .tables import body_table
 
         return body_table(self)

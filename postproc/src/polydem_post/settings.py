@@ -23,12 +23,15 @@ class Group(Mapping[str, Value]):
         self._name, self._entries = name, entries
 
     def __getitem__(self, key: str) -> Value:
+        """Value of an entry."""
         return self._entries[key]
 
     def __iter__(self) -> Iterator[str]:
+        """Names of the entries."""
         return iter(self._entries)
 
     def __len__(self) -> int:
+        """Number of entries."""
         return len(self._entries)
 
     def __getattr__(self, key: str) -> Any:
@@ -55,12 +58,15 @@ class Settings(Mapping[str, Group]):
         self._groups = {name: Group(name, entries) for name, entries in _parse(text).items()}
 
     def __getitem__(self, name: str) -> Group:
+        """A group of entries."""
         return self._groups[name]
 
     def __iter__(self) -> Iterator[str]:
+        """Names of the groups."""
         return iter(self._groups)
 
     def __len__(self) -> int:
+        """Number of groups."""
         return len(self._groups)
 
     def __getattr__(self, name: str) -> Group:

@@ -41,12 +41,13 @@ class Trajectory:
     `run[-1]`, `for frame in run`, `run.at(0.5)`. `run[10:20]`, `run[::5]` and `run[run.times > 1.0]` are trajectories
     of some of the frames; nothing is read for them.
 
-        times  [s]  simulated time of each frame, (frames)
-        steps  [1]  number of the time step of each frame, (frames)
+        folder  [path]  folder of the result
+        times   [s]     simulated time of each frame, (frames)
+        steps   [1]     number of the time step of each frame, (frames)
 
-    Names, sizes, numbers and steps of the segments are compared with the manifest of the result at once, all their
-    bytes when a segment is first used; `check=False` leaves that out. A result without a manifest is read with a
-    warning.
+    `path` is the folder of a result, or one of its segments. Names, sizes, numbers and steps of the segments are
+    compared with the manifest of the result at once, all their bytes when a segment is first used; `check=False` leaves
+    that out. A result without a manifest is read with a warning.
     """
 
     def __init__(self, path: str | PathLike[str], check: bool = True):
@@ -61,6 +62,7 @@ class Trajectory:
     # --- a sequence of frames -------------------------------------------------------------------------------------
 
     def __len__(self) -> int:
+        """Number of frames."""
         return len(self.times)
 
     def __iter__(self) -> Iterator[Frame]:
@@ -82,6 +84,7 @@ class Trajectory:
     def __getitem__(self, which: Choice) -> Trajectory: ...
 
     def __getitem__(self, which: Any) -> Frame | Trajectory:
+        """A frame by its number, or the trajectory of several: a slice, numbers, or a truth value for each frame."""
         if isinstance(which, (int, np.integer)):
             return self.frame(int(which))
         chosen = copy.copy(self)
@@ -98,6 +101,7 @@ class Trajectory:
         return chosen
 
     def __repr__(self) -> str:
+        """Folder, number of frames, times, bodies, contacts, and whether the run has ended."""
         if len(self) == 0:
             return f"<Trajectory {self.folder}: no frames>"
         try:
@@ -131,11 +135,11 @@ class Trajectory:
         return self.frame(int(np.argmin(np.abs(self.times - time))))
 
     def contacts(self, number: int) -> Contacts:
-        """The contacts of a frame."""
+        """The contacts of a frame by its number in this trajectory, as `frame(number).contacts`."""
         return self.frame(number).contacts
 
     def walls(self, number: int) -> Walls:
-        """Forces and torques on the fixed bodies in a frame; empty if there are none."""
+        """Forces and torques on the fixed bodies in a frame by its number; empty if there are none."""
         return self._read_walls(self._whole_number(number))
 
     @cached_property
@@ -147,9 +151,10 @@ class Trajectory:
             return "contacts" in file
 
     def series(self, name: str, index: Any = None) -> npt.NDArray[Any]:
-        """A column of all frames as one array, (frames, n, ...); only of the bodies with these indices, if given.
+        """A column of all frames as one array in the unit of the column, (frames, n, ...).
 
-        All of it is in memory at once: 16 bytes per frame and body for positions.
+        `name` is that of any column of Frame with one value or vector per body; `index` chooses bodies by index or
+        truth value. All of it is in memory at once: 16 bytes per frame and body for positions.
         """
         parts = []
         identifiers = None
@@ -166,7 +171,10 @@ class Trajectory:
         return np.stack(parts)
 
     def to_pandas(self) -> Any:
-        """The bodies of all frames as one pandas table, indexed by time and identifier; all of it is in memory."""
+        """The bodies of all frames as one pandas table, indexed by time [s] and identifier; all of it is in memory.
+
+        Columns and units are those of Frame; vectors become two columns (position_x, position_y).
+        """
         from .tables import trajectory_table
 
         return trajectory_table(self)
@@ -187,7 +195,10 @@ class Trajectory:
 
     @cached_property
     def energy_balance(self) -> dict[str, npt.NDArray[Any]]:
-        """Entries of the energy and momentum balance, one value per frame; empty if it was not computed."""
+        """Entries of the energy and momentum balance by name, each (frames); empty if it was not computed.
+
+        `balance_units` has their units: J/m for energies and work, N s/m for momentum, N s for angular momentum.
+        """
         columns: dict[str, list[npt.NDArray[Any]]] = {}
         for segment in self._files.segments:
             with self._files.open_segment(segment) as file:
@@ -202,7 +213,7 @@ class Trajectory:
 
     @cached_property
     def balance_units(self) -> dict[str, str]:
-        """Unit of each entry of the energy balance."""
+        """Unit of each entry of `energy_balance` by name."""
         units: dict[str, str] = {}
         for segment in self._files.segments:
             with reading(segment.path) as file:
@@ -212,7 +223,11 @@ class Trajectory:
 
     @cached_property
     def profile(self) -> dict[str, Any]:
-        """Per stage: `stage` (list), `calls`, `total`, `least`, `most` [s]; of the run `seconds`, `memory` [KiB]."""
+        """Times of the stages of a time step, and of the whole run.
+
+        Per stage: `stage` (names), `calls` [1], `total`, `least` and `most` [s], each (stages). Of the run: `seconds`
+        [s], and `memory`, the greatest [KiB].
+        """
         with self._files.open_profile() as file:
             group = file["profile"]
             profile: dict[str, Any] = {name: group[name][:] for name in ("calls", "total", "least", "most")}
@@ -227,7 +242,7 @@ class Trajectory:
 
     @cached_property
     def counters(self) -> dict[str, int]:
-        """Exact counts of the run."""
+        """Exact counts of the run by name [1], such as `pairs began` and `finder tests`; a run prints them."""
         with self._files.open_profile() as file:
             if "counters" not in file:
                 return {}
@@ -237,7 +252,7 @@ class Trajectory:
 
     @cached_property
     def provenance(self) -> dict[str, Any]:
-        """Where the result comes from: program, build, machine, input."""
+        """Where the result comes from, by name: program, revision, compiler, machine, input and others."""
         with self._files.open_any() as file:
             return {name: plain(entry) for name, entry in file["provenance"].items()}
 
@@ -249,7 +264,9 @@ class Trajectory:
 
     @property
     def status(self) -> str:
-        """How the run ended."""
+        """How the run ended: `finished`, what interrupted it, or `not ended` if it goes on or was killed."""
+        if not self._files.profile_path.exists():
+            return "not ended"
         with self._files.open_profile() as file:
             return str(plain(file["status"]))
 
@@ -271,7 +288,7 @@ class Trajectory:
             **{name: frames[name][row] for name in GROWING}, **self._bodies[1], _source=self))
 
     def contacts_of(self, frame: Frame) -> Contacts:
-        """The contacts of a frame of this run."""
+        """The contacts of a frame of this run; `frame.contacts` calls it."""
         segment, row = self._files.locate(frame.number)
         with self._files.open_segment(segment) as file:
             if "contacts" not in file:
@@ -288,7 +305,7 @@ class Trajectory:
             raise ResultError(f"{segment.path}: contacts: {error}") from error
 
     def walls_of(self, frame: Frame) -> Walls:
-        """Forces and torques on the fixed bodies in a frame of this run."""
+        """Forces and torques on the fixed bodies in a frame of this run; `frame.walls` calls it."""
         return self._read_walls(frame.number)
 
     def _read_walls(self, number: int) -> Walls:
@@ -303,7 +320,7 @@ class Trajectory:
             return walls
 
     def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
-        """Which bodies the stored namelist moves: all fixed ones, or those in scene.motion_bodies."""
+        """Which bodies the stored namelist moves, (n): all fixed ones, or those in scene.motion_bodies."""
         scene = self.settings["scene"]
         if scene.get("motion", "none") == "none":
             return np.zeros(len(frame), dtype=bool)

@@ -21,12 +21,17 @@ AT_ONCE = 2**20
 
 @dataclass(frozen=True)
 class Kernel:
-    """A coarse-graining function of the distance, which vanishes beyond its range."""
+    """A coarse-graining function of the distance, which vanishes beyond its range.
+
+    Fields:
+
+        name   [text]  what it is called
+        range  [m]     distance beyond which it is zero
+        value  [1/m2]  function of an array of distances [m]; the integral over the plane is 1
+    """
 
     name: str
-    #: Distance beyond which it is zero [m]
     range: float
-    #: Its value at distances [1/m2]; the integral over the plane is 1
     value: Callable[[FloatArray], FloatArray]
 
 
@@ -52,19 +57,23 @@ def gaussian(width: float) -> Kernel:
 
 @dataclass(frozen=True)
 class Fields:
-    """Fields on a grid; arrays have one row per y and one column per x."""
+    """Fields on a grid; arrays have one row per y and one column per x.
 
-    #: Places of the columns [m], (columns)
+    Fields:
+
+        x               [m]          places of the columns, (columns)
+        y               [m]          places of the rows, (rows)
+        density         [kg/m3]      mass per area with unit depth, (rows, columns)
+        momentum        [kg/(m2 s)]  momentum per area, (rows, columns, 2)
+        contact_stress  [N/m2]       compression is positive; NaN if contacts are left out, (rows, columns, 2, 2)
+        kinetic_stress  [N/m2]       compression is positive, (rows, columns, 2, 2)
+    """
+
     x: FloatArray
-    #: Places of the rows [m], (rows)
     y: FloatArray
-    #: Mass per area [kg/m3] with unit depth, (rows, columns)
     density: FloatArray
-    #: Momentum per area [kg/(m2 s)], (rows, columns, 2)
     momentum: FloatArray
-    #: Contact stress; compression is positive [N/m], (rows, columns, 2, 2); NaN if contacts are left out
     contact_stress: FloatArray
-    #: Kinetic stress; compression is positive [N/m], (rows, columns, 2, 2)
     kinetic_stress: FloatArray
 
     @property
@@ -76,7 +85,7 @@ class Fields:
 
     @property
     def stress(self) -> FloatArray:
-        """Sum of contact and kinetic stress [N/m], (rows, columns, 2, 2)."""
+        """Sum of contact and kinetic stress [N/m2], (rows, columns, 2, 2)."""
         return self.contact_stress + self.kinetic_stress
 
     @property

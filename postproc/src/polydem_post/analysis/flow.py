@@ -15,13 +15,17 @@ from ..result_file import ResultError
 
 @dataclass(frozen=True)
 class FlowRate:
-    """Mass that passes a line between frames."""
+    """Mass that passes a line between frames.
 
-    #: Times of the frames [s], (frames)
+    Fields:
+
+        times   [s]     times of the frames, (frames)
+        mass    [kg/m]  mass that passed in each interval, from the left of the line to its right, (frames - 1)
+        bodies  [1]     number of bodies that passed in each interval, those to the left subtracted, (frames - 1)
+    """
+
     times: FloatArray
-    #: Mass that passed in each interval, from the left of the line to its right [kg/m], (frames - 1)
     mass: FloatArray
-    #: Number of bodies that passed in each interval, those to the left subtracted, (frames - 1)
     bodies: Any
 
     @property

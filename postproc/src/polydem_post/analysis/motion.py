@@ -18,13 +18,17 @@ EQUAL = 0.01
 
 @dataclass(frozen=True)
 class Displacements:
-    """Mean squared displacements over lags."""
+    """Mean squared displacements over lags.
 
-    #: Lag [s], (lags); the first is 0
+    Fields:
+
+        lag     [s]   lags, of which the first is 0, (lags)
+        square  [m2]  mean squared displacement, (lags)
+        count   [1]   number of displacements behind each mean, (lags)
+    """
+
     lag: FloatArray
-    #: Mean squared displacement [m2], (lags)
     square: FloatArray
-    #: Number of displacements behind each mean, (lags)
     count: IntArray
 
 

@@ -31,7 +31,7 @@ def rattlers(frame: Frame, least: int = 2) -> npt.NDArray[np.bool_]:
 
 
 def coordination_number(frame: Frame, *, with_rattlers: bool = True, least: int = 2) -> float:
-    """Mean number of contacts of the free bodies: Z = (2 N_ff + N_fw)/N.
+    """Mean number of contacts of the free bodies, Z = (2 N_ff + N_fw)/N (Bernal & Mason, Nature 188 (1960) 910).
 
     N_ff contacts of two free bodies, N_fw of a free and a fixed one, N free bodies. Two convex bodies have one contact,
     whatever they touch with. Without rattlers these bodies and their contacts are left out. NaN if no body is left.
@@ -46,20 +46,24 @@ def coordination_number(frame: Frame, *, with_rattlers: bool = True, least: int 
 
 @dataclass(frozen=True)
 class Distribution:
-    """A distribution of forces divided by their mean."""
+    """A distribution of forces divided by their mean.
 
-    #: Edges of the bins, in units of the mean, (bins + 1)
+    Fields:
+
+        edges    [1]    edges of the bins, in units of the mean, (bins + 1)
+        density  [1]    probability density in each bin; its sum times the widths of the bins is 1, (bins)
+        mean     [N/m]  the mean
+        count    [1]    number of contacts
+    """
+
     edges: FloatArray
-    #: Probability density in each bin; its sum times the widths of the bins is 1, (bins)
     density: FloatArray
-    #: The mean [N/m]
     mean: float
-    #: Number of contacts
     count: int
 
     @property
     def centres(self) -> FloatArray:
-        """Centres of the bins, in units of the mean, (bins)."""
+        """Centres of the bins, in units of the mean [1], (bins)."""
         return 0.5 * (self.edges[1:] + self.edges[:-1])
 
 
@@ -93,15 +97,19 @@ def fabric_tensor(frame: Frame, chosen: Any = None) -> FloatArray:
 
 @dataclass(frozen=True)
 class Anisotropy:
-    """Anisotropies of contacts and their forces; 0: isotropic."""
+    """Anisotropies of contacts and their forces; 0: isotropic.
 
-    #: Of the directions of contacts
+    Fields:
+
+        contacts    [1]    of the directions of contacts, a_c
+        normal      [1]    of the normal forces, a_n
+        tangential  [1]    of the tangential forces, a_t
+        angle       [rad]  direction of most contacts, from the x axis, in (-pi/2, pi/2]
+    """
+
     contacts: float
-    #: Of the normal forces
     normal: float
-    #: Of the tangential forces
     tangential: float
-    #: Direction of most contacts, from the x axis, in (-pi/2, pi/2] [rad]
     angle: float
 
 
@@ -112,8 +120,9 @@ def anisotropy(frame: Frame, chosen: Any = None) -> Anisotropy:
     <f_n>(1 + a_n cos 2(theta - theta_n)) the mean normal force (L. Rothenburg & R.J. Bathurst, Geotechnique 39 (1989)
     601). They follow from tensors: with the fabric tensor F, chi^n = <f_n n n>/<f_n> and chi = <f n>/<f_n>, and the
     differences d of principal values over the traces, a_c = 2 d(F), a_n = 2 d(chi^n) - a_c and
-    a_t = 2 d(chi) - a_c - a_n (E. Azema & F. Radjai, Phys. Rev. E 81 (2010) 051304). Forces on the first
-    body are taken with the sign that makes repulsion positive. All contacts count unless `chosen` selects some.
+    a_t = 2 d(chi) - a_c - a_n (E. Azema & F. Radjai, Phys. Rev. E 81 (2010) 051304), which holds as far as the three
+    tensors have the same principal directions. Forces on the first body are taken with the sign that makes repulsion
+    positive. All contacts count unless `chosen` selects some.
     """
     contacts = frame.contacts
     direction, force = (_chosen(frame, chosen, each) for each in (contacts.direction, -contacts.force))

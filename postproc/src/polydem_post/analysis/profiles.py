@@ -18,13 +18,17 @@ WEIGHTS = ("area", "mass")
 
 @dataclass(frozen=True)
 class Profile:
-    """Means over slabs across one axis."""
+    """Means over slabs across one axis.
 
-    #: Edges of the slabs [m], (slabs + 1)
+    Fields:
+
+        edges   [m]                     edges of the slabs, (slabs + 1)
+        mean    [that of the quantity]  mean in each slab; NaN where there is no body, (slabs) or (slabs, 2)
+        weight  [m2 or kg/m]            area or mass of the parts of bodies in each slab, (slabs)
+    """
+
     edges: FloatArray
-    #: Mean in each slab, in the unit of the quantity; NaN where there is no body, (slabs) or (slabs, 2)
     mean: FloatArray
-    #: Weight in each slab: area [m2] or mass [kg/m] of the parts of bodies in it, (slabs)
     weight: FloatArray
 
     @property
@@ -39,8 +43,8 @@ def profile(frame: Frame, quantity: Any, edges: Any, *, axis: str = "y", weight:
 
     `quantity` is the name of a column of the frame or one value or vector per body. A body counts in each slab with
     the area, or the mass, of its part inside, exact by clipping: weights add up to those of all bodies. The averaging
-    volume is the slab, cut along the other axis to `between` (low, high) [m] if given. The solid fraction of a slab
-    is `weight` over its area.
+    volume is the slab, cut along the other axis to `between` (low, high) [m] if given, as in GDR MiDi, Eur. Phys. J. E
+    14 (2004) 341. The solid fraction of a slab is `weight` over its area.
     """
     values = np.asarray(getattr(frame, quantity) if isinstance(quantity, str) else quantity, dtype=float)
     limits = np.asarray(edges, dtype=float)

@@ -13,28 +13,32 @@ from .windows import Window, contains, outline_of, share_inside
 
 @dataclass(frozen=True)
 class Stress:
-    """A mean stress tensor; compression is positive."""
+    """A mean stress tensor; compression is positive.
 
-    #: Part of the contact forces [N/m], that is N/m2 with unit depth, (2, 2)
+    Fields:
+
+        contact  [N/m2]  part of the contact forces, (2, 2)
+        kinetic  [N/m2]  part of the velocity fluctuations, (2, 2)
+        area     [m2]    area of the window
+    """
+
     contact: FloatArray
-    #: Part of the velocity fluctuations [N/m], (2, 2)
     kinetic: FloatArray
-    #: Area of the window [m2]
     area: float
 
     @property
     def total(self) -> FloatArray:
-        """Sum of both parts [N/m], (2, 2)."""
+        """Sum of both parts [N/m2], (2, 2)."""
         return self.contact + self.kinetic
 
     @property
     def pressure(self) -> float:
-        """Half of the trace [N/m]."""
+        """Half of the trace [N/m2]."""
         return 0.5 * float(np.trace(self.total))
 
     @property
     def deviator(self) -> float:
-        """Half of the difference of the principal stresses [N/m]."""
+        """Half of the difference of the principal stresses [N/m2]."""
         low, high = np.linalg.eigvalsh(0.5 * (self.total + self.total.T))
         return 0.5 * float(high - low)
 
@@ -85,7 +89,7 @@ def branches(frame: Frame) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def body_stress(frame: Frame) -> FloatArray:
-    """Mean stress inside each body [N/m], (n, 2, 2): sigma_ij = -(1/A) sum over its contacts of f_i r_j.
+    """Mean stress inside each body [N/m2], (n, 2, 2): sigma_ij = -(1/A) sum over its contacts of f_i r_j.
 
     A is the area of the body, the averaging volume; f the force on it and r the vector from its centre of mass to the
     point of contact (Love 1927; for bodies with accelerations this is the static part). Compression is positive.

@@ -13,13 +13,17 @@ from ..result_file import ResultError
 
 @dataclass(frozen=True)
 class Surface:
-    """Points of a free surface, and the straight line through them."""
+    """Points of a free surface, and the straight line through them.
 
-    #: Points of the surface [m], (columns, 2)
+    Fields:
+
+        points     [m]       points of the surface, (columns, 2)
+        angle      [degree]  angle of the line to the x axis, anticlockwise
+        deviation  [m]       root mean square distance of the points from the line
+    """
+
     points: FloatArray
-    #: Angle of the line to the x axis, anticlockwise [degree]
     angle: float
-    #: Root mean square distance of the points from the line [m]
     deviation: float
 
 
