@@ -60,16 +60,15 @@ contains
       integer, intent(in), optional :: digits
       character(len=:), allocatable :: text
       character(len=64) :: buffer, form
-      integer :: n
+      !> Binary exponents, less 2, above which a decimal exponent may have three and four digits
+      integer, parameter :: longer_exponents(2) = [329, 3319]
+      integer :: n, width
 
       n = 6
       if (present(digits)) n = digits
-      write (form, '(a,i0,a,i0,a)') '(es', n + 9, '.', n - 1, ')'
-      if (ieee_is_finite(number)) then
-         if (abs(number) > 0.0_wp .and. (abs(number) < 1.0e-30_wp .or. abs(number) > 1.0e30_wp)) then
-            write (form, '(a,i0,a,i0,a)') '(es', n + 11, '.', n - 1, 'e4)'
-         end if
-      end if
+      width = 2
+      if (ieee_is_finite(number)) width = 2 + count(abs(exponent(number) - 2) > longer_exponents)
+      write (form, '(a,i0,a,i0,a,i0,a)') '(es', n + 7 + width, '.', n - 1, 'e', width, ')'
       write (buffer, form) number
       text = trim(adjustl(buffer))
    end function text_wp

@@ -1,8 +1,8 @@
 !> Checks that involve two or more entries. The table of entries holds the checks of single entries.
 module polydem_check_settings
+   use polydem_entry_row, only: row_of
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_kinds, only: wp
-   use polydem_namelist_entries, only: first_row
+   use polydem_kinds, only: ip, wp
    use polydem_namelist_values, only: value_t
    use polydem_settings, only: scene_settings_t, settings_t
    implicit none
@@ -13,6 +13,8 @@ module polydem_check_settings
    real(wp), parameter :: speed_limit = 1.0e6_wp
    !> Upper limit of the length of a container in long axes of a grain. Longer containers need too much time to fill
    real(wp), parameter :: length_limit = 1.0e5_wp
+   !> Upper limit of the number of corners of all polygons, of which half the range of integers can count
+   real(wp), parameter :: corner_limit = 2.0_wp**30
    !> Angle of a full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586_wp
    !> Lower limit of the restitution. Below it, the stable time step is proportional to the square root of the
@@ -43,6 +45,8 @@ contains
          call check_container(scene%radius, 'radius', scene, values, error)
          call check_container(scene%opening, 'opening', scene, values, error)
          if (any(scene%name == grain_scenes)) call check_container(scene%width, 'width', scene, values, error)
+         call check_corners(scene%bodies, 'bodies', scene, values, error)
+         call check_corners(scene%boxes, 'boxes', scene, values, error)
          call require(scene%moving_grains <= scene%bodies, 'must not exceed', 'moving_grains', 'bodies', values, error)
          call require(scene%size_ratio <= 1.0_wp .or. scene%packing == '', &
             'above 1 cannot be combined with', 'size_ratio', 'packing', values, error)
@@ -59,14 +63,14 @@ contains
                'cannot be combined with', 'boxes', 'bodies', values, error)
          end if
       end associate
-      associate (given => values(first_row('forces', 'restitution')))
+      associate (given => values(row_of(values, 'forces', 'restitution')))
          if (given%is_active .and. settings%forces%restitution < least_restitution) then
             call raise(error, input_error, given%place//': ''restitution'' in &forces must be at least 0.01, '// &
                'because a smaller value needs a very small time step; omit it to use ''damping_coefficient''')
          end if
       end associate
       if (settings%guards%energy /= 'off' .and. .not. settings%output%energy_balance) then
-         call raise(error, input_error, values(first_row('guards', 'energy'))%place// &
+         call raise(error, input_error, values(row_of(values, 'guards', 'energy'))%place// &
             ': ''energy'' in &guards needs ''energy_balance'' = .true. in &output')
       end if
    end subroutine check_settings
@@ -83,6 +87,18 @@ contains
          values, error)
    end subroutine check_container
 
+   !> Reject more bodies than corners can be numbered. The number is 0 if its entry is not in use.
+   pure subroutine check_corners(number, key, scene, values, error)
+      integer(ip), intent(in) :: number
+      character(len=*), intent(in) :: key
+      type(scene_settings_t), intent(in) :: scene
+      type(value_t), intent(in) :: values(:)
+      type(error_t), allocatable, intent(inout) :: error
+
+      call require(real(number, wp)*real(scene%corners_max, wp) <= corner_limit, &
+         'must not exceed 2^30 corners divided by', key, 'corners_max', values, error)
+   end subroutine check_corners
+
    !> Raise an error about two entries of &scene if their relation does not hold. The error names the place of `key` if
    !> this entry is given, otherwise the place of `other`.
    pure subroutine require(holds, relation, key, other, values, error)
@@ -93,8 +109,8 @@ contains
       integer :: row
 
       if (holds) return
-      row = first_row('scene', other)
-      if (values(first_row('scene', key))%is_given) row = first_row('scene', key)
+      row = row_of(values, 'scene', key)
+      if (.not. values(row)%is_given) row = row_of(values, 'scene', other)
       call raise(error, input_error, values(row)%place//': '''//key//''' in &scene '//relation// &
          ' '''//other//'''')
    end subroutine require

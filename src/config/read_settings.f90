@@ -7,8 +7,10 @@ module polydem_read_settings
    use polydem_check_bench, only: check_bench
    use polydem_check_settings, only: check_settings
    use polydem_errors, only: error_t
+   use polydem_entry_row, only: row_of
    use polydem_exclusive_entries, only: resolve_exclusive_entries
    use polydem_fill_groups, only: fill_bench, fill_groups
+   use polydem_namelist_entries, only: entries
    use polydem_namelist_tokens, only: source_t
    use polydem_namelist_values, only: value_t
    use polydem_origin, only: origin_t
@@ -91,7 +93,9 @@ contains
       allocate (origin%places(size(values)))
       do k = 1, size(values)
          origin%places(k)%text = origin%file
-         if (allocated(values(k)%place)) origin%places(k)%text = values(k)%place
+         associate (value => values(row_of(values, entries(k)%group, entries(k)%key)))
+            if (allocated(value%place)) origin%places(k)%text = value%place
+         end associate
       end do
    end subroutine read_values
 

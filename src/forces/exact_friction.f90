@@ -96,8 +96,9 @@ contains
       if (settings%integrate%scheme /= 'velocity_verlet') call raise(error, input_error, &
          place_of(settings, 'integrate', 'scheme')//': ''scheme'' in &integrate must be velocity_verlet, since '// &
          '''friction'' in &forces is exact')
-      if (n_processes > 1_ip) call raise(error, input_error, settings%file//': exact friction couples all contacts '// &
-         'and runs on one rank only; use threads instead of ranks, or friction = ''cundall_strack'' in &forces')
+      if (n_processes > 1_ip) call raise(error, input_error, &
+         place_of(settings, 'forces', 'friction')//': exact friction couples all contacts and runs on one rank '// &
+         'only; use threads instead of ranks, or friction = ''cundall_strack'' in &forces')
    end subroutine check
 
    !> Contact history of this part: the force, from which the next search starts

@@ -1,16 +1,18 @@
 !> Depth to which a block at rest sinks into its support.
 module polydem_static_depth
+   use polydem_errors, only: error_t, input_error, raise
    use polydem_force_law, only: choose_parts, force_law_t
    use polydem_kinds, only: wp
    use polydem_settings, only: forces_settings_t
+   use polydem_strings, only: to_text
    implicit none
    private
    public :: static_depth
 
 contains
 
-   !> Depth d at which the elastic force of a flat contact, E w d/l, balances a load [m]
-   real(wp) function static_depth(forces, load, block, support, offset)
+   !> Find the depth d at which the elastic force of a flat contact, E w d/l, balances a load.
+   subroutine static_depth(forces, load, block, support, offset, depth, error)
       !> Group &forces
       type(forces_settings_t), intent(in) :: forces
       !> Normal load per unit depth of the plane [N/m]
@@ -21,10 +23,18 @@ contains
       real(wp), intent(in) :: support(2)
       !> Distance of the two centres along the contact [m]
       real(wp), intent(in) :: offset
+      !> Depth d [m]
+      real(wp), intent(out) :: depth
+      !> Allocated if the depth is not less than the height of the block
+      type(error_t), allocatable, intent(inout) :: error
       type(force_law_t) :: law
 
       call choose_parts(forces, law)
-      static_depth = law%static_depth(load, block, support, offset)
-   end function static_depth
+      depth = law%static_depth(load, block, support, offset)
+      if (depth >= 0.0_wp .and. depth < block(2)) return
+      call raise(error, input_error, 'a block of height '//to_text(block(2))//' m sinks deeper than its height '// &
+                 'under a load of '//to_text(load)//' N/m; increase stiffness in &forces, or '// &
+                 'decrease height or density')
+   end subroutine static_depth
 
 end module polydem_static_depth

@@ -5,8 +5,8 @@
 module polydem_polygon
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_elementary, only: hypotenuse
-   use polydem_kinds, only: ip, wp
-   use polydem_strings, only: to_text
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_strings, only: counted, to_text
    implicit none
    private
    public :: clean_polygon, mass_properties, diameter, clip_half_plane
@@ -41,7 +41,7 @@ contains
          end if
       end do
       if (n < 3_ip) then
-         problem = 'has '//to_text(n)//' vertices, but a polygon needs at least 3'
+         problem = 'has '//counted(int(n, lp), 'corner')//', but a polygon needs at least 3'
          return
       end if
 

@@ -17,6 +17,9 @@ module polydem_bodies_index
    !> Those that may be absent and have a number per body, or two
    character(len=*), parameter :: optional_columns(5) = known_names(4:8)
 
+   !> Greatest number of vertices of all bodies, of which half the range of integers can count
+   integer(lp), parameter :: most_vertices = 2_lp**30
+
    !> What is known of all bodies of the file, checked
    type :: bodies_index_t
       !> Number of bodies
@@ -123,6 +126,9 @@ contains
          call raise(error, input_error, path//': '//entry_text('vertex_start', table%n + 1_ip)//' is ' &
                     //to_text(table%vertex_start(table%n + 1_ip))//', but vertex has ' &
                     //to_text(n_vertices)//' rows')
+      else if (n_vertices > most_vertices) then
+         call raise(error, input_error, path//': vertex has '//to_text(n_vertices)//' rows, but at most '// &
+                    '2^30 are allowed')
       end if
       do k = 1_ip, table%n
          if (allocated(error)) return

@@ -4,6 +4,7 @@ module polydem_check_ranks
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_law, only: check_law
    use polydem_kinds, only: ip
+   use polydem_origin, only: place_of
    use polydem_settings, only: settings_t
    implicit none
    private
@@ -18,11 +19,15 @@ contains
       class(communicator_t), intent(in) :: comm
       !> Names the entry; the same on all ranks
       type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: key
 
       call check_law(settings, comm%size, error)
       if (comm%size == 1_ip) return
-      if (settings%output%trace_steps > 0_ip .or. settings%output%step_profile) call raise(error, input_error, &
-         settings%file//': trace_steps and step_profile in &output need a single rank; run without mpirun')
+      key = ''
+      if (settings%output%step_profile) key = 'step_profile'
+      if (settings%output%trace_steps > 0_ip) key = 'trace_steps'
+      if (key /= '') call raise(error, input_error, &
+         place_of(settings, 'output', key)//': '''//key//''' in &output needs a single rank; run without mpirun')
    end subroutine check_ranks
 
 end module polydem_check_ranks

@@ -5,6 +5,7 @@ module polydem_incline
    use polydem_body_list, only: body_list_t
    use polydem_elementary, only: cosine, sine
    use polydem_grains, only: pi
+   use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_settings, only: settings_t
    use polydem_static_depth, only: static_depth
@@ -21,18 +22,21 @@ module polydem_incline
 contains
 
    !> List the bodies of the incline: block, slope, upper stop, lower stop.
-   subroutine list_incline(settings, list)
+   subroutine list_incline(settings, list, error)
       !> Settings: slope, width and height of the block, speed (downhill); gravity, stiffness and law
       type(settings_t), intent(in) :: settings
       type(body_list_t), intent(inout) :: list
+      !> Allocated if the block is too heavy for the stiffness
+      type(error_t), allocatable, intent(inout) :: error
       real(wp) :: along(2), depth, load, top, bottom
 
       along = [cosine(settings%scene%slope*pi/180.0_wp), -sine(settings%scene%slope*pi/180.0_wp)]
       associate (width => settings%scene%width, height => settings%scene%height, &
                  density => settings%scene%density, gravity => settings%forces%gravity)
          load = density*width*height*max(0.0_wp, gravity(1)*along(2) - gravity(2)*along(1))
-         depth = static_depth(settings%forces, load, [width, height], [(uphill + downhill)*width, height], &
-                              0.5_wp*(downhill - uphill)*width)
+         call static_depth(settings%forces, load, [width, height], [(uphill + downhill)*width, height], &
+                           0.5_wp*(downhill - uphill)*width, depth, error)
+         if (allocated(error)) return
          call list%append(tilted(rectangle(-0.5_wp*width, 0.5_wp*width, -depth, height - depth), along), &
                           density=density, velocity=settings%scene%speed*along)
          top = -uphill*width

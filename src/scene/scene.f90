@@ -18,6 +18,7 @@ module polydem_scene
    use polydem_hopper, only: list_hopper
    use polydem_incline, only: list_incline
    use polydem_kinds, only: ip, lp, wp
+   use polydem_origin, only: place_of
    use polydem_prescribed_motion, only: motion_t, new_motion
    use polydem_settings, only: scene_settings_t, settings_t
    use polydem_stack, only: list_stack
@@ -47,11 +48,11 @@ contains
       if (present(rank)) list%rank = rank
       if (present(n_ranks)) list%n_ranks = n_ranks
 
-      origin = settings%file//': &scene'
+      origin = place_of(settings, 'scene', 'name')//': &scene'
       if (settings%scene%name == 'file') then
          origin = settings%scene%bodies_file
-         if (.not. exists(origin)) call raise(error, input_error, settings%file//": 'bodies_file' in &scene: "// &
-                                              origin//': there is no such file')
+         if (.not. exists(origin)) call raise(error, input_error, place_of(settings, 'scene', 'bodies_file') &
+                                              //": 'bodies_file' in &scene: "//origin//': there is no such file')
          if (.not. allocated(error)) call read_bodies_file(origin, settings%scene%density, list, error)
          if (allocated(error)) return
       else
@@ -63,7 +64,8 @@ contains
          return
       end if
       call assign_motion(settings%scene, bodies, motions, error)
-      if (allocated(error)) error%message = settings%file//': &scene: '//error%message
+      if (allocated(error)) error%message = place_of(settings, 'scene', 'motion_bodies')//': &scene: ' &
+         //error%message
    end subroutine build_scene
 
    !> Call the generator of the scene, which lists the bodies.
@@ -86,9 +88,9 @@ contains
       case ('heap')
          call list_heap(settings%scene, list, error)
       case ('incline')
-         call list_incline(settings, list)
+         call list_incline(settings, list, error)
       case ('stack')
-         call list_stack(settings, list)
+         call list_stack(settings, list, error)
       case default
          call raise(error, input_error, 'unknown scene '//settings%scene%name)
       end select

@@ -20,6 +20,7 @@ module polydem_relaxation
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_local_bodies, only: fit_to_bodies
    use polydem_neighbours, only: neighbours_t, new_neighbours
+   use polydem_origin, only: place_of
    use polydem_redistribution, only: redistribute
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers
@@ -123,9 +124,9 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (depth_share(contacts, thickness, worst) < self%relaxation%after) return
-      call raise(error, input_error, self%settings%file//': after '//to_text(most_sweeps)//' sweeps '// &
-                 depth_text(self%bodies, contacts, thickness, worst)//'. Provide more space for the bodies, or '// &
-                 'increase relaxed_depth in &guards')
+      call raise(error, input_error, place_of(self%settings, 'guards', 'relaxed_depth')//': after '// &
+                 to_text(most_sweeps)//' sweeps '//depth_text(self%bodies, contacts, thickness, worst)// &
+                 '. Provide more space for the bodies, or increase relaxed_depth in &guards')
    end subroutine report_depth
 
    !> One sweep: compute the impulses of all contacts, then move all free bodies. Collective.

@@ -12,6 +12,7 @@ module polydem_start_simulation
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, lp, wp
    use polydem_local_bodies, only: fit_to_bodies
+   use polydem_origin, only: place_of
    use polydem_prescribed_motion, only: motion_t
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
@@ -137,8 +138,8 @@ contains
       associate (settings => self%settings%integrate)
          self%dt = settings%dt
          if (self%dt <= 0.0_wp .and. (has_free(1) < 1.0_wp .or. .not. self%expected_stable_step > 0.0_wp)) then
-            call raise(error, input_error, self%settings%file//': cannot choose dt: there is no free body, or '// &
-                       'stiffness or mass is extreme. Set dt in &integrate')
+            call raise(error, input_error, place_of(self%settings, 'integrate', 'dt')//': cannot choose dt: there '// &
+                       'is no free body, or stiffness or mass is extreme. Set dt in &integrate')
             return
          end if
          if (self%dt <= 0.0_wp) then
@@ -148,9 +149,10 @@ contains
          end if
          steps = settings%duration/self%dt
          if (.not. (steps >= 0.5_wp .and. steps < most_steps)) then
-            call raise(error, input_error, self%settings%file//': a duration of '//to_text(settings%duration)// &
-                       ' s with dt = '//to_text(self%dt)//' s requires '//to_text(steps)//' steps, but only 1 to '// &
-                       to_text(most_steps)//' are allowed. Change dt or duration in &integrate')
+            call raise(error, input_error, place_of(self%settings, 'integrate', 'duration')//': a duration of '// &
+                       to_text(settings%duration)//' s with dt = '//to_text(self%dt)//' s requires '// &
+                       to_text(steps)//' steps, but only 1 to '//to_text(most_steps)// &
+                       ' are allowed. Change dt or duration in &integrate')
             return
          end if
          self%n_steps = nint(steps, lp)
