@@ -28,8 +28,9 @@ entries = dict(words[k + 1].split("=", 1) for k, word in enumerate(words) if wor
 if "--help" in words:
     print("run FILE.nml {options}")
 elif words[0] == "check":
-    if "toy.wrong" in entries:
-        sys.exit("polydem: --set toy.wrong=" + entries["toy.wrong"] + ": unknown key 'wrong' in &toy")
+    for key in ("wrong", "false"):
+        if "toy." + key in entries:
+            sys.exit("polydem: --set toy." + key + "=" + entries["toy." + key] + ": unknown key '" + key + "' in &toy")
 else:
     result = entries["output.folder"]
     again = os.path.isdir(result)
@@ -192,12 +193,13 @@ def test_makes_a_frozen_folder_for_every_run(sweep_of, tmp_path):
 
 def test_wrong_rows_are_told_with_their_lines_and_nothing_is_made(toy, tmp_path, capsys):
     table = tmp_path / "table.csv"
-    table.write_text("name,toy.wrong\na,\nb,1\nc,2\n", encoding="utf-8")
+    table.write_text("name,toy.wrong,toy.false\na,,\nb,1,\nc,2,3\n", encoding="utf-8")
     words = ["make", str(table), str(tmp_path / "base.nml"), "--output", str(tmp_path / "sweep")]
     assert main(["sweep", "--program", str(toy()), *words]) == 2
     said = capsys.readouterr().err.splitlines()
     assert said == [f"error: {table}:3: --set toy.wrong=1: unknown key 'wrong' in &toy",
-                    f"{table}:4: --set toy.wrong=2: unknown key 'wrong' in &toy"]
+                    f"{table}:4: --set toy.wrong=2: unknown key 'wrong' in &toy",
+                    f"{table}:4: --set toy.false=3: unknown key 'false' in &toy"]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["base.nml", "polydem", "table.csv"]
 
 

@@ -271,9 +271,8 @@ def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = Non
     if not table and not lists:
         problems.append("a sweep needs a table, or lists of values like scene.seed=1,2,3")
     raise_all(problems)
-    raise_all(problems_of_names(rows))
     overrides = [[f"{column}={value}" for column, value in zip(columns, row.values) if value] for row in rows]
-    _check_rows(base, program, rows, overrides, cores)
+    raise_all([*problems_of_names(rows), *_problems_of_rows(base, program, rows, overrides, cores)])
     new = folder.with_name(folder.name + ".unfinished")
     try:
         if new.exists():
@@ -293,8 +292,8 @@ def make_sweep(base: Path, folder: Path, program: Path, table: Path | None = Non
     return Sweep(folder)
 
 
-def _check_rows(base: Path, program: Path, rows: list[Row], overrides: list[list[str]], cores: int) -> None:
-    """Let the program check the namelist with the entries of every row."""
+def _problems_of_rows(base: Path, program: Path, rows: list[Row], overrides: list[list[str]], cores: int) -> list[str]:
+    """Let the program check the namelist with the entries of every row. It names one wrong entry at a time."""
 
     def problem(entries: list[str]) -> str:
         command = [str(program), "check", str(base), "--threads", "1"]
@@ -307,6 +306,15 @@ def _check_rows(base: Path, program: Path, rows: list[Row], overrides: list[list
         said = [line for line in answer.stderr.splitlines() if line.strip()]
         return said[-1].replace("polydem: ", "", 1) if said else f"check ended with exit code {answer.returncode}"
 
+    def all_problems(entries: list[str]) -> list[str]:
+        found: list[str] = []
+        while said := problem(entries):
+            found.append(said)
+            others = [entry for entry in entries if not said.startswith(f"--set {entry}: ")]
+            if len(others) == len(entries):
+                break
+            entries = others
+        return found
+
     with ThreadPoolExecutor(max(1, cores)) as pool:
-        problems = [f"{row.place}: {text}" for row, text in zip(rows, pool.map(problem, overrides)) if text]
-    raise_all(problems)
+        return [f"{row.place}: {text}" for row, texts in zip(rows, pool.map(all_problems, overrides)) for text in texts]
