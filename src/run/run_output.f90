@@ -157,17 +157,18 @@ contains
          call run%trajectory%close(write_error, run%manifest)
          call run%recorder%close(run%log, run%manifest, write_error)
          call run%checkpoints%close(run%log)
-         if (run%comm%is_root()) call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, &
-                                                  status, write_error, memory)
-         call run%manifest%close_file(run%folder//'/'//profile_name, write_error)
          call write_timings(run%log, s%timers, seconds, s%step, s%bodies%n_all)
          call write_rank_times(run, run%log)
          call write_counters(run%log, counters)
          if (s%settings%output%energy_balance) call write_energy_report(s, run%log)
          call write_warning_counts(run%monitor, s, run%log)
+         if (allocated(error)) call run%log%write_line('stopped: '//status)
+         call write_hash(run%log, hexadecimal(hash))
+         ! The profile comes last: a result with a profile has the whole log.
+         if (run%comm%is_root()) call write_profile(run%folder, s%timers, seconds, counters, run%provenance, hash, &
+                                                  status, write_error, memory)
+         call run%manifest%close_file(run%folder//'/'//profile_name, write_error)
       end associate
-      if (allocated(error)) call run%log%write_line('stopped: '//status)
-      call write_hash(run%log, hexadecimal(hash))
       call run%log%close(write_error)
       if (.not. allocated(error) .and. allocated(write_error)) call move_alloc(write_error, error)
       call run%comm%all_reduce_error(error)

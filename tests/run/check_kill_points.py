@@ -60,6 +60,8 @@ class Killer:
         assert code == 0, (point, option, message)
         if "nothing to do" in output:
             assert output.splitlines()[-1] == self.expected[-1], (point, output)
+            with open(os.path.join(folder, "log.txt"), encoding="utf-8") as file:
+                assert totals_of(file.read()) == self.expected, (point, "log.txt")
         else:
             assert totals_of(output) == self.expected, (point, option, output)
         # A run that was killed after its end leaves its lock in a finished result; the lock blocks no other run.
