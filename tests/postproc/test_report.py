@@ -214,6 +214,23 @@ def test_scenes_of_ones_own_have_a_figure_of_time_over_size_and_what_is_missing_
     assert 'figure_09_total,figure,"rotating drums' in text and "\nC1,claim," in text
 
 
+def test_a_curve_over_size_joins_scenes_recorded_at_one_time(tmp_path):
+    for name, boxes, start in (("even_500", 500, 0.01), ("even_1000", 1000, 0.01), ("even_2000", 2000, 0.01),
+                               ("gas", 1005, 0.1)):
+        made_by = input_of("gas", boxes) + f"&output\n  trace_start = {start}\n/\n"
+        write_sample(tmp_path, name, "verlet", truths()["quadtree"], boxes, made_by=made_by)
+    (drawing,) = [each for each in own_drawings(read_bench([tmp_path])) if each.name == "own_over_size"]
+    (axis,) = [each for each in drawing.figure.axes if each.get_xlabel()]
+    assert axis.get_title() == "even"
+    assert list(axis.containers[0].lines[0].get_xdata()) == [500, 1000, 2000]
+
+
+def test_samples_on_several_threads_without_a_time_give_no_figure(tmp_path):
+    write_drums(tmp_path / "a", {"quadtree": truths()["quadtree"]}, sizes=(1000,), threads=(1,))
+    write_sample(tmp_path / "a", "drum_1000", "quadtree", truths()["quadtree"], 1000, threads=2, steps=1)
+    assert "speed_up" not in {each.name for each in bench_drawings(read_bench([tmp_path / "a"]))}
+
+
 @pytest.mark.parametrize("options, told", [({"mode": "live"}, "whole time steps"), ({"threads": 2}, "2 threads")])
 @pytest.mark.parametrize("kind", ["drum", "other"])
 def test_whole_steps_and_samples_on_several_threads_alone_have_figures_too(tmp_path, kind, options, told):

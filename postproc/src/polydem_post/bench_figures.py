@@ -134,7 +134,7 @@ def _threaded_scenes(bench: Bench, most: int = 3) -> list[str]:
     """Scenes with most parallel finders on several threads, spread over size; drums if there are any."""
     finders: dict = {}
     for case in bench.select(mode="replay"):
-        if case.threads > 1 and case.finder in PARALLEL:
+        if case.threads > 1 and case.finder in PARALLEL and series.elapsed_time(case):
             finders.setdefault((series.kind(case) == "drum", case.boxes, case.scene), set()).add(case.finder)
     best = max(((key[0], len(found)) for key, found in finders.items()), default=None)
     kept = sorted(key for key, found in finders.items() if (key[0], len(found)) == best)

@@ -8,7 +8,7 @@ from . import series
 from .bench import Bench, Case
 from .claims import NOT_MEASURED
 from .emit import Table
-from .scene_kinds import family_of
+from .scene_kinds import family_of, number_in
 
 #: Figure -> what the samples must have for it
 NEEDED = {
@@ -44,6 +44,9 @@ class Way:
         return f"{how}, {'one thread' if self.threads == 1 else f'{self.threads} threads'}"
 
 
+#: Scenes of one size have numbers of boxes within this factor
+ONE_SIZE = 1.02
+
 #: What most figures show
 USUAL = Way("replay", 1)
 
@@ -61,7 +64,19 @@ def families(bench: Bench) -> list[list[Case]]:
     for case in bench.select(threads=way.threads, mode=way.mode):
         if case.time() and (way != USUAL or series.kind(case) != "drum"):
             found.setdefault(family_of(case.settings), []).append(case)
-    return sorted(found.values(), key=lambda cases: -len({case.boxes for case in cases}))
+    return sorted(map(_of_one_start, found.values()), key=lambda cases: -len({case.boxes for case in cases}))
+
+
+def _of_one_start(cases: list[Case]) -> list[Case]:
+    """Cases of a family; if several scenes have one size, only those recorded when most scenes were."""
+    starts: dict[float, set] = {}
+    for case in cases:
+        starts.setdefault(number_in(case.settings, "output.trace_start"), set()).add(case.scene)
+    sizes = sorted({case.scene: case.boxes for case in cases}.values())
+    if all(larger > ONE_SIZE * size for size, larger in zip(sizes, sizes[1:])):
+        return cases
+    most = max(starts, key=lambda start: len(starts[start]))
+    return [case for case in cases if number_in(case.settings, "output.trace_start") == most]
 
 
 def family_name(cases: list[Case]) -> str:
