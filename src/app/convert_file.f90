@@ -13,7 +13,8 @@ module polydem_convert_file
 
 contains
 
-   !> Convert a namelist file. A file without former words is not changed. No file is overwritten.
+   !> Convert a namelist file. A file without former words is not changed, but copied to `output` if that is given. No
+   !> file is overwritten.
    subroutine convert_file(file, output, report, error)
       !> Path of the namelist file
       character(len=*), intent(in) :: file
@@ -31,16 +32,17 @@ contains
       call read_text_file(file, text, error)
       if (.not. allocated(error)) call convert_namelist(file, text, converted, changes, error)
       if (allocated(error)) return
-      if (size(changes) == 0) then
-         report = file//': contains no former words; nothing is changed'
-         return
-      end if
-      if (output == '') then
-         call replace_file(file, converted, error)
-      else
+      if (output /= '') then
          call write_new(output, converted, error)
+      else if (size(changes) > 0) then
+         call replace_file(file, converted, error)
       end if
       if (allocated(error)) return
+      if (size(changes) == 0) then
+         report = file//': contains no former words; nothing is changed'
+         if (output /= '') report = report//' in the copy '//output
+         return
+      end if
       do k = 1, size(changes)
          report = report//changes(k)%text//new_line('a')
       end do
