@@ -2,12 +2,11 @@
 module polydem_wall_forces
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_contact_block, only: block_size, contact_block_t, load_block
-   use polydem_contacts, only: contacts_t
-   use polydem_force_sums, only: contact_terms_t, n_terms, set_force, term_of, terms_of_block
+   use polydem_force_sums, only: n_terms, set_force
    use polydem_global_order, only: row_key
    use polydem_kinds, only: ip, lp, wp
    use polydem_sort, only: sort_keys
+   use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
    public :: complete_wall_forces
@@ -21,7 +20,7 @@ contains
    subroutine complete_wall_forces(comm, walls, bodies)
       class(communicator_t), intent(inout) :: comm
       !> Contacts of the bodies of this rank with fixed bodies
-      type(contacts_t), intent(in) :: walls
+      type(wall_terms_t), intent(in) :: walls
       !> Bodies of this rank; on the root rank `force` and `torque` of fixed bodies change
       type(bodies_t), intent(inout) :: bodies
       integer(lp), allocatable :: key(:, :), all_keys(:, :)
@@ -41,27 +40,17 @@ contains
    !> List the terms of the forces on fixed bodies. Their partners are free bodies of this rank.
    subroutine list_terms(bodies, walls, key, terms)
       type(bodies_t), intent(in) :: bodies
-      type(contacts_t), intent(in) :: walls
+      type(wall_terms_t), intent(in) :: walls
       !> Global indices of the fixed body and of its partner in one word, (1, term)
       integer(lp), allocatable, intent(out) :: key(:, :)
       !> Terms of the fixed bodies, (n_terms, term)
       real(wp), allocatable, intent(out) :: terms(:, :)
-      type(contact_block_t) :: block
-      type(contact_terms_t) :: some
-      integer(ip) :: c, high, k
+      integer(ip) :: c
 
       allocate (key(1, walls%n), terms(n_terms, walls%n))
-      k = 0_ip
-      do high = walls%n, 1_ip, -block_size
-         call load_block(bodies, walls, max(1_ip, high - block_size + 1_ip), high, block)
-         call terms_of_block(block, some)
-         do c = 1_ip, block%n
-            k = k + 1_ip
-            associate (i => block%first(c), j => block%second(c), index => bodies%global_index)
-               key(1, k) = merge(row_key(index(i), index(j)), row_key(index(j), index(i)), bodies%fixed(i))
-               terms(:, k) = term_of(some, c, bodies%fixed(i))
-            end associate
-         end do
+      do c = 1_ip, walls%n
+         key(1, c) = row_key(bodies%global_index(walls%slots(1, c)), bodies%global_index(walls%slots(2, c)))
+         terms(:, c) = walls%term(:, c)
       end do
    end subroutine list_terms
 

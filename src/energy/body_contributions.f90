@@ -6,11 +6,10 @@
 !> force and torque of the fixed body; the velocities of fixed bodies are known on every rank.
 module polydem_body_contributions
    use polydem_bodies, only: bodies_t
-   use polydem_contact_block, only: block_size, contact_block_t, load_block
-   use polydem_contacts, only: contacts_t
-   use polydem_force_sums, only: contact_terms_t, force_sums_t, n_terms, sum_elastic, sum_energy, sum_normal, &
-      sum_tangential, term_of, terms_of_block
+   use polydem_force_sums, only: force_sums_t, n_terms, of_elastic, of_normal, of_tangential, sum_energy, sum_torque, &
+      sum_x, sum_y
    use polydem_kinds, only: ip, wp
+   use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
    public :: n_channels, n_wall_channels, n_motions, add_powers, add_walls, motion_of
@@ -55,13 +54,15 @@ contains
       real(wp), intent(in) :: weight
       !> Channels [W/m]
       real(wp), intent(inout) :: channels(n_channels)
-      integer, parameter :: e = sum_elastic, n = sum_normal, f = sum_tangential
+      integer, parameter :: e = of_elastic, n = of_normal, f = of_tangential
+      integer, parameter :: ex = sum_x(e), ey = sum_y(e), et = sum_torque(e), nx = sum_x(n), ny = sum_y(n), &
+         nt = sum_torque(n), fx = sum_x(f), fy = sum_y(f), ft = sum_torque(f)
 
       associate (x => bodies%velocity(1, s), y => bodies%velocity(2, s), w => bodies%angular_velocity(s))
-         channels(1) = channels(1) + weight*((term(e + 1)*x + term(e + 2)*y) + term(e + 3)*w)
-         channels(2) = channels(2) + weight*(((term(n + 1) - term(e + 1))*x + (term(n + 2) - term(e + 2))*y) &
-                                             + (term(n + 3) - term(e + 3))*w)
-         channels(3) = channels(3) + weight*((term(f + 1)*x + term(f + 2)*y) + term(f + 3)*w)
+         channels(1) = channels(1) + weight*((term(ex)*x + term(ey)*y) + term(et)*w)
+         channels(2) = channels(2) + weight*(((term(nx) - term(ex))*x + (term(ny) - term(ey))*y) &
+                                             + (term(nt) - term(et))*w)
+         channels(3) = channels(3) + weight*((term(fx)*x + term(fy)*y) + term(ft)*w)
       end associate
    end subroutine add_term
 
@@ -81,9 +82,9 @@ contains
       real(wp) :: fx, fy, twist, torque
 
       call add_term(bodies, wall, term, weight, channels)
-      fx = term(sum_normal + 1) + term(sum_tangential + 1)
-      fy = term(sum_normal + 2) + term(sum_tangential + 2)
-      twist = term(sum_normal + 3) + term(sum_tangential + 3)
+      fx = term(sum_x(of_normal)) + term(sum_x(of_tangential))
+      fy = term(sum_y(of_normal)) + term(sum_y(of_tangential))
+      twist = term(sum_torque(of_normal)) + term(sum_torque(of_tangential))
       associate (x => bodies%position(:, wall), v => bodies%velocity(:, wall), w => bodies%angular_velocity(wall))
          torque = (x(1)*fy - x(2)*fx) + twist
          wall_channels(1) = wall_channels(1) - weight*((fx*v(1) + fy*v(2)) + twist*w)
@@ -99,7 +100,7 @@ contains
    pure subroutine add_walls(bodies, walls, weight, channels, wall_channels, energy)
       type(bodies_t), intent(in) :: bodies
       !> Contacts with fixed bodies
-      type(contacts_t), intent(in) :: walls
+      type(wall_terms_t), intent(in) :: walls
       !> Factor of all that is added to the channels
       real(wp), intent(in) :: weight
       !> Channels of all bodies, (n_channels, slot)
@@ -108,22 +109,13 @@ contains
       real(wp), intent(inout) :: wall_channels(:, :)
       !> Elastic energy of each body [J/m]
       real(wp), intent(inout), optional :: energy(:)
-      type(contact_block_t) :: block
-      type(contact_terms_t) :: terms
-      integer(ip) :: c, high, wall, body
-      logical :: first_is_wall
+      integer(ip) :: c
 
-      do high = walls%n, 1_ip, -block_size
-         call load_block(bodies, walls, max(1_ip, high - block_size + 1_ip), high, block)
-         call terms_of_block(block, terms)
-         do c = 1_ip, block%n
-            first_is_wall = bodies%fixed(block%first(c))
-            wall = merge(block%first(c), block%second(c), first_is_wall)
-            body = merge(block%second(c), block%first(c), first_is_wall)
-            call add_wall(bodies, wall, term_of(terms, c, first_is_wall), weight, channels(:, body), &
-                          wall_channels(:, body))
-            if (present(energy)) energy(body) = energy(body) + terms%first(c, sum_energy)
-         end do
+      do c = 1_ip, walls%n
+         associate (wall => walls%slots(1, c), body => walls%slots(2, c))
+            call add_wall(bodies, wall, walls%term(:, c), weight, channels(:, body), wall_channels(:, body))
+            if (present(energy)) energy(body) = energy(body) + walls%term(sum_energy, c)
+         end associate
       end do
    end subroutine add_walls
 

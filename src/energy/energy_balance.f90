@@ -23,12 +23,12 @@ module polydem_energy_balance
    use polydem_bodies, only: bodies_t
    use polydem_body_contributions, only: add_powers, add_walls, motion_of, n_channels, n_motions, n_wall_channels
    use polydem_communicator, only: communicator_t
-   use polydem_contacts, only: contacts_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
    use polydem_force_sums, only: force_sums_t, sum_energy
    use polydem_kinds, only: ip, lp, wp
    use polydem_serializer, only: serializer_t
+   use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
    public :: energy_balance_t, balance_t, start_energy_balance, accumulate_step, &
@@ -115,7 +115,7 @@ contains
       !> Sums of the contact forces on each body
       type(force_sums_t), intent(in) :: forces
       !> Contacts with fixed bodies
-      type(contacts_t), intent(in) :: walls
+      type(wall_terms_t), intent(in) :: walls
       real(wp) :: total(n_totals)
 
       call allocate_channels(sums, bodies%n)
@@ -139,7 +139,7 @@ contains
       !> Sums of the contact forces on each body
       type(force_sums_t), intent(in) :: forces
       !> Contacts with fixed bodies
-      type(contacts_t), intent(in) :: walls
+      type(wall_terms_t), intent(in) :: walls
 
       call accumulate_bodies(sums, 1.0_wp, gravity, bodies, forces, 1_ip, bodies%n)
       call accumulate_walls(sums, bodies, walls)
@@ -175,7 +175,7 @@ contains
       !> Bodies at the end of this step
       type(bodies_t), intent(in) :: bodies
       !> Contacts with fixed bodies
-      type(contacts_t), intent(in) :: walls
+      type(wall_terms_t), intent(in) :: walls
 
       call add_walls(bodies, walls, 1.0_wp, sums%power_sum, sums%wall_sum)
       sums%steps = sums%steps + 1_lp
@@ -196,7 +196,7 @@ contains
       !> Sums of the contact forces on each body
       type(force_sums_t), intent(in) :: forces
       !> Contacts with fixed bodies
-      type(contacts_t), intent(in) :: walls
+      type(wall_terms_t), intent(in) :: walls
       !> Terms and residuals
       type(balance_t), intent(out) :: balance
       real(wp) :: total(n_totals)
@@ -301,7 +301,7 @@ contains
       real(wp), intent(in) :: gravity(2)
       type(bodies_t), intent(in) :: bodies
       type(force_sums_t), intent(in) :: forces
-      type(contacts_t), intent(in) :: walls
+      type(wall_terms_t), intent(in) :: walls
       real(wp) :: total(n_totals)
       type(exact_sum_t), allocatable :: partial_sums(:, :)
       type(energy_balance_t) :: now

@@ -10,13 +10,14 @@ module polydem_contact_walk
    use polydem_contact_rows, only: append_rows, gather_rows, start_rows
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_fill_block, only: fill_block
-   use polydem_force_sums, only: add_late_terms, add_terms, contact_terms_t, reserve_sums, terms_of_block
+   use polydem_force_sums, only: add_late_terms, add_terms, clear_sums, contact_terms_t, reserve_sums, terms_of_block
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: owns_pair
    use polydem_pair_ranges, only: divide_pairs, most_ranges
    use polydem_passing, only: test_block
    use polydem_range_results, only: range_results_t
    use polydem_simulation, only: simulation_t, sum_contacts_own => sum_contacts, sum_degenerate
+   use polydem_wall_terms, only: append_walls, join_walls
    implicit none
    private
    public :: walk_contacts
@@ -125,16 +126,16 @@ contains
          ! Sums begin just before their first terms: no contact so far had a lower slot.
          if (block%n > 0_ip) then
             low = min(block%first(block%n), block%second(block%n))
-            self%force_sums%value(:, low:high) = 0.0_wp
+            call clear_sums(low, high, self%bodies%n, self%force_sums%value)
             high = min(high, low - 1_ip)
          end if
          call add_terms(block, terms, last(2), self%force_sums, results%late)
-         call keep_contacts(self, block, results)
+         call keep_contacts(self, block, terms, results)
          if (.not. timed) cycle
          clock(3) = wall_seconds()
          results%seconds = results%seconds + (clock(2:3) - clock(1:2))
       end do
-      self%force_sums%value(:, last(1) + 1_ip:high) = 0.0_wp
+      call clear_sums(last(1) + 1_ip, high, self%bodies%n, self%force_sums%value)
    end subroutine walk_range
 
    !> Empty the results of a range.
@@ -144,7 +145,7 @@ contains
 
       results%late%n = 0_ip
       call start_rows(contacts, results%all)
-      call start_rows(contacts, results%walls)
+      results%walls%n = 0_ip
       call start_rows(contacts, results%suspects)
       results%n_contacts = 0_ip
       results%n_degenerate = 0_ip
@@ -153,23 +154,18 @@ contains
    end subroutine start_results
 
    !> Count the contacts of a block, test them by the guards, and keep those that are needed after the walk.
-   subroutine keep_contacts(self, block, results)
+   subroutine keep_contacts(self, block, terms, results)
       type(simulation_t), intent(inout) :: self
       type(contact_block_t), intent(in) :: block
+      type(contact_terms_t), intent(in) :: terms
       type(range_results_t), intent(inout) :: results
-      logical :: chosen(block_size), some
-      integer(ip) :: c
+      logical :: suspect(block_size), some
 
       call count_block(self, block, results)
       if (self%keeps_contacts) call append_rows(block, results%all, with_forces=.true.)
-      some = .false.
-      do c = 1_ip, block%n
-         chosen(c) = self%bodies%fixed(block%first(c)) .or. self%bodies%fixed(block%second(c))
-         some = some .or. chosen(c)
-      end do
-      if (some) call append_rows(block, results%walls, with_forces=.true., chosen=chosen)
-      call test_block(self%contact_guard, self%bodies, block, self%history, chosen, some, results%passing_pair)
-      if (some) call append_rows(block, results%suspects, with_forces=.true., chosen=chosen)
+      call append_walls(self%bodies%fixed, block, terms, results%walls)
+      call test_block(self%contact_guard, self%bodies, block, self%history, suspect, some, results%passing_pair)
+      if (some) call append_rows(block, results%suspects, with_forces=.true., chosen=suspect)
    end subroutine keep_contacts
 
    !> Count the contacts that this rank owns, and those without direction.
@@ -210,7 +206,7 @@ contains
             if (ranges(r)%passing_pair > 0_ip) self%passing_pair = ranges(r)%passing_pair
          end do
          if (self%keeps_contacts) call gather_rows(ranges%all, self%contacts)
-         call gather_rows(ranges%walls, self%walls)
+         call join_walls(ranges%walls, self%walls)
          call gather_rows(ranges%suspects, self%suspects)
       end associate
       associate (suspects => self%suspects)

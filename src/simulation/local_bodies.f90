@@ -30,7 +30,8 @@ contains
 
       call new_force_law(self%settings%forces, self%bodies, self%law)
       call fit_table(self%law, self%contacts)
-      call fit_table(self%law, self%walls)
+      self%walls%n = 0_ip
+      self%walls%energy_is_quadratic = self%law%energy_is_quadratic
       call fit_table(self%law, self%suspects)
       self%n_contacts = 0_ip
       self%passing_pair = 0_ip

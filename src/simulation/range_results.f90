@@ -3,6 +3,7 @@ module polydem_range_results
    use polydem_contact_rows, only: contact_rows_t
    use polydem_force_sums, only: late_terms_t
    use polydem_kinds, only: dp, ip
+   use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
    public :: range_results_t
@@ -14,7 +15,7 @@ module polydem_range_results
       !> All contacts, if the table is asked for
       type(contact_rows_t) :: all
       !> Contacts with fixed bodies
-      type(contact_rows_t) :: walls
+      type(wall_terms_t) :: walls
       !> Contacts that are deep or degenerate
       type(contact_rows_t) :: suspects
       !> Number of contacts that this rank owns, and of those without direction

@@ -22,6 +22,7 @@ module polydem_simulation
    use polydem_range_results, only: range_results_t
    use polydem_settings, only: settings_t
    use polydem_timers, only: timers_t
+   use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
    public :: simulation_t, relaxation_t, former_direction, time_of, compute_balance
@@ -68,8 +69,10 @@ module polydem_simulation
       type(contacts_t) :: contacts
       !> Whether to keep the table of contacts; who needs it asks for it before the step
       logical :: keeps_contacts = .true.
-      !> Contacts with fixed bodies, and contacts that are deep or degenerate
-      type(contacts_t) :: walls, suspects
+      !> Contacts with fixed bodies
+      type(wall_terms_t) :: walls
+      !> Contacts that are deep or degenerate
+      type(contacts_t) :: suspects
       !> Number of contacts that this rank owns
       integer(ip) :: n_contacts = 0_ip
       !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none

@@ -5,7 +5,7 @@ module polydem_time_step
    use polydem_contact_incidence, only: index_contacts
    use polydem_contact_walk, only: walk_contacts
    use polydem_errors, only: error_t, raise, run_error
-   use polydem_force_sums, only: assemble_forces, select_walls, total_forces
+   use polydem_force_sums, only: assemble_forces, total_forces
    use polydem_guards, only: check_contacts
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_redistribution, only: restore_history, redistribute
@@ -14,6 +14,7 @@ module polydem_time_step
    use polydem_strings, only: to_text
    use polydem_timers, only: stage_boxes, stage_decomposition, stage_forces, stage_integrate, stage_neighbours, &
       stage_overlap
+   use polydem_wall_terms, only: select_walls
    implicit none
    private
    public :: advance, compute_forces

@@ -11,17 +11,18 @@
 module polydem_force_sums
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t, load_block
-   use polydem_contacts, only: contacts_t, copy_contact, grow_contacts, set_force_of_contact
+   use polydem_contacts, only: contacts_t, set_force_of_contact
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: force_sums_t, contact_terms_t, late_terms_t, n_terms, sum_elastic, sum_normal, sum_tangential, sum_energy
-   public :: reserve_sums, start_sums, terms_of_block, term_of, add_terms, add_late_terms, assemble_forces, select_walls
-   public :: total_forces, set_force
+   public :: force_sums_t, contact_terms_t, late_terms_t, n_terms, of_elastic, of_normal, of_tangential
+   public :: sum_x, sum_y, sum_torque, sum_energy, reserve_sums, start_sums, clear_sums, terms_of_block, term_of
+   public :: add_terms, add_late_terms, assemble_forces, total_forces, set_force
 
-   !> Rows of a term: force along x and y and torque of the elastic forces with cohesion, of all normal forces with the
-   !> twist, and of the tangential forces [N/m, N/m, N]; elastic energy [J/m]
-   integer, parameter :: sum_elastic = 0, sum_normal = 3, sum_tangential = 6, sum_energy = 10
+   !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
+   integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
+   !> Rows of a term: force along x and along y of each kind [N/m], torque of each kind [N], elastic energy [J/m]
+   integer, parameter :: sum_x(3) = [1, 3, 5], sum_y(3) = [2, 4, 6], sum_torque(3) = [7, 8, 9], sum_energy = 10
    !> Number of rows
    integer, parameter :: n_terms = 10
 
@@ -33,10 +34,10 @@ module polydem_force_sums
 
    !> Terms of the contacts of a block
    type :: contact_terms_t
-      !> Terms of the first body of each contact, (contact, row)
-      real(wp) :: first(block_size, n_terms)
-      !> Torques on the second body of each contact, (contact, kind of force); its forces are opposite to the others
-      real(wp) :: torque_second(block_size, 3)
+      !> Terms of the first body of each contact, (row, contact)
+      real(wp) :: first(n_terms, block_size)
+      !> Rows of the second body from its torques on; its forces are opposite, (row, contact)
+      real(wp) :: second(sum_torque(1):n_terms, block_size)
    end type contact_terms_t
 
    !> Terms of bodies beyond the range of a thread
@@ -71,8 +72,23 @@ contains
       type(force_sums_t), intent(inout) :: sums
 
       call reserve_sums(n, sums)
-      sums%value = 0.0_wp
+      call clear_sums(1_ip, n, n, sums%value)
    end subroutine start_sums
+
+   !> Set the sums of some bodies to zero.
+   pure subroutine clear_sums(first, last, n, value)
+      !> First and last slot
+      integer(ip), intent(in) :: first, last
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> The sums
+      real(wp), intent(inout) :: value(n_terms, n)
+      integer(ip) :: s
+
+      do s = first, last
+         value(:, s) = 0.0_wp
+      end do
+   end subroutine clear_sums
 
    !> Compute the terms of all contacts of a block.
    pure subroutine terms_of_block(block, terms)
@@ -83,7 +99,7 @@ contains
       real(wp) :: elastic, normal, tangential, x, y, lever_first, lever_second
       integer(ip) :: c
 
-      associate (first => terms%first, second => terms%torque_second)
+      associate (first => terms%first, second => terms%second)
          do c = 1_ip, block%n
             x = block%direction(c, 1)
             y = block%direction(c, 2)
@@ -92,19 +108,20 @@ contains
             tangential = block%tangential_force(c)
             lever_first = (block%arm_first(c, 1)*y - block%arm_first(c, 2)*x) + block%lever(c)
             lever_second = (block%arm_second(c, 1)*y - block%arm_second(c, 2)*x) + block%lever(c)
-            first(c, 1) = elastic*x
-            first(c, 2) = elastic*y
-            first(c, 3) = elastic*lever_first
-            second(c, 1) = elastic*lever_second
-            first(c, 4) = normal*x
-            first(c, 5) = normal*y
-            first(c, 6) = normal*lever_first + block%twist(c)
-            second(c, 2) = normal*lever_second + block%twist(c)
-            first(c, 7) = -tangential*y
-            first(c, 8) = tangential*x
-            first(c, 9) = tangential*(block%arm_first(c, 1)*x + block%arm_first(c, 2)*y)
-            second(c, 3) = tangential*(block%arm_second(c, 1)*x + block%arm_second(c, 2)*y)
-            first(c, 10) = 0.25_wp*block%elastic(c)*block%area(c)/block%length(c)
+            first(1, c) = elastic*x
+            first(2, c) = elastic*y
+            first(3, c) = normal*x
+            first(4, c) = normal*y
+            first(5, c) = -tangential*y
+            first(6, c) = tangential*x
+            first(7, c) = elastic*lever_first
+            first(8, c) = normal*lever_first + block%twist(c)
+            first(9, c) = tangential*(block%arm_first(c, 1)*x + block%arm_first(c, 2)*y)
+            first(10, c) = 0.25_wp*block%elastic(c)*block%area(c)/block%length(c)
+            second(7, c) = -elastic*lever_second
+            second(8, c) = -(normal*lever_second + block%twist(c))
+            second(9, c) = -tangential*(block%arm_second(c, 1)*x + block%arm_second(c, 2)*y)
+            second(10, c) = first(10, c)
          end do
       end associate
    end subroutine terms_of_block
@@ -119,12 +136,10 @@ contains
       logical, intent(in) :: is_first
       real(wp) :: term(n_terms)
 
-      term = terms%first(c, :)
+      term = terms%first(:, c)
       if (is_first) return
-      term(1:9) = -term(1:9)
-      term(3) = -terms%torque_second(c, 1)
-      term(6) = -terms%torque_second(c, 2)
-      term(9) = -terms%torque_second(c, 3)
+      term(:6) = -term(:6)
+      term(7:) = terms%second(:, c)
    end function term_of
 
    !> Add the terms of a block to the sums of its bodies, in the order of the block. Terms of bodies after the last slot
@@ -142,7 +157,7 @@ contains
       integer(ip) :: c
 
       if (max(maxval(block%first(:block%n)), maxval(block%second(:block%n))) <= last) then
-         call add_pairs(block%n, block%first, block%second, terms%first, terms%torque_second, last, sums%value)
+         call add_pairs(block%n, block%first, block%second, terms, last, sums%value)
          return
       end if
       call reserve_late(late, block%n)
@@ -153,28 +168,35 @@ contains
    end subroutine add_terms
 
    !> Add the terms of contacts to the sums of their bodies, in the order of the contacts.
-   pure subroutine add_pairs(n, i, j, first, torque_second, last, value)
+   pure subroutine add_pairs(n, i, j, terms, last, value)
       integer(ip), intent(in) :: n, i(n), j(n), last
-      real(wp), intent(in) :: first(block_size, n_terms), torque_second(block_size, 3)
+      type(contact_terms_t), intent(in) :: terms
       real(wp), intent(inout) :: value(n_terms, last)
-      real(wp) :: t(n_terms)
       integer(ip) :: c
-      integer :: k
 
       do c = 1_ip, n
-         do k = 1, n_terms
-            t(k) = first(c, k)
-            value(k, i(c)) = value(k, i(c)) + t(k)
-         end do
-         t(1:9) = -t(1:9)
-         do k = 1, 3
-            t(3*k) = -torque_second(c, k)
-         end do
-         do k = 1, n_terms
-            value(k, j(c)) = value(k, j(c)) + t(k)
-         end do
+         call add(terms%first(:, c), value(:, i(c)))
+         call subtract(terms%first(:, c), terms%second(:, c), value(:, j(c)))
       end do
    end subroutine add_pairs
+
+   !> Add a term to the sums of a body. Arrays of their own let the compiler add two numbers at a time.
+   pure subroutine add(term, value)
+      real(wp), intent(in) :: term(n_terms)
+      real(wp), intent(inout) :: value(n_terms)
+
+      value = value + term
+   end subroutine add
+
+   !> Add the term of the second body to its sums.
+   pure subroutine subtract(first, second, value)
+      !> Term of the first body, and rows of the second
+      real(wp), intent(in) :: first(n_terms), second(sum_torque(1):n_terms)
+      real(wp), intent(inout) :: value(n_terms)
+
+      value(:6) = value(:6) - first(:6)
+      value(7:) = value(7:) + second
+   end subroutine subtract
 
    !> Add a term to the sums of a body, or append it to the late terms.
    pure subroutine add_or_keep(slot, term, last, sums, late)
@@ -262,27 +284,6 @@ contains
       call total_forces(gravity, sums, 1_ip, bodies%n, bodies)
    end subroutine assemble_forces
 
-   !> Select the contacts with fixed bodies from a table.
-   subroutine select_walls(bodies, contacts, walls)
-      type(bodies_t), intent(in) :: bodies
-      !> All contacts
-      type(contacts_t), intent(in) :: contacts
-      !> Those with fixed bodies
-      type(contacts_t), intent(inout) :: walls
-      integer(ip) :: c
-
-      walls%has_cohesion = contacts%has_cohesion
-      walls%has_twist = contacts%has_twist
-      walls%energy_is_quadratic = contacts%energy_is_quadratic
-      walls%n = 0_ip
-      do c = 1_ip, contacts%n
-         if (.not. (bodies%fixed(contacts%first(c)) .or. bodies%fixed(contacts%second(c)))) cycle
-         call grow_contacts(walls, walls%n + 1_ip)
-         walls%n = walls%n + 1_ip
-         call copy_contact(contacts, c, walls, walls%n)
-      end do
-   end subroutine select_walls
-
    !> Set the forces and torques on some bodies from the sums, and add gravity to free bodies. Several threads may call
    !> it for different bodies.
    pure subroutine total_forces(gravity, sums, low, high, bodies)
@@ -312,9 +313,9 @@ contains
       !> Bodies; `force` and `torque` of body s are set
       type(bodies_t), intent(inout) :: bodies
 
-      bodies%force(1, s) = total(sum_normal + 1) + total(sum_tangential + 1)
-      bodies%force(2, s) = total(sum_normal + 2) + total(sum_tangential + 2)
-      bodies%torque(s) = total(sum_normal + 3) + total(sum_tangential + 3)
+      bodies%force(1, s) = total(sum_x(of_normal)) + total(sum_x(of_tangential))
+      bodies%force(2, s) = total(sum_y(of_normal)) + total(sum_y(of_tangential))
+      bodies%torque(s) = total(sum_torque(of_normal)) + total(sum_torque(of_tangential))
    end subroutine set_force
 
 end module polydem_force_sums

@@ -12,9 +12,7 @@ program write_together
    use polydem_bodies, only: state_hash
    use polydem_checkpoint_file, only: checkpoint_file_t
    use polydem_communicator, only: communicator_t
-   use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, io_error, raise, run_error
-   use polydem_force_sums, only: select_walls
    use polydem_global_hash, only: hash_all_bodies, hash_scene
    use polydem_global_order, only: global_order_t
    use polydem_hdf5_file, only: start_library
@@ -25,6 +23,7 @@ program write_together
    use polydem_strings, only: to_text
    use polydem_trajectory_writer, only: trajectory_writer_t
    use polydem_wall_forces, only: complete_wall_forces
+   use polydem_wall_terms, only: select_walls, wall_terms_t
    use polydem_world_communicator, only: create_world
    use sample, only: sample_provenance, sample_row
    use spread_world, only: part_of_world, whole_world, world_t
@@ -96,7 +95,7 @@ contains
       class(communicator_t), intent(inout) :: comm
       integer(lp), intent(in) :: step
       type(world_t), intent(out) :: world
-      type(contacts_t) :: walls
+      type(wall_terms_t) :: walls
 
       if (comm%size == 1_ip) call whole_world(step, world)
       if (comm%size > 1_ip) call part_of_world(step, comm%rank, comm%size, world)
