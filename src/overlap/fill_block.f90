@@ -54,8 +54,8 @@ contains
       logical :: all_certified
 
       call select_pairs(bodies, first, second, low, next, tested, history, block, batch)
-      call copy_shapes(block%n, block%first, block%second, bodies%n, bodies%radius, bodies%vertex_start, batch)
-      call copy_offsets(block%n, block%first, block%second, bodies%n, bodies%position, batch)
+      call describe_pairs(block%n, block%pair, first, second, bodies%radius, bodies%vertex_start, bodies%position, &
+                          block%first, block%second, batch)
       call evaluate_batch(batch, block%n, bodies%turned, effective, isa, block%overlap_columns_t)
       block%degenerate(:block%n) = 0.0_wp
       all_certified = count(batch%certified(:block%n) > 0.0_wp) == block%n
@@ -89,7 +89,6 @@ contains
             call select_in_range(tested, next, nothing(:next - tested + 1_ip), block, batch)
          end if
       end do
-      call choose_roles(bodies%n, bodies%radius, block%n, block%pair, first, second, block%first, block%second)
    end subroutine select_pairs
 
    !> Forget the remembered edges that do not separate the polygons any more.
@@ -110,12 +109,11 @@ contains
       end do
       do done = 0_ip, n_found - 1_ip, block_size
          n = min(block_size, n_found - done)
-         call choose_roles(bodies%n, bodies%radius, n, found(done + 1:done + n), first, second, i, j)
+         call describe_pairs(n, found(done + 1:done + n), first, second, bodies%radius, bodies%vertex_start, &
+                             bodies%position, i, j, batch)
          do k = 1_ip, n
             batch%memory(k) = memory(found(done + k))
          end do
-         call copy_shapes(n, i, j, bodies%n, bodies%radius, bodies%vertex_start, batch)
-         call copy_offsets(n, i, j, bodies%n, bodies%position, batch)
          call test_edges(batch, n, size(bodies%turned, 2, kind=ip), bodies%turned, apart)
          do k = 1_ip, n
             memory(found(done + k)) = merge(batch%memory(k), 0_ip, apart(k))
@@ -123,27 +121,45 @@ contains
       end do
    end subroutine forget_edges
 
-   !> The roles of `is_exchanged`, without a branch: which radius is greater, a processor cannot predict.
-   pure subroutine choose_roles(n, radius, n_pairs, pair, first, second, i, j)
-      !> Number of bodies
+   !> Choose the roles of the bodies, and copy sizes and places of their polygons to the batch.
+   !>
+   !> Roles are those of `is_exchanged`, without a branch: which radius is greater, a processor cannot predict.
+   pure subroutine describe_pairs(n, pair, first, second, radius, start, position, i, j, batch)
+      !> Number of pairs
       integer(ip), intent(in) :: n
-      real(wp), intent(in) :: radius(n)
-      integer(ip), intent(in) :: n_pairs
       !> Pairs
-      integer(ip), intent(in) :: pair(n_pairs)
+      integer(ip), intent(in) :: pair(n)
       integer(ip), intent(in), contiguous :: first(:), second(:)
+      !> Radii of the bodies [m]
+      real(wp), intent(in), contiguous :: radius(:)
+      !> First vertex of each body
+      integer(ip), intent(in), contiguous :: start(:)
+      !> Centres of the bodies [m]
+      real(wp), intent(in) :: position(2, size(radius))
       !> Slots of P and of Q
       integer(ip), intent(inout) :: i(block_size), j(block_size)
-      integer(ip) :: exchange, c
+      !> All but what is remembered is set
+      type(overlap_batch_t), intent(inout) :: batch
+      integer(ip) :: exchange, c, p, q
 
-      do c = 1_ip, n_pairs
-         i(c) = first(pair(c))
-         j(c) = second(pair(c))
-         exchange = iand(ieor(i(c), j(c)), -merge(1_ip, 0_ip, radius(j(c)) < radius(i(c))))
-         i(c) = ieor(i(c), exchange)
-         j(c) = ieor(j(c), exchange)
+      do c = 1_ip, n
+         p = first(pair(c))
+         q = second(pair(c))
+         exchange = iand(ieor(p, q), -merge(1_ip, 0_ip, radius(q) < radius(p)))
+         batch%radius(c, 1) = min(radius(p), radius(q))
+         batch%radius(c, 2) = max(radius(p), radius(q))
+         p = ieor(p, exchange)
+         q = ieor(q, exchange)
+         i(c) = p
+         j(c) = q
+         batch%start(c, 1) = start(p)
+         batch%start(c, 2) = start(q)
+         batch%corners(c, 1) = start(p + 1_ip) - start(p)
+         batch%corners(c, 2) = start(q + 1_ip) - start(q)
+         batch%offset(c, 1) = position(1, q) - position(1, p)
+         batch%offset(c, 2) = position(2, q) - position(2, p)
       end do
-   end subroutine choose_roles
+   end subroutine describe_pairs
 
    !> Add pairs without remembered edge to a block, in descending order, until it is full.
    pure subroutine select_in_range(low, next, memory, block, batch)
@@ -154,53 +170,22 @@ contains
       integer(ip), intent(in) :: memory(low:next)
       type(contact_block_t), intent(inout) :: block
       type(overlap_batch_t), intent(inout) :: batch
-      integer(ip) :: c, p
+      integer(ip) :: c, p, last
 
       c = block%n
-      do p = next, low, -1_ip
-         if (c == block_size) exit
-         block%pair(c + 1_ip) = p
-         batch%memory(c + 1_ip) = memory(p)
-         c = c + shiftr(not(memory(p)), bit_size(p) - 1)
+      p = next
+      do while (p >= low .and. c < block_size)
+         ! So many pairs surely find room.
+         last = max(low, p - (block_size - c) + 1_ip)
+         do p = p, last, -1_ip
+            block%pair(c + 1_ip) = p
+            batch%memory(c + 1_ip) = memory(p)
+            c = c + shiftr(not(memory(p)), bit_size(p) - 1)
+         end do
       end do
       next = p
       block%n = c
    end subroutine select_in_range
-
-   !> Copy sizes and places of the polygons to the batch.
-   pure subroutine copy_shapes(n_lanes, first, second, n, radius, start, batch)
-      integer(ip), intent(in) :: n_lanes, first(block_size), second(block_size)
-      !> Number of bodies
-      integer(ip), intent(in) :: n
-      real(wp), intent(in) :: radius(n)
-      integer(ip), intent(in) :: start(n + 1)
-      type(overlap_batch_t), intent(inout) :: batch
-      integer(ip) :: c
-
-      do c = 1_ip, n_lanes
-         batch%radius(c, 1) = radius(first(c))
-         batch%radius(c, 2) = radius(second(c))
-         batch%start(c, 1) = start(first(c))
-         batch%start(c, 2) = start(second(c))
-         batch%corners(c, 1) = start(first(c) + 1_ip) - start(first(c))
-         batch%corners(c, 2) = start(second(c) + 1_ip) - start(second(c))
-      end do
-   end subroutine copy_shapes
-
-   !> Copy the distances of the centres to the batch.
-   pure subroutine copy_offsets(n_lanes, first, second, n, position, batch)
-      integer(ip), intent(in) :: n_lanes, first(block_size), second(block_size)
-      !> Number of bodies
-      integer(ip), intent(in) :: n
-      real(wp), intent(in) :: position(2, n)
-      type(overlap_batch_t), intent(inout) :: batch
-      integer(ip) :: c
-
-      do c = 1_ip, n_lanes
-         batch%offset(c, 1) = position(1, second(c)) - position(1, first(c))
-         batch%offset(c, 2) = position(2, second(c)) - position(2, first(c))
-      end do
-   end subroutine copy_offsets
 
    !> Centre of the second body minus centre of the first [m]
    pure function offset_of(bodies, i, j) result(offset)
