@@ -139,6 +139,7 @@ contains
 
       call self%candidates%start(boxes%n)
       self%candidates%filtered = self%filtered
+      self%candidates%isa = self%isa
       self%candidates%filter%isa = self%isa
       call measure_reaches(boxes, reach, least)
       if (self%filtered) call self%candidates%start_filter(boxes%n, 2.0_wp*real(reach, wp))

@@ -56,6 +56,7 @@ contains
       else
          call self%list%prepare(boxes)
          self%filter%isa = self%isa
+         self%list%isa = self%isa
          call self%filter%start(boxes%n, self%list%side)
       end if
       if (must_begin(self)) call begin_interval(self, boxes)

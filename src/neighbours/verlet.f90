@@ -104,6 +104,7 @@ contains
       if (.not. self%skin > 0.0_wp) self%thickness = first_skin*self%side
       call choose_levels(boxes, self%thickness, n_levels, level, largest)
       call self%grids%set_levels(n_levels, level, boxes%fixed(1:boxes%n))
+      self%candidates%isa = self%isa
       call self%candidates%start(boxes%n)
       allocate (self%padded(4, boxes%n))
    end subroutine start

@@ -6,7 +6,7 @@
 module polydem_candidate_rows
    use polydem_box_pairs, only: found_pairs_t
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t, find_states, index_list_t, overlapping
+   use polydem_candidates, only: candidates_t, index_list_t, overlapping
    use polydem_kinds, only: bp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
    use polydem_thread_changes, only: part
@@ -155,8 +155,8 @@ contains
          last = i
          self%row(2, i) = self%row(2, i) + 1_ip
       end do
-      call find_states(found%n, self%box(:, offset + 1_ip:offset + found%n), size(bounds, 2, ip), bounds, &
-                       self%overlap(offset + 1_ip:offset + found%n))
+      call self%find_states_of(found%n, self%box(:, offset + 1_ip:offset + found%n), bounds, &
+                               self%overlap(offset + 1_ip:offset + found%n))
    end subroutine fill_rows
 
    !> Append a candidate behind the rows.

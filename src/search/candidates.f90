@@ -6,11 +6,14 @@
 !> itself, and new candidates fill the last holes first. So candidates of near boxes stay near each other in the list,
 !> and threads that compare different parts of it share few boxes.
 module polydem_candidates
+   use polydem_instruction_set, only: isa_avx2, isa_base
    use polydem_kinds, only: bp, dp, ip, lp, wp
+   use polydem_line_lanes_avx2, only: find_states_avx2 => find_states
+   use polydem_line_lanes_base, only: find_states
    use polydem_pair_changes, only: pair_changes_t
    implicit none
    private
-   public :: candidates_t, index_list_t, find_states, meet, overlapping
+   public :: candidates_t, index_list_t, meet, overlapping
 
    !> Number of candidates that are compared at once
    integer(ip), parameter :: block_size = 128_ip
@@ -28,6 +31,8 @@ module polydem_candidates
 
    !> Candidates and holes 1..n
    type :: candidates_t
+      !> Instruction set of the kernels; set before the first step
+      integer :: isa = isa_base
       !> Number of candidates and holes
       integer(ip) :: n = 0_ip
       !> Boxes of each candidate, (2, candidate)
@@ -46,6 +51,7 @@ module polydem_candidates
       procedure :: start
       procedure :: add
       procedure :: compare
+      procedure :: find_states_of
       procedure :: drop
       procedure :: n_pairs
       procedure :: list_separated
@@ -113,16 +119,16 @@ contains
       !> List of changes; the new changes are appended
       type(pair_changes_t), intent(inout) :: changes
       integer(ip) :: from, to, k
-      integer(bp) :: differ(block_size)
+      integer(bp) :: state(block_size)
       logical :: any_differ
 
       do from = low, high, block_size
          to = min(from + block_size - 1_ip, high)
-         call compare_block(to - from + 1_ip, self%box(:, from:to), self%overlap(from:to), &
-                            size(bounds, 2, ip), bounds, differ, any_differ)
+         call self%find_states_of(to - from + 1_ip, self%box(:, from:to), bounds, state)
+         call find_differences(to - from + 1_ip, self%overlap(from:to), state, any_differ)
          if (.not. any_differ) cycle
          do k = from, to
-            if (differ(k - from + 1_ip) == 0_bp .or. self%box(1, k) == self%box(2, k)) cycle
+            if (state(k - from + 1_ip) == 0_bp .or. self%box(1, k) == self%box(2, k)) cycle
             self%overlap(k) = 1_bp - self%overlap(k)
             call changes%record(body(self%box(1, k)), body(self%box(2, k)), &
                                 2_ip*int(self%overlap(k), ip) - 1_ip)
@@ -130,43 +136,42 @@ contains
       end do
    end subroutine compare
 
-   !> Inner loop of every step, on arrays of explicit shape and without branches.
-   pure subroutine compare_block(n, box, overlap, n_boxes, bounds, differ, any_differ)
-      integer(ip), intent(in) :: n, n_boxes
+   !> Find which pairs overlap.
+   pure subroutine find_states_of(self, n, box, bounds, state)
+      class(candidates_t), intent(in) :: self
+      !> Number of pairs
+      integer(ip), intent(in) :: n
+      !> Boxes of each pair, (2, pair)
       integer(ip), intent(in) :: box(2, n)
-      integer(bp), intent(in) :: overlap(n)
-      real(wp), intent(in) :: bounds(4, n_boxes)
-      !> 1 if the result changed, else 0
-      integer(bp), intent(out) :: differ(n)
+      !> Bounds of the boxes, (4, box) [m]
+      real(wp), intent(in), contiguous :: bounds(:, :)
+      !> 1 if the boxes overlap, else 0, (pair)
+      integer(bp), intent(out) :: state(n)
+
+      if (self%isa == isa_avx2) then
+         call find_states_avx2(n, box, size(bounds, 2, ip), bounds, state)
+      else
+         call find_states(n, box, size(bounds, 2, ip), bounds, state)
+      end if
+   end subroutine find_states_of
+
+   !> Replace states by their differences from former ones, without branches.
+   pure subroutine find_differences(n, before, state, any_differ)
+      integer(ip), intent(in) :: n
+      integer(bp), intent(in) :: before(n)
+      !> 1 if the state changed, else 0
+      integer(bp), intent(inout) :: state(n)
       logical, intent(out) :: any_differ
       integer(ip) :: k
       integer(bp) :: some
 
-      call find_states(n, box, n_boxes, bounds, differ)
       some = 0_bp
       do k = 1_ip, n
-         differ(k) = ieor(differ(k), overlap(k))
-         some = ior(some, differ(k))
+         state(k) = ieor(state(k), before(k))
+         some = ior(some, state(k))
       end do
       any_differ = some /= 0_bp
-   end subroutine compare_block
-
-   !> Find which pairs overlap.
-   pure subroutine find_states(n, box, n_boxes, bounds, state)
-      !> Number of pairs and of boxes
-      integer(ip), intent(in) :: n, n_boxes
-      !> Boxes of each pair, (2, pair)
-      integer(ip), intent(in) :: box(2, n)
-      !> Bounds of the boxes, (4, box) [m]
-      real(wp), intent(in) :: bounds(4, n_boxes)
-      !> 1 if the boxes overlap, else 0, (pair)
-      integer(bp), intent(out) :: state(n)
-      integer(ip) :: k
-
-      do k = 1_ip, n
-         state(k) = merge(1_bp, 0_bp, overlapping(bounds(:, box(1, k)), bounds(:, box(2, k))))
-      end do
-   end subroutine find_states
+   end subroutine find_differences
 
    !> Number of candidates
    pure integer(ip) function n_pairs(self)

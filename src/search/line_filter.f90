@@ -103,6 +103,7 @@ contains
       allocate (self%left(n_boxes), source=0_bp)
       self%side = side
       self%tolerance = first_tolerance*side
+      self%active%isa = self%isa
       call self%active%reserve(64_ip)
    end subroutine start
 

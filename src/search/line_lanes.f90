@@ -7,7 +7,7 @@ module polydem_line_lanes
    use polydem_kinds, only: bp, ip, sp, wp
    implicit none
    private
-   public :: pair_block, separate, overlapping, active, find_off, list_strays, draw, classify
+   public :: pair_block, separate, overlapping, active, find_off, list_strays, draw, classify, find_states
 
    !> Classes of candidates; the sure ones are also their states in `polydem_candidates`
    integer(bp), parameter :: separate = 0_bp, overlapping = 1_bp, active = 2_bp
@@ -206,5 +206,34 @@ contains
          kind(k) = merge(separate, kind(k), largest_least(k) > margin)
       end do
    end subroutine classify
+
+   !> Find which pairs of boxes overlap: 1 or 0. The widths that two boxes share along both axes are found at once.
+   pure subroutine find_states(n, box, n_boxes, bounds, state)
+      !> Number of pairs and of boxes
+      integer(ip), intent(in) :: n, n_boxes
+      !> Boxes of each pair, (2, pair)
+      integer(ip), intent(in) :: box(2, n)
+      !> Bounds of the boxes, (4, box) [m]
+      real(wp), intent(in) :: bounds(4, n_boxes)
+      !> 1 if the boxes overlap, else 0, (pair)
+      integer(bp), intent(out) :: state(n)
+      real(wp) :: shared(2, pair_block)
+      integer(ip) :: from, to, k, i, j, a
+
+      do from = 1_ip, n, pair_block
+         to = min(from + pair_block - 1_ip, n)
+         do k = from, to
+            i = box(1, k)
+            j = box(2, k)
+            do a = 1_ip, 2_ip
+               shared(a, k - from + 1_ip) = min(bounds(a + 2_ip, j) - bounds(a, i), bounds(a + 2_ip, i) - bounds(a, j))
+            end do
+         end do
+         do k = from, to
+            state(k) = merge(overlapping, separate, &
+                             min(shared(1, k - from + 1_ip), shared(2, k - from + 1_ip)) >= 0.0_wp)
+         end do
+      end do
+   end subroutine find_states
 
 end module polydem_line_lanes
