@@ -19,6 +19,9 @@ MARK = "polydem_post"
 #: Bytes at both ends of a file in which the mark is
 ENDS = 2**20
 
+#: Bytes of chunks that a data set holds in memory while it is written: files may have many data sets
+CHUNK_CACHE = 2**18
+
 
 @contextmanager
 def new_file(path: Path) -> Iterator[Path]:
@@ -59,7 +62,7 @@ class NewHdf5(h5py.File):
 
     def __init__(self, path: Path):
         self._bytes = _Bytes(path, "w+")
-        super().__init__(self._bytes, "w")
+        super().__init__(self._bytes, "w", rdcc_nbytes=CHUNK_CACHE)
 
     def check(self) -> None:
         """Raise the error of a failed write."""
