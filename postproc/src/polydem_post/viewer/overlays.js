@@ -13,7 +13,7 @@ class Texels {
     this.data = new Float32Array(4 * ROW);
   }
 
-  /** Empty it, and make room. */
+  /** Empty it, and make room: for the fullest frame, since it costs more than to fill it. */
   clear(most) {
     this.n = 0;
     if (4 * most > this.data.length) this.data = new Float32Array(4 * ROW * Math.ceil(1.25 * most / ROW));
@@ -28,7 +28,7 @@ function forceSegments(run, list) {
   const t = run.contacts(), widest = widestForce(run), least = 0.002 * widest;
   const factor = widest / run.facts.contacts.covered;
   const [originX, originY] = run.origin, {state, fixed} = run;
-  list.clear(4 * t.n);
+  list.clear(4 * t.most);
   const {data} = list;
   let k = 0;
   for (let c = 0; c < t.n; c++) {
@@ -52,7 +52,7 @@ function forceSegments(run, list) {
 /** A square at each contact point. */
 function contactSegments(run, list) {
   const t = run.contacts(), half = 0.05 * run.facts.diameter, [originX, originY] = run.origin;
-  list.clear(2 * t.n);
+  list.clear(2 * t.most);
   const {data} = list;
   for (let c = 0, k = 0; c < t.n; c++, k += 8) {
     data[k] = t.x[c] - originX - half;

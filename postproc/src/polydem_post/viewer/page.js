@@ -15,6 +15,7 @@ class Viewer {
     this.drawn = 0;
     this.prepareControls();
     this.preparePointer();
+    this.painter.warmUp(run.facts.colour);
     this.setColour(run.facts.colour);
   }
 

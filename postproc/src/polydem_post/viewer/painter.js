@@ -79,6 +79,9 @@ const SHAPES = 3;
 /** Outlines are drawn where bodies are at least so large [picture elements]. */
 const LEAST_OUTLINED = 5;
 
+/** Frames that are made before the first is shown. */
+const WARMING = 8;
+
 class Painter {
   constructor(canvas, run) {
     this.canvas = canvas;
@@ -229,6 +232,17 @@ class Painter {
       this.drawLayer(layer, this.programs[shapes], ink);
     }
     if (chosen >= 0) this.drawChosen(chosen, 2.5 * this.ratio * step);
+  }
+
+  /** Make some frames without drawing them: an engine runs new code slowly, and no frame that is shown shall wait. */
+  warmUp(colour) {
+    const {run} = this, last = run.frames - 1;
+    for (let round = 0; round < WARMING; round++) {
+      run.go(Math.max(last - round, 0));
+      this.uploadBodies(colour);
+      for (const name of Object.keys(run.facts.overlays)) OVERLAYS[name].make(run, this.layers[name].texels);
+    }
+    run.go(0);
   }
 
   /** State and shades of the bodies, unless they are there. */

@@ -59,7 +59,7 @@ class Run {
     this.cosines = Float64Array.from({length: 256}, (_, k) => Math.cos(2 * Math.PI * k / 256));
     this.sines = Float64Array.from({length: 256}, (_, k) => Math.sin(2 * Math.PI * k / 256));
     const most = facts.count.reduce((a, b) => Math.max(a, b), 0), numbers = () => new Float64Array(most);
-    this.table = {n: 0, frame: -1, first: new Uint32Array(most), second: new Uint32Array(most),
+    this.table = {n: 0, most, frame: -1, first: new Uint32Array(most), second: new Uint32Array(most),
       x: numbers(), y: numbers(), fx: numbers(), fy: numbers(), size: numbers()};
     const sums = () => new Float64Array(this.n);
     this.sums = {frame: -1, fx: sums(), fy: sums(), load: sums(), count: sums(), xx: sums(), yy: sums(), xy: sums()};
