@@ -2,7 +2,7 @@
 !>
 !> The syntax is the part that Fortran compilers and f90nml have in common. A comment runs from `!` to the end of the
 !> line. Blanks, tabs and line ends (also CR LF) separate tokens. A quoted text ends on the line on which it begins;
-!> quotes inside it are doubled.
+!> quotes inside it are doubled. Some editors put a byte order mark at the start of the text.
 module polydem_namelist_tokens
    use polydem_errors, only: error_t, input_error, raise
    use polydem_strings, only: to_text, lower_case
@@ -16,6 +16,8 @@ module polydem_namelist_tokens
    integer, parameter :: comma_token = 4, bare_token = 5, quoted_token = 6
 
    character(len=*), parameter :: tab = achar(9), line_feed = achar(10), carriage_return = achar(13)
+   !> Byte order mark of UTF-8
+   character(len=*), parameter :: byte_order_mark = char(239)//char(187)//char(191)
    !> Characters that end a token without quotes
    character(len=*), parameter :: separators = ' '//tab//line_feed//carriage_return//'=,/!&''"'
 
@@ -72,6 +74,7 @@ contains
       n = 0
       line = 1
       next = 1
+      if (index(source%text, byte_order_mark) == 1) next = 4
       do while (next <= length)
          select case (source%text(next:next))
          case (line_feed)
