@@ -139,6 +139,13 @@ def test_a_concave_outline_is_named_or_decomposed(tmp_path, capsys):
     assert_array_equal(contents(output)["fixed"], [0, 1, 1])
 
 
+def features(*properties):
+    """GeoJSON of triangles with these properties."""
+    triangle = {"type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1]]]}
+    return json.dumps({"features": [{"type": "Feature", "properties": each, "geometry": triangle}
+                                    for each in properties]})
+
+
 @pytest.mark.parametrize("name, content, message", [
     ("a.wkt", "POINT (1 2)", "a.wkt:1: is not a POLYGON or MULTIPOLYGON of WKT: 'POINT (1 2)'"),
     ("a.wkt", "POLYGON ((0 0, 1 0, x 1))", "a.wkt:1: a vertex is not a pair of numbers"),
@@ -151,12 +158,18 @@ def test_a_concave_outline_is_named_or_decomposed(tmp_path, capsys):
     ("a.json", '{"type": "Feature", "geometry": null}', "a.json: has no geometry"),
     ("a.json", '{"type": "Point", "coordinates": [0, 0]}', "a.json: is a Point, not a Polygon or MultiPolygon"),
     ("a.json", '{"type": "Polygon", "coordinates": [[[0], [1, 0], [1, 1]]]}', "the vertices are not pairs of numbers"),
-    ("a.json", json.dumps({"features": [{"type": "Feature", "properties": properties, "geometry": {
-        "type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1]]]}} for properties in ({}, {"velocity": "fast"})]}),
-     "a.json: feature 2: the velocity is 'fast', not 2 number(s)"),
-    ("a.json", json.dumps({"features": [{"type": "Feature", "properties": properties, "geometry": {
-        "type": "Polygon", "coordinates": [[[0, 0], [1, 0], [0, 1]]]}} for properties in ({"id": 3}, {})]}),
-     "a.json: feature 2: has no id, which other polygons have"),
+    ("a.json", features({}, {"velocity": "fast"}), "a.json: feature 2: the velocity is 'fast', not 2 number(s)"),
+    ("a.json", features({"id": 3}, {}), "a.json: feature 2: has no id, which other polygons have"),
+    *(("a.json", features({"density": 1.0}, {"density": 1.0, name: value}),
+       f"a.json: feature 2: the {name} is {value!r}, but must be {wanted}")
+      for name, value, wanted in (
+          ("fixed", 2, "true or false"), ("density", 0, "a number above 0"), ("mass", -1.0, "a number not below 0"),
+          ("inertia", float("inf"), "a number not below 0"), ("velocity", [float("nan"), 1], "finite"))),
+    *(("a.json", features({"id": 3}, {"id": wrong}), f"feature 2: the id is {wrong}, but must be a whole number from 0")
+      for wrong in (1.5, -1, 2**31)),
+    ("a.json", features({"id": 3}, {"id": 3}), "feature 2: the id 3 is that of"),
+    ("a.json", '{"features": 3}', "a.json: its features are no list"),
+    ("a.json", features({}, [1]), "a.json: feature 2: its properties are no object of GeoJSON"),
     ("a.txt", "0 0\n1 0\n1 one\n", "a.txt:3: is neither a vertex such as '0.1 0.2' nor the word fixed: '1 one'"),
     ("a.txt", "0 0\n1 0\n", "a.txt:1: the outline cannot be a body: it has 2 different vertices"),
     ("a.txt", "\n0 0\n1 0\n2 0\n", "a.txt:2: the outline cannot be a body: it has 2 different vertices"),

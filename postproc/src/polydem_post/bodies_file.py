@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,12 @@ from .result_file import ResultError, cannot_write
 
 #: Columns with several numbers per body
 WIDE = {"velocity": 2}
+#: Which numbers a column may have, beside being finite, and how messages say it
+RANGES: dict[str, Callable[[Any], Any]] = {
+    "fixed": lambda x: x in (0.0, 1.0), "id": lambda x: 0.0 <= x < 2.0**31 and x.is_integer(),
+    "density": lambda x: x > 0.0, "mass": lambda x: x >= 0.0, "inertia": lambda x: x >= 0.0}
+MEANINGS = {"fixed": "true or false", "id": "a whole number from 0 to 2147483647", "density": "a number above 0",
+            "mass": "a number not below 0", "inertia": "a number not below 0"}
 
 
 class ConcaveOutline(UserWarning):
@@ -119,8 +125,16 @@ def _column(name: str, rows: list[dict[str, Any]], places: list[str]) -> Any:
             value = np.array(row.get(name, np.zeros(width)), dtype=float).reshape(width)
         except (TypeError, ValueError) as error:
             raise ResultError(f"{place}: the {name} is {row[name]!r}, not {width} number(s)") from error
+        if name in row and not (np.isfinite(value).all() and RANGES.get(name, np.isfinite)(value[0])):
+            raise ResultError(f"{place}: the {name} is {row[name]!r}, but must be {MEANINGS.get(name, 'finite')}")
         values.append(value)
     column = np.array(values)
+    if name == "id":
+        first: dict[float, int] = {}
+        for k, value in enumerate(column[:, 0]):
+            if first.setdefault(value, k) != k:
+                raise ResultError(f"{places[k]}: the id {int(value)} is that of {places[first[value]]}, too; each body "
+                                  "needs its own")
     if name in ("fixed", "id"):
         return column[:, 0].astype(np.int8 if name == "fixed" else np.int64)
     return column if width > 1 else column[:, 0]

@@ -132,12 +132,16 @@ def _read_geojson(text: str, name: str) -> Iterator[Outline]:
     except RecursionError as error:
         raise ResultError(f"{name}: its lists are nested too deeply for GeoJSON") from error
     features = content.get("features", []) if isinstance(content, dict) and "features" in content else [content]
+    if not isinstance(features, list):
+        raise ResultError(f"{name}: its features are no list")
     for number, feature in enumerate(features, 1):
         place = f"{name}: feature {number}" if len(features) > 1 else name
         if not isinstance(feature, dict):
             raise ResultError(f"{place}: is not an object of GeoJSON")
         is_feature = feature.get("type") == "Feature"
         properties = (feature.get("properties") or {}) if is_feature else {}
+        if not isinstance(properties, dict):
+            raise ResultError(f"{place}: its properties are no object of GeoJSON")
         chosen = {key: properties[key] for key in PROPERTIES if properties.get(key) is not None}
         yield from _of_geojson(feature.get("geometry") if is_feature else feature, place, chosen)
 
@@ -145,7 +149,7 @@ def _read_geojson(text: str, name: str) -> Iterator[Outline]:
 def _of_geojson(geometry: Any, place: str, properties: dict[str, Any]) -> Iterator[Outline]:
     kind = geometry.get("type") if isinstance(geometry, dict) else None
     if kind == "GeometryCollection":
-        for part in geometry.get("geometries", []):
+        for part in geometry.get("geometries") or []:
             yield from _of_geojson(part, place, properties)
     elif kind in ("Polygon", "MultiPolygon"):
         coordinates = geometry.get("coordinates")
