@@ -396,6 +396,11 @@ def test_mean_squared_displacement_of_flight_and_of_oscillation():
     assert swing.square[n // 2] == pytest.approx(4 * np.mean(np.cos(times[: 3 * n - n // 2]) ** 2))
     with pytest.raises(ResultError, match="not equally spaced"):
         mean_squared_displacement([*frames, squares([(0, 0), (1, 0)], fixed=[False, True], time=2.6)])
+    # Frames at the steps of 0.3 nearest to multiples of 1: their intervals differ by a step.
+    near = [dataclasses.replace(squares([(0.3 * step, 0.0)], time=0.3 * step), step=step) for step in (0, 3, 7, 10, 13)]
+    assert mean_squared_displacement(near).square[4] == pytest.approx(3.9**2)
+    with pytest.raises(ResultError, match="not equally spaced"):
+        mean_squared_displacement([*near, dataclasses.replace(near[-1], step=14, time=4.2)])
 
 
 # --- documentation -------------------------------------------------------------------------------------------------

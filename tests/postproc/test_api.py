@@ -220,6 +220,13 @@ def test_data_sets_of_xarray(run):
     assert_array_equal(data.kinetic, run.energy_balance["kinetic"])
 
 
+@pytest.mark.parametrize("call", ["to_pandas", "to_xarray"])
+def test_no_frames_make_no_table(run, call):
+    pytest.importorskip(call.removeprefix("to_"))
+    with pytest.raises(ResultError, match="there are no frames"):
+        getattr(run[:0], call)()
+
+
 @pytest.mark.parametrize("package, call", [("pandas", "run[0].to_pandas()"), ("xarray", "run.to_xarray()"),
                                            ("pandas", "run.to_pandas()"), ("pandas", "run[0].contacts.to_pandas()")])
 def test_a_missing_package_is_named(run, monkeypatch, package, call):

@@ -37,6 +37,12 @@ def need(package: str, extra: str, purpose: str) -> Any:
                           f"pip install 'polydem-post[{extra}]'") from error
 
 
+def insist_on_frames(run: Trajectory) -> None:
+    """A table needs a frame."""
+    if len(run) == 0:
+        raise ResultError(f"{run.folder}: there are no frames")
+
+
 def flat(columns: dict[str, npt.NDArray[Any]]) -> dict[str, npt.NDArray[Any]]:
     """Columns of vectors as two columns each, with _x and _y behind their names."""
     found: dict[str, npt.NDArray[Any]] = {}
@@ -72,12 +78,14 @@ def contact_table(contacts: Contacts) -> Any:
 def trajectory_table(run: Trajectory) -> Any:
     """A pandas table of the bodies of all frames."""
     pandas = need("pandas", "tables", "to_pandas()")
+    insist_on_frames(run)
     return pandas.concat([body_table(frame) for frame in run], keys=run.times, names=["time", "id"])
 
 
 def trajectory_dataset(run: Trajectory) -> Any:
     """An xarray data set of a run: columns of bodies and the energy balance, with units and meanings."""
     xarray = need("xarray", "tables", "to_xarray()")
+    insist_on_frames(run)
     first, described = run.frame(0), columns_of(Frame)
 
     def attributes(name: str) -> dict[str, str]:

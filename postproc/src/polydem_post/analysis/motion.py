@@ -36,18 +36,22 @@ def mean_squared_displacement(frames: Iterable[Frame], chosen: Any = None, *, re
     """Mean squared displacement <|r(t + lag) - r(t)|^2> over the free bodies and all times t of the frames.
 
     `chosen` selects bodies by index or truth value instead. With `relative` the displacement of the mean position of
-    these bodies is subtracted. Frames must be equally spaced in time (within one per cent). Source: A. Einstein, Ann.
-    Phys. 322 (1905) 549; averaging over time origins as in M.P. Allen & D.J. Tildesley, Computer Simulation of Liquids
-    (2017), Sec. 8.5. All positions are in memory: 16 bytes per frame and body.
+    these bodies is subtracted. Frames must be equally spaced in time, within one per cent or one time step, since a run
+    writes a frame at the step nearest to its time. Source: A. Einstein, Ann. Phys. 322 (1905) 549; averaging over time
+    origins as in M.P. Allen & D.J. Tildesley, Computer Simulation of Liquids (2017), Sec. 8.5. All positions are in
+    memory: 16 bytes per frame and body.
     """
-    times, places = [], []
+    times, steps, places = [], [], []
     for frame in frames:
         times.append(frame.time)
+        steps.append(frame.step)
         places.append(frame.position[frame.free if chosen is None else chosen])
     if not places or len({place.shape for place in places}) != 1 or len(places[0]) == 0:
         raise ResultError("the frames have no bodies to follow, or not the same ones")
     interval = np.diff(times)
-    if len(times) > 1 and np.abs(interval - np.median(interval)).max() > EQUAL * np.median(interval):
+    time_step = (times[-1] - times[0]) / (steps[-1] - steps[0]) if steps[-1] > steps[0] else 0.0
+    allowed = max(EQUAL * np.median(interval), 1.01 * time_step) if len(times) > 1 else 0.0
+    if len(times) > 1 and np.abs(interval - np.median(interval)).max() > allowed:
         raise ResultError("the frames are not equally spaced in time; choose some, as in run[:-1]")
     position = np.array(places)
     if relative:
