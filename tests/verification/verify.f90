@@ -9,6 +9,7 @@
 program verify
    use, intrinsic :: iso_c_binding, only: c_int
    use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+   use omp_lib, only: omp_set_num_threads
    use benchmarks, only: benchmark_names, long_names, run_benchmark
    use polydem_errors, only: error_t
    use polydem_line_writer, only: line_writer_t
@@ -34,6 +35,7 @@ program verify
    integer :: k
 
    call read_arguments(chosen, thorough)
+   call omp_set_num_threads(1)  ! threads of small scenes wait for each other more often than they work
    do k = 1, size(benchmark_names)
       if (chosen(k)) call run_benchmark(trim(benchmark_names(k)), table, thorough)
    end do

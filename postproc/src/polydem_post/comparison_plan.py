@@ -191,7 +191,7 @@ ALL_FINDERS, EVEN = 2.5, 10000.0
 FIRST_STEP, UNSORTED = 30.0, 0.8
 
 #: Seconds of the pieces that are no benches on a usual machine: quick, full
-OTHERS = {"verification": (30.0, 400.0), "precision": (50.0, 800.0), "cache": (40.0, 300.0)}
+OTHERS = {"verification": (30.0, 600.0), "precision": (50.0, 800.0), "cache": (40.0, 300.0)}
 
 
 def estimate(piece: Piece, rates: Rates, cores: int, mode: str) -> float:
