@@ -31,8 +31,8 @@ module polydem_energy_balance
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: energy_balance_t, balance_t, start_energy_balance, accumulate_step, &
-      accumulate_bodies, accumulate_walls, evaluate_balance, serialize_balance, serialize_contributions
+   public :: energy_balance_t, balance_t, start_energy_balance, accumulate_bodies, &
+      accumulate_walls, evaluate_balance, serialize_balance, serialize_contributions
 
    !> Running sums of the energy and momentum balance, and its values at the start
    type :: energy_balance_t
@@ -127,23 +127,6 @@ contains
       sums%start = [total(1) + total(2), total(3:5)]
       sums%elastic_start = total(at_energy)
    end subroutine start_energy_balance
-
-   !> Accumulate one step. To be called at its end.
-   subroutine accumulate_step(sums, gravity, bodies, forces, walls)
-      !> Running sums
-      type(energy_balance_t), intent(inout) :: sums
-      !> Acceleration of gravity, (2) [m/s2]
-      real(wp), intent(in) :: gravity(2)
-      !> Bodies at the end of this step
-      type(bodies_t), intent(in) :: bodies
-      !> Sums of the contact forces on each body
-      type(force_sums_t), intent(in) :: forces
-      !> Contacts with fixed bodies
-      type(wall_terms_t), intent(in) :: walls
-
-      call accumulate_bodies(sums, 1.0_wp, gravity, bodies, forces, 1_ip, bodies%n)
-      call accumulate_walls(sums, bodies, walls)
-   end subroutine accumulate_step
 
    !> Accumulate the rates of some bodies, times a weight. Several threads may call it for different bodies.
    pure subroutine accumulate_bodies(sums, weight, gravity, bodies, forces, first, last)

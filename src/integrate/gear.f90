@@ -13,7 +13,7 @@ module polydem_gear
    use polydem_stability_limit, only: stability_table_t
    implicit none
    private
-   public :: gear_t, for_velocities, for_positions
+   public :: gear_t, for_positions
 
    !> Corrector c_0 for forces that depend on velocities
    real(wp), parameter :: for_velocities = 3.0_wp/16.0_wp

@@ -8,15 +8,11 @@ module polydem_prescribed_motion
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: motion_t, new_motion, move_bodies, motion_names
-
-   !> Kinds of motion, as in the namelist
-   character(len=*), parameter :: motion_names(3) = &
-      [character(len=11) :: 'rotation', 'translation', 'oscillation']
+   public :: motion_t, new_motion, move_bodies
 
    !> Prescribed motion of a set of fixed bodies
    type :: motion_t
-      !> One of motion_names
+      !> 'rotation', 'translation' or 'oscillation', as in the namelist
       character(len=11) :: kind = ''
       !> Centre of a rotation, (2) [m]
       real(wp) :: pivot(2) = 0.0_wp

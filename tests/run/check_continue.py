@@ -59,6 +59,19 @@ class Case:
         return output
 
 
+def run_all(tests):
+    """Call all tests with the program and the other paths of the command line, in a folder of their own."""
+    program, *libraries = (os.path.abspath(word) for word in sys.argv[1:])
+    with tempfile.TemporaryDirectory() as work:
+        os.chdir(work)
+        write_scene()
+        case = Case(program)
+        for test in tests:
+            began = time.monotonic()
+            test(case, *libraries)
+            print(f"{test.__name__.replace('_', ' ')}: {time.monotonic() - began:.1f} s", flush=True)
+
+
 def wait_for(condition, seconds=60.0):
     """Wait until a condition holds."""
     end = time.monotonic() + seconds
@@ -262,17 +275,5 @@ TESTS = (a_signal_ends_a_run_with_a_checkpoint, a_second_signal_ends_it_at_once,
          a_disk_that_is_full_loses_nothing, a_folder_that_cannot_be_written_is_named)
 
 
-def main():
-    program = os.path.abspath(sys.argv[1])
-    with tempfile.TemporaryDirectory() as work:
-        os.chdir(work)
-        write_scene()
-        case = Case(program)
-        for test in TESTS:
-            began = time.monotonic()
-            test(case)
-            print(f"{test.__name__.replace('_', ' ')}: {time.monotonic() - began:.1f} s", flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    run_all(TESTS)

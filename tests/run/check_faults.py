@@ -12,12 +12,10 @@ import fcntl
 import os
 import re
 import subprocess
-import sys
-import tempfile
 import time
 
-from check_continue import EARLY, NO_FILE, Case, checkpoints_of
-from continued_run import closed_segments, write_scene
+from check_continue import EARLY, NO_FILE, checkpoints_of, run_all
+from continued_run import closed_segments
 
 
 @contextlib.contextmanager
@@ -102,17 +100,5 @@ TESTS = (a_date_that_goes_back_changes_nothing, where_nothing_can_be_locked_the_
          checkpoints_that_may_only_be_read_are_replaced)
 
 
-def main():
-    program, library = (os.path.abspath(word) for word in sys.argv[1:3])
-    with tempfile.TemporaryDirectory() as work:
-        os.chdir(work)
-        write_scene()
-        case = Case(program)
-        for test in TESTS:
-            began = time.monotonic()
-            test(case, library)
-            print(f"{test.__name__.replace('_', ' ')}: {time.monotonic() - began:.1f} s", flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    run_all(TESTS)

@@ -12,14 +12,12 @@ import re
 import shutil
 import signal
 import subprocess
-import sys
-import tempfile
 import threading
 import time
 
-from check_continue import BAD_INPUT, EARLY, NO_FILE, Case, wait_for
+from check_continue import BAD_INPUT, EARLY, NO_FILE, run_all, wait_for
 from check_faults import environment
-from continued_run import start, write_scene
+from continued_run import start
 
 #: Options of a run that does not end by itself
 ENDLESS = ("--set", "integrate.duration=100", "--set", "checkpoint.steps=0", "--set", "checkpoint.elapsed=0.2",
@@ -230,17 +228,5 @@ TESTS = (a_living_run_keeps_others_out_also_when_it_stands_still, a_killed_run_k
          where_nothing_can_be_locked_signs_of_life_decide, no_other_program_gets_the_descriptor)
 
 
-def main():
-    program, library = (os.path.abspath(word) for word in sys.argv[1:3])
-    with tempfile.TemporaryDirectory() as work:
-        os.chdir(work)
-        write_scene()
-        case = Case(program)
-        for test in TESTS:
-            began = time.monotonic()
-            test(case, library)
-            print(f"{test.__name__.replace('_', ' ')}: {time.monotonic() - began:.1f} s", flush=True)
-
-
 if __name__ == "__main__":
-    main()
+    run_all(TESTS)
