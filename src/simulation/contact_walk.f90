@@ -64,7 +64,7 @@ contains
             call add_late_terms(self%ranges(r)%late, low, high, self%force_sums)
          end do
       end do
-      !$omp end do
+      !$omp end do nowait
       !$omp end parallel
       call gather_results(self, n)
       overlap_share = 0.5_dp

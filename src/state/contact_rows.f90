@@ -66,6 +66,7 @@ contains
       end do
       contacts%n = base(size(rows))
       call reserve_contacts(contacts, contacts%n)
+      if (contacts%n == 0_ip) return
       !$omp parallel do schedule(static, 1) if (contacts%n > min_parallel_size) default(none) &
       !$omp    shared(rows, contacts, base) private(r, c)
       do r = 1, size(rows)
