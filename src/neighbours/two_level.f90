@@ -12,11 +12,12 @@
 !> fast box costs only the search for its own candidates.
 module polydem_two_level
    use polydem_boxes, only: boxes_t
+   use polydem_candidate_rows, only: lies_inside
    use polydem_fat_candidates, only: fat_candidates_t
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_nodes, count_passes, &
       count_rebuilds, count_searches, count_tests, count_visits, phase_filter, phase_search, phase_structure
-   use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_kinds, only: dp, ip, lp
    use polydem_line_filter, only: class_cost
    use polydem_pair_changes, only: pair_changes_t
    use polydem_parallel_filter, only: parallel_filter_t
@@ -98,13 +99,6 @@ contains
       if (.not. must_begin(self)) call self%filter%review_left(self%list)
       call self%work%lap(phase_search)
    end subroutine follow_lines
-
-   !> Whether a box lies inside another one
-   pure logical function lies_inside(box, other)
-      real(wp), intent(in) :: box(4), other(4)
-
-      lies_inside = min(min(box(1) - other(1), box(2) - other(2)), min(other(3) - box(3), other(4) - box(4))) >= 0.0_wp
-   end function lies_inside
 
    !> Search for a box alone, and activate its new candidates.
    subroutine search_single(self, i, boxes)

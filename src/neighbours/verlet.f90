@@ -91,7 +91,7 @@ contains
       call self%work%lap(phase_filter)
    end subroutine find
 
-   !> Choose skin and grids, and make an empty list.
+   !> Choose skin and grids, and make an empty list; no box is inside its padded box.
    subroutine start(self, boxes)
       type(verlet_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -107,6 +107,7 @@ contains
       self%candidates%isa = self%isa
       call self%candidates%start(boxes%n)
       allocate (self%padded(4, boxes%n))
+      self%padded = spread([1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]*huge(1.0_wp), 2, boxes%n)
    end subroutine start
 
    !> Whether every box lies inside its padded box
@@ -173,7 +174,7 @@ contains
       integer(lp) :: tests
 
       self%age = 0_lp
-      if (self%candidates%n > 0_ip) call self%candidates%update_states(boxes, self%padded, self%changes%of)
+      call self%candidates%update_states(boxes, self%padded, self%changes%of)
       self%padded(1:2, :) = boxes%bounds(1:2, 1:boxes%n) - 0.5_wp*self%thickness
       self%padded(3:4, :) = boxes%bounds(3:4, 1:boxes%n) + 0.5_wp*self%thickness
       call self%grids%build(boxes%n, self%padded)

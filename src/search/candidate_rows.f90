@@ -12,7 +12,7 @@ module polydem_candidate_rows
    use polydem_thread_changes, only: part
    implicit none
    private
-   public :: candidate_rows_t
+   public :: candidate_rows_t, lies_inside
 
    !> Candidates in rows, the box of the row first; more candidates can follow the rows
    type, extends(candidates_t) :: candidate_rows_t
@@ -47,7 +47,7 @@ contains
       allocate (self%box(2, 0), self%overlap(0), self%of_second(0))
       allocate (self%row(2, n_boxes), source=0_ip)
       allocate (self%first_of_second(n_boxes + 2_ip), source=1_ip)
-      allocate (self%outside(n_boxes), source=1_bp)
+      allocate (self%outside(n_boxes))
    end subroutine start_rows
 
    !> Compare all candidates before they are replaced, and find the boxes outside their padded boxes.
@@ -77,13 +77,15 @@ contains
 
    !> Whether a box lies inside another one; false for NaN
    pure logical function lies_inside(box, other)
-      real(wp), intent(in) :: box(4), other(4)
+      !> Bounds xmin, ymin, xmax, ymax of the box [m]
+      real(wp), intent(in) :: box(4)
+      !> Bounds of the other one [m]
+      real(wp), intent(in) :: other(4)
 
       lies_inside = box(1) >= other(1) .and. box(2) >= other(2) .and. box(3) <= other(3) .and. box(4) <= other(4)
    end function lies_inside
 
-   !> Replace all candidates, and record the pairs that begin to overlap. `update_states` must have been called, unless
-   !> there are no candidates yet.
+   !> Replace all candidates, and record the pairs that begin to overlap. `update_states` must have been called.
    subroutine replace(self, found, boxes, changes)
       class(candidate_rows_t), intent(inout) :: self
       !> New candidates as each thread of the search found them, row by row, (thread)

@@ -81,7 +81,7 @@ module polydem_fat_candidates
 
 contains
 
-   !> Choose margin and grids, and make an empty list.
+   !> Choose margin and grids, and make an empty list; no box is inside its fat box.
    subroutine prepare(self, boxes)
       class(fat_candidates_t), intent(inout) :: self
       !> Boxes of the first step
@@ -96,7 +96,8 @@ contains
       call self%grids%set_levels(n_levels, level, boxes%fixed(1:boxes%n))
       self%n_fixed = count(boxes%fixed(1:boxes%n), kind=ip)
       call self%start(boxes%n)
-      allocate (self%fat(4, boxes%n), source=0.0_wp)
+      allocate (self%fat(4, boxes%n))
+      self%fat = spread([1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]*huge(1.0_wp), 2, boxes%n)
       allocate (self%first_link(boxes%n), self%met_by(boxes%n), source=0_ip)
       allocate (self%is_moved(boxes%n), source=0_bp)
       allocate (self%next_link(2, 0))
@@ -159,7 +160,7 @@ contains
 
       call adapt_margin(self, boxes%n, n_wanted)
       call reset(self)
-      if (self%searched) call self%update_states(boxes, self%fat, changes)
+      call self%update_states(boxes, self%fat, changes)
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes, lines, changes) private(w, low, high)
       do w = 1, size(changes)

@@ -172,7 +172,7 @@ contains
       !> Class of each pair: `separate`, `overlapping` or `active`
       integer(bp), intent(out) :: kind(n)
       real(wp) :: gap(4), rate(4), most(4, pair_block), least(4, pair_block), greatest(2, pair_block), &
-         smallest(2, pair_block), largest_gap(pair_block), largest_least(pair_block)
+         smallest(2, pair_block)
       integer(ip) :: k, i, j, a
 
       ! Elements 1 and 2 of gap, rate, most and least belong to the gaps left of box i and below it, 3 and 4 to the
@@ -198,12 +198,8 @@ contains
          end do
       end do
       do k = 1_ip, n
-         largest_gap(k) = max(greatest(1, k), greatest(2, k))
-         largest_least(k) = max(smallest(1, k), smallest(2, k))
-      end do
-      do k = 1_ip, n
-         kind(k) = merge(overlapping, active, largest_gap(k) < -margin)
-         kind(k) = merge(separate, kind(k), largest_least(k) > margin)
+         kind(k) = merge(overlapping, active, max(greatest(1, k), greatest(2, k)) < -margin)
+         kind(k) = merge(separate, kind(k), max(smallest(1, k), smallest(2, k)) > margin)
       end do
    end subroutine classify
 
