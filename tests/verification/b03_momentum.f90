@@ -73,11 +73,11 @@ contains
       call compute_balance(simulation, end)
       missing(:2) = end%momentum - start%momentum - end%impulse
       missing(3) = end%angular_momentum - start%angular_momentum - end%angular_impulse
-      call table%expect_absolute(name//': momentum that is missing, over sum |m v|', 0.0_wp, &
+      call table%expect_absolute(name//': momentum that is missing, over its sum', 0.0_wp, &
                                  norm2(missing(:2))/scale(1), 1.0e-11_wp)
       call table%expect_absolute(name//': angular momentum that is missing, over its sum', 0.0_wp, &
                                  abs(missing(3))/scale(2), 1.0e-11_wp)
-      call table%show(name//': impulse of the walls, over sum |m v|', norm2(end%impulse)/scale(1))
+      call table%show(name//': impulse of the walls, over the sum of momenta', norm2(end%impulse)/scale(1))
       call table%show(name//': kinetic energy at the end over that at the start', end%kinetic/start%kinetic)
    end subroutine fly
 
