@@ -3,7 +3,7 @@
 !> Candidates can be added and removed in every step. New ones are compared until the next interval.
 module polydem_filtered_candidates
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t, index_list_t
+   use polydem_candidates, only: candidates_t
    use polydem_kinds, only: ip, wp
    use polydem_pair_changes, only: pair_changes_t
    use polydem_parallel_filter, only: parallel_filter_t

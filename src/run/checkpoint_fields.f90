@@ -17,7 +17,6 @@ module polydem_checkpoint_fields
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
-   use polydem_strings, only: to_text
    implicit none
    private
    public :: attempts_t, serialize_run, serialize_progress, hash_scene_of, scene_hash

@@ -7,7 +7,7 @@ module polydem_run_simulation
    use polydem_errors, only: error_t, raise, stopped_early
    use polydem_finished_result, only: find_finished_result, is_finished
    use polydem_kinds, only: ip, lp
-   use polydem_monitor, only: check_step, set_warning_counts, report_pending_warnings, warning_counts
+   use polydem_monitor, only: set_warning_counts, report_pending_warnings, warning_counts
    use polydem_oversubscription, only: oversubscription
    use polydem_prepare, only: build_and_lock, prepare
    use polydem_replacement, only: remove_replaced, restore_replaced

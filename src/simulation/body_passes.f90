@@ -2,7 +2,7 @@
 !>
 !> Each pass does all that it can do for a block of bodies while the block is in the cache.
 module polydem_body_passes
-   use polydem_bodies, only: bodies_t, block_size
+   use polydem_bodies, only: block_size
    use polydem_energy_balance, only: accumulate_bodies, accumulate_walls
    use polydem_errors, only: error_t
    use polydem_force_sums, only: total_forces

@@ -16,7 +16,6 @@ module polydem_relaxation
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_find_contacts, only: find_contacts
-   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_local_bodies, only: fit_to_bodies
    use polydem_neighbours, only: neighbours_t, new_neighbours

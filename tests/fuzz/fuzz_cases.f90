@@ -6,7 +6,7 @@ module fuzz_cases
    use spoilt_checkpoint, only: go_on_from, put_behind_seal, sound_checkpoint
    use polydem_bodies, only: bodies_t
    use polydem_errors, only: error_t
-   use polydem_kinds, only: dp, ip, wp
+   use polydem_kinds, only: dp, ip
    use polydem_namelist_entries, only: choices_of
    use polydem_random, only: random_t
    use polydem_read_settings, only: read_settings_text

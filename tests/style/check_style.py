@@ -16,6 +16,7 @@ TEXTS = (".f90", ".in", ".pf", ".py", ".cmake", ".txt", ".md", ".json", ".toml",
          ".sh", ".yaml")
 TREES = ("src", "tests", "postproc", "inputs")
 REAL_LITERAL = re.compile(r"(?<![\w.])(?:\d+\.\d*|\.\d+)(?:[ed][+-]?\d+)?(?![\w.])|(?<![\w.])\d+[ed][+-]?\d+\b")
+KIND_OF_NUMBER = re.compile(r"(?<!\w)(?:\d+\.?\d*|\.\d+)(?:[ed][+-]?\d+)?_(?=[a-z])")
 
 #: Functions whose bits depend on the processor and its library
 INTRINSIC = re.compile(r"(?<![%\w])(a?(?:sin|cos|tan)h?|atan2|exp|log|log10|log_gamma|gamma|hypot|norm2|erfc?|"
@@ -135,6 +136,21 @@ def check_scopes(source):
             yield scope.first.line, f"{scope.name} has {length} lines, more than {LONGEST_PROCEDURE}"
 
 
+def check_imports(source):
+    """Every name of a use statement occurs elsewhere, alone or as the kind of a number such as 1.0_wp."""
+    imports, others = [], []
+    for statement in source.statements:
+        match = re.match(r"use\b.*\bonly\s*:(.*)", statement.code)
+        if match:
+            imports.extend((statement.line, name.split("=>")[0].strip()) for name in split_commas(match.group(1)))
+        else:
+            others.append(statement.code)
+    words = {word for code in others for word in re.findall(r"[a-z]\w*", KIND_OF_NUMBER.sub(" ", code))}
+    for line, name in imports:
+        if re.fullmatch(r"\w+", name) and name not in words:
+            yield line, f"{name} is not used"
+
+
 def check_documentation(source):
     """A comment !> above what others see."""
     public = public_names(source)
@@ -244,7 +260,8 @@ def check_stages(sources, groups):
 def check_source(path, room, text):
     """All rules of one Fortran source of src."""
     source = Source(path, text)
-    return sorted({*check_statements(source, room), *check_scopes(source), *check_documentation(source)})
+    return sorted({*check_statements(source, room), *check_scopes(source), *check_imports(source),
+                   *check_documentation(source)})
 
 
 def check_tree(root):

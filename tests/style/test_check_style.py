@@ -86,6 +86,8 @@ end function clock
 # What replaces what in GOOD, the line that must be named, and words of the message.
 BAD = [
     ("!> A good module.\n", "\n", 2, "no comment !> above module"),
+    ("only: ip, wp", "only: dp, ip, wp", 3, "dp is not used"),
+    ("only: ip, wp", "only: ip, wp, half_of => ip", 3, "half_of is not used"),
     ("polydem_kinds, only", "hdf5, only", 3, "the library HDF5 is used in src/hdf5 only"),
     ("polydem_kinds, only", "h5lt, only", 3, "the library HDF5 is used in src/hdf5 only"),
     ("polydem_kinds, only", "mpi_f08, only", 3, "MPI is used in src/communicator and src/hdf5 only"),

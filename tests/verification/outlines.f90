@@ -1,6 +1,6 @@
 !> Outlines of bodies and phrases of namelists that the verification benchmarks share.
 module outlines
-   use polydem_kinds, only: ip, wp
+   use polydem_kinds, only: wp
    use polydem_strings, only: to_text
    implicit none
    private
