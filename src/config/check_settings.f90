@@ -2,7 +2,7 @@
 module polydem_check_settings
    use polydem_entry_row, only: row_of
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_kinds, only: ip, wp
+   use polydem_kinds, only: ip, lp, wp
    use polydem_namelist_values, only: value_t
    use polydem_settings, only: scene_settings_t, settings_t
    implicit none
@@ -14,7 +14,7 @@ module polydem_check_settings
    !> Upper limit of the length of a container in long axes of a grain. Longer containers need too much time to fill
    real(wp), parameter :: length_limit = 1.0e5_wp
    !> Upper limit of the number of corners of all polygons, of which half the range of integers can count
-   real(wp), parameter :: corner_limit = 2.0_wp**30
+   integer(lp), parameter :: corner_limit = 2_lp**30
    !> Angle of a full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586_wp
    !> Lower limit of the restitution. Below it, the stable time step is proportional to the square root of the
@@ -95,7 +95,7 @@ contains
       type(value_t), intent(in) :: values(:)
       type(error_t), allocatable, intent(inout) :: error
 
-      call require(real(number, wp)*real(scene%corners_max, wp) <= corner_limit, &
+      call require(int(number, lp)*int(scene%corners_max, lp) <= corner_limit, &
          'must not exceed 2^30 corners divided by', key, 'corners_max', values, error)
    end subroutine check_corners
 
