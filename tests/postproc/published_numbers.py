@@ -48,8 +48,9 @@ def disagreements(folder):
     claims, reasons = rows_of(tables / "claims.csv"), {row["claim"]: row for row in rows_of(tables / "reasons.csv")}
     found = [f"row of {row['claim']}" for row, said in zip(claims, claims_of(page), strict=True) if row != said]
     for row in claims:
+        reason = reasons[row["claim"]]["reason"]
         said = f"**{row['claim']}** {row['says']}. *Rule:* {reasons[row['claim']]['rule']}. " \
-               f"*Verdict:* {row['verdict']}. {reasons[row['claim']]['reason'].removeprefix('-')}".rstrip()
+               f"*Verdict:* {row['verdict']}. {'' if reason == '-' else reason}".rstrip()
         if said not in page.splitlines():
             found.append(f"reason of {row['claim']}")
     listed = set(re.findall(r"\]\(tables/(\w+\.csv)\)", page))

@@ -23,7 +23,12 @@ behind the verdicts. `./polydem paper {mode} --publish` wrote it; do not edit it
 * *Comparison*: times of the publication belong to the program and the scenes of its authors, times on this page to
   polydem and its own drums. A verdict judges a statement, not their measurement. Run `./polydem paper` elsewhere, and
   give the folders of both machines to `./polydem tables`: its tables compare them.
+* *Elsewhere*: the report of the comparison also holds speed against error and the verification benchmarks, which have
+  pages of their own.
 """
+
+#: Beginnings of the names of tables and figures that stand on other pages
+ELSEWHERE = ("workprecision", "verification")
 
 
 def publish(contents: Contents, mode: str, report: Path, folder: Path) -> Path:
@@ -35,9 +40,9 @@ def publish(contents: Contents, mode: str, report: Path, folder: Path) -> Path:
         (folder / TABLES).mkdir(parents=True, exist_ok=True)
         for old in [*folder.glob("*.png"), *(folder / TABLES).glob("*.csv")]:
             old.unlink()
-        for drawing in contents.drawings:
+        for drawing in _here(contents.drawings):
             shutil.copyfile(report / "figures" / f"{drawing.name}.png", folder / f"{drawing.name}.png")
-        for name in [*(f"{table.name}.csv" for table in contents.tables), "revision.txt"]:
+        for name in [*(f"{table.name}.csv" for table in _here(contents.tables)), "revision.txt"]:
             shutil.copyfile(report / "tables" / name, folder / TABLES / name)
         page.write_text(written(contents, mode), encoding="utf-8")
     except OSError as error:
@@ -53,10 +58,15 @@ def written(contents: Contents, mode: str) -> str:
     claims = contents.document.split("\n", 2)[2]
     head = HEAD.format(mode=f"--{mode}", machine=machine, load=load, origin=contents.origin)
     lines = [head, claims, "## Figures", ""]
-    for drawing in contents.drawings:
+    for drawing in _here(contents.drawings):
         lines += [f"![{drawing.name}]({drawing.name}.png)", "", drawing.caption, ""]
     lines += ["## Tables", "", f"The folder [{TABLES}]({TABLES}) holds all tables as comma-separated values:", "",
               "| file | contents |", "|---|---|"]
     lines += [f"| [{table.name}.csv]({TABLES}/{table.name}.csv) | {table.title} |"
-              for table in sorted(contents.tables, key=lambda each: each.name)]
+              for table in sorted(_here(contents.tables), key=lambda each: each.name)]
     return "\n".join(lines) + "\n"
+
+
+def _here(things: list) -> list:
+    """Tables or figures that the page shows."""
+    return [each for each in things if not each.name.startswith(ELSEWHERE)]
