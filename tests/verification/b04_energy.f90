@@ -34,13 +34,15 @@ contains
       call table%begin('B4', 'energy of an elastic impact on a corner')
       do k = 1, size(products)
          call fall(table, 'conservative', products(k)/frequency, worst(k), change(k))
-         call table%show('conservative law, w0 dt = '//to_text(products(k), 2)//': greatest relative error of energy', worst(k))
+         call table%show('conservative law, w0 dt = '//to_text(products(k), 2)//': greatest relative error of energy', &
+                         worst(k))
       end do
       call table%expect_least('conservative law: order of that, last three halvings', 1.9_wp, &
                               log(worst(1)/worst(4))/log(8.0_wp))
       do k = 1, size(products)
          call fall(table, 'area', products(k)/frequency, worst(k), change(k))
-         call table%show('area law, w0 dt = '//to_text(products(k), 2)//': relative error of energy after impact', change(k))
+         call table%show('area law, w0 dt = '//to_text(products(k), 2)//': relative error of energy after impact', &
+                         change(k))
       end do
       call table%expect_relative('area law: that error at the largest step over that at the smallest', 1.0_wp, &
                                  change(1)/change(4), 0.05_wp)
