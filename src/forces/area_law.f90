@@ -10,7 +10,7 @@ module polydem_area_law
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_elementary, only: hypotenuse
-   use polydem_force_part, only: force_part_t, stage_elastic
+   use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -120,28 +120,21 @@ contains
       end do
    end function greatest_ratio
 
-   !> Depth at which a flat contact carries a load at rest [m]: inverse of Matuttis & Chen 2014, Eq. 7.6.
+   !> Depth at which a flat contact carries a block at rest [m]: inverse of Matuttis & Chen 2014, Eq. 7.6.
    !>
    !> The length l = 4 r1 r2/(r1 + r2) contains the distances of the two centres from the centroid of the overlap, which
    !> is d/2 inside either body. l depends weakly on the depth d, so a few fixed-point iterations converge to rounding.
-   real(wp) function static_depth(self, load, block, support, offset) result(depth)
+   real(wp) function static_depth(self, block) result(depth)
       class(area_law_t), intent(in) :: self
-      !> Normal load per unit depth of the plane [N/m]
-      real(wp), intent(in) :: load
-      !> Width and height of the block, (2) [m]
-      real(wp), intent(in) :: block(2)
-      !> Width and thickness of the support, (2) [m]
-      real(wp), intent(in) :: support(2)
-      !> Distance of the two centres along the contact [m]
-      real(wp), intent(in) :: offset
+      type(resting_block_t), intent(in) :: block
       real(wp) :: r1, r2
       integer :: k
 
       depth = 0.0_wp
       do k = 1, 12
-         r1 = 0.5_wp*(block(2) - depth)
-         r2 = hypotenuse(0.5_wp*(support(2) - depth), offset)
-         depth = load/(self%stiffness*block(1))*4.0_wp*r1*r2/(r1 + r2)
+         r1 = 0.5_wp*(block%height - depth)
+         r2 = hypotenuse(0.5_wp*(block%support_height - depth), block%offset)
+         depth = block%load/(self%stiffness*block%width)*4.0_wp*r1*r2/(r1 + r2)
       end do
    end function static_depth
 

@@ -26,7 +26,7 @@ module polydem_conservative_law
    use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
-   use polydem_force_part, only: force_part_t, stage_elastic
+   use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -178,25 +178,16 @@ contains
       ratio = longest*longest/area
    end function longest_edge_over_area
 
-   !> Depth at which a flat contact of width w carries a load at rest, F l/(E w) [m]. The characteristic length is
+   !> Depth at which a flat contact of width w carries a block at rest, F l/(E w) [m]. The characteristic length is
    !> l = 2 s1 s2 min(s1, s2)/((s1 + s2) w), where s is the side of the square of a body's area.
-   real(wp) function static_depth(self, load, block, support, offset) result(depth)
+   real(wp) function static_depth(self, block) result(depth)
       class(conservative_law_t), intent(in) :: self
-      !> Normal load per unit depth of the plane [N/m]
-      real(wp), intent(in) :: load
-      !> Width and height of the block, (2) [m]
-      real(wp), intent(in) :: block(2)
-      !> Width and thickness of the support, (2) [m]
-      real(wp), intent(in) :: support(2)
-      !> Distance of the two centres along the contact [m] (not used)
-      real(wp), intent(in) :: offset
+      type(resting_block_t), intent(in) :: block
       real(wp) :: s1, s2
 
-      associate (unused_offset => offset)
-      end associate
-      s1 = sqrt(block(1)*block(2))
-      s2 = sqrt(support(1)*support(2))
-      depth = load/(self%stiffness*block(1))*(2.0_wp*s1*s2*min(s1, s2)/((s1 + s2)*block(1)))
+      s1 = sqrt(block%width*block%height)
+      s2 = sqrt(block%support_width*block%support_height)
+      depth = block%load/(self%stiffness*block%width)*(2.0_wp*s1*s2*min(s1, s2)/((s1 + s2)*block%width))
    end function static_depth
 
 end module polydem_conservative_law

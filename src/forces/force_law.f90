@@ -7,7 +7,7 @@ module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
    use polydem_conservative_law, only: conservative_law_t
-   use polydem_contact_block, only: block_size, contact_block_t, copy_motion, load_block, store_forces
+   use polydem_contact_block, only: contact_block_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_contacts, only: contacts_t
@@ -15,7 +15,7 @@ module polydem_force_law
    use polydem_damping_onset, only: damping_onset_t
    use polydem_errors, only: error_t
    use polydem_exact_friction, only: exact_friction_t
-   use polydem_force_part, only: force_part_t, stage_on_damping
+   use polydem_force_part, only: force_part_t, resting_block_t, stage_on_damping
    use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
    use polydem_matuttis_chen_damping, only: matuttis_chen_damping_t
@@ -26,7 +26,7 @@ module polydem_force_law
    use polydem_velocity_constraint, only: velocity_constraint_t
    implicit none
    private
-   public :: force_law_t, new_force_law, choose_parts, check_law, evaluate_law
+   public :: force_law_t, new_force_law, choose_parts, check_law
 
    !> A part of any type
    type :: part_holder_t
@@ -243,32 +243,6 @@ contains
       end do
    end subroutine apply
 
-   !> Compute the normal and tangential forces of a table of contacts.
-   subroutine evaluate_law(law, bodies, dt, contacts, history)
-      !> The law
-      type(force_law_t), intent(in) :: law
-      !> Bodies with the positions and velocities of this step
-      type(bodies_t), intent(in) :: bodies
-      !> Time since the last evaluation [s]; 0 at the start of a run
-      real(wp), intent(in) :: dt
-      !> Contacts; the columns from `inverse_length` on are set
-      type(contacts_t), intent(inout) :: contacts
-      !> Contact history
-      type(contact_history_t), intent(inout) :: history
-      type(contact_block_t) :: block
-      integer(ip) :: b, high
-
-      contacts%energy_is_quadratic = law%energy_is_quadratic
-      do high = contacts%n, 1_ip, -block_size
-         call load_block(bodies, contacts, max(1_ip, high - block_size + 1_ip), high, block)
-         call copy_motion(bodies, block)
-         call law%apply(bodies, dt, block, history)
-         do b = 1_ip, block%n
-            call store_forces(block, b, contacts, high - b + 1_ip)
-         end do
-      end do
-   end subroutine evaluate_law
-
    !> Add the springs and dashpots of all parts to those of a contact.
    subroutine stiffen(law, bodies, contacts, element)
       !> The law
@@ -287,23 +261,16 @@ contains
       if (allocated(law%constraint)) call law%constraint%stiffen(bodies, contacts, element)
    end subroutine stiffen
 
-   !> Depth at which a flat contact carries a load at rest [m]; 0 if no part carries a load
-   real(wp) function static_depth(law, load, block, support, offset) result(depth)
+   !> Depth at which a flat contact carries a block at rest [m]; 0 if no part carries a load
+   real(wp) function static_depth(law, block) result(depth)
       !> The law
       class(force_law_t), intent(in) :: law
-      !> Normal load per unit depth of the plane [N/m]
-      real(wp), intent(in) :: load
-      !> Width and height of the block, (2) [m]
-      real(wp), intent(in) :: block(2)
-      !> Width and thickness of the support, (2) [m]
-      real(wp), intent(in) :: support(2)
-      !> Distance of the two centres along the contact [m]
-      real(wp), intent(in) :: offset
+      type(resting_block_t), intent(in) :: block
       integer :: k
 
       depth = 0.0_wp
       do k = 1, size(law%parts)
-         depth = depth + law%parts(k)%part%static_depth(load, block, support, offset)
+         depth = depth + law%parts(k)%part%static_depth(block)
       end do
    end function static_depth
 

@@ -15,18 +15,29 @@
 module polydem_force_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t
-   use polydem_contact_block, only: contact_block_t, copy_motion, load_block, store_forces, block_size
-   use polydem_contacts, only: contacts_t
-   use polydem_kinds, only: ip, wp
+   use polydem_contact_block, only: contact_block_t
+   use polydem_kinds, only: wp
    use polydem_law_part, only: law_part_t
    implicit none
    private
-   public :: force_part_t, stage_elastic, stage_damping, stage_on_damping, stage_normal, stage_last
+   public :: force_part_t, resting_block_t, stage_elastic, stage_damping, stage_on_damping, stage_normal, stage_last
 
    !> Stages in the order in which they act: elastic repulsion, which sets `inverse_length` and `lever`; normal damping,
    !> which uses the repulsion only; changes of the damping; other normal forces, such as cohesion; friction and damping
    !> of tilts, which use the whole normal force
    integer, parameter :: stage_elastic = 1, stage_damping = 2, stage_on_damping = 3, stage_normal = 4, stage_last = 5
+
+   !> A rectangular block at rest on a support
+   type :: resting_block_t
+      !> Normal load per unit depth of the plane [N/m]
+      real(wp) :: load
+      !> Width and height of the block [m]
+      real(wp) :: width, height
+      !> Width, at least that of the block, and thickness of the support [m]
+      real(wp) :: support_width, support_height
+      !> Distance of the two centres along the contact [m]
+      real(wp) :: offset = 0.0_wp
+   end type resting_block_t
 
    !> One part of the force between two bodies in contact. The factory or `configure` sets all components
    type, abstract, extends(law_part_t) :: force_part_t
@@ -47,9 +58,7 @@ module polydem_force_part
    contains
       !> Add this part to the forces of a block of contacts
       procedure(add), deferred :: add
-      !> Add this part to the forces of a table of contacts
-      procedure, non_overridable :: add_to_table
-      !> Depth at which this part carries a load at rest
+      !> Depth at which this part carries a block at rest
       procedure :: static_depth
       !> Warning if no part of the law dissipates
       procedure :: undamped_warning
@@ -73,44 +82,12 @@ module polydem_force_part
 
 contains
 
-   !> Add this part to the forces of a table of contacts.
-   subroutine add_to_table(self, bodies, dt, contacts, history)
+   !> Depth at which this part of a flat contact carries a block at rest [m]. Default: 0, it carries no load
+   real(wp) function static_depth(self, block)
       class(force_part_t), intent(in) :: self
-      !> Bodies with the positions and velocities of this step
-      type(bodies_t), intent(in) :: bodies
-      !> Time since the last evaluation [s]; 0 at the start of a run
-      real(wp), intent(in) :: dt
-      !> Contacts of this step
-      type(contacts_t), intent(inout) :: contacts
-      !> Contact history
-      type(contact_history_t), intent(inout) :: history
-      type(contact_block_t) :: block
-      integer(ip) :: b, high
+      type(resting_block_t), intent(in) :: block
 
-      do high = contacts%n, 1_ip, -block_size
-         call load_block(bodies, contacts, max(1_ip, high - block_size + 1_ip), high, block)
-         call copy_motion(bodies, block)
-         call self%add(bodies, dt, block, history)
-         do b = 1_ip, block%n
-            call store_forces(block, b, contacts, high - b + 1_ip)
-         end do
-      end do
-   end subroutine add_to_table
-
-   !> Depth at which this part of a flat contact carries a load at rest [m]. Default: 0, it carries no load
-   real(wp) function static_depth(self, load, block, support, offset)
-      class(force_part_t), intent(in) :: self
-      !> Normal load per unit depth of the plane [N/m]
-      real(wp), intent(in) :: load
-      !> Width and height of the block, (2) [m]
-      real(wp), intent(in) :: block(2)
-      !> Width, at least that of the block, and thickness of the support, (2) [m]
-      real(wp), intent(in) :: support(2)
-      !> Distance of the two centres along the contact [m]
-      real(wp), intent(in) :: offset
-
-      associate (unused_self => self, unused_load => load, unused_block => block, unused_support => support, &
-                 unused_offset => offset)
+      associate (unused_self => self, unused_block => block)
       end associate
       static_depth = 0.0_wp
    end function static_depth

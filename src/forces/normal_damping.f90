@@ -13,7 +13,7 @@ module polydem_normal_damping
    use polydem_settings, only: forces_settings_t
    implicit none
    private
-   public :: normal_damping_t, block_size
+   public :: normal_damping_t
 
    !> A normal damping
    type, abstract, extends(force_part_t) :: normal_damping_t

@@ -2,27 +2,22 @@
 module polydem_static_depth
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_law, only: choose_parts, force_law_t
+   use polydem_force_part, only: resting_block_t
    use polydem_kinds, only: wp
    use polydem_settings, only: forces_settings_t
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: static_depth
+   public :: resting_block_t, static_depth
 
 contains
 
    !> Find the depth d at which the elastic force of a flat contact, E w d/l, balances a load.
-   subroutine static_depth(forces, load, block, support, offset, depth, error)
+   subroutine static_depth(forces, block, depth, error)
       !> Group &forces
       type(forces_settings_t), intent(in) :: forces
-      !> Normal load per unit depth of the plane [N/m]
-      real(wp), intent(in) :: load
-      !> Width w and height of the block, (2) [m]
-      real(wp), intent(in) :: block(2)
-      !> Width, at least w, and thickness of the support, (2) [m]
-      real(wp), intent(in) :: support(2)
-      !> Distance of the two centres along the contact [m]
-      real(wp), intent(in) :: offset
+      !> The block, of width w
+      type(resting_block_t), intent(in) :: block
       !> Depth d [m]
       real(wp), intent(out) :: depth
       !> Allocated if the depth is not less than the height of the block
@@ -30,10 +25,10 @@ contains
       type(force_law_t) :: law
 
       call choose_parts(forces, law)
-      depth = law%static_depth(load, block, support, offset)
-      if (depth >= 0.0_wp .and. depth < block(2)) return
-      call raise(error, input_error, 'a block of height '//to_text(block(2))//' m sinks deeper than its height '// &
-                 'under a load of '//to_text(load)//' N/m; increase stiffness in &forces, or '// &
+      depth = law%static_depth(block)
+      if (depth >= 0.0_wp .and. depth < block%height) return
+      call raise(error, input_error, 'a block of height '//to_text(block%height)//' m sinks deeper than its height '// &
+                 'under a load of '//to_text(block%load)//' N/m; increase stiffness in &forces, or '// &
                  'decrease height or density')
    end subroutine static_depth
 

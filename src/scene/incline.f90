@@ -8,7 +8,7 @@ module polydem_incline
    use polydem_errors, only: error_t
    use polydem_kinds, only: wp
    use polydem_settings, only: settings_t
-   use polydem_static_depth, only: static_depth
+   use polydem_static_depth, only: resting_block_t, static_depth
    use polydem_walls, only: rectangle
    implicit none
    private
@@ -34,8 +34,8 @@ contains
       associate (width => settings%scene%width, height => settings%scene%height, &
                  density => settings%scene%density, gravity => settings%forces%gravity)
          load = density*width*height*max(0.0_wp, gravity(1)*along(2) - gravity(2)*along(1))
-         call static_depth(settings%forces, load, [width, height], [(uphill + downhill)*width, height], &
-                           0.5_wp*(downhill - uphill)*width, depth, error)
+         call static_depth(settings%forces, resting_block_t(load, width, height, (uphill + downhill)*width, height, &
+                                                            0.5_wp*(downhill - uphill)*width), depth, error)
          if (allocated(error)) return
          call list%append(tilted(rectangle(-0.5_wp*width, 0.5_wp*width, -depth, height - depth), along), &
                           density=density, velocity=settings%scene%speed*along)

@@ -4,7 +4,7 @@ module polydem_stack
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: settings_t
-   use polydem_static_depth, only: static_depth
+   use polydem_static_depth, only: resting_block_t, static_depth
    use polydem_walls, only: rectangle
    implicit none
    private
@@ -23,22 +23,22 @@ contains
       type(body_list_t), intent(inout) :: list
       !> Allocated if the blocks are too heavy for the stiffness
       type(error_t), allocatable, intent(inout) :: error
-      real(wp) :: weight, bottom, support(2), depth
+      real(wp) :: weight, bottom, support, depth
       integer(ip) :: k
 
       bottom = 0.0_wp
       associate (n => settings%scene%bodies, width => settings%scene%width, height => settings%scene%height)
          weight = settings%scene%density*width*height*max(0.0_wp, -settings%forces%gravity(2))
-         support = [floor_width*width, height]
+         support = floor_width*width
          do k = 1_ip, n
-            call static_depth(settings%forces, real(n - k + 1_ip, wp)*weight, [width, height], support, 0.0_wp, depth, &
-                              error)
+            call static_depth(settings%forces, resting_block_t(real(n - k + 1_ip, wp)*weight, width, height, support, &
+                                                               height), depth, error)
             if (allocated(error)) return
             bottom = bottom - depth
             call list%append(rectangle(-0.5_wp*width, 0.5_wp*width, bottom, bottom + height), &
                              density=settings%scene%density)
             bottom = bottom + height
-            support(1) = width
+            support = width
          end do
          call list%append(rectangle(-0.5_wp*floor_width*width, 0.5_wp*floor_width*width, -height, 0.0_wp), &
                           fixed=.true.)

@@ -7,7 +7,7 @@ module polydem_line_lanes
    use polydem_kinds, only: bp, ip, sp, wp
    implicit none
    private
-   public :: pair_block, separate, overlapping, active, find_off, list_strays, draw, classify, find_states
+   public :: pair_block, overlapping, active, find_off, list_strays, draw, classify, find_states
 
    !> Classes of candidates; the sure ones are also their states in `polydem_candidates`
    integer(bp), parameter :: separate = 0_bp, overlapping = 1_bp, active = 2_bp

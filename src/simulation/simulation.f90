@@ -25,7 +25,7 @@ module polydem_simulation
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: simulation_t, relaxation_t, former_direction, time_of, compute_balance
+   public :: simulation_t, former_direction, time_of, compute_balance
    public :: sum_pairs, sum_contacts, sum_began, sum_ended, sum_degenerate
 
    !> Elements of `sums`: pairs, contacts, pairs that began, pairs that ended, contacts without direction

@@ -12,7 +12,7 @@ module polydem_contact_block
    use polydem_overlap_batch, only: lanes, overlap_columns_t
    implicit none
    private
-   public :: contact_block_t, block_size, load_block, store_forces, store_contact, copy_motion, is_exchanged
+   public :: contact_block_t, block_size, load_block, store_forces, store_contact, copy_motion
 
    !> Largest number of contacts in a block
    integer(ip), parameter :: block_size = lanes

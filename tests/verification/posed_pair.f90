@@ -1,12 +1,13 @@
 !> Two bodies in given poses and the elastic forces between them, without a time step.
 module posed_pair
+   use table_forces, only: evaluate_law
    use polydem_bodies, only: bodies_t, turn_bodies
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_find_contacts, only: find_contacts
-   use polydem_force_law, only: evaluate_law, force_law_t, new_force_law
+   use polydem_force_law, only: force_law_t, new_force_law
    use polydem_force_sums, only: assemble_forces, force_sums_t
    use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, wp

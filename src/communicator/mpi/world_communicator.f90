@@ -7,10 +7,7 @@ module polydem_world_communicator
    use polydem_mpi_communicator, only: mpi_communicator_t
    implicit none
    private
-   public :: create_world, communicator_description
-
-   !> Kind of communicator, for the log
-   character(len=*), parameter :: communicator_description = 'MPI'
+   public :: create_world
 
 contains
 

@@ -4,10 +4,8 @@ module polydem_world_communicator
    use polydem_errors, only: error_t, input_error, raise
    implicit none
    private
-   public :: create_world, communicator_description
+   public :: create_world
 
-   !> Kind of communicator, for the log
-   character(len=*), parameter :: communicator_description = 'no MPI'
    !> Environment variables in which Open MPI and other launchers store the number of processes
    character(len=*), parameter :: size_variables(*) = [character(len=20) :: 'OMPI_COMM_WORLD_SIZE', 'PMI_SIZE']
 
