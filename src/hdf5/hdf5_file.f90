@@ -29,7 +29,6 @@ module polydem_hdf5_file
       !> booleans of h5py. With `rows` only some rows along the slowest dimension are read.
       generic :: read => read_reals, read_real_table, read_real_block, read_integers, read_longs, &
          read_one_text
-      procedure :: read_rows
       procedure :: read_real_attribute
       procedure, private :: read_reals, read_real_table, read_real_block, read_integers, read_longs
       procedure, private :: read_one_text
@@ -53,8 +52,7 @@ contains
       call choose_rows(self%location_of(name), 1, rows, start, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1)))
-      call read_dataset(self%location_of(name), holds_reals, double_type(), start, extent, &
-                        c_loc(values), error)
+      call read_dataset(self%location_of(name), holds_reals, double_type(), start, extent, c_loc(values), error)
    end subroutine read_reals
 
    subroutine read_real_table(self, name, values, error, rows)
@@ -68,46 +66,22 @@ contains
       call choose_rows(self%location_of(name), 2, rows, start, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1), extent(2)))
-      call read_dataset(self%location_of(name), holds_reals, double_type(), start, extent, &
-                        c_loc(values), error)
+      call read_dataset(self%location_of(name), holds_reals, double_type(), start, extent, c_loc(values), error)
    end subroutine read_real_table
 
-   subroutine read_real_block(self, name, values, error)
+   subroutine read_real_block(self, name, values, error, rows)
       class(hdf5_file_t), intent(in) :: self
       character(len=*), intent(in) :: name
       real(dp), allocatable, target, intent(out) :: values(:, :, :)
       type(error_t), allocatable, intent(inout) :: error
-      integer(hsize_t), allocatable :: extent(:)
+      integer(lp), intent(in), optional :: rows(2)
+      integer(hsize_t), allocatable :: start(:), extent(:)
 
-      call expect_rank(self%location_of(name), 3, extent, error)
+      call choose_rows(self%location_of(name), 3, rows, start, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1), extent(2), extent(3)))
-      call read_dataset(self%location_of(name), holds_reals, double_type(), 0*extent, extent, &
-                        c_loc(values), error)
+      call read_dataset(self%location_of(name), holds_reals, double_type(), start, extent, c_loc(values), error)
    end subroutine read_real_block
-
-   !> Read some rows of a three-dimensional data set.
-   subroutine read_rows(self, name, first, n_rows, values, error)
-      class(hdf5_file_t), intent(in) :: self
-      !> Name of the data set
-      character(len=*), intent(in) :: name
-      !> First row along the slowest dimension, counted from 1
-      integer(ip), intent(in) :: first
-      !> Number of rows; rows first to first + n_rows - 1 must exist
-      integer(ip), intent(in) :: n_rows
-      !> Values of the rows, fastest dimension first
-      real(dp), allocatable, target, intent(out) :: values(:, :, :)
-      !> Allocated on failure, or if the data set has another number of dimensions
-      type(error_t), allocatable, intent(inout) :: error
-      integer(hsize_t), allocatable :: extent(:)
-
-      call expect_rank(self%location_of(name), 3, extent, error)
-      if (allocated(error)) return
-      extent(3) = int(n_rows, hsize_t)
-      allocate (values(extent(1), extent(2), extent(3)))
-      call read_dataset(self%location_of(name), holds_reals, double_type(), &
-                        [0_hsize_t, 0_hsize_t, int(first - 1_ip, hsize_t)], extent, c_loc(values), error)
-   end subroutine read_rows
 
    subroutine read_longs(self, name, values, error, rows)
       class(hdf5_file_t), intent(in) :: self
@@ -120,8 +94,7 @@ contains
       call choose_rows(self%location_of(name), 1, rows, start, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1)))
-      call read_dataset(self%location_of(name), holds_integers, long_type(), start, extent, &
-                        c_loc(values), error)
+      call read_dataset(self%location_of(name), holds_integers, long_type(), start, extent, c_loc(values), error)
    end subroutine read_longs
 
    !> Read 64-bit integers and check their range, because HDF5 clips values beyond 32 bits without an error.

@@ -34,14 +34,12 @@ module polydem_hdf5_writer
    contains
       procedure :: expect_rows
       !> Write a new data set, or append rows to an extendible one: write(name, values, error, unit, meaning, part,
-      !> rows). `part` is for lists and tables of numbers, `rows` for numbers.
-      generic :: write => write_real, write_reals, write_real_table, write_integer, write_integers, &
-         write_long, write_longs, write_long_table, write_bytes, write_text, write_text_list
+      !> rows). Numbers may have any rank; `part` is for arrays, `rows` for numbers and arrays of numbers.
+      generic :: write => write_reals, write_integers, write_longs, write_bytes, write_text, write_text_list
       !> Write an attribute of a group or data set: write_attribute(object, name, value, error)
       generic :: write_attribute => attach_text, attach_integer, attach_real
       procedure :: describe
-      procedure, private :: write_real, write_reals, write_real_table, write_integer, write_integers
-      procedure, private :: write_long, write_longs, write_long_table, write_bytes, write_text, write_text_list
+      procedure, private :: write_reals, write_integers, write_longs, write_bytes, write_text, write_text_list
       procedure, private :: attach_text, attach_integer, attach_real
       procedure, private :: put
    end type hdf5_writer_t
@@ -76,7 +74,8 @@ contains
 
       if (allocated(error)) return
       location = self%location_of(name)
-      extent = int(shape, hsize_t)
+      ! gfortran 12 passes an empty array constructor with the extent -1 to an array of assumed rank.
+      extent = int(max(0, shape), hsize_t)
       is_new = .true.
       if (present(rows)) then
          is_new = .not. self%has(name)
@@ -105,28 +104,16 @@ contains
       if (present(meaning)) call write_text_attribute(self%location_of(name), 'meaning', meaning, error)
    end subroutine describe
 
-   !> Write a number. The other forms of `write` differ only in kind and shape.
-   subroutine write_real(self, name, values, error, unit, meaning, rows)
+   !> Write a number or an array of numbers. The other forms of `write` for numbers differ only in kind.
+   subroutine write_reals(self, name, values, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       !> Name of the data set, like /frames/position
       character(len=*), intent(in) :: name
-      !> The value
-      real(dp), intent(in), target :: values
+      !> The values, of any rank
+      real(dp), intent(in), target, contiguous :: values(..)
       !> Allocated on failure; nothing happens if it is allocated before
       type(error_t), allocatable, intent(inout) :: error
       !> Attributes, written with a new data set
-      character(len=*), intent(in), optional :: unit, meaning
-      !> one_row: append a row to an extendible data set; a new data set if absent
-      integer, intent(in), optional :: rows
-
-      call self%put(name, double_type(), [integer ::], c_loc(values), error, unit, meaning, rows=rows)
-   end subroutine write_real
-
-   subroutine write_reals(self, name, values, error, unit, meaning, part, rows)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      real(dp), intent(in), target, contiguous :: values(:)
-      type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
       !> Part of the last dimension that this rank has; if absent, the values are equal on all ranks
       type(part_t), intent(in), optional :: part
@@ -139,36 +126,10 @@ contains
       call self%put(name, double_type(), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_reals
 
-   subroutine write_real_table(self, name, values, error, unit, meaning, part, rows)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      real(dp), intent(in), target, contiguous :: values(:, :)
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-      type(part_t), intent(in), optional :: part
-      integer, intent(in), optional :: rows
-      type(c_ptr) :: address
-
-      address = c_null_ptr
-      if (size(values) > 0) address = c_loc(values)
-      call self%put(name, double_type(), shape(values), address, error, unit, meaning, part, rows)
-   end subroutine write_real_table
-
-   subroutine write_integer(self, name, values, error, unit, meaning, rows)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer(ip), intent(in), target :: values
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-      integer, intent(in), optional :: rows
-
-      call self%put(name, integer_type(), [integer ::], c_loc(values), error, unit, meaning, rows=rows)
-   end subroutine write_integer
-
    subroutine write_integers(self, name, values, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
-      integer(ip), intent(in), target, contiguous :: values(:)
+      integer(ip), intent(in), target, contiguous :: values(..)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
@@ -180,21 +141,10 @@ contains
       call self%put(name, integer_type(), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_integers
 
-   subroutine write_long(self, name, values, error, unit, meaning, rows)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer(lp), intent(in), target :: values
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-      integer, intent(in), optional :: rows
-
-      call self%put(name, long_type(), [integer ::], c_loc(values), error, unit, meaning, rows=rows)
-   end subroutine write_long
-
    subroutine write_longs(self, name, values, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
-      integer(lp), intent(in), target, contiguous :: values(:)
+      integer(lp), intent(in), target, contiguous :: values(..)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
@@ -206,25 +156,10 @@ contains
       call self%put(name, long_type(), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_longs
 
-   subroutine write_long_table(self, name, values, error, unit, meaning, part, rows)
-      class(hdf5_writer_t), intent(in) :: self
-      character(len=*), intent(in) :: name
-      integer(lp), intent(in), target, contiguous :: values(:, :)
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=*), intent(in), optional :: unit, meaning
-      type(part_t), intent(in), optional :: part
-      integer, intent(in), optional :: rows
-      type(c_ptr) :: address
-
-      address = c_null_ptr
-      if (size(values) > 0) address = c_loc(values)
-      call self%put(name, long_type(), shape(values), address, error, unit, meaning, part, rows)
-   end subroutine write_long_table
-
    subroutine write_bytes(self, name, values, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
-      integer(bp), intent(in), target, contiguous :: values(:)
+      integer(bp), intent(in), target, contiguous :: values(..)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part

@@ -117,7 +117,8 @@ contains
       ! Several steps are read at once: in a compressed trace, one step costs as much as its whole chunk.
       n_rows = int(max(1_lp, block_numbers/(4_lp*extent(2))), ip)
       do first = 1_ip, trace%n_steps, n_rows
-         call file%read_rows('/aabb', first, min(n_rows, trace%n_steps - first + 1_ip), bounds, error)
+         call file%read('/aabb', bounds, error, &
+                        [int(first - 1_ip, lp), int(min(n_rows, trace%n_steps - first + 1_ip), lp)])
          if (allocated(error)) return
          do s = 1_ip, size(bounds, 3, kind=ip)
             trace%bounds(:, :, first + s - 1_ip) = real(bounds(:, :, s), wp)
