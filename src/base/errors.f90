@@ -32,7 +32,6 @@ contains
 
    !> Report a failure. An error that is already allocated is kept.
    pure subroutine raise(error, code, message)
-      !> Error to allocate
       type(error_t), allocatable, intent(inout) :: error
       !> run_error, input_error, io_error or stopped_early
       integer, intent(in) :: code

@@ -60,12 +60,14 @@ module polydem_serializer
       end subroutine transfer_reals
 
       !> Save or restore integers. A failure is stored in `error`.
-      subroutine transfer_longs(self, name, values, unit, meaning)
+      subroutine transfer_longs(self, name, width, values, unit, meaning)
          import :: serializer_t, lp
          class(serializer_t), intent(inout) :: self
          !> Name of the column
          character(len=*), intent(in) :: name
-         !> The numbers, row after row; the group determines the number of rows, and all rows have the same length
+         !> Numbers per row: more than 1 for the bits of numbers wider than double precision
+         integer, intent(in) :: width
+         !> The numbers, row after row; their count is a multiple of width
          integer(lp), intent(inout), contiguous :: values(:)
          !> Unit and meaning, which are stored with the column
          character(len=*), intent(in) :: unit, meaning
@@ -162,7 +164,8 @@ contains
       if (self%has_failed()) return
       if (storage_size(values) > storage_size(1.0_dp)) then
          words = transfer(values, [0_lp])
-         call self%transfer_longs(name, words, unit, meaning//'; bits of the working precision')
+         call self%transfer_longs(name, width*(storage_size(values)/storage_size(1_lp)), words, unit, &
+                                  meaning//'; bits of the working precision')
          if (self%is_reading .and. .not. allocated(self%error)) values = transfer(words, values, n)
       else
          doubles = real(values, dp)
@@ -178,7 +181,7 @@ contains
       character(len=*), intent(in) :: unit, meaning
 
       if (self%has_failed()) return
-      call self%transfer_longs(name, values, unit, meaning)
+      call self%transfer_longs(name, 1, values, unit, meaning)
       if (.not. self%is_reading .or. allocated(self%error)) return
       if (any(values > max_magnitude .or. values < -max_magnitude)) call raise(self%error, input_error, name//' ('// &
          meaning//') holds integers beyond 2^62: the data are damaged')
@@ -240,7 +243,7 @@ contains
 
       if (self%has_failed()) return
       allocate (saved_values, source=values)
-      call self%transfer_longs(name, saved_values, unit, meaning)
+      call self%transfer_longs(name, 1, saved_values, unit, meaning)
       if (allocated(self%error)) return
       if (any(saved_values /= values)) call raise(self%error, input_error, name//' ('//meaning// &
          ') differs from the saved state')

@@ -48,7 +48,6 @@ contains
       logical, intent(in) :: live
       !> Number of steps; 0: all steps of the trace
       integer(ip), intent(in) :: steps
-      !> Subject of the samples
       type(subject_t), intent(out) :: subject
       !> Allocated if the scene cannot be run or read
       type(error_t), allocatable, intent(inout) :: error
@@ -70,7 +69,6 @@ contains
    subroutine load_trace(path, subject, error, steps)
       !> Path of the trace (HDF5)
       character(len=*), intent(in) :: path
-      !> Subject of the samples
       type(subject_t), intent(inout) :: subject
       !> Allocated if the file cannot be read
       type(error_t), allocatable, intent(inout) :: error
@@ -176,7 +174,6 @@ contains
    !> Compute the reference lists: by comparing all pairs at the steps of `all_pairs_steps`, by the first finder at the
    !> others.
    subroutine find_reference(subject, finder, error)
-      !> Subject of the samples
       type(subject_t), intent(inout) :: subject
       !> Name of the first finder
       character(len=*), intent(in) :: finder
@@ -202,7 +199,6 @@ contains
 
    !> Set the properties of all cases that follow from the reference lists.
    subroutine complete_case(subject)
-      !> Subject of the samples
       type(subject_t), intent(inout) :: subject
 
       associate (case => subject%case, reference => subject%reference)
@@ -216,7 +212,6 @@ contains
 
    !> Take one sample. Repeat 0 checks every list.
    subroutine take_sample(subject, sample, error)
-      !> Subject of the samples
       type(subject_t), intent(inout) :: subject
       !> The sample; its case is set on entry
       type(sample_t), intent(inout) :: sample

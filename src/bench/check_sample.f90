@@ -16,7 +16,6 @@ contains
    subroutine check_sample(path, case, provenance, error)
       !> Path of the sample
       character(len=*), intent(in) :: path
-      !> The present case
       type(case_t), intent(in) :: case
       !> The present program and machine
       type(provenance_t), intent(in) :: provenance

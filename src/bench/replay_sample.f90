@@ -26,7 +26,6 @@ contains
 
    !> Replay a trace once.
    subroutine replay_sample(trace, boxes, checked, reference, sample, error)
-      !> Recorded boxes
       type(trace_t), intent(in) :: trace
       !> Boxes of the trace: on entry of any step, on return of the last one
       type(boxes_t), intent(inout) :: boxes
@@ -108,7 +107,6 @@ contains
       integer(ip), intent(in) :: n_steps
       !> Whether the sample has hashes and finder statistics
       logical, intent(in) :: checked
-      !> Clock of the steps
       type(step_clock_t), intent(inout) :: clock
       type(sample_t), intent(inout) :: sample
 
@@ -126,9 +124,7 @@ contains
 
    !> Boxes of the first step of a trace
    subroutine first_boxes(trace, boxes)
-      !> Recorded boxes
       type(trace_t), intent(in) :: trace
-      !> The boxes
       type(boxes_t), intent(out) :: boxes
 
       boxes%n = size(trace%fixed, kind=ip)

@@ -72,7 +72,6 @@ contains
    pure function sample_path(folder, case) result(path)
       !> Folder of the samples
       character(len=*), intent(in) :: folder
-      !> Case of the sample
       type(case_t), intent(in) :: case
       character(len=:), allocatable :: path
 
@@ -86,7 +85,6 @@ contains
       type(sample_t), intent(in) :: sample
       !> Names of the phases and counts of finders
       character(len=*), intent(in) :: phase_names(:), count_names(:)
-      !> Program and machine
       type(provenance_t), intent(in) :: provenance
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file

@@ -38,11 +38,8 @@ contains
 
    !> Read the values of an entry and check them against its row.
    pure subroutine read_value(entry, statement, value, error)
-      !> Row of the entry
       type(entry_t), intent(in) :: entry
-      !> Statement that gives the values
       type(statement_t), intent(in) :: statement
-      !> Checked value
       type(value_t), intent(inout) :: value
       !> Wrong number of values, wrong type, not finite, out of bounds, or no valid choice
       type(error_t), allocatable, intent(inout) :: error
@@ -75,7 +72,6 @@ contains
 
    !> Name of an entry in messages
    pure function label(entry) result(text)
-      !> Row of the entry
       type(entry_t), intent(in) :: entry
       character(len=:), allocatable :: text
 
@@ -84,7 +80,6 @@ contains
 
    !> Whether the values of an entry are words or paths
    pure logical function is_text(entry)
-      !> Row of the entry
       type(entry_t), intent(in) :: entry
 
       is_text = entry%type == 'word' .or. entry%type == 'path'
@@ -287,9 +282,7 @@ contains
 
    !> A value in namelist syntax. Reading this text gives the same bits
    pure function value_text(entry, value) result(text)
-      !> Row of the entry
       type(entry_t), intent(in) :: entry
-      !> Value of the entry
       type(value_t), intent(in) :: value
       character(len=:), allocatable :: text
       type(text_t), allocatable :: words(:)

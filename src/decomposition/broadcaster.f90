@@ -32,14 +32,15 @@ contains
    end subroutine transfer_reals
 
    !> Broadcast integers from the root rank.
-   subroutine transfer_longs(self, name, values, unit, meaning)
+   subroutine transfer_longs(self, name, width, values, unit, meaning)
       class(broadcaster_t), intent(inout) :: self
       character(len=*), intent(in) :: name
+      integer, intent(in) :: width
       integer(lp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
 
       call self%comm%broadcast(values)
-      associate (unused => name//unit//meaning)
+      associate (unused => name//unit//meaning, unused_width => width)
       end associate
    end subroutine transfer_longs
 

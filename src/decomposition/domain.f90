@@ -67,7 +67,6 @@ contains
    !> Start a domain. In a run on several ranks the first redistribution is in the first step.
    subroutine new_domain(domain, settings, median_diameter, comm, error)
       type(domain_t), intent(out) :: domain
-      !> Group &decomposition
       type(decomposition_settings_t), intent(in) :: settings
       !> Median diameter of the free bodies of the run [m]
       real(wp), intent(in) :: median_diameter

@@ -1,8 +1,8 @@
-!> Migration buffer: transfers the variable fields of bodies between ranks.
+!> Migration buffer: transfers fields of bodies between ranks.
 !>
 !> The buffer is a serializer and is used in three steps. First it stores the rows of some slots of all columns over
-!> /bodies. Then `move` sends them to their new ranks, all-to-all. Finally, called with the same columns in the same
-!> order, it restores the received rows to other slots. Values of the whole run are ignored.
+!> /bodies. Then `move` sends them to their new ranks, all-to-all, if necessary. Finally, after `restore_to` and called
+!> with the same columns in the same order, it restores the rows to other slots. Values of the whole run are ignored.
 module polydem_migration_buffer
    use polydem_communicator, only: communicator_t
    use polydem_kinds, only: dp, ip, lp
@@ -19,8 +19,7 @@ module polydem_migration_buffer
 
    !> Migration buffer
    type, extends(serializer_t) :: migration_buffer_t
-      !> Before `move`: slots of the rows to send, in the order of the destination ranks. Afterwards: slots of the
-      !> received rows, in the order of the source ranks; to be set by the caller
+      !> Slots of the rows to store, in the order of the destination ranks; later the slots to which they are restored
       integer(ip), allocatable :: slots(:)
       !> All columns so far
       type(column_t), allocatable, private :: columns(:)
@@ -28,6 +27,8 @@ module polydem_migration_buffer
       integer, private :: last = 0
    contains
       procedure :: move
+      procedure :: append
+      procedure :: restore_to
       procedure :: transfer_reals
       procedure :: transfer_longs
    end type migration_buffer_t
@@ -37,14 +38,15 @@ module polydem_migration_buffer
 
 contains
 
-   !> Exchange the rows between ranks, and switch from storing to restoring. Collective.
-   subroutine move(self, comm, counts)
+   !> Exchange the rows between ranks. Collective.
+   subroutine move(self, comm, counts, counts_received)
       class(migration_buffer_t), intent(inout) :: self
       class(communicator_t), intent(inout) :: comm
       !> Number of rows for each rank, (0:size - 1)
       integer(ip), intent(in) :: counts(0:)
+      !> Number of rows from each rank, (0:size - 1); the rows are in the order of these ranks
+      integer(ip), allocatable, intent(out) :: counts_received(:)
       integer(lp), allocatable :: sent(:, :), received(:, :)
-      integer(ip), allocatable :: counts_received(:)
       integer :: k, first, width(size(self%columns))
 
       do k = 1, size(self%columns)
@@ -62,9 +64,32 @@ contains
          self%columns(k)%word = received(first:first + width(k) - 1, :)
          first = first + width(k)
       end do
+   end subroutine move
+
+   !> Append the rows of another buffer with the same columns.
+   subroutine append(self, other)
+      class(migration_buffer_t), intent(inout) :: self
+      !> The other buffer
+      type(migration_buffer_t), intent(in) :: other
+      integer :: k
+
+      do k = 1, size(self%columns)
+         associate (word => self%columns(k)%word, more => other%columns(k)%word)
+            self%columns(k)%word = reshape([word, more], [size(word, 1), size(word, 2) + size(more, 2)])
+         end associate
+      end do
+   end subroutine append
+
+   !> Switch to restoring, from the first column on.
+   subroutine restore_to(self, slots)
+      class(migration_buffer_t), intent(inout) :: self
+      !> Slot of each row
+      integer(ip), intent(in) :: slots(:)
+
+      self%slots = slots
       self%is_reading = .true.
       self%last = 0
-   end subroutine move
+   end subroutine restore_to
 
    !> Store a column of real numbers, or restore it.
    subroutine transfer_reals(self, name, width, values, unit, meaning)
@@ -84,14 +109,15 @@ contains
    end subroutine transfer_reals
 
    !> Store a column of integers, or restore it.
-   subroutine transfer_longs(self, name, values, unit, meaning)
+   subroutine transfer_longs(self, name, width, values, unit, meaning)
       class(migration_buffer_t), intent(inout) :: self
       character(len=*), intent(in) :: name
+      integer, intent(in) :: width
       integer(lp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
 
       if (index(name, of_bodies) /= 1) return
-      call transfer_words(self, 1, values)
+      call transfer_words(self, width, values)
       associate (unused => unit//meaning)
       end associate
    end subroutine transfer_longs

@@ -38,7 +38,6 @@ contains
    !> Copy the parameters from the settings.
    subroutine configure(self, settings)
       class(area_law_t), intent(inout) :: self
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
 
       self%stage = stage_elastic
@@ -48,13 +47,10 @@ contains
    !> Set the characteristic length and add the elastic force. It acts at the centroid of the overlap.
    subroutine add(self, bodies, dt, block, history)
       class(area_law_t), intent(in) :: self
-      !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
-      !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
       !> Contacts; `inverse_length`, `lever`, `elastic` and `normal_force` change
       type(contact_block_t), intent(inout) :: block
-      !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
       real(wp) :: length(block_size), r1, r2, least, force
       integer(ip) :: c
@@ -90,7 +86,6 @@ contains
       class(area_law_t), intent(in) :: self
       !> Bodies, for the shape of the body of an expected contact
       type(bodies_t), intent(in) :: bodies
-      !> Contacts (not used)
       type(contacts_t), intent(in) :: contacts
       !> The contact; its normal stiffness changes, and its ratio if it is an expected contact
       type(contact_element_t), intent(inout) :: element

@@ -93,9 +93,7 @@ contains
       !> Programme. Inputs: `free`, `tolerance`, and the first guess `force`, which must be within its bounds. Results:
       !> `force`, `velocity` and `residual`
       type(box_qp_t), intent(inout) :: self
-      !> Network of the contacts
       type(friction_network_t), intent(in) :: network
-      !> Contacts of each body
       type(incidence_t), intent(in) :: incidence
       !> Whether the residual is within the tolerance
       logical, intent(out) :: solved

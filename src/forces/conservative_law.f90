@@ -55,7 +55,6 @@ contains
    !> Copy the parameters from the settings.
    subroutine configure(self, settings)
       class(conservative_law_t), intent(inout) :: self
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
 
       self%stage = stage_elastic
@@ -97,13 +96,10 @@ contains
    !> if they are equally near.
    subroutine add(self, bodies, dt, block, history)
       class(conservative_law_t), intent(in) :: self
-      !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
-      !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
       !> Contacts with the effective area; `inverse_length`, `lever`, `elastic` and `normal_force` change
       type(contact_block_t), intent(inout) :: block
-      !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
       real(wp) :: p, q, force, moment_first, moment_second, nearer
       integer(ip) :: c

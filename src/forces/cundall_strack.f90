@@ -46,7 +46,6 @@ contains
    !> Copy the parameters from the settings.
    subroutine configure(self, settings)
       class(cundall_strack_t), intent(inout) :: self
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
 
       self%stage = stage_last
@@ -72,7 +71,6 @@ contains
       class(cundall_strack_t), intent(in) :: self
       !> Bodies, for their masses and velocities
       type(bodies_t), intent(in) :: bodies
-      !> Time since the last evaluation [s]
       real(wp), intent(in) :: dt
       !> Contacts; `tangential_force` changes
       type(contact_block_t), intent(inout) :: block
@@ -130,9 +128,7 @@ contains
    !> Add the spring and its dashpot.
    subroutine stiffen(self, bodies, contacts, element)
       class(cundall_strack_t), intent(in) :: self
-      !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
-      !> Contacts (not used)
       type(contacts_t), intent(in) :: contacts
       !> The contact; tangential stiffness and dashpot change
       type(contact_element_t), intent(inout) :: element

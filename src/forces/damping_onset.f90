@@ -38,7 +38,6 @@ contains
    !> Weight the damping of new contacts, limit the normal force to repulsion, and store the areas.
    subroutine add(self, bodies, dt, block, history)
       class(damping_onset_t), intent(in) :: self
-      !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0: no contact is new
       real(wp), intent(in) :: dt

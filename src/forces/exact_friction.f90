@@ -74,7 +74,6 @@ contains
    !> Copy the parameters from the settings.
    subroutine configure(self, settings)
       class(exact_friction_t), intent(inout) :: self
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
 
       self%coefficient = settings%friction_coefficient
@@ -84,9 +83,7 @@ contains
    !> Refuse integration schemes without a velocity in the middle of a step, and several ranks.
    subroutine check(self, settings, n_processes, error)
       class(exact_friction_t), intent(in) :: self
-      !> All settings of the run
       type(settings_t), intent(in) :: settings
-      !> Number of ranks
       integer(ip), intent(in) :: n_processes
       !> Allocated if a setting is refused; names the entry and the remedy
       type(error_t), allocatable, intent(inout) :: error
@@ -114,9 +111,7 @@ contains
    !> Compute the friction of all contacts.
    subroutine apply(self, dt, incidence, bodies, contacts, history, error)
       class(exact_friction_t), intent(inout) :: self
-      !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Contacts of each body
       type(incidence_t), intent(in) :: incidence
       !> Bodies with predicted positions and velocities, and all other forces
       type(bodies_t), intent(in) :: bodies
@@ -154,7 +149,6 @@ contains
    !> Set the counters of the solver.
    subroutine report(self, counters)
       class(exact_friction_t), intent(in) :: self
-      !> Counters of the run
       type(counters_t), intent(inout) :: counters
 
       call counters%set('friction steps', self%n_solved, over_steps)

@@ -70,11 +70,9 @@ contains
 
    !> Create the law that the settings ask for. It contains no other parts.
    subroutine new_force_law(settings, bodies, law)
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
       !> Bodies, for their shapes
       type(bodies_t), intent(in) :: bodies
-      !> The law
       type(force_law_t), intent(out) :: law
 
       call choose_parts(settings, law)
@@ -84,9 +82,7 @@ contains
    !> Choose the parts that the settings ask for, from the list of all parts. The law must `measure` the bodies before
    !> it computes forces.
    subroutine choose_parts(settings, law)
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
-      !> The law
       type(force_law_t), intent(out) :: law
 
       associate (s => settings)
@@ -118,7 +114,6 @@ contains
       class(force_law_t), intent(inout) :: law
       !> The part with its name
       class(force_part_t), intent(in) :: new
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
       type(part_holder_t), allocatable :: longer(:)
       class(force_part_t), allocatable :: part
@@ -142,11 +137,9 @@ contains
 
    !> Set the constraint, with the parameters of the settings. A law has at most one.
    subroutine add_constraint(law, new, settings)
-      !> The law
       class(force_law_t), intent(inout) :: law
       !> The constraint with its name
       class(velocity_constraint_t), intent(in) :: new
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
 
       if (allocated(law%constraint)) deallocate (law%constraint)
@@ -156,7 +149,6 @@ contains
 
    !> Collect the requirements, the contact history and the names of the parts.
    subroutine collect_needs(law)
-      !> The law
       class(force_law_t), intent(inout) :: law
       integer :: k
 
@@ -187,7 +179,6 @@ contains
 
    !> Let the parts measure the bodies.
    subroutine measure(law, bodies)
-      !> The law
       class(force_law_t), intent(inout) :: law
       !> Bodies, for their shapes
       type(bodies_t), intent(in) :: bodies
@@ -201,7 +192,6 @@ contains
 
    !> Refuse settings that exclude a part of the law.
    subroutine check_law(settings, n_processes, error)
-      !> All settings of the run
       type(settings_t), intent(in) :: settings
       !> Number of ranks
       integer(ip), intent(in) :: n_processes
@@ -219,7 +209,6 @@ contains
 
    !> Compute the normal and tangential forces of a block of contacts.
    subroutine apply(law, bodies, dt, block, history)
-      !> The law
       class(force_law_t), intent(in) :: law
       !> Bodies with the positions and velocities of this step
       type(bodies_t), intent(in) :: bodies
@@ -245,13 +234,10 @@ contains
 
    !> Add the springs and dashpots of all parts to those of a contact.
    subroutine stiffen(law, bodies, contacts, element)
-      !> The law
       class(force_law_t), intent(in) :: law
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Contacts with their forces; empty for an expected contact
       type(contacts_t), intent(in) :: contacts
-      !> The contact
       type(contact_element_t), intent(inout) :: element
       integer :: k
 
@@ -263,7 +249,6 @@ contains
 
    !> Depth at which a flat contact carries a block at rest [m]; 0 if no part carries a load
    real(wp) function static_depth(law, block) result(depth)
-      !> The law
       class(force_law_t), intent(in) :: law
       type(resting_block_t), intent(in) :: block
       integer :: k
@@ -276,7 +261,6 @@ contains
 
    !> Warning of a law without dissipation; blank if there is none
    function undamped_warning(law) result(warning)
-      !> The law
       class(force_law_t), intent(in) :: law
       character(len=:), allocatable :: warning
       integer :: k

@@ -53,13 +53,10 @@ contains
 
    !> Factorise the mobilities of the contacts whose force is below its limit.
    subroutine build_factor(network, incidence, force, factor)
-      !> Network
       type(friction_network_t), intent(in) :: network
-      !> Contacts of each body
       type(incidence_t), intent(in) :: incidence
       !> Tangential force of each contact [N/m]
       real(wp), intent(in), contiguous :: force(:)
-      !> Factor
       type(friction_factor_t), intent(inout) :: factor
       integer(ip) :: k, low, high
 
@@ -79,7 +76,6 @@ contains
 
    !> Solve L D L' z = r. The threads of a parallel region share the work.
    subroutine apply_factor(factor, residual, solution)
-      !> Factor
       type(friction_factor_t), intent(in) :: factor
       !> Right-hand side r, (contact) [m/s]; 0 for contacts at their bounds
       real(wp), intent(in), contiguous :: residual(:)

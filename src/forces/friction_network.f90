@@ -67,11 +67,9 @@ contains
       real(wp), intent(in) :: dt
       !> Friction coefficient mu
       real(wp), intent(in) :: coefficient
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Contacts with their normal forces
       type(contacts_t), intent(in) :: contacts
-      !> Network to rebuild
       type(friction_network_t), intent(inout) :: network
       integer(ip) :: c, s
 
@@ -186,9 +184,7 @@ contains
 
    !> Compute the velocities due to tangential forces, h M^-1 H f. The threads of a parallel region share the work.
    subroutine push_bodies(network, incidence, force, push)
-      !> Network
       type(friction_network_t), intent(in) :: network
-      !> Contacts of each body
       type(incidence_t), intent(in) :: incidence
       !> Tangential force of each contact [N/m]
       real(wp), intent(in), contiguous :: force(:)
@@ -222,7 +218,6 @@ contains
 
    !> Do one sweep of projected Gauss-Seidel: each contact in turn gets the force that stops its slip, within its limit.
    subroutine sweep_contacts(network, force, velocity)
-      !> Network
       type(friction_network_t), intent(in) :: network
       !> Tangential force of each contact [N/m]
       real(wp), intent(inout), contiguous :: force(:)
@@ -248,7 +243,6 @@ contains
 
    !> Compute the slip velocities of a range of contacts, u = H' v.
    pure subroutine slip_of_contacts(network, velocity, low, high, slip)
-      !> Network
       type(friction_network_t), intent(in) :: network
       !> Velocities, (3, slot)
       real(wp), intent(in), contiguous :: velocity(:, :)
@@ -266,7 +260,6 @@ contains
    !> Find the greatest avoidable slip beyond rounding errors, and the greatest slip velocity that the friction of one
    !> contact removes from its own bodies in a step.
    subroutine measure_slip(network, force, velocity, residual, scale)
-      !> Network
       type(friction_network_t), intent(in) :: network
       !> Tangential force of each contact [N/m]
       real(wp), intent(in), contiguous :: force(:)

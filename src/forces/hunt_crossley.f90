@@ -28,13 +28,9 @@ contains
    !> Compute the damping forces of one block of contacts.
    subroutine find_forces(self, dt, block, history, force)
       class(hunt_crossley_t), intent(in) :: self
-      !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
-      !> Contacts with their elastic forces
       type(contact_block_t), intent(in) :: block
-      !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
-      !> Damping force of each contact [N/m]
       real(wp), intent(inout) :: force(block_size)
       real(wp) :: share
       integer(ip) :: c
@@ -52,9 +48,7 @@ contains
    !> Add stiffness and dashpot from the present force. An expected contact has no force and gets neither.
    subroutine stiffen(self, bodies, contacts, element)
       class(hunt_crossley_t), intent(in) :: self
-      !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
-      !> Contacts with their forces
       type(contacts_t), intent(in) :: contacts
       !> The contact; normal stiffness and dashpot change
       type(contact_element_t), intent(inout) :: element

@@ -40,7 +40,6 @@ contains
    !> Copy the parameters from the settings. Default: there are none.
    subroutine configure(self, settings)
       class(law_part_t), intent(inout) :: self
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
 
       associate (unused_self => self, unused_settings => settings)
@@ -50,7 +49,6 @@ contains
    !> Refuse settings that exclude this member. Default: none.
    subroutine check(self, settings, n_processes, error)
       class(law_part_t), intent(in) :: self
-      !> All settings of the run
       type(settings_t), intent(in) :: settings
       !> Number of ranks
       integer(ip), intent(in) :: n_processes
@@ -86,7 +84,6 @@ contains
    !> the order of their stages.
    subroutine stiffen(self, bodies, contacts, element)
       class(law_part_t), intent(in) :: self
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Contacts with their forces; only the contact `element%contact` may be read
       type(contacts_t), intent(in) :: contacts

@@ -39,11 +39,9 @@ contains
       class(matuttis_chen_damping_t), intent(in) :: self
       !> Time since the last evaluation [s]; 0: the rate is unknown, and there is no damping
       real(wp), intent(in) :: dt
-      !> Contacts with their elastic forces
       type(contact_block_t), intent(in) :: block
       !> Contact history; the area is read and set
       type(contact_history_t), intent(inout) :: history
-      !> Damping force of each contact [N/m]
       real(wp), intent(inout) :: force(block_size)
       real(wp) :: difference
       integer(ip) :: c

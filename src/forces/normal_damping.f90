@@ -51,13 +51,11 @@ contains
    !> Add the damping force. Its sum with the elastic force is limited to repulsion.
    subroutine add(self, bodies, dt, block, history)
       class(normal_damping_t), intent(in) :: self
-      !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0 at the start of a run
       real(wp), intent(in) :: dt
       !> Contacts; `normal_force` changes
       type(contact_block_t), intent(inout) :: block
-      !> Contact history
       type(contact_history_t), intent(inout) :: history
       real(wp) :: force(block_size)
       integer(ip) :: c
@@ -73,9 +71,7 @@ contains
    !> Add the dashpot gamma sqrt(m E) L/l.
    subroutine stiffen(self, bodies, contacts, element)
       class(normal_damping_t), intent(in) :: self
-      !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
-      !> Contacts (not used)
       type(contacts_t), intent(in) :: contacts
       !> The contact; its normal dashpot changes
       type(contact_element_t), intent(inout) :: element
@@ -89,7 +85,6 @@ contains
    !> Copy stiffness and coefficient from the settings.
    subroutine take_coefficients(self, settings)
       class(normal_damping_t), intent(inout) :: self
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
 
       self%stage = stage_damping

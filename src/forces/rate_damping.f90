@@ -22,13 +22,9 @@ contains
    !> Compute the damping forces of one block of contacts.
    subroutine find_forces(self, dt, block, history, force)
       class(rate_damping_t), intent(in) :: self
-      !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
-      !> Contacts with their elastic forces
       type(contact_block_t), intent(in) :: block
-      !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
-      !> Damping force of each contact [N/m]
       real(wp), intent(inout) :: force(block_size)
       integer(ip) :: c
 

@@ -41,7 +41,6 @@ contains
    !> Copy the parameters from the settings.
    subroutine configure(self, settings)
       class(restitution_damping_t), intent(inout) :: self
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
 
       call self%take_coefficients(settings)
@@ -52,13 +51,9 @@ contains
    !> Compute the damping forces of one block of contacts.
    subroutine find_forces(self, dt, block, history, force)
       class(restitution_damping_t), intent(in) :: self
-      !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
-      !> Contacts with their elastic forces
       type(contact_block_t), intent(in) :: block
-      !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
-      !> Damping force of each contact [N/m]
       real(wp), intent(inout) :: force(block_size)
       real(wp) :: reach
       integer(ip) :: c
@@ -76,9 +71,7 @@ contains
    !> Add the dashpot 2 zeta sqrt(m k).
    subroutine stiffen(self, bodies, contacts, element)
       class(restitution_damping_t), intent(in) :: self
-      !> Bodies (not used)
       type(bodies_t), intent(in) :: bodies
-      !> Contacts (not used)
       type(contacts_t), intent(in) :: contacts
       !> The contact; its normal dashpot changes
       type(contact_element_t), intent(inout) :: element

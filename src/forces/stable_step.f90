@@ -27,11 +27,9 @@ contains
 
    !> Find the stable step of the present contacts, and the contact that limits it.
    subroutine stable_step_of_contacts(law, table, bodies, numbers, contacts, step, critical)
-      !> Force law
       type(force_law_t), intent(in) :: law
       !> Stability limit of the integration scheme
       type(stability_table_t), intent(in) :: table
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Number of contacts of each body, (slot)
       real(wp), intent(in) :: numbers(:)
@@ -62,7 +60,6 @@ contains
       type(force_law_t), intent(in) :: law
       !> Stability limit of the integration scheme
       type(stability_table_t), intent(in) :: table
-      !> Bodies
       type(bodies_t), intent(in) :: bodies
       !> Stable step [s], huge if there is no free body
       real(wp), intent(out) :: step
@@ -144,7 +141,6 @@ contains
    pure function contact_numbers(n_bodies, incidence) result(numbers)
       !> Number of bodies
       integer(ip), intent(in) :: n_bodies
-      !> Contacts of each body
       type(incidence_t), intent(in) :: incidence
       real(wp) :: numbers(n_bodies)
       integer(ip) :: s

@@ -38,7 +38,6 @@ contains
    !> Copy the parameters from the settings.
    subroutine configure(self, settings)
       class(tilt_damping_t), intent(inout) :: self
-      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
 
       self%stage = stage_last
@@ -52,11 +51,9 @@ contains
       class(tilt_damping_t), intent(in) :: self
       !> Bodies, for their moments of inertia
       type(bodies_t), intent(in) :: bodies
-      !> Time since the last evaluation [s] (not used)
       real(wp), intent(in) :: dt
       !> Contacts; `twist` changes
       type(contact_block_t), intent(inout) :: block
-      !> Contact history (not used)
       type(contact_history_t), intent(inout) :: history
       real(wp) :: mobility, stiffness, limit, torque
       integer(ip) :: c

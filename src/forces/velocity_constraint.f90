@@ -32,14 +32,12 @@ module polydem_velocity_constraint
          class(velocity_constraint_t), intent(inout) :: self
          !> Time step [s]
          real(wp), intent(in) :: dt
-         !> Contacts of each body
          type(incidence_t), intent(in) :: incidence
          !> Bodies as predicted by velocity Verlet, with the accelerations of the last step (0 before the first step)
          !> and all other forces of this step
          type(bodies_t), intent(in) :: bodies
          !> Contacts of this step; `tangential_force` changes
          type(contacts_t), intent(inout) :: contacts
-         !> Contact history
          type(contact_history_t), intent(inout) :: history
          !> Allocated if the forces are not found
          type(error_t), allocatable, intent(inout) :: error
@@ -49,7 +47,6 @@ module polydem_velocity_constraint
       subroutine report(self, counters)
          import :: counters_t, velocity_constraint_t
          class(velocity_constraint_t), intent(in) :: self
-         !> Counters of the run
          type(counters_t), intent(inout) :: counters
       end subroutine report
    end interface

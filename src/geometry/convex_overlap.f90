@@ -92,7 +92,6 @@ contains
       real(wp), intent(in) :: offset(2)
       !> Edge to try first: +k from vertex k of a, -k from vertex k of b, 0 none
       integer(ip), intent(in) :: separating_edge
-      !> The overlap
       type(overlap_t), intent(out) :: overlap
       !> Whether area, normal and moments are those of the effective area (see `polydem_effective_area`); default: no
       logical, intent(in), optional :: effective

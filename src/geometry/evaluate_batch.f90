@@ -13,7 +13,6 @@ contains
 
    !> Evaluate the first lanes of a batch.
    pure subroutine evaluate_batch(batch, n, turned, effective, isa, columns)
-      !> The batch
       type(overlap_batch_t), intent(inout) :: batch
       !> Number of lanes
       integer(ip), intent(in) :: n

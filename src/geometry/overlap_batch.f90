@@ -52,7 +52,6 @@ contains
 
    !> Write a pair into a lane.
    pure subroutine add_lane(batch, lane, memory, vertices, offset, radius_p, radius_q)
-      !> The batch
       type(overlap_batch_t), intent(inout) :: batch
       !> The lane, from 1
       integer(ip), intent(in) :: lane

@@ -33,7 +33,6 @@ contains
       integer, intent(in) :: status
       !> The failed action, like 'write'; it completes the message 'cannot ...'
       character(len=*), intent(in) :: action
-      !> Location of the data set
       type(dataset_location_t), intent(in) :: location
       !> Allocated if the call failed
       type(error_t), allocatable, intent(inout) :: error

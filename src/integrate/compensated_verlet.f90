@@ -34,7 +34,6 @@ contains
    !> Start with rounding errors of zero.
    subroutine start(self, bodies)
       class(compensated_verlet_t), intent(inout) :: self
-      !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
 
       call self%velocity_verlet_t%start(bodies)
@@ -47,9 +46,7 @@ contains
    !> Move to the end of the step and predict the velocities there.
    subroutine predict(self, dt, first, last, bodies)
       class(compensated_verlet_t), intent(inout) :: self
-      !> Time step [s]
       real(wp), intent(in) :: dt
-      !> First and last slot of a run of free bodies
       integer(ip), intent(in) :: first, last
       !> Bodies; position, angle and velocities of these change
       type(bodies_t), intent(inout) :: bodies
@@ -68,9 +65,7 @@ contains
    !> Final velocities and accelerations from the forces at the end of the step.
    subroutine correct(self, dt, first, last, bodies)
       class(compensated_verlet_t), intent(inout) :: self
-      !> Time step [s]
       real(wp), intent(in) :: dt
-      !> First and last slot of a run of free bodies
       integer(ip), intent(in) :: first, last
       !> Bodies; velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
@@ -93,7 +88,6 @@ contains
    !> Serialize the rounding errors.
    subroutine serialize(self, serializer)
       class(compensated_verlet_t), intent(inout) :: self
-      !> Serializer
       class(serializer_t), intent(inout) :: serializer
 
       call serializer%field('/bodies/lost_place', self%lost_place, 'm, rad', 'rounding errors of x, y and angle')

@@ -43,7 +43,6 @@ contains
    !> Start with zero derivatives above the second.
    subroutine start(self, bodies)
       class(gear_t), intent(inout) :: self
-      !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
 
       if (allocated(self%higher)) deallocate (self%higher)
@@ -54,9 +53,7 @@ contains
    !> Predict by a Taylor expansion to the end of the step.
    subroutine predict(self, dt, first, last, bodies)
       class(gear_t), intent(inout) :: self
-      !> Time step [s]
       real(wp), intent(in) :: dt
-      !> First and last slot of a run of free bodies
       integer(ip), intent(in) :: first, last
       !> Bodies; position, angle, velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
@@ -73,9 +70,7 @@ contains
    !> Correct all derivatives by the difference between computed and predicted acceleration.
    subroutine correct(self, dt, first, last, bodies)
       class(gear_t), intent(inout) :: self
-      !> Time step [s]
       real(wp), intent(in) :: dt
-      !> First and last slot of a run of free bodies
       integer(ip), intent(in) :: first, last
       !> Bodies; position, angle, velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
@@ -94,7 +89,6 @@ contains
    !> Serialize the derivatives above the second.
    subroutine serialize(self, serializer)
       class(gear_t), intent(inout) :: self
-      !> Serializer
       class(serializer_t), intent(inout) :: serializer
 
       call serializer%field('/bodies/gear_higher', self%higher, 'm, rad', &

@@ -13,9 +13,7 @@ contains
 
    !> Make the integration scheme of the settings. Names are valid: the reader of the namelist has checked them.
    subroutine new_integrator(settings, integrator)
-      !> Group &integrate
       type(integrate_settings_t), intent(in) :: settings
-      !> The integration scheme
       class(integrator_t), allocatable, intent(out) :: integrator
 
       select case (settings%scheme)

@@ -29,7 +29,6 @@ contains
    !> Make room for the velocities in the middle of the step.
    subroutine start(self, bodies)
       class(velocity_verlet_t), intent(inout) :: self
-      !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
 
       if (allocated(self%half)) deallocate (self%half)
@@ -39,9 +38,7 @@ contains
    !> Move the bodies to the end of the step and predict the velocities there.
    subroutine predict(self, dt, first, last, bodies)
       class(velocity_verlet_t), intent(inout) :: self
-      !> Time step [s]
       real(wp), intent(in) :: dt
-      !> First and last slot of a run of free bodies
       integer(ip), intent(in) :: first, last
       !> Bodies; position, angle and velocities of these change
       type(bodies_t), intent(inout) :: bodies
@@ -66,9 +63,7 @@ contains
    !> Compute final velocities and accelerations from the forces at the end of the step.
    subroutine correct(self, dt, first, last, bodies)
       class(velocity_verlet_t), intent(inout) :: self
-      !> Time step [s]
       real(wp), intent(in) :: dt
-      !> First and last slot of a run of free bodies
       integer(ip), intent(in) :: first, last
       !> Bodies; velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
@@ -89,7 +84,6 @@ contains
    !> Serialize the velocities in the middle of the step.
    subroutine serialize_step(self, serializer)
       class(velocity_verlet_t), intent(inout) :: self
-      !> Serializer
       class(serializer_t), intent(inout) :: serializer
 
       call self%serialize(serializer)

@@ -36,7 +36,6 @@ contains
 
    !> Read and check what is needed of all bodies at once, and the shapes of all data sets.
    subroutine read_index(file, path, table, error)
-      !> The open file
       type(hdf5_file_t), intent(in) :: file
       !> Its path
       character(len=*), intent(in) :: path

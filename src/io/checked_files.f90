@@ -86,7 +86,6 @@ contains
 
    !> List the closed segments in ascending order.
    subroutine find_segments(manifest, folder, places, problem)
-      !> Manifest
       type(manifest_t), intent(in) :: manifest
       !> Folder of the result
       character(len=*), intent(in) :: folder

@@ -223,29 +223,65 @@ contains
       real(dp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
       real(dp), allocatable :: table(:, :), list(:)
-      integer(lp), allocatable :: words(:, :)
+      integer(lp), allocatable :: words(:)
       integer(lp) :: rows(2)
 
       if (.not. self%is_reading) then
          call write_reals(self, name, reshape(values, [width, size(values)/width]), unit, meaning)
-      else
-         call find_rows(self, name, 1_lp, rows)
-         if (self%has_failed()) return
-         if (width == 1) call self%file%read(name, list, self%error, rows)
-         if (width > 1) call self%file%read(name, table, self%error, rows)
-         if (width > 1 .and. .not. allocated(self%error)) list = reshape(table, [size(table)])
-         if (group_of(self, name) > 0) then
-            if (allocated(self%error)) list = spread(0.0_dp, 1, width*int(rows(2)))
-            words = reshape(transfer(values, 0_lp, size(values)), [width, size(values)/width])
-            call self%rows(place_of(name))%from_blocks( &
-               self%comm, reshape(transfer(list, 0_lp, size(list)), [width, size(list)/width]), words)
-            list = transfer(words, 0.0_dp, size(words))
-         end if
-         if (allocated(self%error)) return
-         call expect_size(self, name, size(list), size(values))
-         if (.not. allocated(self%error)) values = list
+         return
       end if
+      call find_rows(self, name, 1_lp, rows)
+      if (self%has_failed()) return
+      if (width == 1) call self%file%read(name, list, self%error, rows)
+      if (width > 1) call self%file%read(name, table, self%error, rows)
+      if (width > 1 .and. .not. allocated(self%error)) list = reshape(table, [size(table)])
+      if (allocated(self%error)) list = spread(0.0_dp, 1, width*int(rows(2)))
+      words = transfer(list, 0_lp, size(list))
+      call receive_rows(self, name, width, transfer(values, 0_lp, size(values)), words)
+      if (.not. allocated(self%error)) values = transfer(words, values, size(words))
    end subroutine transfer_reals
+
+   !> Write or read integers. Rows of several integers are stored one after the other in a list.
+   subroutine transfer_longs(self, name, width, values, unit, meaning)
+      class(checkpoint_file_t), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: width
+      integer(lp), intent(inout), contiguous :: values(:)
+      character(len=*), intent(in) :: unit, meaning
+      integer(lp), allocatable :: list(:)
+      integer(lp) :: rows(2)
+
+      if (.not. self%is_reading) then
+         call write_longs(self, name, width, values, unit, meaning)
+         return
+      end if
+      call find_rows(self, name, int(width, lp), rows)
+      if (self%has_failed()) return
+      call self%file%read(name, list, self%error, rows)
+      if (allocated(self%error)) list = spread(0_lp, 1, int(rows(2)))
+      call receive_rows(self, name, width, values, list)
+      if (.not. allocated(self%error)) values = list
+   end subroutine transfer_longs
+
+   !> Send the rows that this rank has read to the ranks that need them, and check their number. Collective for rows
+   !> that are distributed, also after an error.
+   subroutine receive_rows(self, name, width, mine, words)
+      class(checkpoint_file_t), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: width
+      !> Present rows of this rank
+      integer(lp), intent(in) :: mine(:)
+      !> Rows that were read; on return those of this rank
+      integer(lp), allocatable, intent(inout) :: words(:)
+      integer(lp), allocatable :: received(:, :)
+
+      if (group_of(self, name) > 0) then
+         received = reshape(mine, [width, size(mine)/width])
+         call self%rows(place_of(name))%from_blocks(self%comm, reshape(words, [width, size(words)/width]), received)
+         words = reshape(received, [size(received)])
+      end if
+      if (.not. allocated(self%error)) call expect_size(self, name, size(words), size(mine))
+   end subroutine receive_rows
 
    !> Find the rows of a column that this rank reads.
    subroutine find_rows(self, name, entries, rows)
@@ -292,14 +328,13 @@ contains
       end if
    end subroutine write_reals
 
-   !> Write rows of integers as a list. A row has several integers if these are the bits of a longer number. A rank
-   !> without rows gets the width of a row by an all-reduce.
-   subroutine write_longs(self, name, values, unit, meaning)
+   !> Write rows of integers as a list.
+   subroutine write_longs(self, name, width, values, unit, meaning)
       class(checkpoint_file_t), intent(inout) :: self
       character(len=*), intent(in) :: name, unit, meaning
+      integer, intent(in) :: width
       integer(lp), intent(in), contiguous :: values(:)
       integer(lp), allocatable :: block(:, :)
-      integer(lp) :: width(1)
       integer :: k
 
       k = group_of(self, name)
@@ -308,11 +343,9 @@ contains
          return
       end if
       associate (rows => self%rows(k))
-         width = size(values, kind=lp)/int(max(1_ip, rows%n_known), lp)
-         call self%comm%all_reduce_max(width)
-         call rows%to_blocks(self%comm, reshape(values, [width(1), int(rows%n_known, lp)]), block)
+         call rows%to_blocks(self%comm, reshape(values, [width, size(values)/width]), block)
          call self%file%write(name, reshape(block, [size(block)]), self%error, unit, meaning, &
-                              part_t(width(1)*rows%first, width(1)*rows%total))
+                              part_t(width*rows%first, width*rows%total))
       end associate
    end subroutine write_longs
 
@@ -335,41 +368,6 @@ contains
          if (index(name, trim(groups(k))) == 1) place_of = k
       end do
    end function place_of
-
-   !> Write or read integers.
-   subroutine transfer_longs(self, name, values, unit, meaning)
-      class(checkpoint_file_t), intent(inout) :: self
-      character(len=*), intent(in) :: name
-      integer(lp), intent(inout), contiguous :: values(:)
-      character(len=*), intent(in) :: unit, meaning
-      integer(lp), allocatable :: list(:), mine(:, :)
-      integer(lp) :: rows(2), width(1)
-
-      if (.not. self%is_reading) then
-         call write_longs(self, name, values, unit, meaning)
-      else
-         width = 1_lp
-         if (group_of(self, name) > 0) then
-            width = size(values, kind=lp)/int(max(1_ip, self%rows(place_of(name))%n_known), lp)
-            call self%comm%all_reduce_max(width)
-         else if (place_of(name) > 0) then
-            width = max(1_lp, size(values, kind=lp)/max(1_lp, self%part(2, place_of(name))))
-         end if
-         call find_rows(self, name, width(1), rows)
-         if (self%has_failed()) return
-         call self%file%read(name, list, self%error, rows)
-         if (group_of(self, name) > 0) then
-            if (allocated(self%error)) list = spread(0_lp, 1, int(rows(2)))
-            mine = reshape(values, [int(width(1)), size(values)/int(width(1))])
-            call self%rows(place_of(name))%from_blocks( &
-               self%comm, reshape(list, [int(width(1)), size(list)/int(width(1))]), mine)
-            list = reshape(mine, [size(mine)])
-         end if
-         if (allocated(self%error)) return
-         call expect_size(self, name, size(list), size(values))
-         if (.not. allocated(self%error)) values = list
-      end if
-   end subroutine transfer_longs
 
    !> Raise an error if a data set has not the expected number of values.
    subroutine expect_size(self, name, found, wanted)

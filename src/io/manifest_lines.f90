@@ -47,7 +47,6 @@ contains
 
    !> Text of the line that declares a file closed
    pure function closing_text(entry) result(text)
-      !> Entry of the file
       type(entry_t), intent(in) :: entry
       character(len=:), allocatable :: text
 

@@ -67,7 +67,6 @@ contains
       character(len=*), intent(in) :: path
       !> Names of the stages, of the phases of the finder and of its statistics
       character(len=*), intent(in) :: stage_names(:), phase_names(:), count_names(:)
-      !> Origin of the file
       type(provenance_t), intent(in) :: provenance
       type(error_t), allocatable, intent(inout) :: error
 
@@ -91,7 +90,6 @@ contains
    !> Add a step. After a failure the file is removed and closed.
    subroutine add(self, row, error)
       class(step_writer_t), intent(inout) :: self
-      !> Record of the step
       type(step_row_t), intent(in) :: row
       type(error_t), allocatable, intent(inout) :: error
 

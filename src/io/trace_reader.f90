@@ -54,7 +54,6 @@ contains
    subroutine read_trace(path, trace, error, most_steps)
       !> Path of the HDF5 file
       character(len=*), intent(in) :: path
-      !> The trace
       type(trace_t), intent(out) :: trace
       !> Allocated if the file cannot be read or is not a valid trace
       type(error_t), allocatable, intent(inout) :: error

@@ -50,7 +50,6 @@ contains
       real(wp), intent(in) :: reach(:)
       !> Time between steps [s]
       real(wp), intent(in) :: dt
-      !> Origin of the trace
       type(provenance_t), intent(in) :: provenance
       type(error_t), allocatable, intent(inout) :: error
 

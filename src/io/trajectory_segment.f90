@@ -42,7 +42,6 @@ contains
 
    !> Write the constant properties of the bodies: identifier, fixed flag, mass, inertia and shape.
    subroutine write_bodies(file, comm, bodies, error)
-      !> Segment
       type(hdf5_file_t), intent(inout) :: file
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
@@ -119,7 +118,6 @@ contains
 
    !> Add the poses and velocities of all bodies.
    subroutine add_frame(file, comm, step, time, bodies, error)
-      !> Segment
       type(hdf5_file_t), intent(inout) :: file
       class(communicator_t), intent(inout) :: comm
       !> Number of the step
@@ -156,7 +154,6 @@ contains
 
    !> Add the forces and torques on the fixed bodies, if there are any.
    subroutine add_walls(file, bodies, error)
-      !> Segment
       type(hdf5_file_t), intent(inout) :: file
       !> Bodies; on the root rank with the total forces on the fixed bodies
       type(bodies_t), intent(in) :: bodies
@@ -181,7 +178,6 @@ contains
 
    !> Add the contacts of a frame.
    subroutine add_contacts(file, comm, n_before, bodies, contacts, error)
-      !> Segment
       type(hdf5_file_t), intent(inout) :: file
       class(communicator_t), intent(inout) :: comm
       !> On entry the number of contacts in the earlier frames of this segment; on return including this frame
@@ -234,7 +230,6 @@ contains
 
    !> Add a row of the energy balance.
    subroutine add_balance(file, row, error)
-      !> Segment
       type(hdf5_file_t), intent(inout) :: file
       !> Entries of the energy balance of this frame, the same on all ranks
       type(named_values_t), intent(in) :: row

@@ -32,7 +32,6 @@ module polydem_bisection
       pure subroutine choose_order(self, groups, bounds)
          import :: dp, rank_groups_t, bisection_t
          class(bisection_t), intent(inout) :: self
-         !> The groups
          type(rank_groups_t), intent(in) :: groups
          !> xmin, ymin, xmax, ymax of the bodies of each group, (4, group) [m]; without bodies xmin > xmax and
          !> ymin > ymax

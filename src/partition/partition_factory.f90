@@ -16,7 +16,6 @@ contains
 
    !> Make a partition in which rank 0 owns all space.
    subroutine new_partition(partition, name, error)
-      !> The partition
       class(partition_t), allocatable, intent(out) :: partition
       !> One of `partition_names`
       character(len=*), intent(in) :: name

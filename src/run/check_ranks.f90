@@ -14,7 +14,6 @@ contains
 
    !> Refuse settings that the force law does not support, and those that only a serial run supports.
    subroutine check_ranks(settings, comm, error)
-      !> Settings of a run
       type(settings_t), intent(in) :: settings
       class(communicator_t), intent(in) :: comm
       !> Names the entry; the same on all ranks

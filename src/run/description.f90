@@ -19,7 +19,6 @@ contains
    subroutine describe(simulation, measures, log)
       !> A simulation at time 0
       type(simulation_t), intent(in) :: simulation
-      !> Its measures
       type(scene_measures_t), intent(in) :: measures
       type(log_t), intent(inout) :: log
 
@@ -98,7 +97,6 @@ contains
    subroutine list_overlaps(simulation, measures, folder, log, error)
       !> A simulation at time 0
       type(simulation_t), intent(inout) :: simulation
-      !> Its measures
       type(scene_measures_t), intent(in) :: measures
       !> Folder for the table of deep contacts; empty: no table
       character(len=*), intent(in) :: folder

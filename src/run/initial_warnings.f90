@@ -41,7 +41,6 @@ contains
    subroutine warn_of_risks(simulation, measures, log, n)
       !> A simulation at time 0
       type(simulation_t), intent(in) :: simulation
-      !> Its measures
       type(scene_measures_t), intent(in) :: measures
       type(log_t), intent(inout) :: log
       !> Number of warnings

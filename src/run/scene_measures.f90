@@ -76,7 +76,6 @@ contains
    subroutine measure_scene(simulation, measures)
       !> A simulation at time 0
       type(simulation_t), intent(inout) :: simulation
-      !> Measures of the scene
       type(scene_measures_t), intent(out) :: measures
       real(wp) :: gravity, down(2)
       integer(ip) :: slot

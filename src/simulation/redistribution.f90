@@ -156,11 +156,12 @@ contains
       end associate
       buffer%slots = slots
       call serialize_columns(buffer, self)
-      call buffer%move(self%comm, counts)
+      call buffer%move(self%comm, counts, counts_received)
       call all_to_all_bodies(self%comm, counts, packed, counts_received)
       self%domain%arrivals = self%domain%arrivals + &
          int(sum(counts_received) - counts_received(lbound(counts_received, 1) + self%comm%rank), lp)
-      call unpack_bodies(packed, (self%bodies%n_all), self%bodies, buffer%slots)
+      call unpack_bodies(packed, (self%bodies%n_all), self%bodies, slots)
+      call buffer%restore_to(slots)
       call self%integrator%start(self%bodies)
       call serialize_columns(buffer, self)
       call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)], self%isa)
@@ -185,12 +186,11 @@ contains
       buffer%slots = [(s, s=1_ip, n)]
       call pack_bodies(self%bodies, buffer%slots, packed)
       call serialize_columns(buffer, self)
-      buffer%is_reading = .true.
       call join_packed(packed, packed_halo)
       call unpack_bodies(packed, (self%bodies%n_all), self%bodies, slots)
       self%bodies%in_halo(slots(n + 1_ip:)) = .true.
       self%bodies%free = pack([(s, s=1_ip, self%bodies%n)],.not. (self%bodies%fixed .or. self%bodies%in_halo))
-      buffer%slots = slots(:n)
+      call buffer%restore_to(slots(:n))
       call self%integrator%start(self%bodies)
       call serialize_columns(buffer, self)
       call new_halo(self%domain%halo, counts, slots(sent), counts_received, slots(n + 1_ip:), &

@@ -30,7 +30,6 @@ contains
    !> that have the pair or ran the finder. All other items are counted once. Collective.
    subroutine report_counters(self, counters)
       type(simulation_t), intent(inout) :: self
-      !> List of counters
       type(counters_t), intent(inout) :: counters
       integer(lp) :: counts(2)
 

@@ -18,7 +18,7 @@ module polydem_bodies
    use polydem_kinds, only: ip, lp, wp, dp, min_parallel_size
    implicit none
    private
-   public :: bodies_t, turn_bodies, turn_block, block_size, measure_radii, state_hash, state_words
+   public :: bodies_t, allocate_bodies, turn_bodies, turn_block, block_size, measure_radii, state_hash, state_words
 
    !> Greatest number of bodies of a block for `turn_block`
    integer(ip), parameter :: block_size = 64_ip
@@ -74,6 +74,25 @@ module polydem_bodies
    end type bodies_t
 
 contains
+
+   !> Allocate the columns of bodies and set them to zero, and reserve memory for vertices.
+   subroutine allocate_bodies(bodies, n, n_vertices)
+      type(bodies_t), intent(out) :: bodies
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> Number of vertices for which `shape` has memory; `turned` is not allocated
+      integer(ip), intent(in) :: n_vertices
+
+      bodies%n = n
+      allocate (bodies%id(n), bodies%global_index(n), source=0_ip)
+      allocate (bodies%vertex_start(n + 1_ip), source=1_ip)
+      allocate (bodies%fixed(n), bodies%in_halo(n), source=.false.)
+      allocate (bodies%mass(n), bodies%inertia(n), bodies%inverse_mass(n), bodies%inverse_inertia(n), bodies%angle(n), &
+                bodies%angular_velocity(n), bodies%angular_acceleration(n), bodies%torque(n), source=0.0_wp)
+      allocate (bodies%position(2, n), bodies%velocity(2, n), bodies%acceleration(2, n), bodies%force(2, n), &
+                source=0.0_wp)
+      allocate (bodies%shape(2, n_vertices))
+   end subroutine allocate_bodies
 
    !> Update `turned` of the given bodies to their angles.
    subroutine turn_bodies(bodies, slots, isa)

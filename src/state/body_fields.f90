@@ -1,11 +1,12 @@
-!> The one list of the variable fields of bodies. Checkpoints and migration between ranks both use it.
+!> The lists of the fields of bodies: those that vary, for checkpoints and migration between ranks, and those that are
+!> constant, for migration. A restart takes the constant fields from the scene.
 module polydem_body_fields
    use polydem_bodies, only: bodies_t
-   use polydem_kinds, only: lp
+   use polydem_kinds, only: ip, lp
    use polydem_serializer, only: serializer_t
    implicit none
    private
-   public :: serialize_bodies
+   public :: serialize_bodies, serialize_constants
 
 contains
 
@@ -26,5 +27,24 @@ contains
       call serializer%field('/bodies/force', bodies%force, 'N/m', 'sums of the forces')
       call serializer%field('/bodies/torque', bodies%torque, 'N', 'sums of the torques about the centres of mass')
    end subroutine serialize_bodies
+
+   !> Serialize the constant fields of bodies, except their shapes, which have any number of vertices.
+   subroutine serialize_constants(serializer, bodies)
+      !> Serializer, which reads or writes columns over /bodies
+      class(serializer_t), intent(inout) :: serializer
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: fixed(bodies%n)
+
+      fixed = merge(1_ip, 0_ip, bodies%fixed)
+      call serializer%field('/bodies/global_index', bodies%global_index, '1', 'indices among all bodies of the run')
+      call serializer%field('/bodies/id', bodies%id, '1', 'identifiers')
+      call serializer%field('/bodies/fixed', fixed, '1', '1: the body is fixed')
+      call serializer%field('/bodies/mass', bodies%mass, 'kg/m', 'masses')
+      call serializer%field('/bodies/inertia', bodies%inertia, 'kg m', 'moments of inertia')
+      call serializer%field('/bodies/inverse_mass', bodies%inverse_mass, 'm/kg', 'inverse masses')
+      call serializer%field('/bodies/inverse_inertia', bodies%inverse_inertia, '1/(kg m)', &
+                            'inverse moments of inertia')
+      bodies%fixed = fixed == 1_ip
+   end subroutine serialize_constants
 
 end module polydem_body_fields

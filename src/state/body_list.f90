@@ -1,6 +1,6 @@
 !> A list to which generators and readers append bodies one by one, and its conversion to the arrays of `bodies_t`.
 module polydem_body_list
-   use polydem_bodies, only: bodies_t, measure_radii, turn_bodies
+   use polydem_bodies, only: allocate_bodies, bodies_t, measure_radii, turn_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
@@ -124,7 +124,6 @@ contains
 
    !> Check the polygons of the kept bodies and build the arrays, in ascending order of the identifiers, at angle 0.
    subroutine new_bodies(list, bodies, error)
-      !> List of bodies
       type(body_list_t), intent(in) :: list
       !> The kept bodies as a structure of arrays
       type(bodies_t), intent(out) :: bodies
@@ -140,7 +139,7 @@ contains
       do k = 1_ip, list%n_kept
          kept(list%entry(k)) = k
       end do
-      call allocate_bodies(bodies, list%n_kept)
+      call allocate_bodies(bodies, list%n_kept, 16_ip*list%n_kept)
       bodies%n_all = list%n
       s = 0_ip
       do k = 1_ip, list%n
@@ -211,25 +210,6 @@ contains
          call move_alloc(table, self%vertex)
       end associate
    end subroutine make_room
-
-   subroutine allocate_bodies(bodies, n)
-      type(bodies_t), intent(inout) :: bodies
-      integer(ip), intent(in) :: n
-
-      bodies%n = n
-      allocate (bodies%id(n), bodies%global_index(n), bodies%fixed(n), bodies%mass(n), bodies%inertia(n), &
-                bodies%inverse_mass(n), bodies%inverse_inertia(n), bodies%position(2, n), &
-                bodies%angle(n), bodies%velocity(2, n), bodies%angular_velocity(n), &
-                bodies%acceleration(2, n), bodies%angular_acceleration(n), bodies%force(2, n), &
-                bodies%torque(n), bodies%vertex_start(n + 1_ip))
-      bodies%angle = 0.0_wp
-      bodies%acceleration = 0.0_wp
-      bodies%angular_acceleration = 0.0_wp
-      bodies%force = 0.0_wp
-      bodies%torque = 0.0_wp
-      bodies%vertex_start(1) = 1_ip
-      allocate (bodies%shape(2, 16*n))
-   end subroutine allocate_bodies
 
    !> Check one body and store it in its slot.
    subroutine place(list, k, s, bodies, error)
@@ -317,11 +297,8 @@ contains
       bodies%shape = bodies%shape(:, 1:n_vertices)
       allocate (bodies%turned(2, n_vertices))
       call measure_radii(bodies)
-      bodies%inverse_mass = 0.0_wp
-      bodies%inverse_inertia = 0.0_wp
       where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass
       where (bodies%inertia > 0.0_wp) bodies%inverse_inertia = 1.0_wp/bodies%inertia
-      bodies%in_halo = spread(.false., 1, bodies%n)
       bodies%free = pack([(s, s=1_ip, bodies%n)],.not. bodies%fixed)
       call turn_bodies(bodies, [(s, s=1_ip, bodies%n)], isa_base)
    end subroutine finish

@@ -41,7 +41,6 @@ contains
    !> Add a column of zeros behind the others.
    subroutine add_column(history, kind, n_pairs)
       type(contact_history_t), intent(inout) :: history
-      !> Description of the column
       type(history_kind_t), intent(in) :: kind
       !> Number of pairs
       integer(ip), intent(in) :: n_pairs

@@ -19,7 +19,6 @@ contains
 
    !> Empty the rows. They get the same columns as a table.
    pure subroutine start_rows(contacts, rows)
-      !> The table
       type(contacts_t), intent(in) :: contacts
       type(contact_rows_t), intent(inout) :: rows
 

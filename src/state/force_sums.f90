@@ -94,7 +94,6 @@ contains
    pure subroutine terms_of_block(block, terms)
       !> Contacts with their forces
       type(contact_block_t), intent(in) :: block
-      !> The terms
       type(contact_terms_t), intent(inout) :: terms
       real(wp) :: elastic, normal, tangential, x, y, lever_first, lever_second
       integer(ip) :: c

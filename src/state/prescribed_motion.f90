@@ -57,7 +57,6 @@ contains
 
    !> Set positions, angles, velocities and accelerations of the bodies of a motion at a time.
    subroutine move_bodies(motion, time, bodies)
-      !> The motion
       type(motion_t), intent(in) :: motion
       !> Time since the start of the run [s]
       real(wp), intent(in) :: time

@@ -28,7 +28,6 @@ contains
       !> Whether each body is fixed
       logical, intent(in), contiguous :: fixed(:)
       type(contact_block_t), intent(in) :: block
-      !> Terms of the block
       type(contact_terms_t), intent(in) :: terms
       !> Contacts with fixed bodies
       type(wall_terms_t), intent(inout) :: walls

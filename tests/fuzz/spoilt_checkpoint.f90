@@ -130,13 +130,14 @@ contains
    end subroutine transfer_reals
 
    !> Take a column of integers as a field.
-   subroutine transfer_longs(self, name, values, unit, meaning)
+   subroutine transfer_longs(self, name, width, values, unit, meaning)
       class(field_serializer_t), intent(inout) :: self
       character(len=*), intent(in) :: name
+      integer, intent(in) :: width
       integer(lp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
 
-      associate (unused => unit//meaning)
+      associate (unused => unit//meaning, unused_width => width)
       end associate
       self%fields = [self%fields, new_field(name, [size(values)], real(values, dp), .true.)]
    end subroutine transfer_longs

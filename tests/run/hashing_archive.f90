@@ -60,9 +60,10 @@ contains
    end subroutine transfer_reals
 
    !> Hash a field of integers.
-   subroutine transfer_longs(self, name, values, unit, meaning)
+   subroutine transfer_longs(self, name, width, values, unit, meaning)
       class(hashing_serializer_t), intent(inout) :: self
       character(len=*), intent(in) :: name
+      integer, intent(in) :: width
       integer(lp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
       integer :: k
@@ -70,7 +71,7 @@ contains
       associate (unused => [len(unit), len(meaning)])
       end associate
       if (.not. counts(name)) return
-      self%hash = mix_word(self%hash, size(values, kind=lp))
+      self%hash = mix_word(mix_word(self%hash, int(width, lp)), size(values, kind=lp))
       do k = 1, size(values)
          self%hash = mix_word(self%hash, values(k))
       end do
