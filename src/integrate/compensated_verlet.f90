@@ -7,6 +7,7 @@
 !> one. Only the rounded value is visible to other modules. The compiler must not reorder sums (no -ffast-math).
 module polydem_compensated_verlet
    use polydem_bodies, only: bodies_t
+   use polydem_integrator, only: clear_negligible, clear_negligible_motion
    use polydem_kinds, only: ip, wp
    use polydem_serializer, only: serializer_t
    use polydem_velocity_verlet, only: velocity_verlet_t
@@ -52,6 +53,8 @@ contains
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: s
 
+      call clear_negligible_motion(first, last, bodies)
+      call clear_negligible(3_ip*(last - first + 1_ip), self%lost_speed(1, first))
       do s = first, last
          call move(dt, bodies%acceleration(1, s), bodies%position(1, s), bodies%velocity(1, s), self%half(1, s), &
                    self%lost_place(1, s), self%lost_speed(1, s))
@@ -111,12 +114,12 @@ contains
    pure subroutine add(number, total, lost)
       real(wp), intent(in) :: number
       real(wp), intent(inout) :: total, lost
-      real(wp) :: addend, rounded, received_history
+      real(wp) :: addend, rounded, received
 
       addend = number + lost
       rounded = total + addend
-      received_history = rounded - total
-      lost = (total - (rounded - received_history)) + (addend - received_history)
+      received = rounded - total
+      lost = (total - (rounded - received)) + (addend - received)
       total = rounded
    end subroutine add
 

@@ -7,7 +7,7 @@
 !> alone, with zero higher derivatives.
 module polydem_gear
    use polydem_bodies, only: bodies_t
-   use polydem_integrator, only: integrator_t
+   use polydem_integrator, only: integrator_t, clear_negligible, clear_negligible_motion
    use polydem_kinds, only: ip, wp
    use polydem_serializer, only: serializer_t
    use polydem_stability_limit, only: stability_table_t
@@ -59,6 +59,8 @@ contains
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: s
 
+      call clear_negligible_motion(first, last, bodies)
+      call clear_negligible(9_ip*(last - first + 1_ip), self%higher(3, 1, first))
       do s = first, last
          call expand(dt, bodies%position(1, s), bodies%velocity(1, s), bodies%acceleration(1, s), self%higher(:, 1, s))
          call expand(dt, bodies%position(2, s), bodies%velocity(2, s), bodies%acceleration(2, s), self%higher(:, 2, s))

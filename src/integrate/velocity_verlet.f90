@@ -4,7 +4,7 @@
 !> (W.C. Swope, H.C. Andersen, P.H. Berens & K.R. Wilson, J. Chem. Phys. 76 (1982) 637).
 module polydem_velocity_verlet
    use polydem_bodies, only: bodies_t
-   use polydem_integrator, only: integrator_t
+   use polydem_integrator, only: integrator_t, clear_negligible_motion
    use polydem_kinds, only: ip, wp
    use polydem_serializer, only: serializer_t
    use polydem_stability_limit, only: stability_table_t
@@ -46,6 +46,7 @@ contains
       real(wp) :: h, half(3)
 
       h = 0.5_wp*dt
+      call clear_negligible_motion(first, last, bodies)
       do s = first, last
          half(1) = bodies%velocity(1, s) + h*bodies%acceleration(1, s)
          half(2) = bodies%velocity(2, s) + h*bodies%acceleration(2, s)
