@@ -19,9 +19,9 @@
 
 threads=${SLURM_CPUS_PER_TASK:-1}
 
+trap 'heard=yes; kill -USR1 "$!" 2>/dev/null' USR1 TERM
 ./polydem sweep run "$@" --rows "$SLURM_ARRAY_TASK_ID" --cores "$threads" --threads "$threads" &
 run=$!
-trap 'heard=yes; kill -USR1 "$run" 2>/dev/null' USR1 TERM
 while :; do
   heard=
   wait "$run"

@@ -18,11 +18,11 @@
 threads=${SLURM_CPUS_PER_TASK:-1}
 export OMP_NUM_THREADS=$threads OMP_PLACES=cores OMP_PROC_BIND=close
 
+trap 'heard=yes; kill -USR1 "$!" 2>/dev/null' USR1 TERM
 # Started in the background, since bash hears a signal at once only while it waits. TERM is not passed on as such:
 # a launcher of parallel programs would kill them a second later.
 ./polydem run "$@" --threads "$threads" --continue &
 run=$!
-trap 'heard=yes; kill -USR1 "$run" 2>/dev/null' USR1 TERM
 while :; do
   heard=
   wait "$run"

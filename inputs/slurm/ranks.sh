@@ -17,12 +17,12 @@
 threads=${SLURM_CPUS_PER_TASK:-1}
 export OMP_PLACES=cores OMP_PROC_BIND=close
 
+trap 'heard=yes; kill -USR1 "$!" 2>/dev/null' USR1 TERM
 # Started in the background, since bash hears a signal at once only while it waits. TERM is not passed on as such:
 # mpirun would kill the run a second later.
 mpirun -n "$SLURM_NTASKS" --map-by "slot:PE=$threads" -x OMP_PLACES -x OMP_PROC_BIND \
   ./polydem run "$@" --threads "$threads" --continue &
 run=$!
-trap 'heard=yes; kill -USR1 "$run" 2>/dev/null' USR1 TERM
 while :; do
   heard=
   wait "$run"

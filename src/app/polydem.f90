@@ -9,7 +9,7 @@ program polydem
    use polydem_kinds, only: ip
    use polydem_process_limits, only: check_stack
    use polydem_screen, only: warn
-   use polydem_signals, only: ignore_write_signals
+   use polydem_signals, only: hold_usr1, ignore_write_signals
    use polydem_standard_streams, only: open_closed_streams
    use polydem_verbs, only: execute
    use polydem_world_communicator, only: create_world
@@ -27,6 +27,7 @@ program polydem
    type(error_t), allocatable :: error
    class(communicator_t), allocatable :: comm
 
+   call hold_usr1()
    call open_closed_streams()
    call ignore_write_signals()
    call check_stack(1_ip, error)

@@ -19,6 +19,7 @@ module polydem_verbs
    use polydem_run_simulation, only: run_simulation
    use polydem_screen, only: print_line, warn
    use polydem_settings, only: bench_settings_t, settings_t
+   use polydem_signals, only: release_signals
    implicit none
    private
    public :: execute
@@ -49,6 +50,7 @@ contains
             continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp)), comm)
          return
       end if
+      call release_signals()
       crowd = ''
       if (command%verb == 'check') crowd = oversubscription(comm)
       ! The root rank alone executes the other verbs.

@@ -6,8 +6,8 @@ module polydem_posix_processes
    private
    public :: c_attributes_init, c_attributes_stack, c_exit_now, c_free, c_getaffinity, c_getpid, c_getrandom, &
       c_getrlimit, c_kill, c_malloc, c_pipe2, c_poll, c_read, c_sigaction, c_strdup, c_time, c_umask, &
-      c_user, event_t, gethostname, gmtime, isatty, limit_t, pthread_create, pthread_join, strftime, sysconf, &
-      timer_create, timer_delete, timer_settime, times_t
+      c_user, event_t, gethostname, gmtime, isatty, limit_t, pthread_create, pthread_join, pthread_sigmask, strftime, &
+      sysconf, timer_create, timer_delete, timer_settime, times_t
 
    !> struct rlimit. Its numbers are unsigned in C: a negative value here means unlimited
    type, bind(C) :: limit_t
@@ -195,6 +195,13 @@ module polydem_posix_processes
          integer(c_int), value :: signal
          type(c_ptr), value :: new, old
       end function c_sigaction
+
+      !> POSIX pthread_sigmask(3)
+      integer(c_int) function pthread_sigmask(how, set, old) bind(C, name='pthread_sigmask')
+         import :: c_int, c_ptr
+         integer(c_int), value :: how
+         type(c_ptr), value :: set, old
+      end function pthread_sigmask
 
       !> POSIX timer_create(2)
       integer(c_int) function timer_create(clock, event, timer) bind(C, name='timer_create')

@@ -71,7 +71,7 @@ class Ranks(Toy):
         for streams in ("", "2>&1"):
             line = f"{{ '{self.launcher}' run x --ranks 1 --threads 1 {streams}; echo $? >'{self.folder}/code'; }}"
             shown = subprocess.run(["bash", "-c", f"{line} | head -n 1"], capture_output=True, text=True,
-                                   env=self.environment, timeout=60, check=False)
+                                   env=self.environment, timeout=600, check=False)
             self.assertEqual((shown.stdout, self.read("code"), self.read("done")), ("line 1\n", ["75"], ["done"]))
             os.remove(os.path.join(self.folder, "done"))
         code, output, messages = self.call("run", "x", "--ranks", "1", "--threads", "1")
@@ -133,7 +133,7 @@ class Ranks(Toy):
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1):
             run = self.begin("short")
             run.send_signal(number)
-            self.assertEqual((run.wait(60), run.stderr.read()), (75, ""))
+            self.assertEqual((run.wait(600), run.stderr.read()), (75, ""))
             self.assertEqual(self.read("heard"), ["USR1"])
 
     def test_the_second_signal_ends_all(self):
@@ -142,6 +142,6 @@ class Ranks(Toy):
         run.send_signal(signal.SIGTERM)
         self.await_file("heard")
         run.send_signal(signal.SIGINT)
-        self.assertEqual(run.wait(60), 128 + signal.SIGINT)
+        self.assertEqual(run.wait(600), 128 + signal.SIGINT)
         self.assertEqual(self.read("heard"), ["USR1", "TERM"])
         self.assertIn("--continue continues from the last checkpoint", run.stderr.read())

@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+import time
 import unittest
 
 # The launcher that is tested
@@ -71,6 +72,9 @@ echo "apt-get $*" >>"$APT_LOG"
 for name in gfortran cmake ninja git h5fc; do ln -sf "$(PATH=$REAL_PATH command -v $name)" "$COMMANDS/$name"; done
 """
 
+# How often a call is repeated that is delayed by other work
+MOST_ATTEMPTS = 100
+
 # Where the help texts of the verbs are
 HELP_PLACES = ("src/app/help", "postproc/src/polydem_post/help")
 
@@ -124,6 +128,16 @@ class Toy(unittest.TestCase):
         result = subprocess.run([launcher or self.launcher, *arguments], capture_output=True, text=True, check=False,
                                 env={**self.environment, **environment}, cwd="/")
         return result.returncode, result.stdout, result.stderr
+
+    def assert_fast(self, limit, call):
+        """Check that a call takes less than a number of seconds once: other work on this machine may delay it."""
+        for _ in range(MOST_ATTEMPTS):
+            start = time.perf_counter()
+            call()
+            seconds = time.perf_counter() - start
+            if seconds < limit:
+                return
+        self.fail(f"{MOST_ATTEMPTS} calls took {limit} s or more each, the last one {seconds:.2f} s")
 
     def read(self, name):
         with open(os.path.join(self.folder, name), encoding="utf-8") as file:

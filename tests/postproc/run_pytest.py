@@ -23,7 +23,9 @@ def main() -> int:
     python = root / ".venv" / "bin" / "python"
     if not python.exists():
         python = Path(sys.executable)
-    if subprocess.run([str(python), "-c", NEEDED], stderr=subprocess.DEVNULL, check=False).returncode != 0:
+    imported = subprocess.run([str(python), "-c", NEEDED], stderr=subprocess.PIPE, text=True, check=False)
+    if imported.returncode != 0:
+        print(imported.stderr.strip())
         print(f"{python} lacks one of h5py, matplotlib, numpy and pytest. Let the launcher make the environment:")
         print("    ./polydem test")
         return 1

@@ -208,7 +208,7 @@ def test_a_comparison_that_was_killed_goes_on_where_it_was(tmp_path):
             assert process.poll() is None
             time.sleep(0.02)
         process.send_signal(signal.SIGTERM)
-        said = process.communicate(timeout=60)[0]
+        said = process.communicate(timeout=600)[0]
     assert process.returncode == 75 and "the same command goes on" in said, said
     before = samples_of(folder)
     assert before

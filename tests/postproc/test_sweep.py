@@ -19,10 +19,14 @@ from polydem_post.sweep_collect import read_outcome
 from polydem_post.sweep_run import Runner, available_cores, environment, is_running, state_of
 from polydem_post.trajectory import ResultError
 
-#: Stands for the program. The entry toy.does says what a run does; toy.seconds how long it takes.
+#: How long something may take on a busy machine [s]
+PATIENCE = 600
+
+#: Stands for the program. The entry toy.does says what a run does; toy.seconds how long it takes: until it is told, or
+#: until two are under way.
 TOY = """\
 #!{python}
-import json, os, signal, sys, time
+import glob, json, os, signal, sys, time
 words = sys.argv[1:]
 entries = dict(words[k + 1].split("=", 1) for k, word in enumerate(words) if word == "--set")
 if "--help" in words:
@@ -43,9 +47,17 @@ else:
         if entries["toy.does"] != "deafen":
             print("stopped"); sys.exit(75)
         signal.signal(number, signal.SIG_DFL)
+        open(os.path.join(result, "heard"), "w").close()
     signal.signal(signal.SIGUSR1, stop)
     print("step", flush=True)
-    time.sleep(float(entries.get("toy.seconds", "0")))
+    open(os.path.join(result, "under_way"), "w").close()
+    seconds = entries.get("toy.seconds", "0")
+    while seconds == "told" and not os.path.exists(os.path.join(result, "told")):
+        time.sleep(0.02)
+    while seconds == "two" and len(glob.glob(os.path.join(result, "..", "..", "*", "*", "under_way"))) < 2:
+        time.sleep(0.02)
+    if seconds not in ("told", "two"):
+        time.sleep(float(seconds))
     while entries["toy.does"] in ("wait", "deafen") and not again:
         time.sleep(0.02)
     with open(os.path.join(result, "calls"), "a") as file:
@@ -232,7 +244,8 @@ def test_make_takes_one_namelist_and_one_table(words, capsys):
 
 
 def test_runs_several_at_once_and_never_more(sweep_of):
-    program, sweep = sweep_of(*((f"r{k}", "finish", "0.3") for k in range(6)))
+    # The first two wait for each other.
+    program, sweep = sweep_of(*((f"r{k}", "finish", "two" if k < 2 else "0.3") for k in range(6)))
     assert Runner(program, 4, 2, say=lambda _: None).run(sweep.runs) == 0
     assert set(states(sweep).values()) == {"finished"}
     spans = [call[1:3] for run in sweep.runs for call in calls_of(run)]
@@ -307,7 +320,7 @@ def start(program, sweep, *options):
 
 def await_steps(sweep, n):
     """Wait until n runs are under way."""
-    for _ in range(1000):
+    for _ in range(PATIENCE * 50):
         if sum((run.folder / "output.txt").exists() and "step" in (run.folder / "output.txt").read_text()
                for run in sweep.runs) == n:
             return
@@ -321,13 +334,13 @@ def test_a_signal_ends_the_runs_early_and_the_next_call_goes_on(sweep_of, number
     process = start(program, sweep, "--cores", "2")
     await_steps(sweep, 2)
     process.send_signal(number)
-    said = process.communicate(timeout=60)[0]
+    said = process.communicate(timeout=PATIENCE)[0]
     assert process.returncode == 75, said
     assert states(sweep) == {"a": "stopped", "b": "stopped", "c": "not run"}
     assert said.splitlines()[-1] == "the same command continues the remaining runs"
     assert "Traceback" not in said
     process = start(program, sweep, "--cores", "2")
-    process.communicate(timeout=60)
+    process.communicate(timeout=PATIENCE)
     assert process.returncode == 0
     assert set(states(sweep).values()) == {"finished"}
 
@@ -337,17 +350,18 @@ def test_a_second_signal_does_not_wait(sweep_of):
     process = start(program, sweep)
     await_steps(sweep, 1)
     process.send_signal(signal.SIGINT)
-    time.sleep(0.5)
+    while not (sweep.runs[0].result / "heard").exists():
+        time.sleep(0.02)
     assert process.poll() is None
     process.send_signal(signal.SIGINT)
-    said = process.communicate(timeout=60)[0]
+    said = process.communicate(timeout=PATIENCE)[0]
     assert process.returncode == 75, said
     assert states(sweep) == {"a": "interrupted"}
 
 
 def await_end(run):
     """Wait until nobody is at a run any more."""
-    for _ in range(1000):
+    for _ in range(PATIENCE * 50):
         if not is_running(run):
             return
         time.sleep(0.02)
@@ -355,23 +369,24 @@ def await_end(run):
 
 
 def test_a_run_that_outlives_its_sweep_is_running_is_not_started_twice_and_counts_when_it_finishes(sweep_of):
-    program, sweep = sweep_of(("a", "leave", "3"), ("b", "finish", ""))
+    program, sweep = sweep_of(("a", "leave", "told"), ("b", "finish", ""))
     process = start(program, sweep, "--cores", "1")
     await_steps(sweep, 1)
     process.kill()
-    process.communicate(timeout=60)
+    process.communicate(timeout=PATIENCE)
     assert states(sweep) == {"a": "running", "b": "not run"}
     process = start(program, sweep, "--cores", "1")
-    said = process.communicate(timeout=60)[0]
+    said = process.communicate(timeout=PATIENCE)[0]
     assert process.returncode == 75, said
     assert "a: left out: another call runs it, or has left it running" in said
     assert states(sweep)["b"] == "finished"
     assert read_outcome(sweep, sweep.runs[0]).facts == {"state": "running", "attempts": 0}
+    (sweep.runs[0].result / "told").touch()
     await_end(sweep.runs[0])
     assert states(sweep) == {"a": "finished", "b": "finished"}
     assert len(calls_of(sweep.runs[0])) == 1
     process = start(program, sweep, "--cores", "1")
-    said = process.communicate(timeout=60)[0]
+    said = process.communicate(timeout=PATIENCE)[0]
     assert process.returncode == 0, said
     assert [len(calls_of(run)) for run in sweep.runs] == [1, 1]
     assert [attempt["exit_code"] for attempt in sweep.runs[0].attempts()] == [0]
@@ -392,12 +407,13 @@ def test_a_result_that_finished_unseen_is_not_failed_whatever_was_booked_before(
 
 
 def test_an_orphan_that_fails_or_is_killed_runs_again(sweep_of):
-    program, sweep = sweep_of(("a", "fail_once", "1"), ("b", "wait", ""))
+    program, sweep = sweep_of(("a", "fail_once", "told"), ("b", "wait", ""))
     process = start(program, sweep, "--cores", "2")
     await_steps(sweep, 2)
     process.kill()
-    process.communicate(timeout=60)
+    process.communicate(timeout=PATIENCE)
     assert states(sweep) == {"a": "running", "b": "running"}
+    (sweep.runs[0].result / "told").touch()
     await_end(sweep.runs[0])
     subprocess.run(["pkill", "-9", "-f", str(sweep.runs[1].result)], check=True)
     await_end(sweep.runs[1])
@@ -433,7 +449,7 @@ def test_a_finished_run_of_bodies_from_a_file_is_asked_again(sweep_of):
 def test_two_calls_share_the_runs(sweep_of):
     program, sweep = sweep_of(*((f"r{k}", "finish", "0.2") for k in range(4)))
     processes = [start(program, sweep, "--cores", "1") for _ in range(2)]
-    said = [process.communicate(timeout=60)[0] for process in processes]
+    said = [process.communicate(timeout=PATIENCE)[0] for process in processes]
     assert [len(calls_of(run)) for run in sweep.runs] == [1] * 4, said
 
 

@@ -7,6 +7,7 @@ import re
 import shutil
 import signal
 import subprocess
+import sys
 import time
 
 import h5py
@@ -30,6 +31,12 @@ CROSSING = """&scene name = 'file', bodies_file = '{bodies}' /
 &overlap degenerate = 'stop' /
 &output frame_interval = 1e-3, contacts = .true. /
 """
+#: Becomes a program to which USR1 was sent before it began; the signal is blocked, and stays pending
+WITH_USR1 = """import os, signal, sys
+signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
+os.kill(os.getpid(), signal.SIGUSR1)
+os.execv(sys.argv[1], sys.argv[1:])
+"""
 #: Exit codes, as inputs/getting_started.md lists them
 FAILED, BAD_INPUT, NO_FILE = 1, 2, 3
 
@@ -51,12 +58,12 @@ def interrupted(whole):
     process = start(whole / "scene.nml", folder, 3, 1, OPTIONS)
     wait_for(lambda: len(list(folder.glob("checkpoint_?.h5"))) == 2, process)
     process.send_signal(signal.SIGUSR1)
-    process.communicate(timeout=60)
+    process.communicate(timeout=600)
     assert process.returncode == 75
     return folder
 
 
-def wait_for(condition, process, seconds=60.0):
+def wait_for(condition, process, seconds=600.0):
     """Wait until a condition holds, while a process runs."""
     end = time.monotonic() + seconds
     while not condition():
@@ -99,7 +106,7 @@ def test_a_killed_rank_ends_the_run_which_goes_on_from_its_last_checkpoint(whole
         if victims:
             with contextlib.suppress(ProcessLookupError):
                 os.kill(chance.choice(victims), signal.SIGKILL)
-        _, message = process.communicate(timeout=60)
+        _, message = process.communicate(timeout=600)
         if process.returncode == 0:
             shutil.rmtree(folder)
             continue
@@ -109,6 +116,15 @@ def test_a_killed_rank_ends_the_run_which_goes_on_from_its_last_checkpoint(whole
         assert all(after.get(name) == content for name, content in before.items()), f"kill {kills} lost a segment"
         if kills % 5 == 0 or kills == wanted:
             finish(whole, folder, chance.choice((None, 1, 2, 3)))
+
+
+def test_usr1_while_ranks_start_ends_the_run_after_its_first_step(whole, tmp_path):
+    folder = tmp_path / "result"
+    words = [PARALLEL, "run", str(whole / "scene.nml"), "--threads", "1", "--set", f"output.folder={folder}", *OPTIONS]
+    end = subprocess.run(["mpirun", "-n", "3", sys.executable, "-c", WITH_USR1, *words], env=ENVIRONMENT,
+                         capture_output=True, text=True, timeout=600, check=False)
+    assert end.returncode == 75 and "interrupted by SIGUSR1 at step 1 of" in end.stderr, end
+    finish(whole, folder, 2)
 
 
 def test_ranks_that_outlive_their_leader_keep_others_out(whole, tmp_path):
@@ -122,11 +138,11 @@ def test_ranks_that_outlive_their_leader_keep_others_out(whole, tmp_path):
     try:
         os.kill(leader, signal.SIGKILL)
         words = [SERIAL, "run", str(whole / "scene.nml"), "--set", f"output.folder={folder}", "--continue", *OPTIONS]
-        end = subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
+        end = subprocess.run(words, capture_output=True, text=True, timeout=600, check=False)
         assert end.returncode == BAD_INPUT and f"another run (process {leader})" in end.stderr, end
     finally:
         process.send_signal(signal.SIGCONT)
-    process.communicate(timeout=60)
+    process.communicate(timeout=600)
     assert f"took over {folder}/running.lock of process {leader}, which has ended" in finish(whole, folder, None)
 
 
@@ -139,7 +155,7 @@ def test_ranks_whose_folder_was_taken_over_end_and_write_nothing_more(whole, tmp
     folder.joinpath("running.lock").unlink()
     folder.joinpath("running.lock").write_text("1 far.away\nkey 0123456789abcdef\n", encoding="utf-8")
     before = {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix != ".open"}
-    _, message = process.communicate(timeout=60)
+    _, message = process.communicate(timeout=600)
     assert process.returncode == NO_FILE and message.count("is gone or belongs to another run") == 1, message
     assert {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix != ".open"} == before
 
@@ -152,8 +168,8 @@ def test_without_mpirun_the_ranks_end_and_leave_a_good_checkpoint(number, whole,
     ranks = ranks_of(process)
     assert len(ranks) == 2
     process.send_signal(number)
-    process.communicate(timeout=60)
-    end = time.monotonic() + 30
+    process.communicate(timeout=600)
+    end = time.monotonic() + 600
     while any(os.path.exists(f"/proc/{rank}") for rank in ranks):
         assert time.monotonic() < end, "ranks outlive mpirun"
         time.sleep(0.02)
@@ -164,14 +180,14 @@ def test_without_mpirun_the_ranks_end_and_leave_a_good_checkpoint(number, whole,
 def test_a_rank_that_never_comes_ends_the_run(whole, tmp_path):
     words = [PARALLEL, "run", str(whole / "scene.nml"), "--set", f"output.folder={tmp_path / 'result'}"]
     end = subprocess.run(["mpirun", "-n", "2", *words, ":", "-n", "1", "false"], env=ENVIRONMENT, capture_output=True,
-                         text=True, timeout=60, check=False)
+                         text=True, timeout=600, check=False)
     assert end.returncode != 0 and end.stderr != ""
     assert not list((tmp_path / "result").glob("*.h5"))
 
 
 def test_the_program_without_mpi_refuses_to_be_several(whole, tmp_path):
     words = [SERIAL, "run", str(whole / "scene.nml"), "--set", f"output.folder={tmp_path / 'result'}"]
-    end = subprocess.run(["mpirun", "-n", "3", *words], env=ENVIRONMENT, capture_output=True, text=True, timeout=60,
+    end = subprocess.run(["mpirun", "-n", "3", *words], env=ENVIRONMENT, capture_output=True, text=True, timeout=600,
                          check=False)
     assert end.returncode == BAD_INPUT and "--ranks 3" in end.stderr, end
     assert not (tmp_path / "result").exists()

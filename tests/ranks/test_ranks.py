@@ -82,12 +82,12 @@ def interrupt(folder, namelist, ranks, options):
     """Begin or continue a run, and end it by a signal soon after its next checkpoint."""
     before = newest(folder)
     process = start(namelist, folder, ranks, 1, ("--continue", *options))
-    end = time.monotonic() + 120
+    end = time.monotonic() + 600
     while newest(folder) == before and process.poll() is None:
         assert time.monotonic() < end, "waited in vain for a checkpoint"
         time.sleep(0.002)
     process.send_signal(signal.SIGUSR1)
-    output, message = process.communicate(timeout=120)
+    output, message = process.communicate(timeout=600)
     assert process.returncode == 75, (process.returncode, message)
     return int(re.search(r"interrupted by SIGUSR1 at step (\d+) of", message).group(1)), output
 

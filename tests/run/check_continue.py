@@ -27,6 +27,8 @@ from continued_run import (
 
 #: Exit codes of a run, as inputs/getting_started.md lists them
 FAILED, BAD_INPUT, NO_FILE, EARLY = 1, 2, 3, 75
+#: How often something is tried that does not come about at once on a busy machine
+MOST_ATTEMPTS = 20
 
 
 class Case:
@@ -42,13 +44,19 @@ class Case:
     def run(self, folder, *options):
         return run(self.program, folder, *options)
 
-    def interrupt(self, folder, number=signal.SIGTERM, least_checkpoints=2):
-        """Run, and interrupt the run by a signal after some checkpoints."""
-        process = start(self.program, folder)
-        wait_for(lambda: len(checkpoints_of(folder)) >= least_checkpoints)
-        process.send_signal(number)
-        output, message = process.communicate()
-        return process.returncode, output, message
+    def interrupt(self, folder, number=signal.SIGTERM, *options, when=None):
+        """Run, and interrupt the run by a signal: after two checkpoints, or when a condition holds."""
+        is_due = when or (lambda: len(checkpoints_of(folder)) == 2)
+        for _ in range(MOST_ATTEMPTS):
+            process = start(self.program, folder, *options)
+            wait_for(lambda: is_due() or process.poll() is not None)
+            process.send_signal(number)
+            output, message = process.communicate()
+            if process.returncode != 0:
+                return process.returncode, output, message
+            # On a busy machine the run may come to its end before the signal does.
+            shutil.rmtree(folder)
+        raise AssertionError("every run ended before the signal came")
 
     def finish(self, folder, *options):
         """Continue to the end, check the result and return the output."""
@@ -72,7 +80,19 @@ def run_all(tests):
             print(f"{test.__name__.replace('_', ' ')}: {time.monotonic() - began:.1f} s", flush=True)
 
 
-def wait_for(condition, seconds=60.0):
+def least_seconds(limit, call):
+    """Least time of a call, repeated until it takes less than a limit: other work on this machine may delay it."""
+    least = float("inf")
+    for _ in range(MOST_ATTEMPTS):
+        began = time.monotonic()
+        call()
+        least = min(least, time.monotonic() - began)
+        if least < limit:
+            break
+    return least
+
+
+def wait_for(condition, seconds=600.0):
     """Wait until a condition holds."""
     end = time.monotonic() + seconds
     while not condition():
@@ -117,29 +137,52 @@ def a_signal_ends_a_run_with_a_checkpoint(case):
         assert told["size"] == f"{size // 1024 + 1} KiB", (told, size)
 
 
+def usr1_while_a_run_starts_ends_it_after_the_first_step(case):
+    def send():
+        # A signal that is blocked and pending stays so in the program that takes the place of this process.
+        signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGUSR1])
+        os.kill(os.getpid(), signal.SIGUSR1)
+
+    process = start(case.program, "at_once", before=send)
+    _, message = process.communicate()
+    assert process.returncode == EARLY and "interrupted by SIGUSR1 at step 1 of 1200" in message, message
+    case.finish("at_once")
+
+
 def a_second_signal_ends_it_at_once(case):
     # No process reads the output of the run, so the run soon blocks on it and polls for no signals.
-    process = start(case.program, "twice", "--set", "integrate.duration=100", "--set", "output.log_interval=1e-5")
-    sizes = [-1]
-    while sizes[-1] < 60000 or sizes[-1] != sizes[-2]:
+    for _ in range(MOST_ATTEMPTS):
+        process = start(case.program, "twice", "--set", "integrate.duration=100", "--set", "output.log_interval=1e-5")
+        sizes = [-1]
+        while sizes[-1] < 60000 or sizes[-1] != sizes[-2]:
+            time.sleep(0.3)
+            sizes.append(os.path.getsize("twice/log.txt") if os.path.exists("twice/log.txt") else 0)
+            assert len(sizes) < 2000, sizes
+        process.send_signal(signal.SIGTERM)
         time.sleep(0.3)
-        sizes.append(os.path.getsize("twice/log.txt") if os.path.exists("twice/log.txt") else 0)
-        assert len(sizes) < 200, sizes
-    process.send_signal(signal.SIGTERM)
-    time.sleep(0.3)
-    assert process.poll() is None
-    process.send_signal(signal.SIGTERM)
-    assert process.wait(timeout=30) == -signal.SIGTERM
+        if process.poll() is None:
+            break
+        # On a busy machine the run may not yet have been blocked.
+        process.communicate()
+        assert process.returncode == EARLY
+        shutil.rmtree("twice")
+    # Two that come before the run has heard the first one are one.
+    while process.poll() is None:
+        process.send_signal(signal.SIGTERM)
+        time.sleep(0.3)
+    assert process.returncode == -signal.SIGTERM
     process.communicate()
 
 
 def elapsed_time_ends_a_run_in_time(case):
-    began = time.monotonic()
-    code, _, message = case.run("limited", "--set", "integrate.duration=100", "--walltime", "00:00:02")
-    seconds = time.monotonic() - began
-    assert code == EARLY and "interrupted by --walltime" in message, (code, message)
-    assert 1.0 < seconds < 4.0, seconds
-    assert len(checkpoints_of("limited")) == 2
+    def run_limited():
+        began = time.monotonic()
+        code, _, message = case.run("limited", "--force", "--set", "integrate.duration=100", "--walltime", "00:00:02")
+        assert code == EARLY and "interrupted by --walltime" in message, (code, message)
+        assert time.monotonic() - began > 1.0
+        assert len(checkpoints_of("limited")) == 2
+
+    assert least_seconds(4.0, run_limited) < 4.0
 
 
 def a_damaged_checkpoint_is_passed_over(case):
@@ -190,10 +233,8 @@ def a_finished_run_stays_as_it_is(case):
 
 def a_run_without_checkpoint_begins_with_its_first_step(case):
     assert "no checkpoint" not in case.finish("fresh")
-    process = start(case.program, "early", "--set", "checkpoint.steps=0", "--set", "output.frames_per_segment=1000")
-    wait_for(lambda: os.path.exists("early/trajectory_0001.h5.open"))
-    process.kill()
-    process.communicate()
+    case.interrupt("early", signal.SIGKILL, "--set", "checkpoint.steps=0", "--set", "output.frames_per_segment=1000",
+                   when=lambda: os.path.exists("early/trajectory_0001.h5.open"))
     assert not closed_segments("early") and not checkpoints_of("early")
     with open("early/trajectory_0001.h5.open", "w", encoding="utf-8") as file:
         file.write("what a kill left")
@@ -268,9 +309,10 @@ def a_folder_that_cannot_be_written_is_named(case):
     case.finish("blocked")
 
 
-TESTS = (a_signal_ends_a_run_with_a_checkpoint, a_second_signal_ends_it_at_once, elapsed_time_ends_a_run_in_time,
-         a_damaged_checkpoint_is_passed_over, changed_settings_are_refused_unless_allowed,
-         a_finished_run_stays_as_it_is, a_run_without_checkpoint_begins_with_its_first_step,
+TESTS = (a_signal_ends_a_run_with_a_checkpoint, usr1_while_a_run_starts_ends_it_after_the_first_step,
+         a_second_signal_ends_it_at_once, elapsed_time_ends_a_run_in_time, a_damaged_checkpoint_is_passed_over,
+         changed_settings_are_refused_unless_allowed, a_finished_run_stays_as_it_is,
+         a_run_without_checkpoint_begins_with_its_first_step,
          a_missing_segment_is_noticed, a_run_that_a_guard_stops_leaves_frames_and_checkpoint,
          a_disk_that_is_full_loses_nothing, a_folder_that_cannot_be_written_is_named)
 

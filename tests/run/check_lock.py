@@ -15,7 +15,7 @@ import subprocess
 import threading
 import time
 
-from check_continue import BAD_INPUT, EARLY, NO_FILE, run_all, wait_for
+from check_continue import BAD_INPUT, EARLY, MOST_ATTEMPTS, NO_FILE, run_all, wait_for
 from check_faults import environment
 from continued_run import start
 
@@ -64,7 +64,7 @@ def held(case, folder, *options):
 def end(process):
     """End a run that holds a folder, with a checkpoint."""
     process.send_signal(signal.SIGTERM)
-    _, message = process.communicate(timeout=60)
+    _, message = process.communicate(timeout=600)
     assert process.returncode == EARLY, message
 
 
@@ -94,11 +94,17 @@ def a_living_run_keeps_others_out_also_when_it_stands_still(case, _):
 
 def a_killed_run_keeps_nobody_out(case, _):
     # The test waits for the dead process only after the next run, so it stays a zombie until then.
-    with start(case.program, "killed") as process:
-        wait_for(lambda: os.path.exists("killed/checkpoint_2.h5"))
-        process.kill()
-        os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
-        assert f"of process {process.pid}, which has ended" in case.finish("killed")
+    for _ in range(MOST_ATTEMPTS):
+        with start(case.program, "killed") as process:
+            wait_for(lambda: os.path.exists("killed/checkpoint_2.h5"))
+            process.kill()
+            end = os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
+            if end.si_code == os.CLD_KILLED:
+                assert f"of process {process.pid}, which has ended" in case.finish("killed")
+                return
+        # On a busy machine the run may come to its end before the signal does.
+        shutil.rmtree("killed")
+    raise AssertionError("every run ended before the signal came")
 
 
 def a_process_number_that_another_one_has_now_keeps_nobody_out(case, _):
@@ -131,7 +137,7 @@ def processes_of_other_namespaces_keep_each_other_out(case, _):
             code, _, message = case.run("spaces", "--continue")
             assert code == BAD_INPUT and "another run (process 1)" in message, (code, message)
             inside = subprocess.run([*command, case.program, *options, "--continue"], capture_output=True, text=True,
-                                    timeout=60, check=False)
+                                    timeout=600, check=False)
             assert inside.returncode == BAD_INPUT and "another run (process 1)" in inside.stderr, inside
         finally:
             holder.kill()
@@ -184,7 +190,7 @@ def a_run_whose_folder_was_taken_over_ends_and_writes_nothing_more(case, library
                     write("lost", words)
                 before = states_of("lost")
                 process.send_signal(signal.SIGCONT)
-                _, message = process.communicate(timeout=30)
+                _, message = process.communicate(timeout=600)
             assert process.returncode == NO_FILE and "is gone or belongs to another run" in message, message
             assert states_of("lost") == before, (before, states_of("lost"))
             assert read(lock_of("lost")) == (words or "")

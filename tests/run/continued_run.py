@@ -32,11 +32,12 @@ def write_scene(path="scene.nml"):
         file.write(SCENE)
 
 
-def start(program, folder, *options):
-    """Start a run of the scene."""
+def start(program, folder, *options, before=None):
+    """Start a run of the scene; its process first executes `before`."""
     command = [program, "run", "scene.nml", "--threads", "2", "--set", f"output.folder={folder}", *options]
     environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
-    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment)
+    return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment,
+                            preexec_fn=before)  # noqa: PLW1509
 
 
 def run(program, folder, *options):

@@ -13,6 +13,6 @@ function(polydem_ranks_test name room target)
     add_test(NAME ${name}_${ranks}
       COMMAND "${MPIEXEC_EXECUTABLE}" ${MPIEXEC_NUMPROC_FLAG} ${ranks} $<TARGET_FILE:${target}> ${ARGN})
     set_tests_properties(${name}_${ranks} PROPERTIES
-      LABELS "${room};ranks" ENVIRONMENT "${polydem_ranks_environment}" PROCESSORS 2 TIMEOUT 300)
+      LABELS "${room};ranks" ENVIRONMENT "${polydem_ranks_environment}" PROCESSORS 2)
   endforeach()
 endfunction()

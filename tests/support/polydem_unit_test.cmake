@@ -40,8 +40,7 @@ function(polydem_unit_test room)
     ENVIRONMENT "POLYDEM_SOURCE_DIR=${PROJECT_SOURCE_DIR};OMP_NUM_THREADS=2;OMP_WAIT_POLICY=passive"
     WORKING_DIRECTORY "${polydem_scratch}/${room}"
     FIXTURES_REQUIRED empty_folders
-    PROCESSORS 2
-    TIMEOUT 600)
+    PROCESSORS 2)
   set_property(GLOBAL APPEND PROPERTY polydem_test_folders "${polydem_scratch}/${room}")
 endfunction()
 
