@@ -44,6 +44,11 @@ class Ranks(Toy):
         self.assertEqual((noted["OMPI_MCA_rmaps_base_oversubscribe"], noted["OMPI_MCA_mpi_yield_when_idle"],
                           noted["OMP_WAIT_POLICY"]), ("1", "1", "passive"))
 
+    def test_waiting_threads_soon_sleep_unless_the_user_has_chosen(self):
+        for chosen, expected in (({}, "3000"), ({"GOMP_SPINCOUNT": "7"}, "7"), ({"OMP_WAIT_POLICY": "active"}, None)):
+            noted = self.run_ranks("run", "x", "--ranks", "1", "--threads", "1", **chosen)[2]
+            self.assertEqual(noted.get("GOMP_SPINCOUNT"), expected)
+
     def test_mpirun_that_went_after_the_build_is_installed_or_named(self):
         self.call("--version", POLYDEM_PRESET="mpi")
         machine = self.bare_machine()

@@ -105,7 +105,7 @@ class Toy(unittest.TestCase):
             self.write(f"mpi/{name}", MPIRUN)
             os.chmod(os.path.join(self.folder, "mpi", name), 0o755)
         self.environment = {name: value for name, value in os.environ.items()
-                            if not name.startswith(("OMPI_", "OMP_", "POLYDEM_", "HDF5_", "CTEST_", "SLURM_"))}
+                            if not name.startswith(("GOMP_", "OMPI_", "OMP_", "POLYDEM_", "HDF5_", "CTEST_", "SLURM_"))}
         self.environment["PATH"] = os.path.join(self.folder, "mpi") + ":" + self.environment["PATH"]
         self.environment["NOTES"] = self.folder
 
