@@ -164,7 +164,7 @@ contains
       if (self%has_failed()) return
       if (storage_size(values) > storage_size(1.0_dp)) then
          words = transfer(values, [0_lp])
-         call self%transfer_longs(name, width*(storage_size(values)/storage_size(1_lp)), words, unit, &
+         call self%transfer_longs(name, width*storage_size(values)/storage_size(1_lp), words, unit, &
                                   meaning//'; bits of the working precision')
          if (self%is_reading .and. .not. allocated(self%error)) values = transfer(words, values, n)
       else
