@@ -18,7 +18,7 @@ WRONG_STEP = 3
 
 def replay(program, *arguments):
     """Run the verb; return exit code, key=value lines and error messages."""
-    done = subprocess.run([program, "replay", *arguments], capture_output=True, text=True, timeout=60, check=False)
+    done = subprocess.run([program, "replay", *arguments], capture_output=True, text=True, timeout=600, check=False)
     lines = dict(line.split("=", 1) for line in done.stdout.splitlines() if "=" in line)
     return done.returncode, lines, done.stderr
 

@@ -32,7 +32,7 @@ DANGERS = (
 def checked(program, path, *settings):
     """Exit code of `check`, its warnings and its message."""
     command = [program, "check", str(path)] + [word for each in settings for word in ("--set", each)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     for line in ("extent     x ", "sizes      ", "thinnest   body ", "masses     ", "speeds     ", "frames     "):
         assert done.returncode == 2 or f"\n{line}" in done.stdout, (path.name, line, done.stdout)
     return done.returncode, re.findall(r"^warning: (.*)$", done.stdout, re.MULTILINE), done.stderr
@@ -61,7 +61,7 @@ def main():
         scene, settings, part, _ = DANGERS[-1]
         words = [*settings, "integrate.duration=1e-3", f"output.folder={work}/result"]
         command = [program, "run", str(inputs / f"{scene}.nml")] + [word for each in words for word in ("--set", each)]
-        subprocess.run(command, capture_output=True, timeout=120, check=True)
+        subprocess.run(command, capture_output=True, timeout=600, check=True)
         log = (Path(work) / "result" / "log.txt").read_text(encoding="utf-8")
         assert part in log and "\nwarnings: 1 about the initial state\nstate hash: " in log, log
 

@@ -35,7 +35,7 @@ def stop(program, path, folder, *settings):
     """Run a scene that must stop; return what it says."""
     overrides = [f"output.folder={folder}", "integrate.dt=0", "integrate.fraction=10", *settings]
     command = [program, "run", str(path)] + [word for each in overrides for word in ("--set", each)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == RUN_ERROR, (path.name, done.returncode, done.stderr)
     match = MESSAGE.fullmatch(done.stderr.strip())
     assert match, (path.name, done.stderr)
@@ -47,7 +47,7 @@ def stop(program, path, folder, *settings):
     step = int(match[1].split()[1].rstrip(":"))
     dt = float(re.search(r"^step       dt = (\S+) s", log, re.MULTILINE)[1])
     segment = max(str(each) for each in folder.glob("trajectory_*.h5"))
-    info = subprocess.run([program, "info", segment], capture_output=True, text=True, timeout=60, check=True).stdout
+    info = subprocess.run([program, "info", segment], capture_output=True, text=True, timeout=600, check=True).stdout
     last = float(re.search(r"frames .* s to (\S+) s", info)[1])
     assert abs(last - step * dt) <= 1e-5 * step * dt, (path.name, step, dt, info)
     return match[1]
@@ -57,7 +57,7 @@ def warn(program, path, folder):
     """Run a scene at ten times its stable step that no guard stops; its log must warn, and its block must hop."""
     overrides = [f"output.folder={folder}", "integrate.dt=0", "integrate.fraction=10", *BLIND]
     command = [program, "run", str(path)] + [word for each in overrides for word in ("--set", each)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, (path.name, done.stderr)
     assert re.search(r"^warning: dt = \S+ s is 1\.00E\+01 times the stable time step", done.stdout, re.MULTILINE), done
     lines = re.findall(r"^ +\d+ +\S+ +\S+ +\S+ +\S+ +(\d+) ", done.stdout, re.MULTILINE)

@@ -39,7 +39,7 @@ def open_browser(folder, width=1000, height=700):
     service = webdriver.ChromeService(shutil.which("chromedriver"))
     browser = webdriver.Chrome(options=options, service=service)
     try:
-        browser.set_script_timeout(60)
+        browser.set_script_timeout(600)
         yield browser
     finally:
         browser.quit()

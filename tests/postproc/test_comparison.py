@@ -53,7 +53,7 @@ def call(output, *options, plan=PLAN):
     """Exit code and output of a comparison."""
     environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
     done = subprocess.run(command(output, *options, plan=plan), capture_output=True, text=True, check=False,
-                          env=environment, timeout=300)
+                          env=environment, timeout=600)
     return done.returncode, done.stdout + done.stderr
 
 
@@ -128,7 +128,7 @@ def test_the_page_opens_in_a_browser_without_errors(output, tmp_path):
     done = subprocess.run(
         [browser, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", "--v=0",
          f"--user-data-dir={tmp_path}", "--dump-dom", (folder / "report.html").as_uri()],
-        capture_output=True, text=True, check=False, timeout=120)
+        capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == 0, done.stderr[-2000:]
     assert "Verdicts on the claims" in done.stdout and done.stdout.count("<figure ") >= 10
     assert not [line for line in done.stderr.splitlines() if "CONSOLE" in line]

@@ -117,6 +117,6 @@ def test_the_search_works_from_a_folder(site):
         pytest.skip("no Chromium here: the search of the manual is not tried in a browser")
     done = subprocess.run([chromium, "--headless=new", "--no-sandbox", "--disable-gpu", "--virtual-time-budget=10000",
                            "--enable-logging=stderr", "--dump-dom", (site / "index.html").as_uri() + "?q=damping"],
-                          capture_output=True, text=True, timeout=120, check=True)
+                          capture_output=True, text=True, timeout=600, check=True)
     assert re.search(r"\b[1-9]\d* matching documents", done.stdout)
     assert [line for line in done.stderr.splitlines() if "CONSOLE" in line] == []

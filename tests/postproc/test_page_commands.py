@@ -16,7 +16,7 @@ from test_pages import PAGES, ROOT
 
 PRESET = os.environ.get("POLYDEM_PRESET") or Path(os.environ["POLYDEM_PROGRAM"]).parents[2].name
 LAUNCHED = Path(os.environ["POLYDEM_PROGRAM"]) == ROOT / "build" / PRESET / "src" / "app" / "polydem"
-PATIENCE = 120  # s
+PATIENCE = 900  # s
 
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
 CHOSEN = os.environ.get("POLYDEM_PAGES", ",".join(NAMES)).split(",")

@@ -40,7 +40,7 @@ def start(namelist, folder, ranks=None, threads=1, options=()):
 def run(namelist, folder, ranks=None, threads=1, options=(), code=0):
     """Run to the end, which must have the given exit code; give standard output and standard error."""
     process = start(namelist, folder, ranks, threads, options)
-    output, message = process.communicate(timeout=300)
+    output, message = process.communicate(timeout=600)
     assert process.returncode == code, f"ended with {process.returncode}, not {code}:\n{message}\n{output[-2000:]}"
     return output, message
 

@@ -28,7 +28,7 @@ def peaks(folder, ranks, bodies):
     (folder / "bed.nml").write_text(BED.replace("200000", str(bodies)), encoding="utf-8")
     command = ["mpirun", "--oversubscribe", "-n", str(ranks), sys.executable, "-c", MEASURE, str(measured),
                PARALLEL, "run", str(folder / "bed.nml"), "--threads", "1", "--set", f"output.folder={results}"]
-    subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, check=True, timeout=300)
+    subprocess.run(command, env=ENVIRONMENT, capture_output=True, text=True, check=True, timeout=600)
     return [int(path.read_text(encoding="utf-8")) for path in measured.iterdir()]
 
 

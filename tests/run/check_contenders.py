@@ -36,7 +36,7 @@ class Contenders:
 
 def end(process):
     """Wait for the end of a process; return how often it acquired the lock, and how often it took over a lock."""
-    output, _ = process.communicate(timeout=240)
+    output, _ = process.communicate(timeout=600)
     *others, counts = output.splitlines()
     inside, taken, refused, met = (int(word) for word in counts.split())
     assert process.returncode == 0 and not others and (refused, met) == (0, 0), output

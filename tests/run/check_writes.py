@@ -46,7 +46,7 @@ SCENE = """\
 #: Exit codes: of a test that is skipped, and of a run that could not write a file
 SKIPPED, NO_FILE = 77, 3
 #: Time within which a run must have ended [s]; the message comes at once, but machines may be busy or stand still
-PATIENCE = 100.0
+PATIENCE = 600.0
 #: How long ranks wait for each other where nobody knows that a call has failed [s]
 WAITING = "5"
 #: Steps: without ranks, so many that the oldest checkpoint is replaced

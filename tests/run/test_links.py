@@ -41,7 +41,7 @@ FROM_FILE = """\
 
 def call(*words):
     """Exit code, output and message of a call."""
-    done = subprocess.run([PROGRAM, *words], capture_output=True, text=True, timeout=60, check=False,
+    done = subprocess.run([PROGRAM, *words], capture_output=True, text=True, timeout=600, check=False,
                           env={**os.environ, "OMP_NUM_THREADS": "1"})
     return done.returncode, done.stdout, done.stderr
 
