@@ -8,7 +8,7 @@ module overlap_cases
    implicit none
    private
    public :: rectangle, regular, median_diameter, turned, overlap_of, roundoff, two_pi
-   public :: worst_area, worst_normal, worst_normal_far, worst_moment, worst_centroid
+   public :: far, worst_area, worst_normal, worst_normal_far, worst_moment, worst_centroid
 
    !> Full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586476925286766559_wp
@@ -19,8 +19,8 @@ module overlap_cases
    real(wp), parameter :: scales(3) = [1.0_wp, 1.0e-9_wp, 1.0e9_wp]
    !> Number of positions: two orders at every angle in every unit
    integer, parameter :: n_positions = 2*size(angles)*size(scales)
-   !> A place far from the origin, in these units
-   real(wp), parameter :: far(2) = [1.0e6_wp, -0.7e6_wp]
+   !> A place far from the origin, in these units: positions there leave three fifths of the digits to the shapes
+   real(wp), parameter :: far(2) = [1.0_wp, -0.7_wp]*2.0_wp**int(0.4_wp*real(digits(1.0_wp), wp))
 
 contains
 

@@ -87,7 +87,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       real(wp), allocatable :: v(:, :)
       integer :: k, l, m, s, n
-      real(wp) :: a(2), b(2), total
+      real(wp) :: a(2), b(2), total, rounding
 
       all_convex = .true.
       do s = 1, bodies%n
@@ -99,10 +99,12 @@ contains
             m = modulo(l, n) + 1
             a = v(:, l) - v(:, k)
             b = v(:, m) - v(:, l)
-            if (a(1)*b(2) - a(2)*b(1) <= 0.0_wp) all_convex = .false.
+            ! Vertices are rounded at their distance from the origin.
+            rounding = 4.0_wp*epsilon(1.0_wp)*maxval(abs(v))*(norm2(a) + norm2(b))
+            if (a(1)*b(2) - a(2)*b(1) <= -rounding) all_convex = .false.
             total = total + atan2(a(1)*b(2) - a(2)*b(1), a(1)*b(1) + a(2)*b(2))
          end do
-         if (abs(total - 8.0_wp*atan(1.0_wp)) > 1.0e-6_wp) all_convex = .false.
+         if (abs(total - 8.0_wp*atan(1.0_wp)) > 1.0e-6_wp + 8.0_wp*real(n, wp)*epsilon(1.0_wp)) all_convex = .false.
       end do
    end function all_convex
 
