@@ -89,6 +89,7 @@ contains
       end if
       if (self%filter%is_due(self%n)) then
          call self%filter%begin_interval(self)
+         call self%tidy()
          call self%filter%draw_all_lines(boxes)
          call self%filter%list_strays(self%everywhere)
          call self%filter%classify_all(boxes, self)

@@ -15,8 +15,8 @@
 !> ancestor that contains the padded cell, and descends from there into every cell that is near enough. The search finds
 !> all boxes, whatever their shape and whatever lies between them.
 !>
-!> All parts except the repair are parallel: each thread works on a contiguous part of a list. The results are joined in
-!> the order of the list and do not depend on the number of threads.
+!> Each thread works on a contiguous part of a list. While the first thread repairs the tree, the others begin to compare
+!> candidates. The results are joined in the order of the list and do not depend on the number of threads.
 !>
 !> The same source makes four finders: the minimal quadtree compiled with and without inlining, the pruned quadtree,
 !> whose leaves all have the same size, and a binary tree along the longer axis for nearly one-dimensional scenes. They
@@ -43,8 +43,8 @@ module polydem_quadtree
    !> contain one centre each in a packing. Other values between powers of two give up to 1.6 times as many candidates
    !> (measured)
    real(dp), parameter :: typical_share = 1.2_dp
-   !> Number of boxes above which the search is parallel. The search for one box takes about two microseconds
-   integer(ip), parameter :: worth_searching = 8_ip
+   !> Time in which one box is moved in the tree, in comparisons of candidates (measured)
+   integer(ip), parameter :: move_cost = 500_ip
    !> Largest number of levels below that level
    integer, parameter :: most_levels = 12
 
@@ -94,19 +94,18 @@ contains
       type(pair_changes_t), intent(inout) :: changes
 
       call prepare_workers(self)
-      if (allocated(self%padded%now)) then
-         call update_tree(self, boxes)
+      if (.not. allocated(self%padded%now)) call build_tree(self, boxes)
+      if (self%filtered) then
+         call self%candidates%compare_active(boxes, changes)
+         call self%work%add(count_tests, int(self%candidates%filter%active%n, lp))
+         call self%work%lap(phase_filter)
       else
-         call build_tree(self, boxes)
+         call self%candidates%tidy()
+         call self%work%add(count_tests, int(self%candidates%n_pairs(), lp))
       end if
-      call update_padded_cells(self)
-      call self%work%lap(phase_structure)
-      call compare_candidates(self, boxes, changes)
-      call self%work%lap(phase_filter)
-      if (self%tree%n_changed > 0_ip) then
-         call search_changed(self, boxes)
-         call replace_candidates(self, boxes, changes)
-      end if
+      call work_on_parts(self, boxes)
+      call self%changes%join(changes)
+      call replace_candidates(self, boxes, changes)
       call self%work%add(count_leaf_changes, int(self%tree%n_changed, lp))
       call self%tree%settle()
       call self%work%lap(phase_search)
@@ -217,20 +216,73 @@ contains
       half_side = 0.5_wp*max(box(3) - box(1), box(4) - box(2))
    end function half_side
 
-   !> Move the boxes that left their leaf, and enlarge reaches that are too small.
-   subroutine update_tree(self, boxes)
+   !> Find the boxes that left their leaf, repair the tree, compare all candidates, and search for new ones.
+   subroutine work_on_parts(self, boxes)
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
-      integer(ip) :: k, i, low, high
+      integer(ip) :: low, high
       integer :: w
 
-      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes) private(w, low, high)
+      !$omp parallel if (boxes%n > min_parallel_size) default(none) shared(self, boxes) private(w, low, high)
+      !$omp do schedule(static, 1)
       do w = 1, size(self%worker)
          call part(boxes%n, size(self%worker), w, low, high)
          call find_outside(self%tree, low, high, boxes%bounds, self%greatest_side, self%worker(w)%outside)
       end do
-      !$omp end parallel do
+      !$omp end do
+      !$omp do schedule(static, 1)
+      do w = 1, size(self%worker)
+         if (w == 1) then
+            call move_boxes(self, boxes)
+            call update_padded_cells(self)
+            call self%work%lap(phase_structure)
+         end if
+         if (.not. self%filtered) then
+            call part_beside_moves(self, w, low, high)
+            call self%candidates%compare(low, high, boxes%bounds, boxes%body, self%changes%of(w))
+         end if
+      end do
+      !$omp end do
+      !$omp do schedule(static, 1)
+      do w = 1, size(self%worker)
+         if (w == 1) call self%work%lap(phase_filter)
+         call part(self%tree%n_changed, size(self%worker), w, low, high)
+         call search_changed(self, low, high, boxes, self%worker(w))
+      end do
+      !$omp end do
+      !$omp end parallel
+      do w = 1, size(self%worker)
+         call self%work%add(count_left_leaf, int(self%worker(w)%outside%n, lp))
+         call self%work%add(count_visits, self%worker(w)%visits)
+      end do
+      call self%work%add(count_searches, int(self%tree%n_changed, lp))
+      call self%work%lap(phase_search)
+   end subroutine work_on_parts
+
+   !> Part of the candidates that a thread compares: less for the first one, which moves boxes meanwhile
+   subroutine part_beside_moves(self, w, low, high)
+      type(quadtree_t), intent(in) :: self
+      !> Thread
+      integer, intent(in) :: w
+      !> First and last candidate
+      integer(ip), intent(out) :: low, high
+      integer(ip) :: n, spent
+
+      n = self%candidates%n
+      spent = move_cost*min(sum(self%worker%outside%n), n/move_cost)
+      spent = min(spent, n/int(max(size(self%worker) - 1, 1), ip))
+      call part(n + spent, size(self%worker), w, low, high)
+      low = max(low - spent, 1_ip)
+      high = high - spent
+   end subroutine part_beside_moves
+
+   !> Move the boxes that left their leaf, and enlarge reaches that are too small.
+   subroutine move_boxes(self, boxes)
+      type(quadtree_t), intent(inout) :: self
+      type(boxes_t), intent(in) :: boxes
+      integer(ip) :: k, i
+      integer :: w
+
       do w = 1, size(self%worker)
          do k = 1_ip, self%worker(w)%outside%n
             i = self%worker(w)%outside%at(k)
@@ -240,9 +292,8 @@ contains
             end if
             call self%tree%move(i, boxes%bounds)
          end do
-         call self%work%add(count_left_leaf, int(self%worker(w)%outside%n, lp))
       end do
-   end subroutine update_tree
+   end subroutine move_boxes
 
    !> List the boxes low..high whose centre is not in its leaf or whose side exceeds `greatest_side`.
    subroutine find_outside(tree, low, high, bounds, greatest_side, outside)
@@ -279,59 +330,22 @@ contains
       end do
    end subroutine update_padded_cells
 
-   !> Compare the boxes of all candidates.
-   subroutine compare_candidates(self, boxes, changes)
-      type(quadtree_t), intent(inout) :: self
+   !> Find the new candidates of boxes whose leaf changed, and those that are candidates no longer.
+   subroutine search_changed(self, low, high, boxes, worker)
+      type(quadtree_t), intent(in) :: self
+      !> First and last box in the list of those whose leaf changed
+      integer(ip), intent(in) :: low, high
       type(boxes_t), intent(in) :: boxes
-      type(pair_changes_t), intent(inout) :: changes
-      integer(ip) :: low, high
-      integer :: w
+      type(worker_t), intent(inout) :: worker
+      integer(ip) :: k
 
-      if (self%filtered) then
-         call self%candidates%compare_active(boxes, changes)
-         call self%work%add(count_tests, int(self%candidates%filter%active%n, lp))
-         return
-      end if
-      !$omp parallel do if (self%candidates%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes) private(w, low, high)
-      do w = 1, size(self%worker)
-         call part(self%candidates%n, size(self%worker), w, low, high)
-         call self%candidates%compare(low, high, boxes%bounds, boxes%body, self%changes%of(w))
-      end do
-      !$omp end parallel do
-      call self%changes%join(changes)
-      call self%work%add(count_tests, int(self%candidates%n_pairs(), lp))
-   end subroutine compare_candidates
-
-   !> Find the new candidates of all boxes whose leaf changed, and those that are candidates no longer.
-   subroutine search_changed(self, boxes)
-      type(quadtree_t), intent(inout) :: self
-      type(boxes_t), intent(in) :: boxes
-      integer(ip) :: k, low, high
-      integer :: w
-
-      !$omp parallel do if (self%tree%n_changed > worth_searching) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes) private(w, k, low, high)
-      do w = 1, size(self%worker)
-         call part(self%tree%n_changed, size(self%worker), w, low, high)
-         do k = low, high
-            call search(self%tree, self%padded, boxes, self%tree%changed(k), self%worker(w)%found, &
-                        self%worker(w)%visits)
-            call self%candidates%list_separated(self%tree%changed(k), self%padded%now, self%worker(w)%separated)
-         end do
-      end do
-      !$omp end parallel do
-      do k = 1_ip, self%tree%n_changed
-         self%padded%before(:, self%tree%changed(k)) = self%padded%now(:, self%tree%changed(k))
-      end do
-      call self%work%add(count_searches, int(self%tree%n_changed, lp))
-      do w = 1, size(self%worker)
-         call self%work%add(count_visits, self%worker(w)%visits)
+      do k = low, high
+         call search(self%tree, self%padded, boxes, self%tree%changed(k), worker%found, worker%visits)
+         call self%candidates%list_separated(self%tree%changed(k), self%padded%now, worker%separated)
       end do
    end subroutine search_changed
 
-   !> Remove the pairs that are not candidates any longer, and add the new candidates, in the reverse order of the
-   !> threads: the new candidates of a box fill the holes that its former ones have left.
+   !> Remove the pairs that are not candidates any longer, and add the new candidates.
    subroutine replace_candidates(self, boxes, changes)
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -340,15 +354,18 @@ contains
       integer :: w
       logical :: overlap
 
+      do k = 1_ip, self%tree%n_changed
+         self%padded%before(:, self%tree%changed(k)) = self%padded%now(:, self%tree%changed(k))
+      end do
       do w = 1, size(self%worker)
          do k = 1_ip, self%worker(w)%separated%n
             call self%candidates%drop(self%worker(w)%separated%at(k))
          end do
       end do
-      do w = size(self%worker), 1, -1
-         do k = self%worker(w)%found%n, 1_ip, -2_ip
-            i = self%worker(w)%found%at(k - 1_ip)
-            j = self%worker(w)%found%at(k)
+      do w = 1, size(self%worker)
+         do k = 1_ip, self%worker(w)%found%n, 2_ip
+            i = self%worker(w)%found%at(k)
+            j = self%worker(w)%found%at(k + 1_ip)
             overlap = overlapping(boxes%bounds(:, i), boxes%bounds(:, j))
             call self%candidates%add(i, j, overlap, number)
             if (overlap) call changes%record(boxes%body(i), boxes%body(j), 1_ip)

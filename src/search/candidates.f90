@@ -3,8 +3,9 @@
 !> The comparison of all candidates is one loop over plain arrays. The candidates of each box also form a doubly linked
 !> list. Element (s, k) of `next` and `previous` belongs to box s (1 or 2) of candidate k; its number 2(k - 1) + s is
 !> its *link*. Removing and adding a candidate cost O(1). A candidate that is removed leaves a *hole*, a box with
-!> itself, and new candidates fill the last holes first. So candidates of near boxes stay near each other in the list,
-!> and threads that compare different parts of it share few boxes.
+!> itself. A new candidate fills a hole near the other candidates of its box: the list is divided into regions, and the
+!> holes of each form a linked list. When many candidates had to go elsewhere, the list is sorted. So candidates of near
+!> boxes stay near each other in the list, and threads that compare different parts of it share few boxes.
 module polydem_candidates
    use polydem_instruction_set, only: isa_avx2, isa_base
    use polydem_kinds, only: bp, dp, ip, lp, wp
@@ -17,6 +18,10 @@ module polydem_candidates
 
    !> Number of candidates that are compared at once
    integer(ip), parameter :: block_size = 128_ip
+   !> Logarithm to base 2 of the number of candidates in a region
+   integer, parameter :: region_bits = 11
+   !> Logarithm to base 2 of the inverse share of candidates outside their region at which the list is sorted
+   integer, parameter :: most_elsewhere = 4
 
    !> List of integers that grows
    type :: index_list_t
@@ -45,14 +50,19 @@ module polydem_candidates
       integer(ip), allocatable :: next(:, :)
       !> Previous link of the same box, (2, candidate), 0: none
       integer(ip), allocatable :: previous(:, :)
-      !> Holes
-      type(index_list_t), private :: hole
+      !> Number of holes
+      integer(ip), private :: n_holes = 0_ip
+      !> Number of candidates that were added elsewhere than in their region since the list was sorted
+      integer(ip), private :: n_elsewhere = 0_ip
+      !> First hole of each region, (region), 0: none; the next one is in `next(1, hole)`
+      integer(ip), allocatable, private :: first_hole(:)
    contains
       procedure :: start
       procedure :: add
       procedure :: compare
       procedure :: find_states_of
       procedure :: drop
+      procedure :: tidy
       procedure :: n_pairs
       procedure :: list_separated
       procedure :: append_candidates_of
@@ -83,18 +93,28 @@ contains
       logical, intent(in) :: overlap
       !> Its number
       integer(ip), intent(out) :: k
-      integer(ip) :: s, link, other
+      integer(ip) :: wanted
 
-      if (self%hole%n > 0_ip) then
-         k = self%hole%at(self%hole%n)
-         self%hole%n = self%hole%n - 1_ip
+      wanted = region(place(max(self%first(a), self%first(b), 1_ip)))
+      if (self%n_holes > 0_ip) then
+         call take_hole(self, wanted, k)
       else
          call reserve(self, self%n + 1_ip)
          self%n = self%n + 1_ip
          k = self%n
       end if
+      if (region(k) /= wanted) self%n_elsewhere = self%n_elsewhere + 1_ip
       self%box(:, k) = [a, b]
       self%overlap(k) = merge(1_bp, 0_bp, overlap)
+      call link_boxes(self, k)
+   end subroutine add
+
+   !> Put a candidate first in the lists of its boxes.
+   pure subroutine link_boxes(self, k)
+      class(candidates_t), intent(inout) :: self
+      integer(ip), intent(in) :: k
+      integer(ip) :: s, link, other
+
       do s = 1_ip, 2_ip
          link = 2_ip*(k - 1_ip) + s
          other = self%first(self%box(s, k))
@@ -103,7 +123,43 @@ contains
          if (other /= 0_ip) self%previous(side(other), place(other)) = link
          self%first(self%box(s, k)) = link
       end do
-   end subroutine add
+   end subroutine link_boxes
+
+   !> Sort the candidates by their lower box, without holes, if many of them are not in their region.
+   pure subroutine tidy(self)
+      class(candidates_t), intent(inout) :: self
+      integer(ip), allocatable :: box(:, :), end_of_row(:)
+      integer(bp), allocatable :: overlap(:)
+      integer(ip) :: n, k, i
+
+      if (self%n_elsewhere <= shiftr(self%n, most_elsewhere)) return
+      n = self%n
+      box = self%box(:, 1:n)
+      overlap = self%overlap(1:n)
+      allocate (end_of_row(0:size(self%first)), source=0_ip)
+      do k = 1_ip, n
+         i = min(box(1, k), box(2, k))
+         end_of_row(i) = end_of_row(i) + merge(0_ip, 1_ip, box(1, k) == box(2, k))
+      end do
+      do i = 1_ip, size(self%first, kind=ip)
+         end_of_row(i) = end_of_row(i - 1_ip) + end_of_row(i)
+      end do
+      self%n = end_of_row(size(self%first))
+      do k = 1_ip, n
+         if (box(1, k) == box(2, k)) cycle
+         i = min(box(1, k), box(2, k))
+         self%box(:, end_of_row(i)) = box(:, k)
+         self%overlap(end_of_row(i)) = overlap(k)
+         end_of_row(i) = end_of_row(i) - 1_ip
+      end do
+      self%first = 0_ip
+      self%first_hole = 0_ip
+      self%n_holes = 0_ip
+      self%n_elsewhere = 0_ip
+      do k = 1_ip, self%n
+         call link_boxes(self, k)
+      end do
+   end subroutine tidy
 
    !> Compare the boxes of a range of candidates and record the pairs that begin or cease to overlap.
    subroutine compare(self, low, high, bounds, body, changes)
@@ -177,7 +233,7 @@ contains
    pure integer(ip) function n_pairs(self)
       class(candidates_t), intent(in) :: self
 
-      n_pairs = self%n - self%hole%n
+      n_pairs = self%n - self%n_holes
    end function n_pairs
 
    !> Append the candidates of a box whose padded boxes do not overlap any longer to a list.
@@ -220,7 +276,8 @@ contains
 
       bytes = 0_lp
       if (.not. allocated(self%box)) return
-      bytes = (int(storage_size(self%box), lp)*(3_lp*size(self%box, kind=lp) + size(self%first, kind=lp)) + &
+      bytes = (int(storage_size(self%box), lp)*(3_lp*size(self%box, kind=lp) + size(self%first, kind=lp) + &
+                                               size(self%first_hole, kind=lp)) + &
                int(storage_size(self%overlap), lp)*size(self%overlap, kind=lp))/8_lp
    end function bytes
 
@@ -237,8 +294,36 @@ contains
       end do
       self%box(2, k) = self%box(1, k)
       self%overlap(k) = 1_bp
-      call self%hole%push(k)
+      self%next(1, k) = self%first_hole(region(k))
+      self%first_hole(region(k)) = k
+      self%n_holes = self%n_holes + 1_ip
    end subroutine drop
+
+   !> Take a hole from the region nearest to a given one that has any.
+   pure subroutine take_hole(self, near, k)
+      class(candidates_t), intent(inout) :: self
+      integer(ip), intent(in) :: near
+      integer(ip), intent(out) :: k
+      integer(ip) :: distance, r, last
+
+      last = region(self%n)
+      k = 0_ip
+      do distance = 0_ip, last
+         r = max(near - distance, 1_ip)
+         if (self%first_hole(r) == 0_ip) r = min(near + distance, last)
+         k = self%first_hole(r)
+         if (k /= 0_ip) exit
+      end do
+      self%first_hole(r) = self%next(1, k)
+      self%n_holes = self%n_holes - 1_ip
+   end subroutine take_hole
+
+   !> Region of a candidate
+   pure integer(ip) function region(k)
+      integer(ip), intent(in) :: k
+
+      region = 1_ip + shiftr(k - 1_ip, region_bits)
+   end function region
 
    !> Set the pointers of two neighbours in the linked list of a box to each other.
    pure subroutine unlink(self, box, previous, next)
@@ -291,7 +376,7 @@ contains
    pure subroutine reserve(self, n)
       type(candidates_t), intent(inout) :: self
       integer(ip), intent(in) :: n
-      integer(ip), allocatable :: box(:, :), next(:, :), previous(:, :)
+      integer(ip), allocatable :: box(:, :), next(:, :), previous(:, :), first_hole(:)
       integer(bp), allocatable :: overlap(:)
       integer(ip) :: m
 
@@ -300,7 +385,9 @@ contains
       end if
       m = n + n/2_ip + 64_ip
       allocate (box(2, m), next(2, m), previous(2, m), overlap(m))
+      allocate (first_hole(region(m)), source=0_ip)
       if (self%n > 0_ip) then
+         first_hole(1:region(self%n)) = self%first_hole(1:region(self%n))
          box(:, 1:self%n) = self%box(:, 1:self%n)
          next(:, 1:self%n) = self%next(:, 1:self%n)
          previous(:, 1:self%n) = self%previous(:, 1:self%n)
@@ -310,6 +397,7 @@ contains
       call move_alloc(next, self%next)
       call move_alloc(previous, self%previous)
       call move_alloc(overlap, self%overlap)
+      call move_alloc(first_hole, self%first_hole)
    end subroutine reserve
 
    !> Make room for n entries.
