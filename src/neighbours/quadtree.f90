@@ -15,21 +15,22 @@
 !> ancestor that contains the padded cell, and descends from there into every cell that is near enough. The search finds
 !> all boxes, whatever their shape and whatever lies between them.
 !>
-!> Each thread works on a contiguous part of a list. While the first thread repairs the tree, the others begin to compare
-!> candidates. The results are joined in the order of the list and do not depend on the number of threads.
+!> Each thread works on a contiguous part of a list. While the first thread repairs the tree, the others begin to
+!> compare candidates. The results are joined in the order of the list and do not depend on the number of threads.
 !>
 !> The same source makes four finders: the minimal quadtree compiled with and without inlining, the pruned quadtree,
 !> whose leaves all have the same size, and a binary tree along the longer axis for nearly one-dimensional scenes. They
 !> differ only in the tree or in the compilation.
 module polydem_quadtree
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: overlapping, index_list_t
+   use polydem_candidates, only: overlapping
    use polydem_exponential, only: exponential, logarithm
    use polydem_filtered_candidates, only: filtered_candidates_t
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_leaf_changes, &
       count_left_leaf, count_nodes, count_searches, count_tests, count_visits, phase_filter, phase_search, &
       phase_structure
+   use polydem_index_list, only: index_list_t
    use polydem_kinds, only: dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
    use polydem_quadtree_nodes, only: tree_t

@@ -1,7 +1,8 @@
 !> Search of the tree for the new candidates of a box.
 module polydem_quadtree_search
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: meet, index_list_t
+   use polydem_candidates, only: meet
+   use polydem_index_list, only: index_list_t
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_quadtree_nodes, only: tree_t
    implicit none

@@ -1,6 +1,7 @@
 !> Active candidates: those that are compared in every step of an interval (`polydem_line_filter`).
 module polydem_active_pairs
-   use polydem_candidates, only: candidates_t, index_list_t
+   use polydem_candidates, only: candidates_t
+   use polydem_index_list, only: index_list_t
    use polydem_kinds, only: bp, ip
    implicit none
    private

@@ -4,7 +4,7 @@
 !> lines* while no side is farther from its line than the tolerance. `polydem_line_filter` explains what follows for
 !> pairs of boxes, and bounds the rounding errors.
 module polydem_box_lines
-   use polydem_candidates, only: index_list_t
+   use polydem_index_list, only: index_list_t
    use polydem_instruction_set, only: isa_avx2, isa_base
    use polydem_kinds, only: bp, ip, sp, wp
    use polydem_line_lanes_avx2, only: classify_avx2 => classify, draw_avx2 => draw, find_off_avx2 => find_off, &

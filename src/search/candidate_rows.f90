@@ -6,7 +6,8 @@
 module polydem_candidate_rows
    use polydem_box_pairs, only: found_pairs_t
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t, index_list_t, overlapping
+   use polydem_candidates, only: candidates_t, overlapping
+   use polydem_index_list, only: index_list_t
    use polydem_kinds, only: bp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
    use polydem_thread_changes, only: part

@@ -7,6 +7,7 @@
 !> holes of each form a linked list. When many candidates had to go elsewhere, the list is sorted. So candidates of near
 !> boxes stay near each other in the list, and threads that compare different parts of it share few boxes.
 module polydem_candidates
+   use polydem_index_list, only: index_list_t
    use polydem_instruction_set, only: isa_avx2, isa_base
    use polydem_kinds, only: bp, dp, ip, lp, wp
    use polydem_line_lanes_avx2, only: find_states_avx2 => find_states
@@ -14,7 +15,7 @@ module polydem_candidates
    use polydem_pair_changes, only: pair_changes_t
    implicit none
    private
-   public :: candidates_t, index_list_t, meet, overlapping
+   public :: candidates_t, meet, overlapping
 
    !> Number of candidates that are compared at once
    integer(ip), parameter :: block_size = 128_ip
@@ -22,17 +23,6 @@ module polydem_candidates
    integer, parameter :: region_bits = 11
    !> Logarithm to base 2 of the inverse share of candidates outside their region at which the list is sorted
    integer, parameter :: most_elsewhere = 4
-
-   !> List of integers that grows
-   type :: index_list_t
-      !> Number of entries
-      integer(ip) :: n = 0_ip
-      !> Entries, (entry); may be longer than n
-      integer(ip), allocatable :: at(:)
-   contains
-      procedure :: push
-      procedure :: reserve => reserve_entries
-   end type index_list_t
 
    !> Candidates and holes 1..n
    type :: candidates_t
@@ -399,37 +389,5 @@ contains
       call move_alloc(overlap, self%overlap)
       call move_alloc(first_hole, self%first_hole)
    end subroutine reserve
-
-   !> Make room for n entries.
-   pure subroutine reserve_entries(self, n)
-      class(index_list_t), intent(inout) :: self
-      !> Number of entries
-      integer(ip), intent(in) :: n
-      integer(ip), allocatable :: longer(:)
-
-      if (allocated(self%at)) then
-         if (size(self%at) >= n) return
-      end if
-      allocate (longer(n + n/4_ip + 64_ip))
-      if (self%n > 0_ip) longer(1:self%n) = self%at(1:self%n)
-      call move_alloc(longer, self%at)
-   end subroutine reserve_entries
-
-   !> Append an entry.
-   pure subroutine push(self, entry)
-      class(index_list_t), intent(inout) :: self
-      !> Entry to append
-      integer(ip), intent(in) :: entry
-      integer(ip), allocatable :: longer(:)
-
-      if (.not. allocated(self%at)) allocate (self%at(64))
-      if (self%n == size(self%at)) then
-         allocate (longer(2_ip*self%n))
-         longer(1:self%n) = self%at
-         call move_alloc(longer, self%at)
-      end if
-      self%n = self%n + 1_ip
-      self%at(self%n) = entry
-   end subroutine push
 
 end module polydem_candidates

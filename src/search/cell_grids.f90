@@ -20,9 +20,9 @@ module polydem_cell_grids
    use omp_lib, only: omp_get_max_threads
    use polydem_box_pairs, only: found_pairs_t
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: index_list_t
    use polydem_cell_grid, only: cell_grid_t, extent_t, measure, measure_levels, new_grid
    use polydem_cell_order, only: cell_order_t
+   use polydem_index_list, only: index_list_t
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
    use polydem_thread_changes, only: part
    implicit none

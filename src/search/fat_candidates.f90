@@ -13,8 +13,9 @@ module polydem_fat_candidates
    use polydem_box_lines, only: box_lines_t
    use polydem_boxes, only: boxes_t
    use polydem_candidate_rows, only: candidate_rows_t
-   use polydem_candidates, only: index_list_t, overlapping
+   use polydem_candidates, only: overlapping
    use polydem_cell_grids, only: cell_grids_t
+   use polydem_index_list, only: index_list_t
    use polydem_kinds, only: bp, dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
    use polydem_size_levels, only: choose_levels, typical_side

@@ -31,7 +31,8 @@
 module polydem_line_filter
    use polydem_active_pairs, only: active_pairs_t
    use polydem_box_lines, only: box_lines_t, list_differences, trust
-   use polydem_candidates, only: candidates_t, index_list_t
+   use polydem_candidates, only: candidates_t
+   use polydem_index_list, only: index_list_t
    use polydem_kinds, only: bp, dp, ip, lp, sp, wp
    use polydem_line_lanes_base, only: active, overlapping, pair_block
    use polydem_pair_changes, only: pair_changes_t

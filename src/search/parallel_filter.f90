@@ -3,7 +3,8 @@
 module polydem_parallel_filter
    use polydem_active_pairs, only: active_pairs_t
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t, index_list_t
+   use polydem_candidates, only: candidates_t
+   use polydem_index_list, only: index_list_t
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
    use polydem_line_filter, only: line_filter_t
    use polydem_thread_changes, only: part, thread_changes_t

@@ -1,0 +1,53 @@
+!> List of integers that grows.
+module polydem_index_list
+   use polydem_kinds, only: ip
+   implicit none
+   private
+   public :: index_list_t
+
+   !> List of integers
+   type :: index_list_t
+      !> Number of entries
+      integer(ip) :: n = 0_ip
+      !> Entries, (entry); may be longer than n
+      integer(ip), allocatable :: at(:)
+   contains
+      procedure :: push
+      procedure :: reserve
+   end type index_list_t
+
+contains
+
+   !> Make room for n entries.
+   pure subroutine reserve(self, n)
+      class(index_list_t), intent(inout) :: self
+      !> Number of entries
+      integer(ip), intent(in) :: n
+      integer(ip), allocatable :: longer(:)
+
+      if (allocated(self%at)) then
+         if (size(self%at) >= n) return
+      end if
+      allocate (longer(n + n/4_ip + 64_ip))
+      if (self%n > 0_ip) longer(1:self%n) = self%at(1:self%n)
+      call move_alloc(longer, self%at)
+   end subroutine reserve
+
+   !> Append an entry.
+   pure subroutine push(self, entry)
+      class(index_list_t), intent(inout) :: self
+      !> Entry to append
+      integer(ip), intent(in) :: entry
+      integer(ip), allocatable :: longer(:)
+
+      if (.not. allocated(self%at)) allocate (self%at(64))
+      if (self%n == size(self%at)) then
+         allocate (longer(2_ip*self%n))
+         longer(1:self%n) = self%at
+         call move_alloc(longer, self%at)
+      end if
+      self%n = self%n + 1_ip
+      self%at(self%n) = entry
+   end subroutine push
+
+end module polydem_index_list
