@@ -31,6 +31,9 @@ module polydem_relaxation
 
    !> Maximum number of sweeps
    integer(ip), parameter :: most_sweeps = 10000_ip
+   !> Number of sweeps within which the greatest depth must fall by a share, or the greatest displacement grow by it
+   integer(ip), parameter :: most_idle_sweeps = 1000_ip
+   real(wp), parameter :: least_progress = 0.05_wp
 
 contains
 
@@ -39,15 +42,17 @@ contains
    subroutine relax_bodies(self, error)
       !> The simulation before time 0; positions and angles of free bodies change, and `relaxation` is set
       type(simulation_t), intent(inout) :: self
-      !> Names a contact that is still too deep after `most_sweeps` sweeps
+      !> Names a contact that is still too deep after `most_sweeps` sweeps, or when there is no progress
       type(error_t), allocatable, intent(inout) :: error
       type(neighbours_t) :: neighbours
       type(contacts_t) :: contacts
       real(wp), allocatable :: thickness(:)
-      real(wp) :: greatest(1)
+      real(wp) :: greatest(1), least, before(2)
       integer(ip) :: worst, generation
+      logical :: is_idle
 
       generation = -1_ip
+      least = huge(least)
 
       ! Until the forces are computed, the column `force` holds the positions before the relaxation.
       self%bodies%force = self%bodies%position
@@ -64,8 +69,10 @@ contains
             relaxation%after = greatest(1)
             if (relaxation%sweeps == 0_ip) relaxation%before = relaxation%after
             if (relaxation%after <= self%settings%guards%relaxed_depth) exit
-            if (relaxation%sweeps == most_sweeps) then
-               if (worst > 0_ip) call report_depth(self, contacts, thickness, worst, error)
+            least = min(least, relaxation%after)
+            call check_progress(self, least, before, is_idle)
+            if (is_idle .or. relaxation%sweeps == most_sweeps) then
+               if (worst > 0_ip) call report_depth(self, contacts, thickness, worst, is_idle, error)
                call self%comm%all_reduce_error(error)
                return
             end if
@@ -73,17 +80,44 @@ contains
             relaxation%sweeps = relaxation%sweeps + 1_ip
          end associate
       end do
+      self%relaxation%move = greatest_displacement(self)
+      self%bodies%force = 0.0_wp
+      call fit_to_bodies(self, error, self%domain%median_diameter)
+   end subroutine relax_bodies
+
+   !> Greatest displacement of a body since the start of the relaxation [m]. Collective.
+   real(wp) function greatest_displacement(self)
+      type(simulation_t), intent(inout) :: self
+      real(wp) :: greatest(1)
+
+      greatest = 0.0_wp
       associate (bodies => self%bodies)
-         greatest = 0.0_wp
          if (bodies%n > 0_ip) greatest = sqrt(maxval((bodies%position(1, :) - bodies%force(1, :))**2 &
                                                      + (bodies%position(2, :) - bodies%force(2, :))**2, &
                                                      .not. bodies%in_halo))
-         call reduce_to_greatest(self%comm, greatest)
-         self%relaxation%move = greatest(1)
-         bodies%force = 0.0_wp
       end associate
-      call fit_to_bodies(self, error, self%domain%median_diameter)
-   end subroutine relax_bodies
+      call reduce_to_greatest(self%comm, greatest)
+      greatest_displacement = greatest(1)
+   end function greatest_displacement
+
+   !> Find out every `most_idle_sweeps` sweeps whether they brought no progress. A pile that spreads from its ends moves on
+   !> long before its deepest contact does. Collective.
+   subroutine check_progress(self, least, before, is_idle)
+      type(simulation_t), intent(inout) :: self
+      !> Least of the greatest depths after each sweep
+      real(wp), intent(in) :: least
+      !> This depth, and the greatest displacement, at the last check
+      real(wp), intent(inout) :: before(2)
+      logical, intent(out) :: is_idle
+      real(wp) :: move
+
+      is_idle = .false.
+      if (modulo(self%relaxation%sweeps, most_idle_sweeps) /= 0_ip) return
+      move = greatest_displacement(self)
+      if (self%relaxation%sweeps > 0_ip) is_idle = least > (1.0_wp - least_progress)*before(1) .and. &
+         move < (1.0_wp + least_progress)*before(2)
+      before = [least, move]
+   end subroutine check_progress
 
    !> Find the contacts of the bodies at their present positions. Collective.
    subroutine find_overlaps(self, neighbours, generation, contacts, error)
@@ -115,16 +149,22 @@ contains
    end subroutine find_overlaps
 
    !> Report the deepest contact of all ranks. Two ranks may have it.
-   subroutine report_depth(self, contacts, thickness, worst, error)
+   subroutine report_depth(self, contacts, thickness, worst, is_idle, error)
       type(simulation_t), intent(in) :: self
       type(contacts_t), intent(in) :: contacts
       real(wp), intent(in) :: thickness(:)
       integer(ip), intent(in) :: worst
+      !> Whether the last sweeps brought no progress
+      logical, intent(in) :: is_idle
       type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: idle
 
       if (depth_share(contacts, thickness, worst) < self%relaxation%after) return
+      idle = ''
+      if (is_idle) idle = ', the last '//to_text(most_idle_sweeps)//' without progress,'
       call raise(error, input_error, place_of(self%settings, 'guards', 'relaxed_depth')//': after '// &
-                 to_text(most_sweeps)//' sweeps '//depth_text(self%bodies, contacts, thickness, worst)// &
+                 to_text(self%relaxation%sweeps)//' sweeps'//idle//' '// &
+                 depth_text(self%bodies, contacts, thickness, worst)// &
                  '. Provide more space for the bodies, or increase relaxed_depth in &guards')
    end subroutine report_depth
 
