@@ -1,12 +1,16 @@
 !> Detection of a finished result: a restart of a finished run does nothing.
 module polydem_finished_result
+   use polydem_changed_entries, only: changed_entries
+   use polydem_checked_files, only: check_closed
    use polydem_errors, only: error_t
    use polydem_kinds, only: lp
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_hash
+   use polydem_manifest, only: manifest_t
+   use polydem_profile_file, only: read_final_status
+   use polydem_provenance, only: origin_of
    use polydem_replaced_result, only: replaced_name
-   use polydem_restart, only: find_finished
-   use polydem_result_files, only: profile_name
+   use polydem_result_files, only: name_in, profile_name
    use polydem_run, only: run_t
    use polydem_settings, only: settings_t
    use polydem_start, only: build_start
@@ -52,6 +56,32 @@ contains
                                                  run%manifest, last_state, error)
       call run%comm%all_reduce_error(error)
    end subroutine find_finished_result
+
+   !> Find the finished result of the same settings and initial bodies.
+   subroutine find_finished(folder, settings, scene, manifest, last_state, error)
+      !> Result folder
+      character(len=*), intent(in) :: folder
+      type(settings_t), intent(in) :: settings
+      !> Hash of the initial bodies, as in the provenance of results
+      character(len=*), intent(in) :: scene
+      !> Valid manifest of the folder, with a closed profile
+      type(manifest_t), intent(in) :: manifest
+      !> Hash of the last state; unallocated if the folder holds no such result
+      character(len=:), allocatable, intent(out) :: last_state
+      !> Allocated if the result is finished but damaged
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: path, status, text
+
+      path = folder//'/'//profile_name
+      call check_closed(manifest, folder, error, only=name_in(path))
+      if (.not. allocated(error)) call read_final_status(path, status, text, error)
+      if (allocated(error)) return
+      if (status /= 'finished') return
+      if (origin_of(path, 'scene') /= scene) return
+      if (changed_entries(origin_of(path, 'resolved_input'), settings%resolved) /= '') return
+      call check_closed(manifest, folder, error)
+      if (.not. allocated(error)) call move_alloc(text, last_state)
+   end subroutine find_finished
 
    !> Whether the root rank found a finished result, which it then reports; collective.
    logical function is_finished(run, last_state)

@@ -207,7 +207,7 @@ contains
 
       associate (settings => simulation%settings%guards)
          if (settings%overlap /= 'off') call respond_to_depth(monitor, simulation, error)
-         if (simulation%passing_pair > 0_ip .and. .not. allocated(error)) &
+         if (simulation%walk%passing_pair > 0_ip .and. .not. allocated(error)) &
             call respond_to_passing(monitor, simulation, error)
       end associate
    end subroutine check_contact_guards
@@ -224,11 +224,11 @@ contains
 
       share = 0.0_dp
       associate (s => simulation, settings => simulation%settings%guards, &
-                 thickness => simulation%contact_guard%thickness)
-         if (any_deeper(s%suspects, thickness, settings%overlap_limit)) then
-            worst = deepest_contact(s%suspects, thickness)
-            text = depth_text(s%bodies, s%suspects, thickness, worst)
-            share = real(depth_share(s%suspects, thickness, worst), dp)
+                 thickness => simulation%walk%contact_guard%thickness)
+         if (any_deeper(s%walk%suspects, thickness, settings%overlap_limit)) then
+            worst = deepest_contact(s%walk%suspects, thickness)
+            text = depth_text(s%bodies, s%walk%suspects, thickness, worst)
+            share = real(depth_share(s%walk%suspects, thickness, worst), dp)
          end if
          if (settings%overlap == 'stop') call s%comm%all_reduce_text(text, share)
          if (.not. allocated(text)) return
@@ -247,10 +247,10 @@ contains
       integer(lp) :: place
 
       associate (s => simulation)
-         found = findloc(s%suspects%pair(:s%suspects%n), s%passing_pair, dim=1)
-         place = place_of(s%bodies, s%suspects%first(found), s%suspects%second(found))
+         found = findloc(s%walk%suspects%pair(:s%walk%suspects%n), s%walk%passing_pair, dim=1)
+         place = place_of(s%bodies, s%walk%suspects%first(found), s%walk%suspects%second(found))
          call monitor%passing%respond(s%settings%guards%passing, 'step '//to_text(s%step)//': '// &
-                                    passing_text(s%bodies, s%suspects, s%bodies%radius, found), error, &
+                                    passing_text(s%bodies, s%walk%suspects, s%bodies%radius, found), error, &
                                     -real(place, dp))
          if (allocated(error)) error%place = place
       end associate

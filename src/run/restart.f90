@@ -13,7 +13,6 @@ module polydem_restart
    use polydem_manifest, only: manifest_t
    use polydem_monitor, only: monitor_t
    use polydem_ownership, only: order_bodies
-   use polydem_profile_file, only: read_final_status
    use polydem_provenance, only: origin_of
    use polydem_result_files, only: checkpoint_path, n_checkpoints, name_in, profile_name, segment_path, trace_name
    use polydem_serializer, only: serializer_t
@@ -23,7 +22,7 @@ module polydem_restart
    use polydem_timers, only: timers_t
    implicit none
    private
-   public :: earlier_attempts_t, find_finished, find_restart, restore, remove_surplus_files, serialize_earlier
+   public :: earlier_attempts_t, find_restart, restore, remove_surplus_files, serialize_earlier
 
    !> State of the result folder after earlier attempts
    type :: earlier_attempts_t
@@ -52,32 +51,6 @@ module polydem_restart
    character(len=*), parameter :: other_bodies = 'the initial bodies differ'
 
 contains
-
-   !> Find the finished result of the same settings and initial bodies.
-   subroutine find_finished(folder, settings, scene, manifest, last_state, error)
-      !> Result folder
-      character(len=*), intent(in) :: folder
-      type(settings_t), intent(in) :: settings
-      !> Hash of the initial bodies, as in the provenance of results
-      character(len=*), intent(in) :: scene
-      !> Valid manifest of the folder, with a closed profile
-      type(manifest_t), intent(in) :: manifest
-      !> Hash of the last state; unallocated if the folder holds no such result
-      character(len=:), allocatable, intent(out) :: last_state
-      !> Allocated if the result is finished but damaged
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: path, status, text
-
-      path = folder//'/'//profile_name
-      call check_closed(manifest, folder, error, only=name_in(path))
-      if (.not. allocated(error)) call read_final_status(path, status, text, error)
-      if (allocated(error)) return
-      if (status /= 'finished') return
-      if (origin_of(path, 'scene') /= scene) return
-      if (changed_entries(origin_of(path, 'resolved_input'), settings%resolved) /= '') return
-      call check_closed(manifest, folder, error)
-      if (.not. allocated(error)) call move_alloc(text, last_state)
-   end subroutine find_finished
 
    !> Choose the newest valid checkpoint, and check that settings and initial bodies are unchanged.
    subroutine find_restart(folder, manifest, settings, scene, may_change, earlier, error)

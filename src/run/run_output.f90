@@ -94,7 +94,7 @@ contains
 
       if (run%simulation%step <= run%earlier%last_frame) return
       associate (s => run%simulation, output => run%simulation%settings%output)
-         call complete_wall_forces(run%comm, s%walls, s%bodies)
+         call complete_wall_forces(run%comm, s%walk%walls, s%bodies)
          if (output%contacts .and. output%energy_balance) then
             call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, row=run%row, &
                                             manifest=run%manifest)

@@ -80,7 +80,7 @@ contains
       done = 0_ip
       if (n > 0_ip) done = self%bodies%free(n)
       call total_forces(self%settings%forces%gravity, self%force_sums, done + 1_ip, self%bodies%n, self%bodies)
-      if (self%settings%output%energy_balance) call accumulate_walls(self%energy_balance, self%bodies, self%walls)
+      if (self%settings%output%energy_balance) call accumulate_walls(self%energy_balance, self%bodies, self%walk%walls)
       do k = n + 1_ip, size(self%guard%moving, kind=ip)
          good = good .and. move_within_limit(self%guard, self%bodies, self%guard%moving(k), self%guard%moving(k), &
                                              self%dt)

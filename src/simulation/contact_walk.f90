@@ -52,7 +52,7 @@ contains
       !$omp parallel num_threads(n) default(none) shared(self, dt, ends, last, n) private(r, k, low, high)
       !$omp do schedule(static, 1)
       do r = 1_ip, n
-         call walk_range(self, dt, ends(r - 1_ip:r), last(r - 1_ip:r), self%ranges(r))
+         call walk_range(self, dt, ends(r - 1_ip:r), last(r - 1_ip:r), self%walk%ranges(r))
       end do
       !$omp end do
       ! Bodies beyond the first range share their late terms out evenly.
@@ -61,14 +61,14 @@ contains
          low = last(1) + share_of(self%bodies%n - last(1), k - 1_ip, n) + 1_ip
          high = last(1) + share_of(self%bodies%n - last(1), k, n)
          do r = n - 1_ip, 1_ip, -1_ip
-            call add_late_terms(self%ranges(r)%late, low, high, self%force_sums)
+            call add_late_terms(self%walk%ranges(r)%late, low, high, self%force_sums)
          end do
       end do
       !$omp end do nowait
       !$omp end parallel
       call gather_results(self, n)
       overlap_share = 0.5_dp
-      associate (seconds => self%ranges(1)%seconds)
+      associate (seconds => self%walk%ranges(1)%seconds)
          if (sum(seconds) > 0.0_dp) overlap_share = seconds(1)/sum(seconds)
       end associate
    end subroutine walk_contacts
@@ -85,11 +85,11 @@ contains
       type(simulation_t), intent(inout) :: self
       integer(ip), intent(in) :: n
 
-      if (allocated(self%ranges)) then
-         if (size(self%ranges) >= n) return
-         deallocate (self%ranges)
+      if (allocated(self%walk%ranges)) then
+         if (size(self%walk%ranges) >= n) return
+         deallocate (self%walk%ranges)
       end if
-      allocate (self%ranges(n))
+      allocate (self%walk%ranges(n))
    end subroutine reserve_ranges
 
    !> Walk over the pairs of one range in descending order.
@@ -164,7 +164,7 @@ contains
       call count_block(self, block, results)
       if (self%keeps_contacts) call append_rows(block, results%all, with_forces=.true.)
       call append_walls(self%bodies%fixed, block, terms, results%walls)
-      call test_block(self%contact_guard, self%bodies, block, self%history, suspect, some, results%passing_pair)
+      call test_block(self%walk%contact_guard, self%bodies, block, self%history, suspect, some, results%passing_pair)
       if (some) call append_rows(block, results%suspects, with_forces=.true., chosen=suspect)
    end subroutine keep_contacts
 
@@ -198,21 +198,21 @@ contains
       self%contacts%n = 0_ip
       n_degenerate = 0_ip
       self%n_contacts = 0_ip
-      self%passing_pair = 0_ip
-      associate (ranges => self%ranges(:n))
+      self%walk%passing_pair = 0_ip
+      associate (ranges => self%walk%ranges(:n))
          do r = n, 1_ip, -1_ip
             self%n_contacts = self%n_contacts + ranges(r)%n_contacts
             n_degenerate = n_degenerate + ranges(r)%n_degenerate
-            if (ranges(r)%passing_pair > 0_ip) self%passing_pair = ranges(r)%passing_pair
+            if (ranges(r)%passing_pair > 0_ip) self%walk%passing_pair = ranges(r)%passing_pair
          end do
          if (self%keeps_contacts) call gather_rows(ranges%all, self%contacts)
-         call join_walls(ranges%walls, self%walls)
-         call gather_rows(ranges%suspects, self%suspects)
+         call join_walls(ranges%walls, self%walk%walls)
+         call gather_rows(ranges%suspects, self%walk%suspects)
       end associate
-      associate (suspects => self%suspects)
+      associate (suspects => self%walk%suspects)
          suspects%n_degenerate = count([(is_degenerate(suspects, c), c=1_ip, suspects%n)], kind=ip)
       end associate
-      self%contacts%n_degenerate = self%suspects%n_degenerate
+      self%contacts%n_degenerate = self%walk%suspects%n_degenerate
       self%sums(sum_contacts_own) = self%sums(sum_contacts_own) + int(self%n_contacts, lp)
       self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(n_degenerate, lp)
    end subroutine gather_results

@@ -30,13 +30,13 @@ contains
 
       call new_force_law(self%settings%forces, self%bodies, self%law)
       call fit_table(self%law, self%contacts)
-      self%walls%n = 0_ip
-      self%walls%energy_is_quadratic = self%law%energy_is_quadratic
-      call fit_table(self%law, self%suspects)
+      self%walk%walls%n = 0_ip
+      self%walk%walls%energy_is_quadratic = self%law%energy_is_quadratic
+      call fit_table(self%law, self%walk%suspects)
       self%n_contacts = 0_ip
-      self%passing_pair = 0_ip
+      self%walk%passing_pair = 0_ip
       call start_sums(self%bodies%n, self%force_sums)
-      self%incidence = incidence_t()
+      self%walk%incidence = incidence_t()
       call list_moving(self)
       call rebuild_guard(self)
       associate (choice => self%settings%boxes)
@@ -46,7 +46,7 @@ contains
       if (allocated(error)) return
       call rebuild_neighbours(self, error)
       call allocate_history(self)
-      call new_contact_guard(self%contact_guard, self%settings%guards, self%bodies, &
+      call new_contact_guard(self%walk%contact_guard, self%settings%guards, self%bodies, &
                              column_of(self%history, 'direction'))
       self%generation = self%generation + 1_ip
    end subroutine fit_to_bodies

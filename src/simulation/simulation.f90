@@ -5,7 +5,6 @@ module polydem_simulation
    use polydem_boxes, only: boxes_t
    use polydem_communicator, only: communicator_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
-   use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
    use polydem_domain, only: domain_t
    use polydem_energy_balance, only: energy_balance_t, evaluate_balance, balance_t
@@ -16,13 +15,11 @@ module polydem_simulation
    use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
    use polydem_neighbours, only: neighbours_t
-   use polydem_passing, only: contact_guard_t
    use polydem_packed_history, only: packed_history_t
    use polydem_prescribed_motion, only: motion_t
-   use polydem_range_results, only: range_results_t
    use polydem_settings, only: settings_t
    use polydem_timers, only: timers_t
-   use polydem_wall_terms, only: wall_terms_t
+   use polydem_walk_results, only: walk_results_t
    implicit none
    private
    public :: simulation_t, former_direction, time_of, compute_balance
@@ -69,26 +66,16 @@ module polydem_simulation
       type(contacts_t) :: contacts
       !> Whether to keep the table of contacts; who needs it asks for it before the step
       logical :: keeps_contacts = .true.
-      !> Contacts with fixed bodies
-      type(wall_terms_t) :: walls
-      !> Contacts that are deep or degenerate
-      type(contacts_t) :: suspects
+      !> Results of the walk over the contacts of this step
+      type(walk_results_t) :: walk
       !> Number of contacts that this rank owns
       integer(ip) :: n_contacts = 0_ip
-      !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none
-      integer(ip) :: passing_pair = 0_ip
-      !> Guard of the contacts
-      type(contact_guard_t) :: contact_guard
       !> Sums of the contact forces on each body
       type(force_sums_t) :: force_sums
-      !> Results of the ranges of pairs, one per thread
-      type(range_results_t), allocatable :: ranges(:)
       !> Contact history of the pairs
       type(contact_history_t) :: history
       !> Contact history received by a redistribution, until the pairs are found again; unallocated between steps
       type(packed_history_t), allocatable :: received_history
-      !> Contacts of each body
-      type(incidence_t) :: incidence
       !> Force law
       type(force_law_t) :: law
       !> Integration scheme
@@ -136,7 +123,7 @@ contains
       type(balance_t), intent(out) :: balance
 
       call evaluate_balance(self%energy_balance, self%comm, self%dt, self%settings%forces%gravity, self%bodies, &
-                            self%force_sums, self%walls, balance)
+                            self%force_sums, self%walk%walls, balance)
    end subroutine compute_balance
 
 end module polydem_simulation

@@ -45,7 +45,7 @@ contains
       real(wp), allocatable :: numbers(:)
       real(wp) :: least(1)
 
-      numbers = contact_numbers(self%bodies%n, self%incidence)
+      numbers = contact_numbers(self%bodies%n, self%walk%incidence)
       call self%domain%halo%exchange_column(self%comm, numbers)
       call stable_step_of_contacts(self%law, self%integrator%stability(), self%bodies, numbers, self%contacts, &
                                    stable, critical)

@@ -113,8 +113,8 @@ contains
       if (allocated(self%law%constraint)) self%keeps_contacts = .true.
       call walk_contacts(self, dt, overlap_share)
       call self%timers%divide_lap(stage_overlap, stage_forces, overlap_share)
-      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%suspects, self%step, error)
-      if (self%keeps_contacts) call index_contacts(self%bodies%n, self%contacts, self%incidence)
+      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%walk%suspects, self%step, error)
+      if (self%keeps_contacts) call index_contacts(self%bodies%n, self%contacts, self%walk%incidence)
       if (allocated(self%law%constraint)) call constrain(self, error)
       call self%timers%lap(stage_forces)
    end subroutine sum_forces
@@ -126,10 +126,10 @@ contains
 
       if (allocated(error)) return
       call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, self%bodies%n, self%bodies)
-      call self%law%constraint%apply(self%dt, self%incidence, self%bodies, self%contacts, self%history, error)
+      call self%law%constraint%apply(self%dt, self%walk%incidence, self%bodies, self%contacts, self%history, error)
       if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
       call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%force_sums)
-      call select_walls(self%bodies, self%contacts, self%walls)
+      call select_walls(self%bodies, self%contacts, self%walk%walls)
    end subroutine constrain
 
    !> Apply the moves of the pair list to the columns of the contact history.

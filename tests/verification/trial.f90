@@ -1,5 +1,6 @@
 !> Simulations of a few bodies for the tests, from a namelist text and a list of polygons.
 module trial
+   use serial_simulation, only: start_simulation
    use polydem_bodies, only: bodies_t
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_errors, only: error_t
@@ -8,7 +9,6 @@ module trial
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
-   use polydem_start_simulation, only: start_simulation
    use polydem_time_step, only: advance
    implicit none
    private

@@ -1,0 +1,61 @@
+!> Choice of the time step, and the number of steps.
+module polydem_choose_step
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_force_law, only: choose_parts, force_law_t
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_origin, only: place_of
+   use polydem_simulation, only: simulation_t
+   use polydem_stable_step, only: stable_step_of_shapes
+   use polydem_strings, only: to_text
+   use polydem_whole_run, only: reduce_to_greatest, reduce_to_least
+   implicit none
+   private
+   public :: choose_step
+
+   !> Upper limit of the number of steps
+   real(wp), parameter :: most_steps = 1.0e15_wp
+
+contains
+
+   !> Use dt of the settings, or compute it: a fraction of the stable time step, reduced to divide the duration evenly.
+   !> Collective; all ranks get the same error.
+   subroutine choose_step(self, error)
+      !> The simulation with settings, ranks, bodies and integrator; `dt`, `n_steps` and `expected_stable_step` are set
+      type(simulation_t), intent(inout) :: self
+      !> Allocated if no step can be chosen, or if the number of steps is not allowed
+      type(error_t), allocatable, intent(inout) :: error
+      type(force_law_t) :: law
+      integer(ip) :: critical
+      real(wp) :: steps, least(1), has_free(1)
+
+      call choose_parts(self%settings%forces, law)
+      call stable_step_of_shapes(law, self%integrator%stability(), self%bodies, least(1), critical)
+      has_free = merge(1.0_wp, 0.0_wp, critical > 0_ip)
+      call reduce_to_least(self%comm, least)
+      call reduce_to_greatest(self%comm, has_free)
+      self%expected_stable_step = least(1)
+      associate (settings => self%settings%integrate)
+         self%dt = settings%dt
+         if (self%dt <= 0.0_wp .and. (has_free(1) < 1.0_wp .or. .not. self%expected_stable_step > 0.0_wp)) then
+            call raise(error, input_error, place_of(self%settings, 'integrate', 'dt')//': cannot choose dt: there '// &
+                       'is no free body, or stiffness or mass is extreme. Set dt in &integrate')
+            return
+         end if
+         if (self%dt <= 0.0_wp) then
+            steps = settings%duration/(settings%fraction*self%expected_stable_step)
+            self%dt = settings%fraction*self%expected_stable_step
+            if (steps < most_steps) self%dt = settings%duration/real(max(1_lp, ceiling(steps, lp)), wp)
+         end if
+         steps = settings%duration/self%dt
+         if (.not. (steps >= 0.5_wp .and. steps < most_steps)) then
+            call raise(error, input_error, place_of(self%settings, 'integrate', 'duration')//': a duration of '// &
+                       to_text(settings%duration)//' s with dt = '//to_text(self%dt)//' s requires '// &
+                       to_text(steps)//' steps, but only 1 to '//to_text(most_steps)// &
+                       ' are allowed. Change dt or duration in &integrate')
+            return
+         end if
+         self%n_steps = nint(steps, lp)
+      end associate
+   end subroutine choose_step
+
+end module polydem_choose_step

@@ -1,0 +1,29 @@
+!> Results of the walk over the contacts of a step.
+module polydem_walk_results
+   use polydem_contact_incidence, only: incidence_t
+   use polydem_contacts, only: contacts_t
+   use polydem_kinds, only: ip
+   use polydem_passing, only: contact_guard_t
+   use polydem_range_results, only: range_results_t
+   use polydem_wall_terms, only: wall_terms_t
+   implicit none
+   private
+   public :: walk_results_t
+
+   !> Results of the walk of a step, and the guard that it calls
+   type :: walk_results_t
+      !> Results of the ranges of pairs, one per thread
+      type(range_results_t), allocatable :: ranges(:)
+      !> Contacts with fixed bodies
+      type(wall_terms_t) :: walls
+      !> Guard of the contacts
+      type(contact_guard_t) :: contact_guard
+      !> Contacts that are deep or degenerate
+      type(contacts_t) :: suspects
+      !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none
+      integer(ip) :: passing_pair = 0_ip
+      !> Contacts of each body, if the table of contacts is kept
+      type(incidence_t) :: incidence
+   end type walk_results_t
+
+end module polydem_walk_results

@@ -1,0 +1,34 @@
+!> Serial simulations of given bodies
+module serial_simulation
+   use polydem_bodies, only: bodies_t
+   use polydem_communicator, only: communicator_t
+   use polydem_errors, only: error_t
+   use polydem_prescribed_motion, only: motion_t
+   use polydem_settings, only: settings_t
+   use polydem_simulation, only: simulation_t
+   use polydem_start_simulation, only: start_with_bodies
+   implicit none
+   private
+   public :: start_simulation
+
+contains
+
+   !> Set up a serial simulation with given bodies, and compute the forces at time 0.
+   subroutine start_simulation(settings, bodies, motions, self, error)
+      !> Checked settings; the group &scene is not used
+      type(settings_t), intent(in) :: settings
+      !> Bodies at the start
+      type(bodies_t), intent(in) :: bodies
+      !> Prescribed motions of fixed bodies
+      type(motion_t), intent(in) :: motions(:)
+      !> The simulation, ready to advance
+      type(simulation_t), intent(out) :: self
+      !> Allocated if bodies or settings are invalid
+      type(error_t), allocatable, intent(inout) :: error
+
+      self%bodies = bodies
+      self%motions = motions
+      call start_with_bodies(settings, communicator_t(), self, error)
+   end subroutine start_simulation
+
+end module serial_simulation
