@@ -92,7 +92,7 @@ contains
          call self%tidy()
          call self%filter%draw_all_lines(boxes)
          call self%filter%list_strays(self%everywhere)
-         call self%filter%classify_all(boxes, self)
+         call self%filter%classify_all(boxes, self, known=.true.)
          do k = 1_ip, self%filter%strays%n
             call self%filter%activate_candidates_of(self%filter%strays%at(k), self)
          end do

@@ -12,15 +12,14 @@
 !>     Only pairs that have become candidates are added, and pairs that have ceased to be candidates are removed.
 !>
 !> Krengel et al. (2026) walk across cell edges and corners within a window. Here the search climbs to the lowest
-!> ancestor that contains the padded cell, and descends from there into every cell that is near enough. The search finds
-!> all boxes, whatever their shape and whatever lies between them.
+!> ancestor that contains the padded cell, and descends into every cell that is near enough. So it finds all boxes.
 !>
 !> Each thread works on a contiguous part of a list. While the first thread repairs the tree, the others begin to
-!> compare candidates. The results are joined in the order of the list and do not depend on the number of threads.
+!> compare candidates. If few boxes moved, the first thread also searches meanwhile, since the nodes that it has changed
+!> are in its cache. The results are joined in the order of the list and do not depend on the number of threads.
 !>
-!> The same source makes four finders: the minimal quadtree compiled with and without inlining, the pruned quadtree,
-!> whose leaves all have the same size, and a binary tree along the longer axis for nearly one-dimensional scenes. They
-!> differ only in the tree or in the compilation.
+!> The same source makes the minimal quadtree, the pruned quadtree, whose leaves all have the same size, and a binary
+!> tree along the longer axis for nearly one-dimensional scenes.
 module polydem_quadtree
    use polydem_boxes, only: boxes_t
    use polydem_candidates, only: overlapping
@@ -41,11 +40,11 @@ module polydem_quadtree
    public :: quadtree_t
 
    !> Side of the cells of one level in units of the typical (geometric mean) reach. These are the largest cells that
-   !> contain one centre each in a packing. Other values between powers of two give up to 1.6 times as many candidates
-   !> (measured)
+   !> contain one centre each in a packing; others give up to 1.6 times as many candidates (measured)
    real(dp), parameter :: typical_share = 1.2_dp
-   !> Time in which one box is moved in the tree, in comparisons of candidates (measured)
-   integer(ip), parameter :: move_cost = 500_ip
+   !> Time in which one box is moved in the tree, and in which the boxes whose leaf changes with it are searched, in
+   !> comparisons of candidates (measured)
+   integer(ip), parameter :: move_cost = 500_ip, search_cost = 1600_ip
    !> Largest number of levels below that level
    integer, parameter :: most_levels = 12
 
@@ -107,7 +106,6 @@ contains
       call work_on_parts(self, boxes)
       call self%changes%join(changes)
       call replace_candidates(self, boxes, changes)
-      call self%work%add(count_leaf_changes, int(self%tree%n_changed, lp))
       call self%tree%settle()
       call self%work%lap(phase_search)
    end subroutine find
@@ -221,32 +219,42 @@ contains
    subroutine work_on_parts(self, boxes)
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
-      integer(ip) :: low, high
+      integer(ip) :: low, high, spent
       integer :: w
+      logical :: one_searches, is_new
 
-      !$omp parallel if (boxes%n > min_parallel_size) default(none) shared(self, boxes) private(w, low, high)
+      is_new = self%tree%n_changed > 0_ip
+      !$omp parallel if (boxes%n > min_parallel_size) default(none) shared(self, boxes, is_new) &
+      !$omp    private(w, low, high, spent, one_searches)
       !$omp do schedule(static, 1)
       do w = 1, size(self%worker)
          call part(boxes%n, size(self%worker), w, low, high)
          call find_outside(self%tree, low, high, boxes%bounds, self%greatest_side, self%worker(w)%outside)
       end do
       !$omp end do
+      call plan_first_thread(self, is_new, spent, one_searches)
       !$omp do schedule(static, 1)
       do w = 1, size(self%worker)
          if (w == 1) then
             call move_boxes(self, boxes)
             call update_padded_cells(self)
             call self%work%lap(phase_structure)
+            if (one_searches) then
+               call search_changed(self, 1_ip, self%tree%n_changed, boxes, self%worker(1))
+               call self%work%lap(phase_search)
+            end if
          end if
          if (.not. self%filtered) then
-            call part_beside_moves(self, w, low, high)
-            call self%candidates%compare(low, high, boxes%bounds, boxes%body, self%changes%of(w))
+            call part(self%candidates%n + spent, size(self%worker), w, low, high)
+            low = max(low - spent, 1_ip)
+            call self%candidates%compare(low, high - spent, boxes%bounds, boxes%body, self%changes%of(w))
          end if
       end do
       !$omp end do
       !$omp do schedule(static, 1)
       do w = 1, size(self%worker)
          if (w == 1) call self%work%lap(phase_filter)
+         if (one_searches) cycle
          call part(self%tree%n_changed, size(self%worker), w, low, high)
          call search_changed(self, low, high, boxes, self%worker(w))
       end do
@@ -256,26 +264,28 @@ contains
          call self%work%add(count_left_leaf, int(self%worker(w)%outside%n, lp))
          call self%work%add(count_visits, self%worker(w)%visits)
       end do
+      call self%work%add(count_leaf_changes, int(self%tree%n_changed, lp))
       call self%work%add(count_searches, int(self%tree%n_changed, lp))
       call self%work%lap(phase_search)
    end subroutine work_on_parts
 
-   !> Part of the candidates that a thread compares: less for the first one, which moves boxes meanwhile
-   subroutine part_beside_moves(self, w, low, high)
+   !> Decide what the first thread does while the others compare candidates.
+   subroutine plan_first_thread(self, is_new, spent, one_searches)
       type(quadtree_t), intent(in) :: self
-      !> Thread
-      integer, intent(in) :: w
-      !> First and last candidate
-      integer(ip), intent(out) :: low, high
-      integer(ip) :: n, spent
+      !> Whether the tree was built in this step, so that all boxes are searched
+      logical, intent(in) :: is_new
+      !> Time that it spends before it compares candidates too, in comparisons of candidates
+      integer(ip), intent(out) :: spent
+      !> Whether it searches for all boxes whose leaf changed
+      logical, intent(out) :: one_searches
+      integer(ip) :: n_moved, most
 
-      n = self%candidates%n
-      spent = move_cost*min(sum(self%worker%outside%n), n/move_cost)
-      spent = min(spent, n/int(max(size(self%worker) - 1, 1), ip))
-      call part(n + spent, size(self%worker), w, low, high)
-      low = max(low - spent, 1_ip)
-      high = high - spent
-   end subroutine part_beside_moves
+      n_moved = sum(self%worker%outside%n)
+      most = self%candidates%n/int(max(size(self%worker) - 1, 1), ip)
+      one_searches = .not. (is_new .or. self%filtered) .and. n_moved <= most/(move_cost + search_cost)
+      spent = min(n_moved, most/move_cost)*move_cost
+      if (one_searches) spent = n_moved*(move_cost + search_cost)
+   end subroutine plan_first_thread
 
    !> Move the boxes that left their leaf, and enlarge reaches that are too small.
    subroutine move_boxes(self, boxes)
@@ -346,7 +356,7 @@ contains
       end do
    end subroutine search_changed
 
-   !> Remove the pairs that are not candidates any longer, and add the new candidates.
+   !> Replace the candidates of the boxes whose leaf changed.
    subroutine replace_candidates(self, boxes, changes)
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes

@@ -119,6 +119,7 @@ contains
       type(two_level_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       integer(ip) :: n_wanted, longest, k, i
+      logical :: searched
 
       n_wanted = self%filter%active%n_sure + self%filter%active%n
       self%list%surplus = self%list%surplus + self%filter%surplus()
@@ -128,7 +129,8 @@ contains
       call choose_length(self)
       call self%work%add(count_passes, 1_lp)
       call self%work%lap(phase_structure)
-      if (self%list%should_search(self%filter%strays%n, self%filter%length)) then
+      searched = self%list%should_search(self%filter%strays%n, self%filter%length)
+      if (searched) then
          self%filter%length = longest
          call self%list%search_all(boxes, self%filter, n_wanted, self%filter%changes%of)
          call self%work%add(count_rebuilds, 1_lp)
@@ -139,7 +141,7 @@ contains
          end do
       end if
       call self%work%lap(phase_search)
-      call self%filter%classify_all(boxes, self%list)
+      call self%filter%classify_all(boxes, self%list, known=.not. searched)
       self%list%surplus = self%list%surplus + class_cost* &
          real(self%list%n - self%filter%active%n - self%filter%active%n_sure, dp)
       do k = 1_ip, self%filter%strays%n
@@ -147,6 +149,7 @@ contains
          if (.not. self%filter%stays_inside(i, self%list%fat(:, i))) &
             call self%filter%activate_candidates_of(i, self%list)
       end do
+      if (searched) call self%filter%find_active_states(boxes)
       call self%work%lap(phase_structure)
    end subroutine begin_interval
 

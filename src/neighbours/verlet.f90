@@ -185,7 +185,7 @@ contains
       call self%work%add(count_tests, self%grids%total%tests - tests)
       self%work%value(count_searches) = self%grids%total%searches
       self%work%value(count_visits) = self%grids%total%visits
-      call self%candidates%replace(self%grids%found, boxes, self%changes%of)
+      call self%candidates%replace(self%grids%found, boxes, self%changes%of, with_states=.true.)
       call self%work%lap(phase_search)
    end subroutine rebuild
 

@@ -87,7 +87,7 @@ contains
    end function lies_inside
 
    !> Replace all candidates, and record the pairs that begin to overlap. `update_states` must have been called.
-   subroutine replace(self, found, boxes, changes)
+   subroutine replace(self, found, boxes, changes, with_states)
       class(candidate_rows_t), intent(inout) :: self
       !> New candidates as each thread of the search found them, row by row, (thread)
       type(found_pairs_t), intent(in) :: found(:)
@@ -95,6 +95,8 @@ contains
       type(boxes_t), intent(in) :: boxes
       !> Changes of each thread; appended, (thread)
       type(pair_changes_t), intent(inout) :: changes(:)
+      !> Whether to find the states of the new candidates; else they are undefined
+      logical, intent(in) :: with_states
       integer :: w
 
       if (any(self%outside /= 0_bp)) then
@@ -109,9 +111,9 @@ contains
       call reserve(self)
       self%row = 0_ip
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, found, boxes) private(w)
+      !$omp    shared(self, found, boxes, with_states) private(w)
       do w = 1, size(found)
-         call fill_rows(self, sum(found(1:w - 1)%n), found(w), boxes%bounds)
+         call fill_rows(self, sum(found(1:w - 1)%n), found(w), boxes%bounds, with_states)
       end do
       !$omp end parallel do
    end subroutine replace
@@ -139,14 +141,15 @@ contains
       end do
    end subroutine record_begun
 
-   !> Copy the pairs of a thread to their rows, with their states.
-   pure subroutine fill_rows(self, offset, found, bounds)
+   !> Copy the pairs of a thread to their rows, with their states on request.
+   pure subroutine fill_rows(self, offset, found, bounds, with_states)
       type(candidate_rows_t), intent(inout) :: self
       !> Number of candidates before those of this thread
       integer(ip), intent(in) :: offset
       type(found_pairs_t), intent(in) :: found
       !> Bounds of the boxes, (4, box) [m]
       real(wp), intent(in), contiguous :: bounds(:, :)
+      logical, intent(in) :: with_states
       integer(ip) :: m, i, last
 
       last = 0_ip
@@ -158,8 +161,8 @@ contains
          last = i
          self%row(2, i) = self%row(2, i) + 1_ip
       end do
-      call self%find_states_of(found%n, self%box(:, offset + 1_ip:offset + found%n), bounds, &
-                               self%overlap(offset + 1_ip:offset + found%n))
+      if (with_states) call self%find_states_of(found%n, self%box(:, offset + 1_ip:offset + found%n), bounds, &
+                                                self%overlap(offset + 1_ip:offset + found%n))
    end subroutine fill_rows
 
    !> Append a candidate behind the rows.

@@ -159,18 +159,21 @@ contains
       !> Boxes; only their bodies, and whether the bodies are passive, are used
       type(boxes_t), intent(in) :: boxes
       type(tally_t), allocatable :: tally(:)
+      logical :: all_valid
       integer :: w
 
+      ! Fixed boxes do not find each other.
+      all_valid = boxes%one_to_one .and. all(boxes%passive(1:boxes%n) .eqv. boxes%fixed(1:boxes%n))
       if (allocated(self%found)) then
          if (size(self%found) /= omp_get_max_threads()) deallocate (self%found)
       end if
       if (.not. allocated(self%found)) allocate (self%found(omp_get_max_threads()))
       allocate (tally(size(self%found)))
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes, tally) private(w)
+      !$omp    shared(self, boxes, tally, all_valid) private(w)
       do w = 1, size(self%found)
          call search_part(self, w, size(self%found), self%found(w), tally(w))
-         call self%found(w)%remove_invalid_pairs(boxes%body, boxes%passive)
+         if (.not. all_valid) call self%found(w)%remove_invalid_pairs(boxes%body, boxes%passive)
       end do
       !$omp end parallel do
       self%total%tests = self%total%tests + sum(tally%tests)

@@ -145,7 +145,7 @@ contains
          (single_cost + real(self%n_fixed + self%moved%n, dp) + 0.5_dp*real(n_strays, dp))
    end function cost_of_singles
 
-   !> Set the margin, make all fat boxes, and search for all candidates.
+   !> Set the margin, make all fat boxes, and search for all candidates. Their states are not found.
    subroutine search_all(self, boxes, lines, n_wanted, changes)
       class(fat_candidates_t), intent(inout) :: self
       !> Boxes of this step
@@ -171,7 +171,7 @@ contains
       !$omp end parallel do
       call self%grids%build(boxes%n, self%fat)
       call self%grids%search(boxes)
-      call self%replace(self%grids%found, boxes, changes)
+      call self%replace(self%grids%found, boxes, changes, with_states=.false.)
       self%n_listed = self%n
       self%searched = .true.
       self%first_link = 0_ip

@@ -184,13 +184,16 @@ contains
       self%tolerance = min(max(self%tolerance, least_tolerance*self%side), greatest_tolerance*self%side)
    end subroutine adapt
 
-   !> Classify a range of candidates at the start of an interval. The present boxes are those of `draw_lines`.
-   pure subroutine classify(self, low, high, body, candidates, found, changes)
+   !> Classify a range of candidates at the start of an interval. The present boxes are those of `draw_lines`. If the
+   !> states of the candidates are not known, those of the active ones remain so.
+   pure subroutine classify(self, low, high, body, known, candidates, found, changes)
       class(line_filter_t), intent(in) :: self
       !> First and last candidate
       integer(ip), intent(in) :: low, high
       !> Body of each box, (box)
       integer(ip), intent(in) :: body(:)
+      !> Whether the states of the candidates are known; else no change is recorded
+      logical, intent(in) :: known
       !> Candidates; the states of those that are not active are set
       class(candidates_t), intent(inout) :: candidates
       !> Active candidates of the range
@@ -208,6 +211,7 @@ contains
          call self%classify_pairs(to - from + 1_ip, candidates%box(:, from:to), 0_ip, kind)
          found%n_sure = found%n_sure + count(kind(1:to - from + 1_ip) == overlapping, kind=ip)
          call found%reserve(found%n + pair_block)
+         if (.not. known) candidates%overlap(from:to) = iand(kind(1:to - from + 1_ip), overlapping)
          call list_differences(to - from + 1_ip, kind, candidates%overlap(from:to), n, listed)
          do m = 1_ip, n
             k = from + listed(m) - 1_ip

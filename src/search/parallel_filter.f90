@@ -45,6 +45,7 @@ module polydem_parallel_filter
       procedure :: draw_all_lines
       procedure :: list_strays
       procedure :: classify_all
+      procedure :: find_active_states
       procedure :: compare_active
    end type parallel_filter_t
 
@@ -212,24 +213,44 @@ contains
    end subroutine list_strays
 
    !> Classify all candidates.
-   subroutine classify_all(self, boxes, candidates)
+   subroutine classify_all(self, boxes, candidates, known)
       class(parallel_filter_t), intent(inout) :: self
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
       !> All candidates
       class(candidates_t), intent(inout) :: candidates
+      !> Whether the states of the candidates are known; else those of the active ones must be set afterwards
+      logical, intent(in) :: known
       integer(ip) :: low, high
       integer :: w
 
       !$omp parallel do if (candidates%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes, candidates) private(w, low, high)
+      !$omp    shared(self, boxes, candidates, known) private(w, low, high)
       do w = 1, size(self%worker)
          call part(candidates%n, size(self%worker), w, low, high)
-         call self%classify(low, high, boxes%body, candidates, self%worker(w)%active, self%changes%of(w))
+         call self%classify(low, high, boxes%body, known, candidates, self%worker(w)%active, self%changes%of(w))
       end do
       !$omp end parallel do
       call self%collect(candidates%n, self%worker%active)
    end subroutine classify_all
+
+   !> Find the states of all active candidates, without changes.
+   subroutine find_active_states(self, boxes)
+      class(parallel_filter_t), intent(inout) :: self
+      !> Boxes of this step
+      type(boxes_t), intent(in) :: boxes
+      integer(ip) :: low, high
+      integer :: w
+
+      !$omp parallel do if (self%active%n > min_parallel_size) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes) private(w, low, high)
+      do w = 1, size(self%worker)
+         call part(self%active%n, size(self%worker), w, low, high)
+         call self%active%find_states_of(high - low + 1_ip, self%active%box(:, low:high), boxes%bounds, &
+                                         self%active%overlap(low:high))
+      end do
+      !$omp end parallel do
+   end subroutine find_active_states
 
    !> Compare the boxes of the active candidates.
    subroutine compare_active(self, boxes)
