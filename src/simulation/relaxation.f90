@@ -100,8 +100,8 @@ contains
       greatest_displacement = greatest(1)
    end function greatest_displacement
 
-   !> Find out every `most_idle_sweeps` sweeps whether they brought no progress. A pile that spreads from its ends moves on
-   !> long before its deepest contact does. Collective.
+   !> Find out every `most_idle_sweeps` sweeps whether they brought no progress. A pile that spreads from its ends moves
+   !> on long before its deepest contact does. Collective.
    subroutine check_progress(self, least, before, is_idle)
       type(simulation_t), intent(inout) :: self
       !> Least of the greatest depths after each sweep
