@@ -106,27 +106,33 @@ contains
       if (.not. has_link) has_link = is_external_link(location)
    end function has_link
 
-   !> Write a new data set of fixed shape.
-   subroutine write_dataset(location, kind_in_file, slab, error)
+   !> Write a data set of fixed shape: a new one, or another part of one.
+   subroutine write_dataset(location, kind_in_file, slab, is_new, error)
       type(dataset_location_t), intent(in) :: location
       !> HDF5 type in memory and in the file
       integer(hid_t), intent(in) :: kind_in_file
       !> Values to write
       type(slab_t), intent(in) :: slab
+      !> Whether to create the data set
+      logical, intent(in) :: is_new
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: space, dataset
       integer :: status
 
-      call h5screate_simple_f(size(slab%whole), slab%whole, space, status)
-      call check_status(status, 'create the data space of', location, error)
-      if (allocated(error)) return
-      call create_dataset(location, kind_in_file, space, dataset, error)
-      if (.not. allocated(error)) then
-         if (product(slab%whole) > 0_hsize_t) call write_slab(dataset, location, kind_in_file, slab, error)
-         call h5dclose_f(dataset, status)
-         call check_status(status, 'finish writing', location, error)
+      if (is_new) then
+         call h5screate_simple_f(size(slab%whole), slab%whole, space, status)
+         call check_status(status, 'create the data space of', location, error)
+         if (allocated(error)) return
+         call create_dataset(location, kind_in_file, space, dataset, error)
+         call h5sclose_f(space, status)
+      else
+         call h5dopen_f(location%file, location%name, dataset, status)
+         call check_status(status, 'open', location, error)
       end if
-      call h5sclose_f(space, status)
+      if (allocated(error)) return
+      if (product(slab%whole) > 0_hsize_t) call write_slab(dataset, location, kind_in_file, slab, error)
+      call h5dclose_f(dataset, status)
+      call check_status(status, 'finish writing', location, error)
    end subroutine write_dataset
 
    !> Create a data set and its missing groups. The caller closes the data set.

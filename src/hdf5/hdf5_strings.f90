@@ -37,7 +37,7 @@ contains
       call pack_texts(texts, size(extent) > 0, characters, addresses)
       call text_type(location, kind_in_file, error)
       if (allocated(error)) return
-      call write_dataset(location, kind_in_file, slab_of(location, extent, c_loc(addresses), 1), error)
+      call write_dataset(location, kind_in_file, slab_of(location, extent, c_loc(addresses), 1), .true., error)
       call h5tclose_f(kind_in_file, status)
    end subroutine write_texts
 

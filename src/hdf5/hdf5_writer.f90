@@ -57,7 +57,8 @@ contains
       self%expected(many_rows) = many
    end subroutine expect_rows
 
-   !> Write contiguous values as a new data set or as rows of an extendible one. A new data set gets its attributes.
+   !> Write contiguous values as a new data set, as another part of one, or as rows of an extendible one. A new data set
+   !> gets its attributes.
    subroutine put(self, name, type, shape, address, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
@@ -77,13 +78,13 @@ contains
       ! gfortran 12 passes an empty array constructor with the extent -1 to an array of assumed rank.
       extent = int(max(0, shape), hsize_t)
       is_new = .true.
+      if (present(rows) .or. present(part)) is_new = .not. self%has(name)
       if (present(rows)) then
-         is_new = .not. self%has(name)
          if (rows == one_row) extent = [extent, 1_hsize_t]
          location%expected_rows = self%expected(rows)
          call append_rows_to(location, type, slab_of(location, extent, address, max(1, size(shape)), part), error)
       else
-         call write_dataset(location, type, slab_of(location, extent, address, size(shape), part), error)
+         call write_dataset(location, type, slab_of(location, extent, address, size(shape), part), is_new, error)
       end if
       if (is_new) call self%describe(name, error, unit, meaning)
    end subroutine put
@@ -115,7 +116,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Attributes, written with a new data set
       character(len=*), intent(in), optional :: unit, meaning
-      !> Part of the last dimension that this rank has; if absent, the values are equal on all ranks
+      !> Part of the last dimension that this rank has; if absent, the values are equal on all ranks. Several calls may
+      !> write parts of one data set
       type(part_t), intent(in), optional :: part
       !> one_row or many_rows: append to an extendible data set; a new data set if absent
       integer, intent(in), optional :: rows

@@ -28,6 +28,9 @@ module polydem_trajectory_segment
    private
    public :: start_segment, write_bodies, add_frame, add_walls, add_contacts, add_balance
 
+   !> Number of vertices that one rank writes at once, so that it needs little memory
+   integer(ip), parameter :: vertices_at_once = 100000_ip
+
 contains
 
    !> Write the attributes and the provenance of a segment. Called by the root rank only.
@@ -48,29 +51,50 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(global_order_t) :: blocks
       type(part_t) :: part
-      integer(lp), allocatable :: numbers(:, :)
-      real(dp), allocatable :: masses(:, :)
+      integer(lp), allocatable :: numbers(:, :), block(:, :)
       integer(ip) :: s
 
       call order_bodies(comm, bodies, blocks)
       part = part_t(blocks%first, blocks%total)
-      associate (n => bodies%n)
-         call blocks%to_blocks(comm, reshape([(int(bodies%id(s), lp), merge(1_lp, 0_lp, bodies%fixed(s)), &
-            int(bodies%vertex_start(s + 1_ip) - bodies%vertex_start(s), lp), s=1_ip, n)], [3_ip, n]), numbers)
-         call blocks%to_blocks(comm, reshape([(real(bodies%mass(s), dp), real(bodies%inertia(s), dp), s=1_ip, n)], &
-                                         [2_ip, n]), masses)
-      end associate
-      call file%write('/bodies/id', int(numbers(1, :), ip), error, '1', 'identifier of each body, ascending', part)
-      call file%write('/bodies/fixed', int(numbers(2, :), bp), error, '1', &
+      call write_masses(file, comm, bodies, blocks, error)
+      allocate (numbers(3, bodies%n))
+      do s = 1_ip, bodies%n
+         numbers(1, s) = int(bodies%id(s), lp)
+         numbers(2, s) = merge(1_lp, 0_lp, bodies%fixed(s))
+         numbers(3, s) = int(bodies%vertex_start(s + 1_ip) - bodies%vertex_start(s), lp)
+      end do
+      call blocks%to_blocks(comm, numbers, block)
+      deallocate (numbers)
+      call file%write('/bodies/id', int(block(1, :), ip), error, '1', 'identifier of each body, ascending', part)
+      call file%write('/bodies/fixed', int(block(2, :), bp), error, '1', &
                       '1: fixed or with prescribed motion, 0: free', part)
-      call file%write('/bodies/mass', component(masses, 1), error, 'kg/m', 'mass; 0: infinite', part)
-      call file%write('/bodies/inertia', component(masses, 2), error, 'kg m', &
-                      'moment of inertia about the centre of mass; 0: infinite', part)
-      call write_vertices(file, comm, bodies, numbers(3, :), part, error)
+      call write_vertices(file, comm, bodies, int(block(3, :), ip), part, error)
       if (.not. any(bodies%fixed(:bodies%n))) return
       call file%write('/walls/id', pack(bodies%id(:bodies%n), bodies%fixed(:bodies%n)), error, '1', &
                       'identifier of each fixed body, ascending')
    end subroutine write_bodies
+
+   !> Write the masses and moments of inertia of all bodies.
+   subroutine write_masses(file, comm, bodies, blocks, error)
+      type(hdf5_file_t), intent(inout) :: file
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      type(global_order_t), intent(in) :: blocks
+      type(error_t), allocatable, intent(inout) :: error
+      real(dp), allocatable :: masses(:, :), block(:, :)
+      type(part_t) :: part
+      integer(ip) :: s
+
+      allocate (masses(2, bodies%n))
+      do s = 1_ip, bodies%n
+         masses(:, s) = [real(bodies%mass(s), dp), real(bodies%inertia(s), dp)]
+      end do
+      call blocks%to_blocks(comm, masses, block)
+      part = part_t(blocks%first, blocks%total)
+      call file%write('/bodies/mass', component(block, 1), error, 'kg/m', 'mass; 0: infinite', part)
+      call file%write('/bodies/inertia', component(block, 2), error, 'kg m', &
+                      'moment of inertia about the centre of mass; 0: infinite', part)
+   end subroutine write_masses
 
    !> Write the vertices of all bodies and the first vertex of each body.
    subroutine write_vertices(file, comm, bodies, n_vertices, part, error)
@@ -78,7 +102,7 @@ contains
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
       !> Number of vertices of each body in the block of this rank
-      integer(lp), intent(in) :: n_vertices(:)
+      integer(ip), intent(in) :: n_vertices(:)
       !> Block of bodies of this rank
       type(part_t), intent(in) :: part
       type(error_t), allocatable, intent(inout) :: error
@@ -94,7 +118,12 @@ contains
       if (comm%size == 1_ip) then
          ! One rank has all rows in order. It needs no memory for a plan.
          call file%write('/bodies/vertex_start', bodies%vertex_start - 1_ip, error, '1', about_start)
-         call file%write('/bodies/vertex', real(bodies%shape(:, :n), dp), error, 'm', about_vertex)
+         do k = 1_ip, max(n, 1_ip), vertices_at_once
+            associate (last => min(n, k + (vertices_at_once - 1_ip)))
+               call file%write('/bodies/vertex', real(bodies%shape(:, k:last), dp), error, 'm', about_vertex, &
+                               part_t(int(k, lp) - 1_lp, int(n, lp)))
+            end associate
+         end do
          return
       end if
       allocate (body(n), start(size(n_vertices) + 1))
@@ -105,7 +134,7 @@ contains
       call blocks%to_blocks(comm, real(bodies%shape(:, :n), dp), vertices)
       start(1) = int(blocks%first, ip)
       do k = 1_ip, size(n_vertices, kind=ip)
-         start(k + 1) = start(k) + int(n_vertices(k), ip)
+         start(k + 1) = start(k) + n_vertices(k)
       end do
       ! The last rank also writes the final entry, the number of all vertices.
       n = size(n_vertices, kind=ip)
@@ -140,6 +169,7 @@ contains
       end do
       call order_bodies(comm, bodies, blocks)
       call blocks%to_blocks(comm, state, block)
+      deallocate (state)
       part = part_t(blocks%first, blocks%total)
       call file%write('/frames/step', step, error, '1', 'number of the time step', rows=one_row)
       call file%write('/frames/time', time, error, 's', 'simulated time', rows=one_row)
