@@ -39,7 +39,7 @@ contains
       integer(ip) :: s
 
       do s = first, last
-         if (bodies%fixed(s) .or. bodies%in_halo(s)) cycle
+         if (.not. forces%has_terms(s) .or. bodies%fixed(s) .or. bodies%in_halo(s)) cycle
          call add_term(bodies, s, forces%value(:, s), weight, channels(:, s))
       end do
    end subroutine add_powers

@@ -144,11 +144,12 @@ contains
       integer(ip), intent(in) :: first, last
       integer(ip) :: s
 
+      call add_powers(bodies, forces, weight, first, last, sums%power_sum)
+      if (.not. any(abs(gravity) > 0.0_wp)) return
       do s = first, last
          if (bodies%fixed(s) .or. bodies%in_halo(s)) cycle
          sums%torque(s) = sums%torque(s) + weight*torque_of(gravity, bodies, s)
       end do
-      call add_powers(bodies, forces, weight, first, last, sums%power_sum)
    end subroutine accumulate_bodies
 
    !> Accumulate the action of fixed bodies in one step, after the rates of all bodies of this step.

@@ -66,10 +66,12 @@ contains
    end subroutine predict
 
    !> Final velocities and accelerations from the forces at the end of the step.
-   subroutine correct(self, dt, first, last, bodies)
+   subroutine correct(self, dt, first, last, force, bodies)
       class(compensated_verlet_t), intent(inout) :: self
       real(wp), intent(in) :: dt
       integer(ip), intent(in) :: first, last
+      !> Forces along x and y [N/m] and torques [N], (3, slot)
+      real(wp), intent(in) :: force(3, first:last)
       !> Bodies; velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: s
@@ -77,9 +79,9 @@ contains
 
       h = 0.5_wp*dt
       do s = first, last
-         bodies%acceleration(1, s) = bodies%force(1, s)*bodies%inverse_mass(s)
-         bodies%acceleration(2, s) = bodies%force(2, s)*bodies%inverse_mass(s)
-         bodies%angular_acceleration(s) = bodies%torque(s)*bodies%inverse_inertia(s)
+         bodies%acceleration(1, s) = force(1, s)*bodies%inverse_mass(s)
+         bodies%acceleration(2, s) = force(2, s)*bodies%inverse_mass(s)
+         bodies%angular_acceleration(s) = force(3, s)*bodies%inverse_inertia(s)
          bodies%velocity(:, s) = self%half(1:2, s)
          bodies%angular_velocity(s) = self%half(3, s)
          call add(h*bodies%acceleration(1, s), bodies%velocity(1, s), self%lost_speed(1, s))

@@ -70,20 +70,22 @@ contains
    end subroutine predict
 
    !> Correct all derivatives by the difference between computed and predicted acceleration.
-   subroutine correct(self, dt, first, last, bodies)
+   subroutine correct(self, dt, first, last, force, bodies)
       class(gear_t), intent(inout) :: self
       real(wp), intent(in) :: dt
       integer(ip), intent(in) :: first, last
+      !> Forces along x and y [N/m] and torques [N], (3, slot)
+      real(wp), intent(in) :: force(3, first:last)
       !> Bodies; position, angle, velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: s
 
       do s = first, last
-         call adjust(self%c0, dt, bodies%force(1, s)*bodies%inverse_mass(s), bodies%position(1, s), &
+         call adjust(self%c0, dt, force(1, s)*bodies%inverse_mass(s), bodies%position(1, s), &
                      bodies%velocity(1, s), bodies%acceleration(1, s), self%higher(:, 1, s))
-         call adjust(self%c0, dt, bodies%force(2, s)*bodies%inverse_mass(s), bodies%position(2, s), &
+         call adjust(self%c0, dt, force(2, s)*bodies%inverse_mass(s), bodies%position(2, s), &
                      bodies%velocity(2, s), bodies%acceleration(2, s), self%higher(:, 2, s))
-         call adjust(self%c0, dt, bodies%torque(s)*bodies%inverse_inertia(s), bodies%angle(s), &
+         call adjust(self%c0, dt, force(3, s)*bodies%inverse_inertia(s), bodies%angle(s), &
                      bodies%angular_velocity(s), bodies%angular_acceleration(s), self%higher(:, 3, s))
       end do
    end subroutine correct

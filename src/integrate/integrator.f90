@@ -21,9 +21,9 @@ module polydem_integrator
       !> Prepare for bodies whose accelerations are known
       procedure(start), deferred :: start
       !> Predict bodies at the end of the step
-      procedure(advance), deferred :: predict
+      procedure(predict), deferred :: predict
       !> Compute the final state of bodies from the forces
-      procedure(advance), deferred :: correct
+      procedure(correct), deferred :: correct
       !> Greatest stable products of angular frequency and time step
       procedure(stability), deferred :: stability
       procedure :: serialize
@@ -39,8 +39,8 @@ module polydem_integrator
          type(bodies_t), intent(in) :: bodies
       end subroutine start
 
-      !> Predict or correct a run of bodies. Several threads may call it for different runs.
-      subroutine advance(self, dt, first, last, bodies)
+      !> Predict a run of bodies. Several threads may call it for different runs.
+      subroutine predict(self, dt, first, last, bodies)
          import :: bodies_t, integrator_t, ip, wp
          class(integrator_t), intent(inout) :: self
          !> Time step [s]
@@ -49,7 +49,21 @@ module polydem_integrator
          integer(ip), intent(in) :: first, last
          !> Bodies; only these change
          type(bodies_t), intent(inout) :: bodies
-      end subroutine advance
+      end subroutine predict
+
+      !> Correct a run of bodies. Several threads may call it for different runs.
+      subroutine correct(self, dt, first, last, force, bodies)
+         import :: bodies_t, integrator_t, ip, wp
+         class(integrator_t), intent(inout) :: self
+         !> Time step [s]
+         real(wp), intent(in) :: dt
+         !> First and last slot of a run of free bodies
+         integer(ip), intent(in) :: first, last
+         !> Forces along x and y [N/m] and torques [N] at the end of the step, (3, slot)
+         real(wp), intent(in) :: force(3, first:last)
+         !> Bodies; only these change
+         type(bodies_t), intent(inout) :: bodies
+      end subroutine correct
 
       !> Greatest stable product of angular frequency and time step against the damping ratio.
       function stability(self) result(table)

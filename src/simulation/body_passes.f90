@@ -2,43 +2,65 @@
 !>
 !> Each pass does all that it can do for a block of bodies while the block is in the cache.
 module polydem_body_passes
+   use omp_lib, only: omp_get_thread_num
    use polydem_bodies, only: block_size
+   use polydem_box_maker, only: turn_and_bound_block
+   use polydem_clock, only: wall_seconds
    use polydem_energy_balance, only: accumulate_bodies, accumulate_walls
    use polydem_errors, only: error_t
-   use polydem_force_sums, only: total_forces
+   use polydem_force_sums, only: force_on, total_forces
    use polydem_guards, only: check_motion, check_poses, have_valid_poses, move_within_limit
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: dp, ip, wp, min_parallel_size
    use polydem_prescribed_motion, only: move_bodies
    use polydem_simulation, only: simulation_t, time_of
    implicit none
    private
-   public :: predict_bodies, complete_step, move_walls
+   public :: predict_bodies, complete_step, keep_forces, move_walls
+
+   !> One of so many blocks of the first thread is timed
+   integer(ip), parameter :: timed_blocks = 8_ip
 
 contains
 
-   !> Predict the free bodies at the end of the step, move those with prescribed motion there, and check their poses.
-   subroutine predict_bodies(self, error)
+   !> Predict the free bodies at the end of the step, turn their vertices and update their boxes, in one pass over the
+   !> bodies. Move those with prescribed motion, and check all poses.
+   subroutine predict_bodies(self, boxes_share, error)
       !> The simulation at the start of a step
       type(simulation_t), intent(inout) :: self
+      !> Share of the time spent in vertices and boxes, in a pass of which some blocks were timed
+      real(dp), intent(out) :: boxes_share
       !> Names a body with an invalid pose
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: n, k, next, high, first, last
-      logical :: good
+      real(dp) :: clock(3), seconds(2)
+      logical :: good, valid, timed
 
       n = size(self%bodies%free, kind=ip)
       good = .true.
-      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(self, n) &
-      !$omp    private(next, high, first, last) reduction(.and.:good)
+      seconds = 0.0_dp
+      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(self, n, seconds) &
+      !$omp    private(next, high, first, last, clock, valid, timed) reduction(.and.:good)
       do k = 1_ip, n, block_size
+         timed = omp_get_thread_num() == 0 .and. mod(k, timed_blocks*block_size) == 1_ip
+         if (timed) clock(1) = wall_seconds()
          high = min(k + block_size - 1_ip, n)
          next = k
+         valid = .true.
          do while (next <= high)
             call find_run(self%bodies%free, high, next, first, last)
             call self%integrator%predict(self%dt, first, last, self%bodies)
-            good = good .and. have_valid_poses(self%bodies, first, last)
+            valid = valid .and. have_valid_poses(self%bodies, first, last)
          end do
+         if (timed) clock(2) = wall_seconds()
+         if (valid) call turn_and_bound_block(self%maker, self%bodies%free(k:high), self%isa, self%bodies, self%boxes)
+         good = good .and. valid
+         if (.not. timed) cycle
+         clock(3) = wall_seconds()
+         seconds = seconds + (clock(2:3) - clock(1:2))
       end do
       !$omp end parallel do
+      boxes_share = 0.0_dp
+      if (sum(seconds) > 0.0_dp) boxes_share = seconds(2)/sum(seconds)
       call move_walls(self, time_of(self))
       do k = n + 1_ip, size(self%guard%moving, kind=ip)
          good = good .and. have_valid_poses(self%bodies, self%guard%moving(k), self%guard%moving(k))
@@ -47,7 +69,7 @@ contains
    end subroutine predict_bodies
 
    !> Complete the step from the sums of the contact forces: total forces, final velocities, energy balance, and the
-   !> guard of the motion, in one pass over the bodies.
+   !> guard of the motion, in one pass over the bodies. Of the total forces, only those on fixed bodies are kept.
    subroutine complete_step(self, error)
       !> The simulation with the sums of the contact forces
       type(simulation_t), intent(inout) :: self
@@ -67,12 +89,9 @@ contains
          next = k
          do while (next <= high)
             call find_run(self%bodies%free, high, next, first, last)
-            call total_forces(self%settings%forces%gravity, self%force_sums, done + 1_ip, last, self%bodies)
-            call self%integrator%correct(self%dt, first, last, self%bodies)
+            call total_forces(self%settings%forces%gravity, self%force_sums, done + 1_ip, first - 1_ip, self%bodies)
+            call complete_run(self, first, last)
             good = good .and. move_within_limit(self%guard, self%bodies, first, last, self%dt)
-            if (self%settings%output%energy_balance) &
-               call accumulate_bodies(self%energy_balance, 1.0_wp, self%settings%forces%gravity, self%bodies, &
-                                      self%force_sums, first, last)
             done = last
          end do
       end do
@@ -87,6 +106,33 @@ contains
       end do
       if (.not. good) call check_motion(self%guard, self%bodies, self%step, self%dt, error)
    end subroutine complete_step
+
+   !> Compute final velocities of a run of free bodies, and accumulate their energy balance.
+   subroutine complete_run(self, first, last)
+      type(simulation_t), intent(inout) :: self
+      !> First and last slot, at most `block_size` bodies
+      integer(ip), intent(in) :: first, last
+      real(wp) :: force(3, block_size)
+      integer(ip) :: s
+
+      associate (bodies => self%bodies, gravity => self%settings%forces%gravity)
+         do s = first, last
+            force(:, s - first + 1_ip) = force_on(gravity, self%force_sums, s, bodies%mass(s))
+         end do
+         call self%integrator%correct(self%dt, first, last, force, bodies)
+         if (self%settings%output%energy_balance) &
+            call accumulate_bodies(self%energy_balance, 1.0_wp, gravity, bodies, self%force_sums, first, last)
+      end associate
+   end subroutine complete_run
+
+   !> Set the total forces on all bodies at the end of a step, if only those on fixed bodies are known.
+   subroutine keep_forces(self)
+      type(simulation_t), intent(inout) :: self
+
+      if (.not. self%has_forces) call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, &
+                                                   self%bodies%n, self%bodies)
+      self%has_forces = .true.
+   end subroutine keep_forces
 
    !> Find the next run of consecutive slots in a list.
    pure subroutine find_run(slots, high, next, first, last)

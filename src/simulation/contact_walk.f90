@@ -126,7 +126,7 @@ contains
          ! Sums begin just before their first terms: no contact so far had a lower slot.
          if (block%n > 0_ip) then
             low = min(block%first(block%n), block%second(block%n))
-            call clear_sums(low, high, self%bodies%n, self%force_sums%value)
+            call clear_sums(low, high, self%force_sums)
             high = min(high, low - 1_ip)
          end if
          call add_terms(block, terms, last(2), self%force_sums, results%late)
@@ -135,7 +135,7 @@ contains
          clock(3) = wall_seconds()
          results%seconds = results%seconds + (clock(2:3) - clock(1:2))
       end do
-      call clear_sums(last(1) + 1_ip, high, self%bodies%n, self%force_sums%value)
+      call clear_sums(last(1) + 1_ip, high, self%force_sums)
    end subroutine walk_range
 
    !> Empty the results of a range.

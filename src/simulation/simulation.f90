@@ -72,6 +72,8 @@ module polydem_simulation
       integer(ip) :: n_contacts = 0_ip
       !> Sums of the contact forces on each body
       type(force_sums_t) :: force_sums
+      !> Whether `bodies` has the total forces of this step on all bodies, not only on fixed ones
+      logical :: has_forces = .true.
       !> Contact history of the pairs
       type(contact_history_t) :: history
       !> Contact history received by a redistribution, until the pairs are found again; unallocated between steps

@@ -27,12 +27,14 @@ contains
       type(simulation_t), intent(inout) :: self
       !> Allocated if the run must stop; names the body, its position and the step
       type(error_t), allocatable, intent(inout) :: error
+      real(dp) :: boxes_share
 
       self%step = self%step + 1_lp
       self%energy_balance%is_current = .false.
+      self%has_forces = .false.
       call self%timers%start()
-      call predict_bodies(self, error)
-      call self%timers%lap(stage_integrate)
+      call predict_bodies(self, boxes_share, error)
+      call self%timers%divide_lap(stage_boxes, stage_integrate, boxes_share)
       call place_boxes(self, error)
       if (allocated(error)) return
       call sum_forces(self, self%dt, error)
@@ -43,7 +45,7 @@ contains
       call self%timers%lap(stage_integrate)
    end subroutine advance
 
-   !> Update halo, vertices and boxes from the predicted positions. Redistribute the bodies if necessary.
+   !> Update the halo, and vertices and boxes of all but the free bodies. Redistribute the bodies if necessary.
    subroutine place_boxes(self, error)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
@@ -61,7 +63,7 @@ contains
          call self%timers%lap(stage_decomposition)
       end if
       if (.not. allocated(error)) then
-         call turn_and_bound(self%maker, self%moving, self%isa, self%bodies, self%boxes)
+         call turn_and_bound(self%maker, self%moving(size(self%bodies%free) + 1:), self%isa, self%bodies, self%boxes)
          call self%timers%lap(stage_boxes)
       end if
       call redistribute(self, error)

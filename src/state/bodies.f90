@@ -59,9 +59,9 @@ module polydem_bodies
       real(wp), allocatable :: acceleration(:, :)
       !> Angular acceleration [rad/s2]
       real(wp), allocatable :: angular_acceleration(:)
-      !> Sum of the forces, (2, slot) [N/m]
+      !> Sum of the forces, (2, slot) [N/m]. A step keeps the sums of fixed bodies only, see `keep_forces`
       real(wp), allocatable :: force(:, :)
-      !> Sum of the torques about the centre of mass [N]
+      !> Sum of the torques about the centre of mass, likewise [N]
       real(wp), allocatable :: torque(:)
       !> First vertex of each body, (n + 1)
       integer(ip), allocatable :: vertex_start(:)

@@ -17,7 +17,7 @@ module polydem_force_sums
    private
    public :: force_sums_t, contact_terms_t, late_terms_t, n_terms, of_elastic, of_normal, of_tangential
    public :: sum_x, sum_y, sum_torque, sum_energy, reserve_sums, start_sums, clear_sums, terms_of_block, term_of
-   public :: add_terms, add_late_terms, assemble_forces, total_forces, set_force
+   public :: add_terms, add_late_terms, assemble_forces, total_forces, force_on, set_force
 
    !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
    integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
@@ -30,6 +30,8 @@ module polydem_force_sums
    type :: force_sums_t
       !> Sums over the contacts of each body, (n_terms, slot)
       real(wp), allocatable :: value(:, :)
+      !> Whether a term was added to the sums of a body, (slot); the others are zero
+      logical, allocatable :: has_terms(:)
    end type force_sums_t
 
    !> Terms of the contacts of a block
@@ -52,7 +54,7 @@ module polydem_force_sums
 
 contains
 
-   !> Make room for the sums of n bodies.
+   !> Make room for the sums of n bodies. New sums are zero.
    subroutine reserve_sums(n, sums)
       !> Number of bodies
       integer(ip), intent(in) :: n
@@ -60,9 +62,10 @@ contains
 
       if (allocated(sums%value)) then
          if (size(sums%value, 2) == n) return
-         deallocate (sums%value)
+         deallocate (sums%value, sums%has_terms)
       end if
-      allocate (sums%value(n_terms, n))
+      allocate (sums%value(n_terms, n), source=0.0_wp)
+      allocate (sums%has_terms(n), source=.false.)
    end subroutine reserve_sums
 
    !> Set the sums of all bodies to zero.
@@ -72,21 +75,20 @@ contains
       type(force_sums_t), intent(inout) :: sums
 
       call reserve_sums(n, sums)
-      call clear_sums(1_ip, n, n, sums%value)
+      call clear_sums(1_ip, n, sums)
    end subroutine start_sums
 
-   !> Set the sums of some bodies to zero.
-   pure subroutine clear_sums(first, last, n, value)
+   !> Set the sums of some bodies to zero. In a dilute scene most of them are.
+   pure subroutine clear_sums(first, last, sums)
       !> First and last slot
       integer(ip), intent(in) :: first, last
-      !> Number of bodies
-      integer(ip), intent(in) :: n
-      !> The sums
-      real(wp), intent(inout) :: value(n_terms, n)
+      type(force_sums_t), intent(inout) :: sums
       integer(ip) :: s
 
       do s = first, last
-         value(:, s) = 0.0_wp
+         if (.not. sums%has_terms(s)) cycle
+         sums%value(:, s) = 0.0_wp
+         sums%has_terms(s) = .false.
       end do
    end subroutine clear_sums
 
@@ -156,7 +158,7 @@ contains
       integer(ip) :: c
 
       if (max(maxval(block%first(:block%n)), maxval(block%second(:block%n))) <= last) then
-         call add_pairs(block%n, block%first, block%second, terms, last, sums%value)
+         call add_pairs(block%n, block%first, block%second, terms, last, sums%value, sums%has_terms)
          return
       end if
       call reserve_late(late, block%n)
@@ -167,15 +169,18 @@ contains
    end subroutine add_terms
 
    !> Add the terms of contacts to the sums of their bodies, in the order of the contacts.
-   pure subroutine add_pairs(n, i, j, terms, last, value)
+   pure subroutine add_pairs(n, i, j, terms, last, value, has_terms)
       integer(ip), intent(in) :: n, i(n), j(n), last
       type(contact_terms_t), intent(in) :: terms
       real(wp), intent(inout) :: value(n_terms, last)
+      logical, intent(inout) :: has_terms(last)
       integer(ip) :: c
 
       do c = 1_ip, n
          call add(terms%first(:, c), value(:, i(c)))
          call subtract(terms%first(:, c), terms%second(:, c), value(:, j(c)))
+         has_terms(i(c)) = .true.
+         has_terms(j(c)) = .true.
       end do
    end subroutine add_pairs
 
@@ -209,6 +214,7 @@ contains
          call append_late(slot, term, late)
       else
          sums%value(:, slot) = sums%value(:, slot) + term
+         sums%has_terms(slot) = .true.
       end if
    end subroutine add_or_keep
 
@@ -252,7 +258,9 @@ contains
 
       do k = 1_ip, late%n
          associate (s => late%slot(k))
-            if (s >= low .and. s <= high) sums%value(:, s) = sums%value(:, s) + late%value(:, k)
+            if (s < low .or. s > high) cycle
+            sums%value(:, s) = sums%value(:, s) + late%value(:, k)
+            sums%has_terms(s) = .true.
          end associate
       end do
    end subroutine add_late_terms
@@ -283,8 +291,7 @@ contains
       call total_forces(gravity, sums, 1_ip, bodies%n, bodies)
    end subroutine assemble_forces
 
-   !> Set the forces and torques on some bodies from the sums, and add gravity to free bodies. Several threads may call
-   !> it for different bodies.
+   !> Set the forces and torques on some bodies from the sums, and add gravity to free bodies.
    pure subroutine total_forces(gravity, sums, low, high, bodies)
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
@@ -293,28 +300,58 @@ contains
       integer(ip), intent(in) :: low, high
       !> Bodies; `force` and `torque` are set
       type(bodies_t), intent(inout) :: bodies
+      real(wp) :: total(3)
       integer(ip) :: s
 
       do s = low, high
          call set_force(sums%value(:, s), s, bodies)
          if (bodies%fixed(s)) cycle
-         bodies%force(1, s) = bodies%force(1, s) + bodies%mass(s)*gravity(1)
-         bodies%force(2, s) = bodies%force(2, s) + bodies%mass(s)*gravity(2)
+         total = force_on(gravity, sums, s, bodies%mass(s))
+         bodies%force(:, s) = total(1:2)
       end do
    end subroutine total_forces
 
    !> Set the force and torque on one body from the sum of its terms.
-   pure subroutine set_force(total, s, bodies)
+   pure subroutine set_force(value, s, bodies)
       !> Sum of the terms
-      real(wp), intent(in) :: total(n_terms)
+      real(wp), intent(in) :: value(n_terms)
       !> Slot of the body
       integer(ip), intent(in) :: s
       !> Bodies; `force` and `torque` of body s are set
       type(bodies_t), intent(inout) :: bodies
+      real(wp) :: total(3)
 
-      bodies%force(1, s) = total(sum_x(of_normal)) + total(sum_x(of_tangential))
-      bodies%force(2, s) = total(sum_y(of_normal)) + total(sum_y(of_tangential))
-      bodies%torque(s) = total(sum_torque(of_normal)) + total(sum_torque(of_tangential))
+      total = contact_force(value)
+      bodies%force(:, s) = total(1:2)
+      bodies%torque(s) = total(3)
    end subroutine set_force
+
+   !> Force of contacts and gravity on a free body, and torque: x, y [N/m], torque [N]
+   pure function force_on(gravity, sums, s, mass) result(total)
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      type(force_sums_t), intent(in) :: sums
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      !> Its mass [kg/m]
+      real(wp), intent(in) :: mass
+      real(wp) :: total(3)
+
+      total = 0.0_wp
+      if (sums%has_terms(s)) total = contact_force(sums%value(:, s))
+      total(1) = total(1) + mass*gravity(1)
+      total(2) = total(2) + mass*gravity(2)
+   end function force_on
+
+   !> Force and torque from a sum of terms: x, y [N/m], torque [N]
+   pure function contact_force(value) result(total)
+      !> Sum of the terms
+      real(wp), intent(in) :: value(n_terms)
+      real(wp) :: total(3)
+
+      total(1) = value(sum_x(of_normal)) + value(sum_x(of_tangential))
+      total(2) = value(sum_y(of_normal)) + value(sum_y(of_tangential))
+      total(3) = value(sum_torque(of_normal)) + value(sum_torque(of_tangential))
+   end function contact_force
 
 end module polydem_force_sums
