@@ -8,7 +8,6 @@ module polydem_hunt_crossley
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_element, only: contact_element_t
-   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
@@ -26,17 +25,13 @@ module polydem_hunt_crossley
 contains
 
    !> Compute the damping forces of one block of contacts.
-   subroutine find_forces(self, dt, block, history, force)
+   subroutine find_forces(self, block, force)
       class(hunt_crossley_t), intent(in) :: self
-      real(wp), intent(in) :: dt
       type(contact_block_t), intent(in) :: block
-      type(contact_history_t), intent(inout) :: history
       real(wp), intent(inout) :: force(block_size)
       real(wp) :: share
       integer(ip) :: c
 
-      associate (unused_dt => dt, unused_history => history)
-      end associate
       do c = 1_ip, block%n
          ! Bars that nearly cross turn without approach. L is at least the side of a square of the same area.
          share = self%coefficient*sqrt(1.0_wp/(block%mobility(c)*self%stiffness))*block%inverse_length(c) &

@@ -4,6 +4,7 @@
 !> is at most four times the elastic force (p. 227). The sum with the elastic force is never attractive (p. 277). This
 !> law is for comparison; `rate_damping` is the same law without the artefacts of the difference.
 module polydem_matuttis_chen_damping
+   use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_kinds, only: ip, wp
@@ -16,7 +17,7 @@ module polydem_matuttis_chen_damping
    type, extends(normal_damping_t) :: matuttis_chen_damping_t
    contains
       procedure :: history_kinds
-      procedure :: find_forces
+      procedure :: add
    end type matuttis_chen_damping_t
 
    !> Greatest damping on approach, as a multiple of the elastic force
@@ -34,19 +35,20 @@ contains
       kinds = [history_kind_t('area', 'm2', 'overlap area at the last step', zero_is_new=.true.)]
    end function history_kinds
 
-   !> Compute the damping forces of one block of contacts, and store the areas.
-   subroutine find_forces(self, dt, block, history, force)
+   !> Add the damping force, and store the areas.
+   subroutine add(self, bodies, dt, block, history)
       class(matuttis_chen_damping_t), intent(in) :: self
+      type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]; 0: the rate is unknown, and there is no damping
       real(wp), intent(in) :: dt
-      type(contact_block_t), intent(in) :: block
+      !> Contacts; `normal_force` changes
+      type(contact_block_t), intent(inout) :: block
       !> Contact history; the area is read and set
       type(contact_history_t), intent(inout) :: history
-      real(wp), intent(inout) :: force(block_size)
-      real(wp) :: difference
+      real(wp) :: difference, force(block_size)
       integer(ip) :: c
 
-      associate (area => history%column(self%first_column)%value)
+      associate (unused_bodies => bodies, area => history%column(self%first_column)%value)
          do c = 1_ip, block%n
             difference = 0.0_wp
             if (dt > 0.0_wp) then
@@ -58,6 +60,7 @@ contains
             area(block%pair(c)) = block%area(c)
          end do
       end associate
-   end subroutine find_forces
+      call self%add_limited(force, block)
+   end subroutine add
 
 end module polydem_matuttis_chen_damping

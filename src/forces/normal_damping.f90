@@ -1,4 +1,4 @@
-!> Base type of normal dampings: the loop over the contacts, the limit of the force, and the dashpot of the stable step.
+!> Base type of normal dampings: the limit of the force, and the dashpot of the stable step.
 !>
 !> Damping never makes a contact attractive: the sum of elastic and damping force is not negative (H.-G. Matuttis & J.
 !> Chen, Understanding the Discrete Element Method, Wiley 2014, p. 277). An attraction by another part is not changed.
@@ -22,51 +22,59 @@ module polydem_normal_damping
       !> Dimensionless damping coefficient gamma
       real(wp) :: coefficient = 0.0_wp
    contains
-      !> Compute the damping forces of one block of contacts
-      procedure(find_forces), deferred :: find_forces
       procedure :: add
+      !> Compute the damping forces of a block of contacts from their present state
+      procedure :: find_forces
+      !> Add damping forces to those of a block of contacts
+      procedure, nopass :: add_limited
       procedure :: stiffen
       procedure :: configure => take_coefficients
       procedure, non_overridable :: take_coefficients
    end type normal_damping_t
 
-   abstract interface
-      !> Compute the damping forces of one block of contacts, without a limit.
-      subroutine find_forces(self, dt, block, history, force)
-         import :: block_size, contact_history_t, contact_block_t, normal_damping_t, wp
-         class(normal_damping_t), intent(in) :: self
-         !> Time since the last evaluation [s]; 0 at the start of a run
-         real(wp), intent(in) :: dt
-         !> Contacts with their elastic forces
-         type(contact_block_t), intent(in) :: block
-         !> Contact history; only the pairs of these contacts may change
-         type(contact_history_t), intent(inout) :: history
-         !> Damping force of each contact, positive in repulsion [N/m]
-         real(wp), intent(inout) :: force(block_size)
-      end subroutine find_forces
-   end interface
-
 contains
 
-   !> Add the damping force. Its sum with the elastic force is limited to repulsion.
+   !> Add the forces of `find_forces`. A damping with a contact history overrides this procedure.
    subroutine add(self, bodies, dt, block, history)
       class(normal_damping_t), intent(in) :: self
       type(bodies_t), intent(in) :: bodies
-      !> Time since the last evaluation [s]; 0 at the start of a run
       real(wp), intent(in) :: dt
       !> Contacts; `normal_force` changes
       type(contact_block_t), intent(inout) :: block
       type(contact_history_t), intent(inout) :: history
       real(wp) :: force(block_size)
+
+      associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
+      end associate
+      call self%find_forces(block, force)
+      call self%add_limited(force, block)
+   end subroutine add
+
+   !> Compute the damping forces of a block of contacts, without a limit. Default: none.
+   subroutine find_forces(self, block, force)
+      class(normal_damping_t), intent(in) :: self
+      !> Contacts with their elastic forces
+      type(contact_block_t), intent(in) :: block
+      !> Damping force of each contact, positive in repulsion [N/m]
+      real(wp), intent(inout) :: force(block_size)
+
+      associate (unused_self => self)
+      end associate
+      force(:block%n) = 0.0_wp
+   end subroutine find_forces
+
+   !> Add damping forces. Their sum with the elastic force is limited to repulsion.
+   subroutine add_limited(force, block)
+      !> Damping force of each contact, positive in repulsion [N/m]
+      real(wp), intent(in) :: force(block_size)
+      !> Contacts; `normal_force` changes
+      type(contact_block_t), intent(inout) :: block
       integer(ip) :: c
 
-      associate (unused_bodies => bodies)
-      end associate
-      call self%find_forces(dt, block, history, force)
       do c = 1_ip, block%n
          block%normal_force(c) = block%normal_force(c) + max(-block%elastic(c), force(c))
       end do
-   end subroutine add
+   end subroutine add_limited
 
    !> Add the dashpot gamma sqrt(m E) L/l.
    subroutine stiffen(self, bodies, contacts, element)

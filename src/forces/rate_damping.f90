@@ -4,7 +4,6 @@
 !> no contact history, no lag of half a step and no jump in the first step of a contact.
 module polydem_rate_damping
    use polydem_contact_block, only: block_size, contact_block_t
-   use polydem_contact_history, only: contact_history_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
    implicit none
@@ -20,16 +19,12 @@ module polydem_rate_damping
 contains
 
    !> Compute the damping forces of one block of contacts.
-   subroutine find_forces(self, dt, block, history, force)
+   subroutine find_forces(self, block, force)
       class(rate_damping_t), intent(in) :: self
-      real(wp), intent(in) :: dt
       type(contact_block_t), intent(in) :: block
-      type(contact_history_t), intent(inout) :: history
       real(wp), intent(inout) :: force(block_size)
       integer(ip) :: c
 
-      associate (unused_dt => dt, unused_history => history)
-      end associate
       do c = 1_ip, block%n
          force(c) = self%coefficient*sqrt(self%stiffness/block%mobility(c))*block%rate(c) &
             *block%inverse_length(c)

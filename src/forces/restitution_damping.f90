@@ -16,7 +16,6 @@ module polydem_restitution_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_element, only: contact_element_t
-   use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
    use polydem_elementary, only: arc_cosine, exponential, logarithm
    use polydem_kinds, only: ip, wp
@@ -49,17 +48,13 @@ contains
    end subroutine configure
 
    !> Compute the damping forces of one block of contacts.
-   subroutine find_forces(self, dt, block, history, force)
+   subroutine find_forces(self, block, force)
       class(restitution_damping_t), intent(in) :: self
-      real(wp), intent(in) :: dt
       type(contact_block_t), intent(in) :: block
-      type(contact_history_t), intent(inout) :: history
       real(wp), intent(inout) :: force(block_size)
       real(wp) :: reach
       integer(ip) :: c
 
-      associate (unused_dt => dt, unused_history => history)
-      end associate
       do c = 1_ip, block%n
          ! Bars that nearly cross turn without approach. L is at least the side of a square of the same area.
          reach = max(block%length(c), sqrt(block%area(c)))

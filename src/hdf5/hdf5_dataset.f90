@@ -16,13 +16,13 @@ module polydem_hdf5_dataset
    use polydem_hdf5_hyperslab, only: read_slab, slab_t, write_slab
    use polydem_hdf5_links, only: check_storage, disable_external_links, raise_external, is_external_link
    use polydem_hdf5_location, only: check_status, dataset_location_t
-   use polydem_kinds, only: bp, dp, ip, lp
+   use polydem_kinds, only: dp, ip, lp
    use polydem_strings, only: to_text
    implicit none
    private
    public :: start_library, library_version
    public :: write_dataset, append_rows_to, read_dataset, dataset_shape, has_link
-   public :: holds_reals, holds_integers, double_type, integer_type, long_type, byte_type
+   public :: holds_reals, holds_integers
 
    !> Accepted types: real numbers or integers
    integer, parameter :: holds_reals = 1
@@ -67,26 +67,6 @@ contains
       call h5get_libversion_f(major, minor, release, status)
       version = to_text(int(major, ip))//'.'//to_text(int(minor, ip))//'.'//to_text(int(release, ip))
    end function library_version
-
-   !> HDF5 type of real(dp) in memory and in files
-   integer(hid_t) function double_type()
-      double_type = h5kind_to_type(dp, h5_real_kind)
-   end function double_type
-
-   !> HDF5 type of integer(ip) in memory and in files
-   integer(hid_t) function integer_type()
-      integer_type = h5kind_to_type(ip, h5_integer_kind)
-   end function integer_type
-
-   !> HDF5 type of integer(lp) in memory and in files
-   integer(hid_t) function long_type()
-      long_type = h5kind_to_type(lp, h5_integer_kind)
-   end function long_type
-
-   !> HDF5 type of integer(bp) in memory and in files
-   integer(hid_t) function byte_type()
-      byte_type = h5kind_to_type(bp, h5_integer_kind)
-   end function byte_type
 
    !> Whether a name exists. Every group of the path is tested, as HDF5 requires. A name that leads to another file
    !> exists; an attempt to read it gives an error.
@@ -303,12 +283,10 @@ contains
    end subroutine dataset_shape
 
    !> Read a slab of a data set into memory.
-   subroutine read_dataset(location, wanted, kind_in_memory, start, extent, address, error)
+   subroutine read_dataset(location, wanted, start, extent, address, error)
       type(dataset_location_t), intent(in) :: location
-      !> holds_reals or holds_integers
+      !> holds_reals: read real(dp); holds_integers: read integer(lp). HDF5 converts the values
       integer, intent(in) :: wanted
-      !> HDF5 type in memory; HDF5 converts the values
-      integer(hid_t), intent(in) :: kind_in_memory
       !> Start of the slab, counted from 0, fastest dimension first
       integer(hsize_t), intent(in) :: start(:)
       !> Shape of the slab
@@ -317,7 +295,7 @@ contains
       type(c_ptr), intent(in) :: address
       !> Allocated on failure, or if the data set has a type that is not accepted
       type(error_t), allocatable, intent(inout) :: error
-      integer(hid_t) :: dataset
+      integer(hid_t) :: dataset, kind_in_memory
       integer :: status
 
       if (product(extent) == 0_hsize_t) return
@@ -326,6 +304,8 @@ contains
       if (allocated(error)) return
       call check_class(dataset, location, wanted, error)
       if (.not. allocated(error)) then
+         if (wanted == holds_reals) kind_in_memory = h5kind_to_type(dp, h5_real_kind)
+         if (wanted == holds_integers) kind_in_memory = h5kind_to_type(lp, h5_integer_kind)
          call read_slab(dataset, location, kind_in_memory, &
                         slab_t(whole=extent, start=start, extent=extent, address=address), error)
       end if

@@ -6,10 +6,9 @@
 !> come from one thread.
 module polydem_hdf5_file
    use, intrinsic :: iso_c_binding, only: c_loc
-   use hdf5, only: hsize_t
+   use hdf5, only: h5_real_kind, h5kind_to_type, hsize_t
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_hdf5_dataset, only: double_type, holds_integers, holds_reals, library_version, long_type, read_dataset, &
-      start_library
+   use polydem_hdf5_dataset, only: holds_integers, holds_reals, library_version, read_dataset, start_library
    use polydem_hdf5_hyperslab, only: part_t
    use polydem_hdf5_location, only: dataset_location_t
    use polydem_hdf5_shape_check, only: checked_shape, shape_text
@@ -52,7 +51,7 @@ contains
       call choose_rows(self%location_of(name), 1, rows, start, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1)))
-      call read_dataset(self%location_of(name), holds_reals, double_type(), start, extent, c_loc(values), error)
+      call read_dataset(self%location_of(name), holds_reals, start, extent, c_loc(values), error)
    end subroutine read_reals
 
    subroutine read_real_table(self, name, values, error, rows)
@@ -66,7 +65,7 @@ contains
       call choose_rows(self%location_of(name), 2, rows, start, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1), extent(2)))
-      call read_dataset(self%location_of(name), holds_reals, double_type(), start, extent, c_loc(values), error)
+      call read_dataset(self%location_of(name), holds_reals, start, extent, c_loc(values), error)
    end subroutine read_real_table
 
    subroutine read_real_block(self, name, values, error, rows)
@@ -80,7 +79,7 @@ contains
       call choose_rows(self%location_of(name), 3, rows, start, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1), extent(2), extent(3)))
-      call read_dataset(self%location_of(name), holds_reals, double_type(), start, extent, c_loc(values), error)
+      call read_dataset(self%location_of(name), holds_reals, start, extent, c_loc(values), error)
    end subroutine read_real_block
 
    subroutine read_longs(self, name, values, error, rows)
@@ -94,7 +93,7 @@ contains
       call choose_rows(self%location_of(name), 1, rows, start, extent, error)
       if (allocated(error)) return
       allocate (values(extent(1)))
-      call read_dataset(self%location_of(name), holds_integers, long_type(), start, extent, c_loc(values), error)
+      call read_dataset(self%location_of(name), holds_integers, start, extent, c_loc(values), error)
    end subroutine read_longs
 
    !> Read 64-bit integers and check their range, because HDF5 clips values beyond 32 bits without an error.
@@ -136,7 +135,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: there
 
-      call read_attribute_value(self%location_of(object), name, double_type(), c_loc(value), there, error)
+      call read_attribute_value(self%location_of(object), name, h5kind_to_type(dp, h5_real_kind), c_loc(value), there, &
+                                error)
    end subroutine read_real_attribute
 
    !> Choose the part of a data set to read, and check that it exists.

@@ -9,9 +9,9 @@
 !> join the file.
 module polydem_hdf5_writer
    use, intrinsic :: iso_c_binding, only: c_loc, c_null_ptr, c_ptr
-   use hdf5, only: hid_t, hsize_t
+   use hdf5, only: h5_integer_kind, h5_real_kind, h5kind_to_type, hid_t, hsize_t
    use polydem_errors, only: error_t
-   use polydem_hdf5_dataset, only: append_rows_to, byte_type, double_type, integer_type, long_type, write_dataset
+   use polydem_hdf5_dataset, only: append_rows_to, write_dataset
    use polydem_hdf5_handle, only: hdf5_handle_t
    use polydem_hdf5_hyperslab, only: part_t, slab_of
    use polydem_hdf5_location, only: dataset_location_t
@@ -125,7 +125,7 @@ contains
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, double_type(), shape(values), address, error, unit, meaning, part, rows)
+      call self%put(name, h5kind_to_type(dp, h5_real_kind), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_reals
 
    subroutine write_integers(self, name, values, error, unit, meaning, part, rows)
@@ -140,7 +140,7 @@ contains
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, integer_type(), shape(values), address, error, unit, meaning, part, rows)
+      call self%put(name, h5kind_to_type(ip, h5_integer_kind), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_integers
 
    subroutine write_longs(self, name, values, error, unit, meaning, part, rows)
@@ -155,7 +155,7 @@ contains
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, long_type(), shape(values), address, error, unit, meaning, part, rows)
+      call self%put(name, h5kind_to_type(lp, h5_integer_kind), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_longs
 
    subroutine write_bytes(self, name, values, error, unit, meaning, part, rows)
@@ -170,7 +170,7 @@ contains
 
       address = c_null_ptr
       if (size(values) > 0) address = c_loc(values)
-      call self%put(name, byte_type(), shape(values), address, error, unit, meaning, part, rows)
+      call self%put(name, h5kind_to_type(bp, h5_integer_kind), shape(values), address, error, unit, meaning, part, rows)
    end subroutine write_bytes
 
    subroutine write_text(self, name, values, error, unit, meaning)
@@ -216,7 +216,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call write_attribute_value(self%location_of(object), name, integer_type(), c_loc(value), error)
+      call write_attribute_value(self%location_of(object), name, h5kind_to_type(ip, h5_integer_kind), c_loc(value), &
+                                 error)
    end subroutine attach_integer
 
    subroutine attach_real(self, object, name, value, error)
@@ -226,7 +227,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error)) return
-      call write_attribute_value(self%location_of(object), name, double_type(), c_loc(value), error)
+      call write_attribute_value(self%location_of(object), name, h5kind_to_type(dp, h5_real_kind), c_loc(value), error)
    end subroutine attach_real
 
 end module polydem_hdf5_writer

@@ -36,6 +36,16 @@ module polydem_prescribed_motion
       real(wp), allocatable :: angle(:)
    end type motion_t
 
+   !> Ramp of a motion, which rises smoothly from rest to the full rate
+   type :: ramp_t
+      !> Integral of the factor from the start of the motion [s]
+      real(wp) :: elapsed = 0.0_wp
+      !> Fraction of the full rate
+      real(wp) :: factor = 0.0_wp
+      !> Derivative of the factor [1/s]
+      real(wp) :: growth = 0.0_wp
+   end type ramp_t
+
 contains
 
    !> Make a motion of some bodies from their present positions and angles.
@@ -78,11 +88,13 @@ contains
       real(wp), intent(in) :: time
       type(bodies_t), intent(inout) :: bodies
       real(wp) :: turn, rate, growth, c, s, arm(2)
+      type(ramp_t) :: ramp
       integer(ip) :: k, slot
 
-      turn = motion%rate*elapsed(motion, time)
-      rate = motion%rate*ramp_factor(motion, time)
-      growth = motion%rate*ramp_growth(motion, time)
+      ramp = ramp_at(motion, time)
+      turn = motion%rate*ramp%elapsed
+      rate = motion%rate*ramp%factor
+      growth = motion%rate*ramp%growth
       call sine_and_cosine(turn, s, c)
       do k = 1_ip, size(motion%slots, kind=ip)
          slot = motion%slots(k)
@@ -101,13 +113,15 @@ contains
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: time
       type(bodies_t), intent(inout) :: bodies
+      type(ramp_t) :: ramp
       integer(ip) :: k
 
+      ramp = ramp_at(motion, time)
       do k = 1_ip, size(motion%slots, kind=ip)
          associate (slot => motion%slots(k))
-            bodies%position(:, slot) = motion%position(:, k) + motion%velocity*elapsed(motion, time)
-            bodies%velocity(:, slot) = motion%velocity*ramp_factor(motion, time)
-            bodies%acceleration(:, slot) = motion%velocity*ramp_growth(motion, time)
+            bodies%position(:, slot) = motion%position(:, k) + motion%velocity*ramp%elapsed
+            bodies%velocity(:, slot) = motion%velocity*ramp%factor
+            bodies%acceleration(:, slot) = motion%velocity*ramp%growth
          end associate
       end do
    end subroutine translate
@@ -118,13 +132,15 @@ contains
       real(wp), intent(in) :: time
       type(bodies_t), intent(inout) :: bodies
       real(wp) :: phase, rate, speed, change, c, s
+      type(ramp_t) :: ramp
       integer(ip) :: k
 
-      phase = motion%frequency*elapsed(motion, time)
-      rate = motion%frequency*ramp_factor(motion, time)
+      ramp = ramp_at(motion, time)
+      phase = motion%frequency*ramp%elapsed
+      rate = motion%frequency*ramp%factor
       call sine_and_cosine(phase, s, c)
       speed = rate*c
-      change = motion%frequency*ramp_growth(motion, time)*c - rate**2*s
+      change = motion%frequency*ramp%growth*c - rate**2*s
       do k = 1_ip, size(motion%slots, kind=ip)
          associate (slot => motion%slots(k))
             bodies%position(:, slot) = motion%position(:, k) + motion%amplitude*s
@@ -134,48 +150,21 @@ contains
       end do
    end subroutine oscillate
 
-   !> Fraction of the full rate at a time
-   pure real(wp) function ramp_factor(motion, time)
+   !> The ramp of a motion at a time
+   pure type(ramp_t) function ramp_at(motion, time) result(ramp)
       type(motion_t), intent(in) :: motion
+      !> Time since the start of the run [s]
       real(wp), intent(in) :: time
       real(wp) :: u
 
-      if (time < motion%start) then
-         ramp_factor = 0.0_wp
-      else if (time - motion%start >= motion%ramp) then
-         ramp_factor = 1.0_wp
+      if (time < motion%start) return
+      if (time - motion%start >= motion%ramp) then
+         ramp = ramp_t(time - motion%start - 0.5_wp*motion%ramp, 1.0_wp, 0.0_wp)
       else
          u = (time - motion%start)/motion%ramp
-         ramp_factor = u*u*(3.0_wp - 2.0_wp*u)
+         ramp = ramp_t(motion%ramp*u*u*u*(1.0_wp - 0.5_wp*u), u*u*(3.0_wp - 2.0_wp*u), &
+                       6.0_wp*u*(1.0_wp - u)/motion%ramp)
       end if
-   end function ramp_factor
-
-   !> Derivative of the ramp factor [1/s]
-   pure real(wp) function ramp_growth(motion, time)
-      type(motion_t), intent(in) :: motion
-      real(wp), intent(in) :: time
-      real(wp) :: u
-
-      ramp_growth = 0.0_wp
-      if (time <= motion%start .or. time - motion%start >= motion%ramp) return
-      u = (time - motion%start)/motion%ramp
-      ramp_growth = 6.0_wp*u*(1.0_wp - u)/motion%ramp
-   end function ramp_growth
-
-   !> Integral of the ramp factor from the start to a time [s]
-   pure real(wp) function elapsed(motion, time)
-      type(motion_t), intent(in) :: motion
-      real(wp), intent(in) :: time
-      real(wp) :: u
-
-      if (time < motion%start) then
-         elapsed = 0.0_wp
-      else if (time - motion%start >= motion%ramp) then
-         elapsed = time - motion%start - 0.5_wp*motion%ramp
-      else
-         u = (time - motion%start)/motion%ramp
-         elapsed = motion%ramp*u*u*u*(1.0_wp - 0.5_wp*u)
-      end if
-   end function elapsed
+   end function ramp_at
 
 end module polydem_prescribed_motion

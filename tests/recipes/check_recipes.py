@@ -118,7 +118,8 @@ def build_program(root, copy, build, ninja, folder):
                        ("neighbours/plain_loop.f90", neighbours), ("neighbours/finder_factory.f90", neighbours)):
         plan.append((os.path.join(copy, "src", name), like))
     trial = os.path.join(root, "tests", "verification", "trial.f90")
-    plan += [(trial, trial), (os.path.join(root, "tests", "recipes", "try_recipes.f90"), trial)]
+    serial = os.path.join(root, "tests", "simulation", "serial_simulation.f90")
+    plan += [(serial, trial), (trial, trial), (os.path.join(root, "tests", "recipes", "try_recipes.f90"), trial)]
     objects = [compile_file(path, like, commands, modules, folder) for path, like in plan]
     output = subprocess.run([ninja, "-C", build, "-t", "commands", "tests/verification/verify"], capture_output=True,
                             text=True, check=True).stdout
