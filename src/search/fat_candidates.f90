@@ -10,6 +10,7 @@
 !> Both are counted, so runs are reproducible. `must_search` asks for a search of all boxes when single searches have
 !> cost as much.
 module polydem_fat_candidates
+   use omp_lib, only: omp_get_max_threads
    use polydem_box_lines, only: box_lines_t
    use polydem_boxes, only: boxes_t
    use polydem_candidate_rows, only: candidate_rows_t
@@ -145,7 +146,8 @@ contains
          (single_cost + real(self%n_fixed + self%moved%n, dp) + 0.5_dp*real(n_strays, dp))
    end function cost_of_singles
 
-   !> Set the margin, make all fat boxes, and search for all candidates. Their states are not found.
+   !> Set the margin, make all fat boxes, and search for all candidates. Their states are not found. The number of
+   !> candidates of the first search shows how much a wider margin costs: little where boxes are far apart.
    subroutine search_all(self, boxes, lines, n_wanted, changes)
       class(fat_candidates_t), intent(inout) :: self
       !> Boxes of this step
@@ -156,27 +158,43 @@ contains
       integer(ip), intent(in) :: n_wanted
       !> Changes of each thread; appended, (thread)
       type(pair_changes_t), intent(inout) :: changes(:)
-      integer(ip) :: low, high
-      integer :: w
+      real(dp) :: widen
 
       call adapt_margin(self, boxes%n, n_wanted)
       call reset(self)
       call self%update_states(boxes, self%fat, changes)
-      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes, lines, changes) private(w, low, high)
-      do w = 1, size(changes)
-         call part(boxes%n, size(changes), w, low, high)
-         call fatten(self, low, high, boxes%bounds, lines)
-      end do
-      !$omp end parallel do
-      call self%grids%build(boxes%n, self%fat)
-      call self%grids%search(boxes)
+      call find_candidates(self, boxes, lines)
+      if (.not. self%searched) then
+         widen = sqrt(0.5_dp + box_cost*real(boxes%n, dp)/(candidate_cost*real(max(1_ip, sum(self%grids%found%n)), dp)))
+         self%margin = self%margin*real(min(max(widen, 1.0_dp), 2.0_dp), wp)
+         if (widen > 1.0_dp) call find_candidates(self, boxes, lines)
+      end if
       call self%replace(self%grids%found, boxes, changes, with_states=.false.)
       self%n_listed = self%n
       self%searched = .true.
       self%first_link = 0_ip
       call self%list_by_second()
    end subroutine search_all
+
+   !> Make all fat boxes, and find the pairs of those that overlap.
+   subroutine find_candidates(self, boxes, lines)
+      type(fat_candidates_t), intent(inout) :: self
+      type(boxes_t), intent(in) :: boxes
+      class(box_lines_t), intent(in) :: lines
+      integer(ip) :: low, high
+      integer :: w, n_parts
+
+      n_parts = omp_get_max_threads()
+      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
+      !$omp    shared(self, boxes, lines, n_parts) private(w, low, high)
+      do w = 1, n_parts
+         call part(boxes%n, n_parts, w, low, high)
+         call fatten(self, low, high, boxes%bounds, lines)
+      end do
+      !$omp end parallel do
+      call self%grids%build(boxes%n, self%fat)
+      call self%grids%search(boxes)
+   end subroutine find_candidates
 
    !> Set the margin from the costs of the last list. The first list was made without velocities, so its life says
    !> nothing.
