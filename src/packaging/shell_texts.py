@@ -21,6 +21,13 @@ EXIT_CODES = (("0", "done"), ("1", "the run failed, for example because a guard 
               ("3", "a file or folder cannot be read or written, or a checksum is wrong"),
               ("75", "ended early with a checkpoint; the same command with --continue continues the run"))
 
+ENVIRONMENT = (("OMP_NUM_THREADS", "number of threads of a run without --threads"),
+               ("GOMP_SPINCOUNT", "how long a waiting thread spins before it sleeps. If unset, for about 10 ms, which slows "
+                "runs on a machine that other programs use; with 3000 for about 0.1 ms. The launcher of the sources sets "
+                "3000"),
+               ("POLYDEM_ISA", "base or avx2: instruction set of the kernels; results have the same bits"),
+               ("POLYDEM_PATIENCE", "seconds that a parallel write may hang before it ends the run (default: 600)"))
+
 
 @dataclass(frozen=True)
 class Verb:
@@ -127,6 +134,9 @@ def man_text(verbs, version):
     lines += [".SH EXIT STATUS"]
     for code, meaning in EXIT_CODES:
         lines += [".TP", f".B {code}", escaped(meaning)]
+    lines += [".SH ENVIRONMENT"]
+    for name, meaning in ENVIRONMENT:
+        lines += [".TP", f".B {name}", escaped(meaning)]
     return "\n".join([*lines, ""])
 
 

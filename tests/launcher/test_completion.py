@@ -80,6 +80,14 @@ class Completion(unittest.TestCase):
                         name = f"-l {option[2:]} " if kind == "fish" and option[:2] == "--" else option.lstrip("-")
                         self.assertIn(name, part)
 
+    def test_the_man_page_names_the_variables_that_the_program_reads(self):
+        sources = [path.read_text(encoding="utf-8") for path in (LAUNCHER.parent / "src").rglob("*.f90")]
+        read = {name for text in sources for name in re.findall(r"'(POLYDEM_[A-Z]+)'", text)} - {"POLYDEM_CALL"}
+        self.assertTrue(read)
+        part = call(LAUNCHER, "completion", "man").partition(".SH ENVIRONMENT")[2]
+        for name in (*read, "GOMP_SPINCOUNT"):
+            self.assertIn(f".B {name}\n", part)
+
     def test_shells_accept_the_texts(self):
         with tempfile.TemporaryDirectory() as folder:
             for kind, command in (("bash", ["bash", "-n"]), ("zsh", ["zsh", "-n"]), ("fish", ["fish", "-n"]),

@@ -6,6 +6,7 @@ usage: test_cmake.py SOURCES BUILD CMAKE      sources, a built folder, the progr
 import json
 import os
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -50,6 +51,16 @@ class Compiler(Scene):
                                 "-D", "CMAKE_Fortran_COMPILER_ID=LLVMFlang", "-D", "CMAKE_Fortran_COMPILER_VERSION=20")
         self.assertNotEqual(code, 0)
         self.assertIn("polydem needs gfortran 12 or newer", message)
+
+    def test_a_release_without_tests_names_the_optimisation_once_and_has_a_man_page(self):
+        code, _, message = call(CMAKE, "-S", SOURCES, "-B", self.folder, "-G", "Ninja", "-D", "POLYDEM_TESTS=OFF")
+        self.assertEqual(code, 0, message)
+        for entry in json.loads((self.folder / "compile_commands.json").read_text(encoding="utf-8")):
+            if not entry["file"].endswith("_o2.f90"):
+                self.assertEqual(re.findall(r" -O\S+", entry["command"]), [" -O3"])
+        code, output, message = call(CMAKE, "--build", self.folder, "--target", "shell_texts")
+        self.assertEqual(code, 0, output + message)
+        self.assertIn(".SH ENVIRONMENT", (self.folder / "src/packaging/polydem.1").read_text(encoding="utf-8"))
 
 
 class Revision(Scene):
