@@ -32,7 +32,7 @@ contains
       type(line_writer_t) :: file
       type(global_order_t) :: rows
       real(dp), allocatable :: values(:, :), block(:, :), of_rank(:)
-      integer(ip), allocatable :: deep(:), counts(:)
+      integer(ip), allocatable :: deep(:)
       integer(ip) :: c, k, rank
 
       deep = pack([(c, c=1_ip, contacts%n)], [(depth_share(contacts, thickness, c) > limit, c=1_ip, contacts%n)])
@@ -54,22 +54,35 @@ contains
          call file%put_line('first,second,x [m],y [m],area [m2],depth [m],depth/thinner body')
       ! One block at a time, as no rank has memory for all of them.
       do rank = 0_ip, comm%size - 1_ip
-         call comm%gather(reshape(block(:, :merge(rows%n, 0_ip, rank == comm%rank)), &
-                                  [7*merge(rows%n, 0_ip, rank == comm%rank)]), of_rank, counts)
-         if (comm%is_root()) call put_rows(file, reshape(of_rank, [7, size(of_rank)/7]))
+         call gather_rows(comm, 7*int(merge(rows%n, 0_ip, rank == comm%rank)), block, of_rank)
+         if (comm%is_root()) call put_rows(file, size(of_rank)/7, of_rank)
       end do
       if (comm%is_root()) call file%close(error)
       call comm%all_reduce_error(error)
    end subroutine write_overlap_table
 
+   !> Gather the rows of all ranks; collective.
+   subroutine gather_rows(comm, n, values, of_rank)
+      class(communicator_t), intent(inout) :: comm
+      !> Number of values that this rank gives
+      integer, intent(in) :: n
+      real(dp), intent(in) :: values(n)
+      real(dp), allocatable, intent(out) :: of_rank(:)
+      integer(ip), allocatable :: counts(:)
+
+      call comm%gather(values, of_rank, counts)
+   end subroutine gather_rows
+
    !> Write the rows of a block.
-   subroutine put_rows(file, block)
+   subroutine put_rows(file, n, block)
       type(line_writer_t), intent(inout) :: file
+      !> Number of rows
+      integer, intent(in) :: n
       !> Identifiers, position, area, depth, and depth over thickness, (7, row)
-      real(dp), intent(in) :: block(:, :)
+      real(dp), intent(in) :: block(7, n)
       integer :: k
 
-      do k = 1, size(block, 2)
+      do k = 1, n
          associate (row => real(block(:, k), wp))
             call file%put_line(to_text(nint(block(1, k), ip))//','//to_text(nint(block(2, k), ip))//','// &
                                to_text(row(3), 9)//','//to_text(row(4), 9)//','//to_text(row(5))//','// &

@@ -291,11 +291,13 @@ contains
 
    subroutine finish(bodies)
       type(bodies_t), intent(inout) :: bodies
+      real(wp), allocatable :: shape(:, :)
       integer(ip) :: s, n_vertices
 
       n_vertices = bodies%vertex_start(bodies%n + 1_ip) - 1_ip
-      bodies%shape = bodies%shape(:, 1:n_vertices)
-      allocate (bodies%turned(2, n_vertices))
+      allocate (shape(2, n_vertices), bodies%turned(2, n_vertices))
+      shape(:, :) = bodies%shape(:, :n_vertices)
+      call move_alloc(shape, bodies%shape)
       call measure_radii(bodies)
       where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass
       where (bodies%inertia > 0.0_wp) bodies%inverse_inertia = 1.0_wp/bodies%inertia

@@ -35,7 +35,7 @@ BENCH = """\
 """
 
 #: Exit codes, as inputs/getting_started.md lists them
-GOOD, BAD_INPUT, NO_FILE = 0, 2, 3
+GOOD, FAILED, BAD_INPUT, NO_FILE = 0, 1, 2, 3
 
 #: A user without privileges
 NOBODY = 65534
@@ -133,6 +133,24 @@ def threads_that_openmp_or_the_system_do_not_grant_are_refused(case):
     assert not os.path.exists("result")
     code, output, _ = case.call(*case.run_words("limited"), env={"OMP_THREAD_LIMIT": "1", "OMP_NUM_THREADS": "5"})
     assert code == GOOD and "threads    1 on" in output and hash_of(output) == case.expected, output
+
+
+def memory_that_is_not_granted_is_named(case):
+    """Limits of the memory, from enough for a few bodies to enough for many."""
+    words = ["run", "scene.nml", "--force", "--threads", "1", "--set", "output.folder=result",
+             "--set", "integrate.duration=1e-5"]
+    size = 20_000_000
+    while case.call(*words, before=limit(resource.RLIMIT_AS, size))[0] != GOOD:
+        size = size*5//4
+    ends = []
+    while not ends or ends[-1] != GOOD:
+        code, _, message = case.call(*words, "--set", "scene.bodies=50000", before=limit(resource.RLIMIT_AS, size))
+        ends.append(code)
+        # Libraries of Fortran and HDF5 that get no memory have words of their own, but no crash.
+        if code != GOOD and "Memory allocation failed" not in message and code != NO_FILE:
+            assert_one_sentence(code, message, FAILED, "there is not enough memory: ", " bytes more ", "ulimit -v")
+        size = size*5//4
+    assert len(ends) > 2 and FAILED in ends, ends
 
 
 def threads_that_take_turns_draw_a_warning(case):
@@ -342,9 +360,10 @@ def the_parents_of_new_folders_are_brought_to_disk(case, library):
 
 
 TESTS = (too_many_threads_are_refused_before_anything_is_written,
-         threads_that_openmp_or_the_system_do_not_grant_are_refused, threads_that_take_turns_draw_a_warning,
-         a_small_stack_is_refused, files_that_may_not_grow_are_named, nobody_need_read_what_is_printed,
-         closed_streams_leave_files_alone, a_umask_that_takes_ones_own_rights_is_refused)
+         threads_that_openmp_or_the_system_do_not_grant_are_refused, memory_that_is_not_granted_is_named,
+         threads_that_take_turns_draw_a_warning, a_small_stack_is_refused, files_that_may_not_grow_are_named,
+         nobody_need_read_what_is_printed, closed_streams_leave_files_alone,
+         a_umask_that_takes_ones_own_rights_is_refused)
 
 
 def main():
