@@ -8,7 +8,7 @@ module polydem_body_passes
    use polydem_clock, only: wall_seconds
    use polydem_energy_balance, only: accumulate_bodies, accumulate_walls
    use polydem_errors, only: error_t
-   use polydem_force_sums, only: force_on, total_forces
+   use polydem_force_sums, only: find_forces, total_forces
    use polydem_guards, only: check_motion, check_poses, have_valid_poses, move_within_limit
    use polydem_kinds, only: dp, ip, wp, min_parallel_size
    use polydem_prescribed_motion, only: move_bodies
@@ -113,15 +113,12 @@ contains
       !> First and last slot, at most `block_size` bodies
       integer(ip), intent(in) :: first, last
       real(wp) :: force(3, block_size)
-      integer(ip) :: s
 
-      associate (bodies => self%bodies, gravity => self%settings%forces%gravity)
-         do s = first, last
-            force(:, s - first + 1_ip) = force_on(gravity, self%force_sums, s, bodies%mass(s))
-         end do
+      associate (bodies => self%bodies, gravity => self%settings%forces%gravity, sums => self%force_sums)
+         call find_forces(gravity, first, last, bodies%mass, sums%value, sums%has_terms, force)
          call self%integrator%correct(self%dt, first, last, force, bodies)
          if (self%settings%output%energy_balance) &
-            call accumulate_bodies(self%energy_balance, 1.0_wp, gravity, bodies, self%force_sums, first, last)
+            call accumulate_bodies(self%energy_balance, 1.0_wp, gravity, bodies, sums, first, last)
       end associate
    end subroutine complete_run
 

@@ -17,7 +17,7 @@ module polydem_force_sums
    private
    public :: force_sums_t, contact_terms_t, late_terms_t, n_terms, of_elastic, of_normal, of_tangential
    public :: sum_x, sum_y, sum_torque, sum_energy, reserve_sums, start_sums, clear_sums, terms_of_block, term_of
-   public :: add_terms, add_late_terms, assemble_forces, total_forces, force_on, set_force
+   public :: add_terms, add_late_terms, assemble_forces, total_forces, find_forces, set_force
 
    !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
    integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
@@ -300,58 +300,57 @@ contains
       integer(ip), intent(in) :: low, high
       !> Bodies; `force` and `torque` are set
       type(bodies_t), intent(inout) :: bodies
-      real(wp) :: total(3)
       integer(ip) :: s
 
       do s = low, high
          call set_force(sums%value(:, s), s, bodies)
          if (bodies%fixed(s)) cycle
-         total = force_on(gravity, sums, s, bodies%mass(s))
-         bodies%force(:, s) = total(1:2)
+         bodies%force(1, s) = bodies%force(1, s) + bodies%mass(s)*gravity(1)
+         bodies%force(2, s) = bodies%force(2, s) + bodies%mass(s)*gravity(2)
       end do
    end subroutine total_forces
 
    !> Set the force and torque on one body from the sum of its terms.
-   pure subroutine set_force(value, s, bodies)
+   pure subroutine set_force(total, s, bodies)
       !> Sum of the terms
-      real(wp), intent(in) :: value(n_terms)
+      real(wp), intent(in) :: total(n_terms)
       !> Slot of the body
       integer(ip), intent(in) :: s
       !> Bodies; `force` and `torque` of body s are set
       type(bodies_t), intent(inout) :: bodies
-      real(wp) :: total(3)
 
-      total = contact_force(value)
-      bodies%force(:, s) = total(1:2)
-      bodies%torque(s) = total(3)
+      bodies%force(1, s) = total(sum_x(of_normal)) + total(sum_x(of_tangential))
+      bodies%force(2, s) = total(sum_y(of_normal)) + total(sum_y(of_tangential))
+      bodies%torque(s) = total(sum_torque(of_normal)) + total(sum_torque(of_tangential))
    end subroutine set_force
 
-   !> Force of contacts and gravity on a free body, and torque: x, y [N/m], torque [N]
-   pure function force_on(gravity, sums, s, mass) result(total)
+   !> Find the forces of contacts and gravity on a run of free bodies, as `total_forces` does, without storing them.
+   !> Several threads may call it for different bodies.
+   pure subroutine find_forces(gravity, first, last, mass, value, has_terms, force)
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
-      type(force_sums_t), intent(in) :: sums
-      !> Slot of the body
-      integer(ip), intent(in) :: s
-      !> Its mass [kg/m]
-      real(wp), intent(in) :: mass
-      real(wp) :: total(3)
+      !> First and last slot
+      integer(ip), intent(in) :: first, last
+      !> Masses [kg/m]
+      real(wp), intent(in) :: mass(last)
+      !> Sums of the bodies
+      real(wp), intent(in) :: value(n_terms, last)
+      !> Whether they have terms
+      logical, intent(in) :: has_terms(last)
+      !> Forces along x and y [N/m] and torques [N], (3, slot)
+      real(wp), intent(inout) :: force(3, first:last)
+      integer(ip) :: s
 
-      total = 0.0_wp
-      if (sums%has_terms(s)) total = contact_force(sums%value(:, s))
-      total(1) = total(1) + mass*gravity(1)
-      total(2) = total(2) + mass*gravity(2)
-   end function force_on
-
-   !> Force and torque from a sum of terms: x, y [N/m], torque [N]
-   pure function contact_force(value) result(total)
-      !> Sum of the terms
-      real(wp), intent(in) :: value(n_terms)
-      real(wp) :: total(3)
-
-      total(1) = value(sum_x(of_normal)) + value(sum_x(of_tangential))
-      total(2) = value(sum_y(of_normal)) + value(sum_y(of_tangential))
-      total(3) = value(sum_torque(of_normal)) + value(sum_torque(of_tangential))
-   end function contact_force
+      do s = first, last
+         force(:, s) = 0.0_wp
+         if (has_terms(s)) then
+            force(1, s) = value(sum_x(of_normal), s) + value(sum_x(of_tangential), s)
+            force(2, s) = value(sum_y(of_normal), s) + value(sum_y(of_tangential), s)
+            force(3, s) = value(sum_torque(of_normal), s) + value(sum_torque(of_tangential), s)
+         end if
+         force(1, s) = force(1, s) + mass(s)*gravity(1)
+         force(2, s) = force(2, s) + mass(s)*gravity(2)
+      end do
+   end subroutine find_forces
 
 end module polydem_force_sums
