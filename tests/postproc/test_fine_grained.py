@@ -6,8 +6,10 @@ import h5py
 import numpy as np
 import pytest
 from polydem_post.bench import read_bench
-from polydem_post.fine_grained import PARTITIONED, Waiting, agreement, contests, fine_grained_tables
+from polydem_post.fine_grained import PARTITIONED, Waiting, contests, not_negative
+from polydem_post.fine_grained_tables import agreement, error_told, fine_grained_tables, span_of_error
 from polydem_post.series import TREE
+from polydem_post.sweep_parts import Exchanges, exchanges_down, exchanges_of, exchanges_up_to
 from synthetic_bench import Truth, write_sample
 
 BOXES = 10000
@@ -72,7 +74,7 @@ def test_samples_without_the_cost_of_waiting_have_no_model_but_a_table(tmp_path)
         for n in (1, 2):
             for repeat in range(2):
                 write_sample(tmp_path, "drum_5", finder, truth, BOXES, repeat=repeat, threads=n)
-    times, limits, _ = fine_grained_tables(read_bench([tmp_path]))
+    times, limits, *_ = fine_grained_tables(read_bench([tmp_path]))
     assert times.rows and np.isnan(contests(read_bench([tmp_path]))[0].model(PARTITIONED, 2))
     row = dict(zip(limits.heading, limits.rows[0]))
     assert (row["loses from, model"], row["agree"]) == ("-", "-")
@@ -85,3 +87,125 @@ def test_costs_between_and_beyond_the_measured_numbers_of_threads_lie_on_lines()
     assert waiting.of("barrier", 8) == pytest.approx(8.0)
     assert waiting.of("region", 8) == pytest.approx(16.0)
     assert np.isnan(Waiting({}, {}).of("barrier", 2))
+
+
+# --- Parts with given work --------------------------------------------------------------------------------------------
+
+#: Boxes of a row, of which the first so many exchange places in pairs, four exchanges of ends each
+ROW = 64
+
+
+def row_of(movers, steps=7):
+    """Bounds of a row of boxes, (step, box, 4); at every second step the first ones stand the other way round."""
+    bounds = np.zeros((steps, ROW, 4))
+    left = np.tile(np.arange(ROW, dtype=float), (steps, 1))
+    left[1::2, :movers] = left[1::2, :movers].reshape(-1, movers // 2, 2)[:, :, ::-1].reshape(-1, movers)
+    bounds[:, :, 0], bounds[:, :, 2] = left, left + 0.5
+    bounds[:, :, 1], bounds[:, :, 3] = np.arange(ROW), np.arange(ROW) + 0.5
+    return bounds
+
+
+def test_exchanges_are_counted_where_ends_stood():
+    values = np.array([3.0, 1.0, 2.0, 7.0, 5.0, 6.0, 4.0, 4.0])
+    expected = [sum(before > value for before in values[:k]) for k, value in enumerate(values)]
+    assert exchanges_down(values).tolist() == expected
+    random = np.random.default_rng(5)
+    values = np.arange(200.0) + random.normal(0.0, 8.0, 200)
+    assert exchanges_down(values).tolist() == [int((values[:k] > values[k]).sum()) for k in range(200)]
+
+
+def test_exchanges_of_both_axes_add_up_over_the_list():
+    bounds = row_of(16)
+    summed = exchanges_up_to(bounds[0], bounds[1])
+    assert (len(summed), summed[0], summed[32], summed[-1]) == (2 * ROW + 1, 0, 4 * 8, 4 * 8)
+
+
+#: Work of a step that the parts below have: what an end and an exchange cost, and the rest [s]
+END, EXCHANGE, REST = 1e-7, 4e-7, 2e-6
+
+
+def write_row(folder, name, movers, repeats=4, fetch=0.0):
+    """Samples of a row on 1, 2 and 4 threads: a pass takes as long as the part with most of the given work."""
+    (folder / "traces" / name).mkdir(parents=True)
+    with h5py.File(folder / "traces" / name / "trace.h5", "w") as file:
+        file["aabb"] = row_of(movers)
+    swaps = 2 * movers
+    for n in (1, 2, 4):
+        # All exchanges lie in the first quarter of the list, so in one part
+        work = 4 * ROW * END / n + (swaps if movers <= ROW // 4 else max(swaps / n, ROW / 2)) * EXCHANGE
+        seconds = {PARTITIONED: work + REST + fetch * ROW * (n - 1) / n**2, TREE: 1e-3 / n}
+        for finder, time in seconds.items():
+            shares = (work / seconds[PARTITIONED], 0.0, 0.0, 1.0 - work / seconds[PARTITIONED], 0.0, 0.0)
+            truth = Truth(1e9 * time / ROW, 1.0, shares if finder == PARTITIONED else (0.0, 0.5, 0.5, 0.0, 0.0, 0.0),
+                          counts={"swaps": swaps / ROW, "passes": 2.0 / ROW})
+            for repeat in range(repeats):
+                write_sample(folder, name, finder, truth, ROW, repeat=repeat, threads=n, noise=1e-5)
+                with h5py.File(folder / "samples" / f"{name}-{finder}-{n}-{repeat}.h5", "a") as file:
+                    file["case/barrier_cost"] = file["case/region_cost"] = 1e-15 if n > 1 else 0.0
+
+
+@pytest.fixture(scope="module")
+def rows(tmp_path_factory):
+    """Two rows with different numbers of exchanges, all of them in the first quarter of the list."""
+    folder = tmp_path_factory.mktemp("rows")
+    for name, movers in (("row_slow", 4), ("row_fast", 16)):
+        write_row(folder, name, movers)
+    return contests(read_bench([folder]))
+
+
+def test_the_work_of_ends_and_exchanges_is_told_apart(rows):
+    for contest, movers in zip(rows, (4, 16)):
+        whole = 4 * ROW * END + 2 * movers * EXCHANGE
+        assert contest.exchanging == pytest.approx(2 * movers * EXCHANGE / whole, rel=0.01)
+        assert contest.splits[PARTITIONED].rest == pytest.approx(REST, rel=0.01)
+
+
+@pytest.mark.parametrize("n", [2, 4])
+def test_the_part_with_most_work_decides_the_time(rows, n):
+    for contest, movers in zip(rows, (4, 16)):
+        mean = (4 * ROW * END + 2 * movers * EXCHANGE) / n
+        most = 4 * ROW * END / n + 2 * movers * EXCHANGE
+        assert contest.unevenness(n) == pytest.approx(most / mean, rel=0.01)
+        assert contest.predict(PARTITIONED, n).uneven == pytest.approx(most - mean, rel=0.02)
+        assert contest.model(PARTITIONED, n) == pytest.approx(most + REST, rel=0.01)
+    assert span_of_error(rows, PARTITIONED, n) == pytest.approx((1.0, 1.0), abs=0.01)
+    least, worst = span_of_error(rows, PARTITIONED, n, ("uneven", "fetched"))
+    assert 1.0 < least < worst  # even parts alone do not explain the time
+
+
+def test_a_trace_of_other_boxes_is_not_counted(tmp_path):
+    write_row(tmp_path, "row", 16)
+    case = read_bench([tmp_path]).select(finder=PARTITIONED, threads=1)[0]
+    assert exchanges_of(case, 4) == Exchanges(32.0, {1: 32.0, 2: 32.0, 3: 32.0, 4: 32.0})
+    (tmp_path / "traces" / "row" / "trace.h5").unlink()
+    assert exchanges_of(case, 4) is None
+    with h5py.File(tmp_path / "traces" / "row" / "trace.h5", "w") as file:
+        file["aabb"] = row_of(8)
+    assert exchanges_of(case, 5) is None
+    assert contests(read_bench([tmp_path]))[0].unevenness(4) == 1.0
+
+
+def test_what_fetching_costs_is_fitted_to_two_threads_and_tells_four(tmp_path):
+    cost = 5e-8
+    for name, movers in (("row_slow", 4), ("row_fast", 16)):
+        write_row(tmp_path, name, movers, fetch=cost)
+    found = contests(read_bench([tmp_path]))
+    for contest in found:
+        assert contest.fetch[PARTITIONED] == pytest.approx([cost], rel=0.02)
+        assert contest.predict(PARTITIONED, 4).fetched == pytest.approx(cost * ROW * 3 / 16, rel=0.02)
+        assert contest.measured(PARTITIONED, 4).value == pytest.approx(contest.model(PARTITIONED, 4), rel=0.01)
+    (error,) = (table for table in fine_grained_tables(read_bench([tmp_path])) if table.name == "fine_grained_error")
+    told = [dict(zip(error.heading, row)) for row in error.rows if row[0] == PARTITIONED]
+    assert [row["serves"] for row in told] == ["work on one thread", "fit", "check"]
+    assert float(told[-1]["fetching a box [ns]"]) == pytest.approx(50.0, rel=0.02)
+    assert [float(word) for word in told[-1]["and fetching"].split(" to ")] == pytest.approx([1.0, 1.0], abs=0.01)
+    spoken = f"with 4 threads: partitioned_sweep {told[-1]['and fetching']}, quadtree "
+    assert spoken in error_told(found)
+
+
+def test_least_squares_without_negative_numbers():
+    rows = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0]])
+    assert not_negative(rows, rows @ [2.0, 3.0]) == pytest.approx([2.0, 3.0])
+    assert not_negative(rows, rows @ [4.0, -1.0]) == pytest.approx([3.0, 0.0])
+    assert not_negative(rows, -np.ones(3)) == pytest.approx([0.0, 0.0])
+    assert not_negative(np.ones((1, 2)), np.ones(1)) == pytest.approx([1.0, 0.0])

@@ -8,7 +8,8 @@ from . import complexity, paper, series
 from .bench import Bench
 from .bench_tables import visits_per_search
 from .claims import CONFIRMED, CONTRADICTED, Finding, Missing, claim, needed, of_parts, said, word
-from .fine_grained import PARTITIONED, contests
+from .fine_grained import MOST_THREADS, PARTITIONED, contests
+from .fine_grained_tables import error_told
 from .series import SWEEP, TREE
 from .statistics import every, number
 
@@ -20,7 +21,7 @@ from .statistics import every, number
     "elapsed time on the drums of the paper's sizes with the most threads of which there are processors, against "
     "one thread: partitioned_sweep on none faster than sort_and_sweep; on the largest sort_and_sweep (two threads) and "
     "quadtree at least 1.2 times as fast; intervals included; larger drums are told apart",
-    "speed_up, fine_grained, fine_grained_limits",
+    "speed_up, fine_grained, fine_grained_error, fine_grained_limits",
 )
 def parallel(bench: Bench) -> Finding:
     here = bench.on()
@@ -60,12 +61,15 @@ def _gains(bench: Bench, finder: str) -> dict:
 
 def _limits(bench: Bench) -> str:
     """With how many threads the partitioned sweep loses to the tree, as measured and by the model."""
-    told = []
-    for contest in contests(bench):
+    told, found = [], contests(bench)
+    for contest in found:
         seen, model = contest.seen_to_lose_at(), contest.loses_at()
-        predicted = f"from {model}" if model else "not" if contest.has_model else "-"
+        predicted = f"from {model}" if model else f"not to {MOST_THREADS}" if contest.has_model else "-"
         told.append(f"{contest.one.scene} {f'from {seen}' if seen else 'not'} (model: {predicted})")
-    return f" Threads with which the partitioned sweep loses to the tree: {', '.join(told)}." if told else ""
+    if not told:
+        return ""
+    limits = f" Threads with which the partitioned sweep loses to the tree: {', '.join(told)}."
+    return f"{limits} {error_told(found)}".rstrip()
 
 
 @claim(

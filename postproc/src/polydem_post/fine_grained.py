@@ -1,34 +1,43 @@
 """The fine-grained parallel sweep beside the tree: its waiting per pass against its work per part, and who wins.
 
-The model has no fitted number. From samples on one thread come the work that threads share and the rest; from the
-machine, measured beside the samples, the cost of a barrier and of starting threads. With n threads
+From samples on one thread come the work that threads share and the rest, which one thread does alone; from the machine,
+measured beside the samples, the cost of a barrier and of starting threads. With n threads
 
-    sweep:  rest + work/n + passes barrier(n) + region(n)
-    tree:   rest + work/n + regions region(n)
+    sweep:  rest + work/n uneven(n) + fetched(n) + passes barrier(n) + region(n)
+    tree:   rest + work/n           + fetched(n) + regions region(n)
 
-where all threads of the sweep meet after every pass, and the tree has three parallel regions in a step, none of which
-waits for another thread in its middle. The repair of the tree is no shared work: one thread does it. The model is a
-lower bound: what it leaves out (boxes that another core has written, parts of unequal work, other processes) only adds
-time, and the tables say how much.
+All threads of the sweep meet after every pass, so a pass takes as long as the part with most work. The work of a part
+is that of its ends, of which all parts have as many, and that of its exchanges, which are counted from the trace
+(`sweep_parts.py`); what an end and an exchange cost follows from the steps on one thread. The tree has three parallel
+regions in a step, none of which waits for another thread in its middle. The repair of the tree is no shared work.
+
+fetched(n) = (cost per box * boxes + cost per search * searches) (n - 1)/n / n: of the boxes, and of the nodes that a
+search visits, the part (n - 1)/n has been written by another core. These costs are the only fitted numbers: one for the
+sweep, two for the tree, for all scenes, fitted to the fewest several threads. Samples on more threads check the model.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import combinations
 
 import numpy as np
 
 from . import series
 from .bench import Bench, Case
-from .emit import Table
 from .series import TREE
-from .statistics import Estimate, median, number, of_one_bench, typical
+from .statistics import Estimate, median, of_one_bench, typical
+from .sweep_parts import Exchanges, exchanges_of
 
 #: The sweep that all threads sort together
 PARTITIONED = "partitioned_sweep"
 
 #: Finder -> phases whose work threads share
 SHARED = {PARTITIONED: ("structure",), TREE: ("search", "filter")}
+
+#: Finder -> counts of a step, for each of which threads fetch what another core has written
+FETCHED: dict[str, tuple[str, ...]] = {PARTITIONED: ("boxes",), TREE: ("boxes", "searches")}
 
 #: All phases of a finder but waiting
 WORKING = ("structure", "search", "filter", "order", "merge")
@@ -69,6 +78,29 @@ class Split:
     rest: float
 
 
+@dataclass(frozen=True)
+class Prediction:
+    """Time of a step by the model, in its parts [s]."""
+
+    #: What one thread does alone, and the mean work of the threads
+    rest: float
+    work: float
+    #: What waiting itself costs; how much more than the mean the part with most works; what other cores have written
+    waits: float
+    uneven: float = 0.0
+    fetched: float = 0.0
+
+    @property
+    def total(self) -> float:
+        """Time of a step [s]."""
+        return self.rest + self.work + self.waits + self.uneven + self.fetched
+
+    @property
+    def waiting(self) -> float:
+        """Mean time in which a thread does not work [s]."""
+        return self.waits + self.uneven
+
+
 @dataclass
 class Contest:
     """The sweep and the tree on one scene, with all numbers of threads that were measured."""
@@ -76,11 +108,22 @@ class Contest:
     sweep: dict[int, Case]
     tree: dict[int, Case]
     waiting: Waiting
+    #: Exchanges in the parts of the sweep, if the trace is there
+    parts: Exchanges | None = None
+    #: Part of the shared work of the sweep on one thread that exchanges are; the rest are ends
+    exchanging: float = 0.0
+    #: Finder -> costs of fetching, as FETCHED names them [s]
+    fetch: dict[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def one(self) -> Case:
         """The sweep on one thread."""
         return self.sweep[1]
+
+    @cached_property
+    def splits(self) -> dict[str, Split]:
+        """Finder -> shared work and rest on one thread."""
+        return {finder: split_of(self.cases(finder)[1]) for finder in FETCHED}
 
     @property
     def exchanges(self) -> float:
@@ -92,6 +135,11 @@ class Contest:
         """Numbers of threads that both were measured with."""
         return sorted(set(self.sweep) & set(self.tree))
 
+    @property
+    def free_threads(self) -> list[int]:
+        """Those with a processor for each thread."""
+        return [n for n in self.threads if n == 1 or n <= int(self.sweep[n].provenance.get("processors", n))]
+
     def passes(self, threads: int) -> float:
         """Passes of the sweep in a step; those of most threads stand for more."""
         if threads == 1:
@@ -100,16 +148,41 @@ class Contest:
         near = max((n for n in counted if n <= threads and counted[n] > 0.0), default=None)
         return counted[near] if near else USUAL_PASSES
 
-    def model(self, finder: str, threads: int) -> float:
-        """Predicted time of a step [s]."""
-        split = split_of(self.sweep[1] if finder == PARTITIONED else self.tree[1])
+    def unevenness(self, threads: int) -> float:
+        """Work of the part with most over the mean of the parts; 1 if it is not known."""
+        if self.parts is None:
+            return 1.0
+        return 1.0 - self.exchanging + self.exchanging * self.parts.unevenness(threads)
+
+    def predict(self, finder: str, threads: int) -> Prediction:
+        """Time of a step by the model, in its parts."""
+        split = self.splits[finder]
+        work = split.shared / threads
+        if threads == 1:
+            return Prediction(split.rest, work, 0.0)
         barrier, region = (self.waiting.of(which, threads) for which in ("barrier", "region"))
         waits = self.passes(threads) * barrier + region if finder == PARTITIONED else TREE_REGIONS * region
-        return split.rest + split.shared / threads + waits * (threads > 1)
+        uneven = work * (self.unevenness(threads) - 1.0) if finder == PARTITIONED else 0.0
+        fetched = float(self.foreign(finder, threads) @ self.fetch[finder]) if finder in self.fetch else 0.0
+        return Prediction(split.rest, work, waits, uneven, fetched)
+
+    def foreign(self, finder: str, threads: int) -> np.ndarray:
+        """How many of what FETCHED names a thread finds written by another core in a step."""
+        one = self.cases(finder)[1]
+        counts = [one.boxes if name == "boxes" else np.nan_to_num(one.count(name)) for name in FETCHED[finder]]
+        return np.array(counts, dtype=float) * (threads - 1) / threads**2
+
+    def cases(self, finder: str) -> dict[int, Case]:
+        """Number of threads -> case of a finder."""
+        return self.sweep if finder == PARTITIONED else self.tree
+
+    def model(self, finder: str, threads: int) -> float:
+        """Predicted time of a step [s]."""
+        return float(self.predict(finder, threads).total)
 
     def measured(self, finder: str, threads: int) -> Estimate:
         """Measured time of a step [s]."""
-        case = (self.sweep if finder == PARTITIONED else self.tree)[threads]
+        case = self.cases(finder)[threads]
         return median([1e-9 * case.boxes * value for value in of_one_bench(series.elapsed_time(case))])
 
     def beyond_model(self, finder: str, threads: int) -> float:
@@ -118,8 +191,7 @@ class Contest:
 
     def speed_up(self, finder: str) -> Estimate:
         """How much faster the most threads are than one, not more threads than there are processors."""
-        cases = self.sweep if finder == PARTITIONED else self.tree
-        most = max(n for n in self.threads if n == 1 or n <= int(cases[n].provenance.get("processors", n)))
+        cases, most = self.cases(finder), self.free_threads[-1]
         return series.ratio(cases[1], cases[most], series.elapsed_time)
 
     def ratio(self, threads: int) -> Estimate:
@@ -133,8 +205,20 @@ class Contest:
         return median([1e-9 * case.boxes * value / self.passes(threads) for value in waits])
 
     def work_per_part(self, threads: int) -> float:
-        """Work of one part in one pass, from one thread [s]."""
-        return split_of(self.one).shared / threads / self.passes(threads)
+        """Mean work of a part in a pass, by the model [s]."""
+        step = self.predict(PARTITIONED, threads)
+        return (step.work + step.fetched) / self.passes(threads)
+
+    def waiting_over_work(self, threads: int) -> Estimate:
+        """Measured waiting of a thread over its work, in the passes."""
+        case = self.sweep[threads]
+        waits, passes = (case.phase(name) for name in ("waiting", "structure"))
+        return median(of_one_bench({key: waits[key] / (passes[key] - waits[key]) for key in waits}))
+
+    def predicted_waiting_over_work(self, threads: int) -> float:
+        """Waiting of a thread over its work, by the model."""
+        step = self.predict(PARTITIONED, threads)
+        return step.waiting / (step.work + step.fetched)
 
     @property
     def has_model(self) -> bool:
@@ -185,88 +269,62 @@ def contests(bench: Bench) -> list[Contest]:
                         if case.time()} for finder in (PARTITIONED, TREE))
         contest = Contest(sweep, tree, waiting)
         if 1 in contest.threads and len(contest.threads) > 1:
+            contest.parts = exchanges_of(contest.one, MOST_THREADS)
             found.append(contest)
+    for boxes in {contest.one.boxes for contest in found}:
+        set_exchanging([contest for contest in found if contest.one.boxes == boxes])
+    for finder in FETCHED:
+        set_fetch(found, finder)
     return sorted(found, key=lambda each: (each.one.boxes, each.exchanges))
 
 
-def fine_grained_tables(bench: Bench) -> list[Table]:
-    """The model beside the measurement, and where the sweep loses."""
-    found = contests(bench)
-    return [times_table(found), limits_table(found), waiting_table(bench)] if found else []
+def set_exchanging(same_size: list[Contest]) -> None:
+    """Tell the work of ends from that of exchanges, by a straight line through the steps of scenes of one size."""
+    steps = [points for contest in same_size if len(points := steps_of(contest.one))]
+    swaps, seconds = np.concatenate(steps).T if steps else (np.zeros(0), np.zeros(0))
+    if len(swaps) < 2 or np.ptp(swaps) == 0.0:
+        return
+    slope, constant = np.polyfit(swaps, seconds, 1)
+    for contest in same_size:
+        exchanging = max(slope, 0.0) * contest.one.count("swaps")
+        whole = exchanging + max(constant, 0.0)
+        contest.exchanging = float(exchanging / whole) if whole > 0.0 else 0.0
 
 
-def _micro(seconds: float) -> str:
-    return number(1e6 * seconds)
+def steps_of(case: Case) -> np.ndarray:
+    """(exchanges, seconds of the sort) of the steps but the first, medians over repeats."""
+    swaps = next((sample.counts["swaps"] for sample in case.samples if "swaps" in sample.counts), np.empty(0))
+    times = [sample.phases["structure"] for sample in case.samples
+             if sample.repeat >= 1 and "structure" in sample.phases]
+    if not times or any(len(each) != len(swaps) for each in times):
+        return np.empty((0, 2))
+    return np.column_stack([swaps, np.median(times, axis=0)])[1:]
 
 
-def _micros(estimate: Estimate) -> str:
-    return Estimate(1e6 * estimate.value, 1e6 * estimate.low, 1e6 * estimate.high).text()
-
-
-def times_table(found: list[Contest]) -> Table:
-    """Measured and predicted times of a step."""
-    table = Table(
-        "fine_grained", "Fine-grained sweep against parallel tree: time of a step [us]",
-        ("scene", "boxes", "exchanges per box", "threads", "sweep", "measured / model", "tree", "measured / model",
-         "sweep / tree", "model", "passes", "work per part and pass", "waiting per pass", "barrier"),
-    )
+def set_fetch(found: list[Contest], finder: str) -> None:
+    """Fit what fetching costs a finder on all scenes to the samples on the fewest several threads."""
+    rows, lacking = [], []
     for contest in found:
-        for n in contest.threads:
-            sweep, tree = contest.model(PARTITIONED, n), contest.model(TREE, n)
-            table.add(
-                contest.one.scene, contest.one.boxes, number(contest.exchanges), n,
-                _micros(contest.measured(PARTITIONED, n)), number(contest.beyond_model(PARTITIONED, n)),
-                _micros(contest.measured(TREE, n)), number(contest.beyond_model(TREE, n)), contest.ratio(n).text(),
-                number(sweep / tree), number(contest.passes(n), 2),
-                _micro(contest.work_per_part(n)), _micros(contest.waiting_per_pass(n)) if n > 1 else "-",
-                _micro(contest.waiting.of("barrier", n)) if n > 1 else "-",
-            )
-    table.note = (
-        "Model: rest + work / threads + what waiting costs on this machine (table waiting), from samples on one "
-        "thread; a lower bound, since it knows nothing of boxes that another core has written, parts of unequal work "
-        "and other processes. Waiting per pass: mean time in which a thread of the sweep does not work."
-    )
-    return table
+        several = contest.free_threads[1:]
+        if several and np.isfinite(contest.model(finder, several[0])):
+            seconds = contest.measured(finder, several[0]).value
+            rows.append(contest.foreign(finder, several[0]) / seconds)
+            lacking.append(1.0 - contest.model(finder, several[0]) / seconds)
+    if rows:
+        costs = not_negative(np.array(rows), np.array(lacking))
+        for contest in found:
+            contest.fetch[finder] = costs
 
 
-def limits_table(found: list[Contest]) -> Table:
-    """With how many threads the sweep loses to the tree."""
-    table = Table(
-        "fine_grained_limits", "With how many threads the fine-grained sweep loses to the tree",
-        ("scene", "boxes", "exchanges per box", "loses from, model", "loses from, measured", "measured up to",
-         "agree", "best number of threads for the sweep, model"),
-    )
-    for contest in found:
-        model, seen, most = contest.loses_at(), contest.seen_to_lose_at(), contest.threads[-1]
-        predicted = model or f"not to {MOST_THREADS}" if contest.has_model else "-"
-        table.add(contest.one.scene, contest.one.boxes, number(contest.exchanges), predicted,
-                  seen or f"not to {most}", most, agreement(contest), contest.best_threads() or "-")
-    table.note = (
-        "Agree: model and measurement name the same winner with every measured number of threads; undecided where the "
-        "interval of the measured ratio holds 1."
-    )
-    return table
-
-
-def agreement(contest: Contest) -> str:
-    """Whether the model names the winner that was measured: 3 of 3, 1 undecided."""
-    if not contest.has_model:
-        return "-"
-    right, open_ones = 0, 0
-    for n in contest.threads:
-        won = contest.ratio(n).at_least(1.0)
-        predicted = contest.model(PARTITIONED, n) >= contest.model(TREE, n)
-        right += won is predicted
-        open_ones += won is None
-    text = f"{right} of {len(contest.threads) - open_ones}"
-    return f"{text}, {open_ones} undecided" if open_ones else text
-
-
-def waiting_table(bench: Bench) -> Table:
-    """What waiting costs on this machine."""
-    waiting = waiting_of(bench)
-    table = Table("waiting", "Cost of waiting on this machine [us]", ("threads", "barrier", "start and join threads"))
-    for n in sorted(waiting.barrier):
-        table.add(n, _micro(waiting.barrier[n]), _micro(waiting.region.get(n, np.nan)))
-    table.note = "Medians of what was measured just before each sample: 15 batches of 20 barriers and 20 empty regions."
-    return table
+def not_negative(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Least squares with no negative number; of equally good ones that with fewest numbers."""
+    columns = rows.shape[1]
+    best, least = np.zeros(columns), float(values @ values)
+    for size in range(1, columns + 1):
+        for chosen in map(list, combinations(range(columns), size)):
+            solved = np.linalg.lstsq(rows[:, chosen], values, rcond=None)[0]
+            off = float(np.sum((rows[:, chosen] @ solved - values) ** 2))
+            if solved.min() >= 0.0 and off < least * (1.0 - 1e-9):
+                best, least = np.zeros(columns), off
+                best[chosen] = solved
+    return best

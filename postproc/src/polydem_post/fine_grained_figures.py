@@ -8,6 +8,7 @@ import numpy as np
 from .bench import Bench
 from .figure_style import SETTINGS, Drawing, draw_estimates, grid_with_legend, readable_decades, shared_legend
 from .fine_grained import MOST_THREADS, PARTITIONED, Contest, contests
+from .fine_grained_tables import error_told
 from .series import TREE
 from .statistics import Estimate
 
@@ -53,9 +54,9 @@ def side_by_side(found: list[Contest]) -> Drawing:
             axis.plot(curve, [per_box * contest.model(finder, n) for n in curve], color=colour, linestyle=line,
                       linewidth=1.0)
         several = [n for n in threads if n > 1]
-        draw_estimates(waits, several, [scaled(contest.waiting_per_pass(n), 1e6) for n in several], **look)
-        waits.plot(curve[1:], [1e6 * contest.work_per_part(n) for n in curve[1:]], color=colour, linestyle=line,
-                   linewidth=1.0)
+        draw_estimates(waits, several, [contest.waiting_over_work(n) for n in several], **look)
+        waits.plot(curve[1:], [contest.predicted_waiting_over_work(n) for n in curve[1:]], color=colour,
+                   linestyle=line, linewidth=1.0)
         draw_estimates(wins, threads, [contest.ratio(n) for n in threads], **look)
         wins.plot(curve, [contest.model(PARTITIONED, n) / contest.model(TREE, n) for n in curve], color=colour,
                   linestyle=line, linewidth=1.0)
@@ -65,10 +66,10 @@ def side_by_side(found: list[Contest]) -> Drawing:
         "fine_grained", figure,
         "Above: time per box and step over threads, left of the sweep that all threads sort together, right of the "
         "tree; titles: gain of the most threads over one, of all scenes; both have the same axis. Below left: waiting "
-        "of a thread per pass (points) against the work of a part per pass (lines): where points lie above their line, "
-        "threads wait longer than they work. Below right: time of the sweep over that of the tree; above 1 the sweep "
-        "loses. Points: measured, with 95 % intervals; lines: the model, a lower bound that knows one thread and the "
-        "cost of waiting; beyond the last point it is a prediction.",
+        "of a thread in a pass over its work; above 1 threads wait longer than they work. Below right: time of the "
+        "sweep over that of the tree; above 1 the sweep loses. Points: measured, with 95 % intervals; lines: the model "
+        "of work, of parts that are uneven by exchanges counted from the trace, of fetching and of waiting; on grey "
+        f"ground it is a prediction. {error_told(found)}",
     )
 
 
@@ -94,8 +95,9 @@ def _label(axes: list, scenes: list[Contest]) -> None:
         axis.set_ylim(0.3 * min(drawn), 2.0 * max(drawn))
         readable_decades(axis.yaxis)
         axis.title.set_fontsize(9)
-    waits.set(yscale="log", ylabel="per pass [us]: waiting, work")
-    readable_decades(waits.yaxis)
+    waits.set(ylabel="waiting / work in a pass")
+    waits.set_ylim(bottom=0.0)
+    waits.axhline(1.0, color="0.6", linewidth=0.8, zorder=0)
     wins.set(ylabel="sweep / tree")
     wins.set_ylim(bottom=0.0)
     wins.axhline(1.0, color="0.6", linewidth=0.8, zorder=0)

@@ -9,7 +9,7 @@ from .bench_tables import all_tables
 from .claims import claims_document, judge_all, reasons_table, verdict_table
 from .complexity import SOURCES, complexity_tables
 from .emit import Table
-from .fine_grained import fine_grained_tables
+from .fine_grained_tables import fine_grained_tables
 from .own_scenes import skipped
 from .report_files import write_figures, write_tables
 from .result_file import cannot_write
