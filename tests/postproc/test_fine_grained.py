@@ -57,6 +57,9 @@ def test_it_says_with_how_many_threads_the_sweep_loses(contest):
     assert contest.seen_to_lose_at() == 4
     assert agreement(contest) == "3 of 3"
     assert contest.best_threads() == min(range(1, 100), key=sweep_time)
+    ratio, near = contest.nearest_to_lose()
+    assert near == max(range(2, 257), key=lambda n: sweep_time(n) / tree_time(n))
+    assert ratio == pytest.approx(sweep_time(near) / tree_time(near), rel=0.01)
 
 
 def test_work_per_part_halves_with_the_threads(contest):

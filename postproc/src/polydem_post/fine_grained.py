@@ -230,6 +230,10 @@ class Contest:
         return next((n for n in range(1, MOST_THREADS + 1)
                      if self.model(PARTITIONED, n) >= self.model(TREE, n)), None)
 
+    def nearest_to_lose(self) -> tuple[float, int]:
+        """Greatest time of the sweep over that of the tree with several threads by the model, and their number."""
+        return max((self.model(PARTITIONED, n) / self.model(TREE, n), n) for n in range(2, MOST_THREADS + 1))
+
     def seen_to_lose_at(self) -> int | None:
         """Least measured number of threads with which the sweep takes as long as the tree."""
         return next((n for n in self.threads if self.ratio(n).value >= 1.0), None)

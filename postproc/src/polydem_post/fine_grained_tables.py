@@ -114,16 +114,20 @@ def limits_table(found: list[Contest]) -> Table:
     table = Table(
         "fine_grained_limits", "With how many threads the fine-grained sweep loses to the tree",
         ("scene", "boxes", "exchanges per box", "loses from, model", "loses from, measured", "measured up to",
-         "agree", "best number of threads for the sweep, model"),
+         "agree", "greatest sweep / tree with several, model", "threads there",
+         "best number of threads for the sweep, model"),
     )
     for contest in found:
         model, seen, most = contest.loses_at(), contest.seen_to_lose_at(), contest.threads[-1]
         predicted = model or f"not to {MOST_THREADS}" if contest.has_model else "-"
+        ratio, near = contest.nearest_to_lose() if contest.has_model else (np.nan, "-")
         table.add(contest.one.scene, contest.one.boxes, number(contest.exchanges), predicted,
-                  seen or f"not to {most}", most, agreement(contest), contest.best_threads() or "-")
+                  seen or f"not to {most}", most, agreement(contest), number(ratio) if contest.has_model else "-",
+                  near, contest.best_threads() or "-")
     table.note = (
         "Agree: model and measurement name the same winner with every measured number of threads; undecided where the "
-        "interval of the measured ratio holds 1."
+        "interval of the measured ratio holds 1. A greatest ratio as near to 1 as the error of the model (table "
+        "fine_grained_error) leaves the limit open; with more threads than were measured the model is a prediction."
     )
     return table
 
