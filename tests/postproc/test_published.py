@@ -92,3 +92,15 @@ def test_the_exponents_in_the_text_on_performance_are_those_of_the_published_tab
     slopes = {row["finder"]: row for row in rows_of(VERDICTS / "tables" / "slopes.csv") if row["scenes"] == "drum"}
     for said, finder in ((tree, "quadtree"), (sweep, "sort_and_sweep")):
         assert float(said) == pytest.approx(float(slopes[finder]["all sizes"].split()[0]) - 1.0, abs=0.006)
+
+
+def test_the_error_of_the_model_of_the_fine_grained_sweep_in_the_text_is_that_of_its_table():
+    page = (VERDICTS / "README.md").read_text(encoding="utf-8")
+    rows = rows_of(VERDICTS / "tables" / "fine_grained_error.csv")
+    most = max(int(row["threads"]) for row in rows)
+    errors = ", ".join(f"{row['finder']} {row['and fetching']}" for row in rows if int(row["threads"]) == most)
+    assert len(re.findall(re.escape(f"of the model with {most} threads: {errors}."), page)) == 2  # figure and C5
+    limits = rows_of(VERDICTS / "tables" / "fine_grained_limits.csv")
+    for row in limits:
+        said = re.search(rf"\b{row['scene']} (?:not|from \d+) \(model: ([^)]*)\)", page)
+        assert said[1] == row["loses from, model"].replace("from ", ""), row["scene"]
