@@ -189,6 +189,14 @@ def test_pan_zoom_and_double_click(page):
     assert js(page, "return viewer.painter.shown") == whole
 
 
+def test_play_shows_no_frame_while_the_last_one_is_drawn(page):
+    js(page, "viewer.show(0); viewer.painter.isDrawing = () => true; viewer.play(true)")
+    page.execute_async_script("setTimeout(arguments[0], 300)")
+    assert js(page, "return [viewer.frame, viewer.playing]") == [0, True]
+    js(page, "delete viewer.painter.isDrawing")
+    WebDriverWait(page, 20).until(lambda _: js(page, "return viewer.frame > 0 && !viewer.painter.isDrawing()"))
+
+
 def test_play_scrub_keys_and_curves(page, run):
 
     last = len(run) - 1

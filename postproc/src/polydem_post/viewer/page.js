@@ -96,7 +96,7 @@ class Viewer {
     let next = performance.now() + 1000 / this.perSecond;
     const turn = (now) => {
       if (!this.playing) return;
-      if (now >= next) {
+      if (now >= next && !this.painter.isDrawing()) {
         next = Math.max(next + 1000 / this.perSecond, now);
         this.show(this.frame + 1);
         if (this.frame === this.run.frames - 1) {

@@ -232,6 +232,19 @@ class Painter {
       this.drawLayer(layer, this.programs[shapes], ink);
     }
     if (chosen >= 0) this.drawChosen(chosen, 2.5 * this.ratio * step);
+    if (this.fence) gl.deleteSync(this.fence);
+    this.fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    gl.flush();
+  }
+
+  /** Whether the last picture is still being drawn. What is sent meanwhile may have to wait for it. */
+  isDrawing() {
+    const {gl} = this;
+    if (!this.fence || gl.isContextLost()) return false;
+    if (gl.getSyncParameter(this.fence, gl.SYNC_STATUS) !== gl.SIGNALED) return true;
+    gl.deleteSync(this.fence);
+    this.fence = null;
+    return false;
   }
 
   /** Make some frames without drawing them: an engine runs new code slowly, and no frame that is shown shall wait. */
