@@ -23,8 +23,8 @@ EXIT_CODES = (("0", "done"), ("1", "the run failed, for example because a guard 
 
 ENVIRONMENT = (("OMP_NUM_THREADS", "number of threads of a run without --threads"),
                ("GOMP_SPINCOUNT", "how long a waiting thread spins before it sleeps. If unset, for about 10 ms, which "
-                "slows runs on a machine that other programs use; with 3000 for about 0.1 ms. The launcher of the "
-                "sources sets 3000"),
+                "slows runs on a machine that other programs use; with 10000 for less than 1 ms. The launcher of the "
+                "sources sets 10000"),
                ("POLYDEM_ISA", "base or avx2: instruction set of the kernels; results have the same bits"),
                ("POLYDEM_PATIENCE", "seconds that a parallel write may hang before it ends the run (default: 600)"))
 

@@ -45,7 +45,7 @@ class Ranks(Toy):
                           noted["OMP_WAIT_POLICY"]), ("1", "1", "passive"))
 
     def test_waiting_threads_soon_sleep_unless_the_user_has_chosen(self):
-        for chosen, expected in (({}, "3000"), ({"GOMP_SPINCOUNT": "7"}, "7"), ({"OMP_WAIT_POLICY": "active"}, None)):
+        for chosen, expected in (({}, "10000"), ({"GOMP_SPINCOUNT": "7"}, "7"), ({"OMP_WAIT_POLICY": "active"}, None)):
             noted = self.run_ranks("run", "x", "--ranks", "1", "--threads", "1", **chosen)[2]
             self.assertEqual(noted.get("GOMP_SPINCOUNT"), expected)
 
