@@ -12,13 +12,13 @@
 !> Only neighbours in the wrong order are exchanged, so exchanges and changes are the same as in `sort_and_sweep`.
 !> Crossings are the exchanges that the first pass cannot make.
 !>
-!> Three things limit the speed-up. Each core fetches the boxes that other cores wrote. The parts have unequal work, and
-!> all threads wait for the slowest after every pass, twice in nearly every step. With few threads these two cost most.
-!> With many threads the waiting itself does: sorting a part takes some ten microseconds, and less with more threads, but
-!> a barrier takes longer. A thread that the operating system suspends makes all others wait; this happens if there are
-!> more threads than free processors. The serial work (joining and sorting the changes, merging them into the list of pairs) is small. Few ends
-!> cross borders because ends move by a few places per step; these ends make the second pass necessary but add little
-!> work. Threads write to shared cache lines only at the borders.
+!> Three things limit the speed-up. Each core fetches the boxes that other cores wrote. The parts have unequal work,
+!> and all threads wait for the slowest after every pass, twice in nearly every step. With few threads these two cost
+!> most. With many threads the waiting itself does: sorting a part takes some ten microseconds, and less with more
+!> threads, but a barrier takes longer. A thread that the operating system suspends makes all others wait; this happens
+!> if there are more threads than free processors. The serial work (joining and sorting the changes, merging them into
+!> the list of pairs) is small. Few ends cross borders because ends move by a few places per step; these ends make the
+!> second pass necessary but add little work. Threads write to shared cache lines only at the borders.
 !>
 !> The waiting time is the time in which a thread does not work, from the start of the threads to the end of the last
 !> one, as the mean over the threads. A thread that the operating system suspends during work counts as working.
