@@ -16,6 +16,7 @@ PAGES = [
     "inputs/bench/README.md",
     "inputs/parallel_runs.md",
     "inputs/performance.md",
+    "inputs/performance_details.md",
     "postproc/verdicts/README.md",
     "postproc/verdicts/precision/README.md",
     "postproc/verdicts/scale/README.md",
