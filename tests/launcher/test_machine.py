@@ -56,6 +56,36 @@ class Stranger(Toy):
             self.assertFalse(os.path.exists(os.path.join(self.folder, "build")))
 
 
+class Places(Toy):
+    """Folders with odd names."""
+
+    def call_in(self, name, *words):
+        """Call the launcher of the project in a folder of another name."""
+        usual, self.folder = self.folder, f"{self.folder} {name}"
+        os.rename(usual, self.folder)
+        try:
+            return self.call(*words, launcher=os.path.join(self.folder, "polydem"))
+        finally:
+            os.rename(self.folder, usual)
+            self.folder = usual
+
+    def test_what_cmake_does_not_take_in_a_path_is_named(self):
+        odd = ('a"b', "a\\b", "a;b", "a#b", "a<b", "a>b", "a|b", "a[b", "a]b", "a$b", "a\nb", "a\rb")
+        for name in odd:
+            code, output, messages = self.call_in(name, "run", "x.nml")
+            self.assertEqual((code, output), (1, ""), name)
+            self.assertEqual(len(messages.splitlines()), 1, messages)
+            self.assertIn("CMake cannot build in ", messages)
+            self.assertIn("its path must have none of", messages)
+        # What is built already runs.
+        self.call("--version")
+        for name in odd:
+            self.assertEqual(self.call_in(name, "run", "x.nml"), (0, "<run>\n<x.nml>\n", ""), name)
+
+    def test_other_characters_are_no_obstacle(self):
+        self.assertEqual(self.call_in("it's (a) & 5% ü*?!=+~^{}@`,:\t", "info")[:2], (0, "<info>\n"))
+
+
 class Streams(Toy):
     """Streams that are closed, and pipes that nobody reads."""
 

@@ -55,3 +55,11 @@ def test_a_verb_without_room_leaves_nothing_but_a_sentence(small_drum, tmp_path,
     assert done.stderr.startswith(f"error: {tmp_path / name}: cannot be written (")
     assert done.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_output_that_takes_no_more_is_named(finished):
+    with open("/dev/full", "w", encoding="utf-8") as full:
+        end = subprocess.run([sys.executable, "-m", "polydem_post", "table", str(finished)], stdout=full, check=False,
+                             stderr=subprocess.PIPE, text=True)
+    assert end.returncode == 2
+    assert end.stderr.endswith("\nerror: standard output: cannot be written (No space left on device)\n")

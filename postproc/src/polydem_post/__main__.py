@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import errno
 import math
 import os
 import re
@@ -16,6 +17,7 @@ from .comparison_verb import add_paper
 from .data_verbs import add_data_verbs
 from .emit import printable
 from .picture_verbs import add_picture_verbs
+from .result_file import reason
 from .table import FORMATS, timing_table
 from .trajectory import ResultError, Trajectory
 
@@ -24,6 +26,9 @@ INPUT_ERROR = 2
 
 #: Exit code of an error that no reader foresaw; after Ctrl-C; if nobody reads the output any more, as in shells
 UNFORESEEN, INTERRUPTED, CLOSED_PIPE = 1, 130, 141
+
+#: Errors of a file system that takes no more; those of files that the package writes are known by their names before
+NO_ROOM = errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO
 
 #: A list of numbers that begins with a minus sign, which argparse takes for an option
 NEGATIVE = re.compile(r"-[\d.][\d.eE+,:-]*")
@@ -57,6 +62,10 @@ def main(arguments: list[str] | None = None) -> int:
     except Exception as error:  # the last resort: an error that no reader foresaw is reported in a sentence, too
         if os.environ.get(TRACEBACK):
             raise
+        if isinstance(error, OSError) and error.errno in NO_ROOM and error.filename is None:
+            _end_quietly()
+            print(f"error: standard output: cannot be written ({reason(error)})", file=sys.stderr)
+            return INPUT_ERROR
         words = " ".join(str(error).split())
         print(f"error: {options.verb} cannot go on: {type(error).__name__}: {printable(words)[:300]}. A file may be "
               f"damaged; {TRACEBACK}=1 shows where", file=sys.stderr)
@@ -75,7 +84,7 @@ def join_numbers(arguments: list[str]) -> list[str]:
 
 
 def _end_quietly() -> int:
-    """What to give back when the reader of a pipe, as in `| head -1`, has seen enough."""
+    """Write no more; what to give back when the reader of a pipe, as in `| head -1`, has seen enough."""
     try:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # the rest is written when Python ends
     except (OSError, ValueError):
