@@ -8,7 +8,7 @@ module polydem_find_contacts
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_fill_block, only: fill_block
    use polydem_instruction_set, only: isa_base
-   use polydem_kinds, only: ip
+   use polydem_kinds, only: dp, ip
    use polydem_pair_ranges, only: divide_pairs, most_ranges
    implicit none
    private
@@ -34,9 +34,10 @@ contains
       type(contact_rows_t) :: rows(most_ranges)
       integer(ip) :: ends(0:most_ranges)
       integer(ip) :: c, n_ranges, r
+      real(dp), allocatable :: equal_parts(:)
 
       n_ranges = min(int(omp_get_max_threads(), ip), most_ranges)
-      call divide_pairs(n_pairs, first, n_ranges, ends)
+      call divide_pairs(n_pairs, first, n_ranges, equal_parts, ends)
       !$omp parallel do schedule(static, 1) num_threads(n_ranges) default(none) private(r) &
       !$omp    shared(bodies, first, second, history, contacts, rows, ends, n_ranges)
       do r = 1_ip, n_ranges

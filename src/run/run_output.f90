@@ -18,6 +18,7 @@ module polydem_run_output
    use polydem_simulation, only: simulation_t, time_of, compute_balance
    use polydem_simulation_counters, only: count_contacts, report_counters
    use polydem_strings, only: to_text
+   use polydem_time_step, only: tabulate_contacts
    use polydem_timers, only: n_stages
    use polydem_wall_forces, only: complete_wall_forces
    implicit none
@@ -65,8 +66,8 @@ contains
       type(run_t), intent(inout) :: run
 
       associate (s => run%simulation)
-         s%keeps_contacts = s%settings%output%contacts .or. &
-            checks_contacts(s, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
+         s%keeps_contacts = s%settings%output%contacts .and. is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
+         s%keeps_contacts = s%keeps_contacts .or. checks_contacts(s, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
       end associate
    end subroutine choose_tables
 
@@ -128,6 +129,7 @@ contains
          call run%comm%all_reduce_max(is_not_finite)
          if (is_not_finite(1) == 1_lp) return
          call update_balance(run)
+         if (s%settings%output%contacts) call tabulate_contacts(s)
       end associate
       call write_frame(run, error)
    end subroutine write_last_frame

@@ -13,7 +13,7 @@ module polydem_contact_walk
    use polydem_force_sums, only: add_late_terms, add_terms, clear_sums, contact_terms_t, reserve_sums, terms_of_block
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: owns_pair
-   use polydem_pair_ranges, only: divide_pairs, most_ranges
+   use polydem_pair_ranges, only: balance_ranges, divide_pairs, most_ranges
    use polydem_passing, only: test_block
    use polydem_range_results, only: range_results_t
    use polydem_simulation, only: simulation_t, sum_contacts_own => sum_contacts, sum_degenerate
@@ -40,7 +40,7 @@ contains
 
       associate (pairs => self%neighbours%pairs)
          n = min(int(omp_get_max_threads(), ip), most_ranges)
-         call divide_pairs(pairs%n, pairs%first, n, ends)
+         call divide_pairs(pairs%n, pairs%first, n, self%walk%upto, ends)
          call reserve_ranges(self, n)
          last(0) = 0_ip
          do r = 1_ip, n - 1_ip
@@ -66,6 +66,8 @@ contains
       end do
       !$omp end do nowait
       !$omp end parallel
+      self%walk%step = self%step
+      call balance_ranges(self%walk%ranges(:n)%elapsed, self%walk%upto)
       call gather_results(self, n)
       overlap_share = 0.5_dp
       associate (seconds => self%walk%ranges(1)%seconds)
@@ -103,10 +105,11 @@ contains
       type(range_results_t), intent(inout) :: results
       type(contact_block_t) :: block
       type(contact_terms_t) :: terms
-      real(dp) :: clock(3)
+      real(dp) :: clock(3), began
       integer(ip) :: next, tested, n_blocks, low, high
       logical :: timed
 
+      began = wall_seconds()
       call start_results(self%contacts, results)
       next = ends(2)
       tested = next + 1_ip
@@ -136,6 +139,7 @@ contains
          results%seconds = results%seconds + (clock(2:3) - clock(1:2))
       end do
       call clear_sums(last(1) + 1_ip, high, self%force_sums)
+      results%elapsed = max(wall_seconds() - began, tiny(began))
    end subroutine walk_range
 
    !> Empty the results of a range.

@@ -24,6 +24,8 @@ module polydem_range_results
       integer(ip) :: passing_pair = 0_ip
       !> Time spent in the search for overlaps and in the forces, measured for some of the blocks [s]
       real(dp) :: seconds(2) = 0.0_dp
+      !> Time of the walk over the range [s]
+      real(dp) :: elapsed = 0.0_dp
    end type range_results_t
 
 end module polydem_range_results

@@ -17,7 +17,7 @@ module polydem_time_step
    use polydem_wall_terms, only: select_walls
    implicit none
    private
-   public :: advance, compute_forces
+   public :: advance, compute_forces, tabulate_contacts
 
 contains
 
@@ -85,6 +85,19 @@ contains
       if (allocated(error)) return
       call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, self%bodies%n, self%bodies)
    end subroutine compute_forces
+
+   !> After a failure, make the table of contacts of this step if the step has not kept it. The forces are those of a time
+   !> step of length 0 at the same poses and velocities. The table is empty if the step found no contacts before it failed.
+   subroutine tabulate_contacts(self)
+      type(simulation_t), intent(inout) :: self
+      type(error_t), allocatable :: known_error
+
+      if (self%keeps_contacts) return
+      self%contacts%n = 0_ip
+      if (self%walk%step /= self%step) return
+      self%keeps_contacts = .true.
+      call compute_forces(self, 0.0_wp, known_error)
+   end subroutine tabulate_contacts
 
    !> Sum the contact forces on the bodies from their boxes: neighbours, contacts, force law. This is the middle of a
    !> step.

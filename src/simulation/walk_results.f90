@@ -2,7 +2,7 @@
 module polydem_walk_results
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
-   use polydem_kinds, only: ip
+   use polydem_kinds, only: dp, ip, lp
    use polydem_passing, only: contact_guard_t
    use polydem_range_results, only: range_results_t
    use polydem_wall_terms, only: wall_terms_t
@@ -12,8 +12,12 @@ module polydem_walk_results
 
    !> Results of the walk of a step, and the guard that it calls
    type :: walk_results_t
+      !> Step of the walk
+      integer(lp) :: step = -1_lp
       !> Results of the ranges of pairs, one per thread
       type(range_results_t), allocatable :: ranges(:)
+      !> Part of all pairs up to the end of each range, (0:number of ranges)
+      real(dp), allocatable :: upto(:)
       !> Contacts with fixed bodies
       type(wall_terms_t) :: walls
       !> Guard of the contacts
