@@ -86,8 +86,9 @@ contains
       call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, self%bodies%n, self%bodies)
    end subroutine compute_forces
 
-   !> After a failure, make the table of contacts of this step if the step has not kept it. The forces are those of a time
-   !> step of length 0 at the same poses and velocities. The table is empty if the step found no contacts before it failed.
+   !> After a failure, make the table of contacts of this step if the step has not kept it. The forces are those of a
+   !> time step of length 0 at the same poses and velocities. The table is empty if the step failed before it found
+   !> contacts.
    subroutine tabulate_contacts(self)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable :: known_error

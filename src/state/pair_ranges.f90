@@ -9,8 +9,8 @@ module polydem_pair_ranges
    integer(ip), parameter :: most_ranges = 256_ip
    !> Smallest number of pairs for which a thread saves time
    integer(ip), parameter :: least_pairs = 64_ip
-   !> Part of the way to ends at which all ranges would have taken equal times, by which `balance_ranges` moves the ends:
-   !> little, since a thread that was interrupted for a moment is no reason to move much
+   !> Part of the way to ends at which all ranges would have taken equal times, by which `balance_ranges` moves the
+   !> ends: little, since a thread that was interrupted for a moment is no reason to move much
    real(dp), parameter :: balance_rate = 0.02_dp
 
 contains
