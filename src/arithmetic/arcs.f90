@@ -1,14 +1,14 @@
-!> Arc tangent, arc cosine and hypotenuse in double precision, with the basic operations of IEEE 754 only.
+!> Arc cosine and hypotenuse in double precision, with the basic operations of IEEE 754 only.
 !>
-!> The bits do not depend on the processor, the library or the optimisation. Errors are below 1 ulp. The arc tangent is
-!> the tabulated one of a multiple of 1/8 and a Taylor series for the angle between both.
+!> The bits do not depend on the processor, the library or the optimisation. Errors are below 1 ulp. An angle is the
+!> tabulated arc tangent of a multiple of 1/8 and a Taylor series for the rest.
 module polydem_arcs
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_is_nan, ieee_positive_inf, ieee_quiet_nan, ieee_value
    use polydem_double_double, only: add, multiply
    use polydem_kinds, only: dp
    implicit none
    private
-   public :: arc_tangent, arc_cosine, hypotenuse
+   public :: arc_cosine, hypotenuse
 
    !> atan(j/8) as sums of two numbers, (part, j)
    real(dp), parameter :: known(2, 0:8) = reshape([ &
@@ -29,23 +29,6 @@ module polydem_arcs
    real(dp), parameter :: least_unscaled = 2.0_dp**(-200)
 
 contains
-
-   !> Angle of the vector (x, y) against the x axis, from -pi to pi [rad]
-   elemental real(dp) function arc_tangent(y, x)
-      !> Components of the vector
-      real(dp), intent(in) :: y, x
-      real(dp) :: finite_x, finite_y
-
-      arc_tangent = ieee_value(y, ieee_quiet_nan)
-      if (ieee_is_nan(x) .or. ieee_is_nan(y)) return
-      finite_x = x
-      finite_y = y
-      if (.not. (ieee_is_finite(x) .and. ieee_is_finite(y))) then
-         finite_x = sign(merge(0.0_dp, 1.0_dp, ieee_is_finite(x)), x)
-         finite_y = sign(merge(0.0_dp, 1.0_dp, ieee_is_finite(y)), y)
-      end if
-      arc_tangent = sign(angle_above(abs(finite_y), 0.0_dp, finite_x), y)
-   end function arc_tangent
 
    !> Arc cosine, from 0 to pi [rad]
    elemental real(dp) function arc_cosine(x)

@@ -1,9 +1,8 @@
 !> Checks that involve two or more entries. The table of entries holds the checks of single entries.
 module polydem_check_settings
-   use polydem_entry_row, only: row_of
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
-   use polydem_namelist_values, only: value_t
+   use polydem_namelist_values, only: row_of, value_t
    use polydem_settings, only: scene_settings_t, settings_t
    implicit none
    private

@@ -1,4 +1,4 @@
-!> Pairs of entries that set the same quantity in different ways. At most one entry of a pair may be given.
+!> The two entries that set the damping in different ways, of which at most one may be given.
 module polydem_exclusive_entries
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: wp
@@ -10,24 +10,18 @@ module polydem_exclusive_entries
 
 contains
 
-   !> Leave one entry of each pair in use. The resolved text can then be read again.
+   !> Leave one of both entries in use: the restitution if it is given, otherwise the damping coefficient. An entry of
+   !> the command line takes precedence over one of the file. The resolved text can then be read again.
    pure subroutine resolve_exclusive_entries(values, error)
       !> Values, (row of the table)
       type(value_t), intent(inout) :: values(:)
-      !> Both entries of a pair are given
+      !> Both entries are given
       type(error_t), allocatable, intent(inout) :: error
-
-      call choose_entry(first_row('forces', 'restitution'), first_row('forces', 'damping_coefficient'), values, error)
-   end subroutine resolve_exclusive_entries
-
-   !> Choose between a special entry, which replaces the usual one if it is given, and the usual entry. An entry of the
-   !> command line takes precedence over one of the file.
-   pure subroutine choose_entry(special, usual, values, error)
-      integer, intent(in) :: special, usual
-      type(value_t), intent(inout) :: values(:)
-      type(error_t), allocatable, intent(inout) :: error
+      integer :: special, usual
       logical :: use_special
 
+      special = first_row('forces', 'restitution')
+      usual = first_row('forces', 'damping_coefficient')
       if (.not. values(special)%is_active) return
       use_special = values(special)%is_given
       if (use_special .and. values(usual)%is_given) then
@@ -41,6 +35,6 @@ contains
       values(special)%is_active = use_special
       values(usual)%is_active = .not. use_special
       if (.not. use_special) values(special)%reals = 0.0_wp
-   end subroutine choose_entry
+   end subroutine resolve_exclusive_entries
 
 end module polydem_exclusive_entries

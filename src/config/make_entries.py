@@ -165,7 +165,7 @@ def fill_module(groups, rows):
                      f"{copies}   end subroutine fill_{group}\n")
     uses = [f"settings, only: {group}_settings_t" for group in groups]
     return module("fill_groups", "Copies the values of the table of entries to the settings.",
-                  ["entry_row, only: row_of", "namelist_values, only: value_t", "settings, only: settings_t", *uses],
+                  ["namelist_values, only: row_of, value_t", "settings, only: settings_t", *uses],
                   ["fill_groups", f"fill_{BENCH}"], "", "\n".join(parts))
 
 

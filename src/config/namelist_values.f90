@@ -2,12 +2,12 @@
 module polydem_namelist_values
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
-   use polydem_namelist_entries, only: entry_t, required
+   use polydem_namelist_entries, only: entries, entry_t, first_row, required
    use polydem_namelist_statements, only: literal_t, statement_t
    use polydem_strings, only: to_text, counted, count_words, lower_case, quoted, split_words, suggestion, text_t
    implicit none
    private
-   public :: value_t, read_value, value_text, label, is_text
+   public :: value_t, read_value, row_of, value_text, label, is_text
 
    !> Decimal digits
    character(len=*), parameter :: digits = '0123456789'
@@ -69,6 +69,19 @@ contains
          end if
       end do
    end subroutine read_value
+
+   !> Row of an entry that is in use; the first row of the entry if none is in use
+   pure integer function row_of(values, group, key) result(row)
+      !> Values, (row of the table)
+      type(value_t), intent(in) :: values(:)
+      !> Namelist group, and name in the group; the entry must exist
+      character(len=*), intent(in) :: group, key
+
+      do row = first_row(group, key), size(entries)
+         if (values(row)%is_active .and. entries(row)%group == group .and. entries(row)%key == key) return
+      end do
+      row = first_row(group, key)
+   end function row_of
 
    !> Name of an entry in messages
    pure function label(entry) result(text)

@@ -7,12 +7,11 @@ module polydem_read_settings
    use polydem_check_bench, only: check_bench
    use polydem_check_settings, only: check_settings
    use polydem_errors, only: error_t
-   use polydem_entry_row, only: row_of
    use polydem_exclusive_entries, only: resolve_exclusive_entries
    use polydem_fill_groups, only: fill_bench, fill_groups
    use polydem_namelist_entries, only: entries
    use polydem_namelist_tokens, only: source_t
-   use polydem_namelist_values, only: value_t
+   use polydem_namelist_values, only: row_of, value_t
    use polydem_origin, only: origin_t
    use polydem_resolve_entries, only: resolve_entries, resolved_text
    use polydem_settings, only: bench_settings_t, settings_t

@@ -6,7 +6,7 @@ module polydem_gas
    use polydem_body_list, only: body_list_t
    use polydem_cut_cells, only: fit_cells
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_grains, only: append_grains, draw_grains, draw_sizes, grains_t
+   use polydem_grains, only: append_grains, draw_grains, grains_t
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: fill_lattice, row_height
    use polydem_pour, only: loose_spacing_ratio, loose_spacing, displace_randomly
@@ -34,7 +34,7 @@ contains
 
       allocate (centres(2, scene%bodies))
       random = new_random(scene%seed)
-      call draw_grains(scene, random, scene%bodies, grains, draw_sizes(scene%size_ratio, scene%bodies))
+      call draw_grains(scene, random, scene%bodies, grains)
       area = total_area(grains%area)/scene%fraction
       width = scene%width
       if (.not. width > 0.0_wp) width = sqrt(area)

@@ -84,26 +84,23 @@ contains
       corners = self%corner(:, self%first(k):self%first(k + 1_ip) - 1_ip)
    end function corners
 
-   !> Draw grains of random shape and orientation.
-   subroutine draw_grains(scene, random, n, grains, sizes)
-      !> Numbers of corners and axes of the ellipses
+   !> Draw grains of random shape and orientation, in descending order of size.
+   subroutine draw_grains(scene, random, n, grains)
+      !> Numbers of corners, axes of the ellipses and size ratio
       type(scene_settings_t), intent(in) :: scene
       type(random_t), intent(inout) :: random
       !> Number of grains
       integer(ip), intent(in) :: n
       !> Grains to draw
       type(grains_t), intent(out) :: grains
-      !> Size factor (of both axes) of each grain, (grain); 1 if absent
-      real(wp), intent(in), optional :: sizes(:)
-      real(wp), allocatable :: corners(:, :)
-      real(wp) :: length, area, centroid(2), second_moment, factor
+      real(wp), allocatable :: corners(:, :), sizes(:)
+      real(wp) :: length, area, centroid(2), second_moment
       integer(ip) :: k
 
       call grains%reserve(n, scene%corners_max)
-      factor = 1.0_wp
+      sizes = draw_sizes(scene%size_ratio, n)
       do k = 1_ip, n
-         if (present(sizes)) factor = sizes(k)
-         call draw_corners(scene, factor, random, corners, length)
+         call draw_corners(scene, sizes(k), random, corners, length)
          call mass_properties(corners, area, centroid, second_moment)
          call grains%set(k, corners, length, area)
       end do
@@ -146,17 +143,15 @@ contains
       real(wp), intent(in) :: centres(:, :)
       !> Velocities, (2, grain) [m/s]
       real(wp), intent(in) :: velocities(:, :)
-      !> Angular velocities, (grain) [rad/s]; 0 if absent
-      real(wp), intent(in), optional :: spins(:)
+      !> Angular velocities, (grain) [rad/s]
+      real(wp), intent(in) :: spins(:)
       real(wp), allocatable :: corners(:, :)
-      real(wp) :: spin
       integer(ip), allocatable :: order(:)
       integer(ip) :: j, k
 
       allocate (order(size(centres, 2)))
       order = [(k, k=1_ip, size(order, kind=ip))]
       if (scene%order == 'descending') call sort_reals(-centres(1, :), order)
-      spin = 0.0_wp
       do j = 1_ip, size(order, kind=ip)
          k = order(j)
          if (list%leaves_next()) then
@@ -166,8 +161,7 @@ contains
          corners = grains%corners(k)
          corners(1, :) = corners(1, :) + centres(1, k)
          corners(2, :) = corners(2, :) + centres(2, k)
-         if (present(spins)) spin = spins(k)
-         call list%append(corners, density=scene%density, velocity=velocities(:, k), angular_velocity=spin)
+         call list%append(corners, density=scene%density, velocity=velocities(:, k), angular_velocity=spins(k))
       end do
    end subroutine append_grains
 

@@ -4,7 +4,7 @@ module polydem_pour
    use polydem_body_list, only: body_list_t
    use polydem_cut_cells, only: fit_cells
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_grains, only: append_grains, draw_grains, draw_sizes, grains_t
+   use polydem_grains, only: append_grains, draw_grains, grains_t
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: fill_lattice
    use polydem_packing, only: pack_grains, rotate_with_walls
@@ -63,8 +63,8 @@ contains
       integer(ip) :: n, n_found
 
       n = size(centres, 2, kind=ip)
+      call draw_grains(scene, random, n, grains)
       if (scene%size_ratio > 1.0_wp) then
-         call draw_grains(scene, random, n, grains, draw_sizes(scene%size_ratio, n))
          call fit_cells(outline, loose_spacing_ratio*grains%length, random, centres, spread)
          if (.not. spread > 0.0_wp) call raise(error, input_error, 'the container has no room for grains of such '// &
             'different sizes; enlarge the container or reduce the number of grains')
@@ -76,7 +76,6 @@ contains
                     //to_text(n)//'; enlarge the container or reduce the number of grains')
          return
       end if
-      call draw_grains(scene, random, n, grains)
       call displace_randomly(random, loose_spacing(scene) - scene%long_axis_max, centres)
    end subroutine pour_loosely
 

@@ -46,10 +46,10 @@ def check_lines(path, lines):
 def check_statements(source, room):
     """Rules that need to see a statement and its scopes."""
     for statement in source.statements:
-        if os.path.basename(source.path) != "elementary_quadruple.f90":
+        if os.path.basename(source.path) != "elementary.f90":
             for name in INTRINSIC.findall(statement.code):
                 yield statement.line, (f"{name}: the bits of this intrinsic depend on the machine; "
-                                       "see arithmetic/elementary_own.f90")
+                                       "see arithmetic/elementary.f90")
         if REAL_POWER.search(statement.code):
             yield statement.line, "the bits of a power with a real exponent depend on the machine"
         for message in [*of_any(statement, room), *of_declaration(statement), *of_directive(statement)]:

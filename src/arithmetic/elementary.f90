@@ -1,17 +1,20 @@
 !> Elementary functions of the working precision, for all that results depend on: no other procedure of a run calls an
 !> intrinsic sine, exponential and so on, whose bits would depend on the processor and its library.
 !>
-!> Single precision rounds the results of double precision.
+!> Single precision rounds the results of double precision. Quadruple precision uses the intrinsics: the compiler
+!> computes all quadruple numbers in software.
 module polydem_elementary
-   use polydem_arcs, only: dp_arc_cosine => arc_cosine, dp_arc_tangent => arc_tangent, dp_hypotenuse => hypotenuse
+   use polydem_arcs, only: dp_arc_cosine => arc_cosine, dp_hypotenuse => hypotenuse
    use polydem_circular, only: dp_cosine => cosine, dp_sine => sine, dp_sine_and_cosine => sine_and_cosine, &
       dp_sines_and_cosines => sines_and_cosines, dp_tangent => tangent
    use polydem_exponential, only: dp_exponential => exponential, dp_logarithm => logarithm
    use polydem_kinds, only: dp, wp
    implicit none
    private
-   public :: sine, cosine, sine_and_cosine, sines_and_cosines, tangent, arc_tangent, arc_cosine, exponential, &
-      logarithm, hypotenuse
+   public :: sine, cosine, sine_and_cosine, sines_and_cosines, tangent, arc_cosine, exponential, logarithm, hypotenuse
+
+   !> Whether the working precision is quadruple
+   logical, parameter :: is_quadruple = precision(1.0_wp) > precision(1.0_dp)
 
 contains
 
@@ -25,9 +28,14 @@ contains
       real(wp), intent(out) :: sine(:), cosine(:)
       real(dp) :: s(size(angle)), c(size(angle))
 
-      call dp_sines_and_cosines(isa, real(angle, dp), s, c)
-      sine = real(s, wp)
-      cosine = real(c, wp)
+      if (is_quadruple) then
+         sine = sin(angle)
+         cosine = cos(angle)
+      else
+         call dp_sines_and_cosines(isa, real(angle, dp), s, c)
+         sine = real(s, wp)
+         cosine = real(c, wp)
+      end if
    end subroutine sines_and_cosines
 
    !> Sine and cosine of an angle
@@ -38,9 +46,14 @@ contains
       real(wp), intent(out) :: sine, cosine
       real(dp) :: s, c
 
-      call dp_sine_and_cosine(real(angle, dp), s, c)
-      sine = real(s, wp)
-      cosine = real(c, wp)
+      if (is_quadruple) then
+         sine = sin(angle)
+         cosine = cos(angle)
+      else
+         call dp_sine_and_cosine(real(angle, dp), s, c)
+         sine = real(s, wp)
+         cosine = real(c, wp)
+      end if
    end subroutine sine_and_cosine
 
    !> Sine
@@ -48,7 +61,11 @@ contains
       !> Angle [rad]
       real(wp), intent(in) :: angle
 
-      sine = real(dp_sine(real(angle, dp)), wp)
+      if (is_quadruple) then
+         sine = sin(angle)
+      else
+         sine = real(dp_sine(real(angle, dp)), wp)
+      end if
    end function sine
 
    !> Cosine
@@ -56,7 +73,11 @@ contains
       !> Angle [rad]
       real(wp), intent(in) :: angle
 
-      cosine = real(dp_cosine(real(angle, dp)), wp)
+      if (is_quadruple) then
+         cosine = cos(angle)
+      else
+         cosine = real(dp_cosine(real(angle, dp)), wp)
+      end if
    end function cosine
 
    !> Tangent
@@ -64,7 +85,11 @@ contains
       !> Angle [rad]
       real(wp), intent(in) :: angle
 
-      tangent = real(dp_tangent(real(angle, dp)), wp)
+      if (is_quadruple) then
+         tangent = tan(angle)
+      else
+         tangent = real(dp_tangent(real(angle, dp)), wp)
+      end if
    end function tangent
 
    !> Exponential function
@@ -72,7 +97,11 @@ contains
       !> Exponent
       real(wp), intent(in) :: x
 
-      exponential = real(dp_exponential(real(x, dp)), wp)
+      if (is_quadruple) then
+         exponential = exp(x)
+      else
+         exponential = real(dp_exponential(real(x, dp)), wp)
+      end if
    end function exponential
 
    !> Natural logarithm
@@ -80,7 +109,11 @@ contains
       !> Number, not negative
       real(wp), intent(in) :: x
 
-      logarithm = real(dp_logarithm(real(x, dp)), wp)
+      if (is_quadruple) then
+         logarithm = log(x)
+      else
+         logarithm = real(dp_logarithm(real(x, dp)), wp)
+      end if
    end function logarithm
 
    !> Arc cosine, from 0 to pi [rad]
@@ -88,23 +121,23 @@ contains
       !> Cosine, from -1 to 1
       real(wp), intent(in) :: x
 
-      arc_cosine = real(dp_arc_cosine(real(x, dp)), wp)
+      if (is_quadruple) then
+         arc_cosine = acos(x)
+      else
+         arc_cosine = real(dp_arc_cosine(real(x, dp)), wp)
+      end if
    end function arc_cosine
-
-   !> Angle of the vector (x, y) against the x axis, from -pi to pi [rad]
-   elemental real(wp) function arc_tangent(y, x)
-      !> Components of the vector
-      real(wp), intent(in) :: y, x
-
-      arc_tangent = real(dp_arc_tangent(real(y, dp), real(x, dp)), wp)
-   end function arc_tangent
 
    !> Length of the vector (x, y)
    elemental real(wp) function hypotenuse(x, y)
       !> Components of the vector
       real(wp), intent(in) :: x, y
 
-      hypotenuse = real(dp_hypotenuse(real(x, dp), real(y, dp)), wp)
+      if (is_quadruple) then
+         hypotenuse = hypot(x, y)
+      else
+         hypotenuse = real(dp_hypotenuse(real(x, dp), real(y, dp)), wp)
+      end if
    end function hypotenuse
 
 end module polydem_elementary
