@@ -185,7 +185,8 @@ contains
       shift = mod(last - 1, base_bits)
       up = btest(amount%digit(k), shift)
       below = iand(amount%digit(k), shiftl(1_lp, shift) - 1_lp)
-      if (all(amount%digit(:k - 1) == 0_lp) .and. below == 0_lp) up = up .and. has_bit(amount, last)
+      if (all(amount%digit(:k - 1) == 0_lp) .and. below == 0_lp) up = &
+         up .and. btest(amount%digit(last/base_bits + 1), mod(last, base_bits))
       amount%digit(:k - 1) = 0_lp
       amount%digit(k) = amount%digit(k) - iand(amount%digit(k), shiftl(1_lp, shift + 1) - 1_lp)
       if (.not. up) return
@@ -222,13 +223,5 @@ contains
          return
       end do
    end function highest_bit
-
-   !> Whether the bit at a position is set
-   pure logical function has_bit(amount, place)
-      type(exact_sum_t), intent(in) :: amount
-      integer, intent(in) :: place
-
-      has_bit = btest(amount%digit(place/base_bits + 1), mod(place, base_bits))
-   end function has_bit
 
 end module polydem_exact_sum

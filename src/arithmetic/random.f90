@@ -63,10 +63,8 @@ contains
    !> A number between two bounds, uniformly distributed
    real(wp) function between(self, low, high)
       class(random_t), intent(inout) :: self
-      !> Lower bound
-      real(wp), intent(in) :: low
-      !> Upper bound
-      real(wp), intent(in) :: high
+      !> The bounds
+      real(wp), intent(in) :: low, high
 
       between = low + (high - low)*self%uniform()
    end function between
@@ -74,10 +72,8 @@ contains
    !> A uniformly distributed integer from low to high, both included
    integer(ip) function whole(self, low, high)
       class(random_t), intent(inout) :: self
-      !> Smallest value
-      integer(ip), intent(in) :: low
-      !> Largest value
-      integer(ip), intent(in) :: high
+      !> The bounds
+      integer(ip), intent(in) :: low, high
 
       whole = min(high, low + int(self%uniform()*real(high - low + 1_ip, wp), ip))
    end function whole

@@ -38,10 +38,8 @@ contains
       integer, intent(in) :: n
       !> Angles [rad]
       real(dp), intent(in) :: angle(n)
-      !> Their sines
-      real(dp), intent(out) :: sine(n)
-      !> Their cosines
-      real(dp), intent(out) :: cosine(n)
+      !> Their sines and cosines
+      real(dp), intent(out) :: sine(n), cosine(n)
       real(dp) :: x, k, whole, r, rest, first, second, lost, also_lost, product, part_of_it
       integer(lp) :: sign
       integer :: l
@@ -78,10 +76,8 @@ contains
       real(dp), intent(in) :: r
       !> What the remainder lacks, less than its rounding error [rad]
       real(dp), intent(in) :: rest
-      !> Sine
-      real(dp), intent(out) :: sine
-      !> Cosine
-      real(dp), intent(out) :: cosine
+      !> Sine and cosine
+      real(dp), intent(out) :: sine, cosine
       real(dp) :: z, half, near_one
       integer(lp) :: sine_bits, cosine_bits, swapped
 

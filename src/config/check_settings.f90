@@ -1,9 +1,9 @@
 !> Checks that involve two or more entries. The table of entries holds the checks of single entries.
 module polydem_check_settings
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: lp, wp
    use polydem_namelist_values, only: row_of, value_t
-   use polydem_settings, only: scene_settings_t, settings_t
+   use polydem_settings, only: settings_t
    implicit none
    private
    public :: check_settings
@@ -14,6 +14,9 @@ module polydem_check_settings
    real(wp), parameter :: length_limit = 1.0e5_wp
    !> Upper limit of the number of corners of all polygons, of which half the range of integers can count
    integer(lp), parameter :: corner_limit = 2_lp**30
+   !> What is said of entries beyond these two limits
+   character(len=*), parameter :: too_long = 'must not exceed 1e5 times'
+   character(len=*), parameter :: too_many = 'must not exceed 2^30 corners divided by'
    !> Angle of a full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586_wp
    !> Lower limit of the restitution. Below it, the stable time step is proportional to the square root of the
@@ -34,18 +37,21 @@ contains
       !> First pair of contradictory entries
       type(error_t), allocatable, intent(inout) :: error
 
-      associate (scene => settings%scene)
+      associate (scene => settings%scene, longest => length_limit*settings%scene%long_axis_max, &
+                 most_corners => int(settings%scene%corners_max, lp))
          call require(scene%corners_min <= scene%corners_max, &
             'must not exceed', 'corners_min', 'corners_max', values, error)
          call require(scene%short_axis <= scene%long_axis_min, &
             'must not exceed', 'short_axis', 'long_axis_min', values, error)
          call require(scene%long_axis_min <= scene%long_axis_max, &
             'must not exceed', 'long_axis_min', 'long_axis_max', values, error)
-         call check_container(scene%radius, 'radius', scene, values, error)
-         call check_container(scene%opening, 'opening', scene, values, error)
-         if (any(scene%name == grain_scenes)) call check_container(scene%width, 'width', scene, values, error)
-         call check_corners(scene%bodies, 'bodies', scene, values, error)
-         call check_corners(scene%boxes, 'boxes', scene, values, error)
+         ! Lengths and numbers are 0 if their entries are not in use.
+         call require(scene%radius <= longest, too_long, 'radius', 'long_axis_max', values, error)
+         call require(scene%opening <= longest, too_long, 'opening', 'long_axis_max', values, error)
+         call require(scene%width <= longest .or. all(scene%name /= grain_scenes), &
+            too_long, 'width', 'long_axis_max', values, error)
+         call require(scene%bodies*most_corners <= corner_limit, too_many, 'bodies', 'corners_max', values, error)
+         call require(scene%boxes*most_corners <= corner_limit, too_many, 'boxes', 'corners_max', values, error)
          call require(scene%moving_grains <= scene%bodies, 'must not exceed', 'moving_grains', 'bodies', values, error)
          call require(scene%size_ratio <= 1.0_wp .or. scene%packing == '', &
             'above 1 cannot be combined with', 'size_ratio', 'packing', values, error)
@@ -73,30 +79,6 @@ contains
             ': ''energy'' in &guards needs ''energy_balance'' = .true. in &output')
       end if
    end subroutine check_settings
-
-   !> Reject containers that are too large for the grains. The length is 0 if its entry is not in use.
-   pure subroutine check_container(length, key, scene, values, error)
-      real(wp), intent(in) :: length
-      character(len=*), intent(in) :: key
-      type(scene_settings_t), intent(in) :: scene
-      type(value_t), intent(in) :: values(:)
-      type(error_t), allocatable, intent(inout) :: error
-
-      call require(length <= length_limit*scene%long_axis_max, 'must not exceed 1e5 times', key, 'long_axis_max', &
-         values, error)
-   end subroutine check_container
-
-   !> Reject more bodies than corners can be numbered. The number is 0 if its entry is not in use.
-   pure subroutine check_corners(number, key, scene, values, error)
-      integer(ip), intent(in) :: number
-      character(len=*), intent(in) :: key
-      type(scene_settings_t), intent(in) :: scene
-      type(value_t), intent(in) :: values(:)
-      type(error_t), allocatable, intent(inout) :: error
-
-      call require(int(number, lp)*int(scene%corners_max, lp) <= corner_limit, &
-         'must not exceed 2^30 corners divided by', key, 'corners_max', values, error)
-   end subroutine check_corners
 
    !> Raise an error about two entries of &scene if their relation does not hold. The error names the place of `key` if
    !> this entry is given, otherwise the place of `other`.

@@ -364,7 +364,7 @@ contains
    pure function resolved_text(values) result(text)
       !> Values, (row of the table)
       type(value_t), intent(in) :: values(:)
-      character(len=:), allocatable :: text
+      character(len=:), allocatable :: text, value
       character(len=*), parameter :: line_end = new_line('a')
       character(len=group_length) :: group
       integer :: row
@@ -378,19 +378,10 @@ contains
             group = entries(row)%group
             text = text//'&'//trim(group)//line_end
          end if
-         text = text//line_of(entries(row), value_text(entries(row), values(row)))
+         value = value_text(entries(row), values(row))
+         if (value /= '') text = text//'   '//trim(entries(row)%key)//' = '//value//line_end
       end do
       text = text//'/'//line_end
    end function resolved_text
-
-   !> Line of an entry; empty for an empty list
-   pure function line_of(entry, value) result(line)
-      type(entry_t), intent(in) :: entry
-      character(len=*), intent(in) :: value
-      character(len=:), allocatable :: line
-
-      line = ''
-      if (value /= '') line = '   '//trim(entry%key)//' = '//value//new_line('a')
-   end function line_of
 
 end module polydem_resolve_entries

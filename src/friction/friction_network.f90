@@ -345,8 +345,7 @@ contains
    pure subroutine stop_slip(network, c, force, velocity)
       type(friction_network_t), intent(in) :: network
       integer(ip), intent(in) :: c
-      real(wp), intent(inout), contiguous :: force(:)
-      real(wp), intent(inout), contiguous :: velocity(:, :)
+      real(wp), intent(inout), contiguous :: force(:), velocity(:, :)
       real(wp) :: before, change, g(2)
 
       before = force(c)

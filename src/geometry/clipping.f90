@@ -33,16 +33,12 @@ contains
    !> to each, and an exchange of the polygons changes no bit but signs. Complexity: O(n m) at worst for n and m
    !> vertices.
    pure subroutine clip_overlap(p, q, offset, radius_p, radius_q, effective, overlap)
-      !> Vertices of P, anticlockwise, relative to its centre, which is inside, (2, n) [m]
-      real(wp), intent(in), contiguous :: p(:, :)
-      !> Vertices of Q, anticlockwise, relative to its own centre, (2, m) [m]
-      real(wp), intent(in), contiguous :: q(:, :)
+      !> Vertices of P and of Q, anticlockwise, each relative to its own centre, which is inside, (2, n) and (2, m) [m]
+      real(wp), intent(in), contiguous :: p(:, :), q(:, :)
       !> Centre of Q minus centre of P [m]
       real(wp), intent(in) :: offset(2)
-      !> Radius of P [m]
-      real(wp), intent(in) :: radius_p
-      !> Radius of Q, at least that of P [m]
-      real(wp), intent(in) :: radius_q
+      !> Radii of P and of Q, that of P not greater than that of Q [m]
+      real(wp), intent(in) :: radius_p, radius_q
       !> Whether area, normal and moments are those of the effective area (see `polydem_effective_area`)
       logical, intent(in) :: effective
       !> The overlap; a is P, b is Q
@@ -85,8 +81,7 @@ contains
 
    !> First edge of one polygon that separates it from another, 0 if there is none
    pure integer(ip) function first_separating(polygon, other, offset, reach_other, scale)
-      real(wp), intent(in), contiguous :: polygon(:, :)
-      real(wp), intent(in), contiguous :: other(:, :)
+      real(wp), intent(in), contiguous :: polygon(:, :), other(:, :)
       !> Centre of the other minus centre of the polygon
       real(wp), intent(in) :: offset(2)
       real(wp), intent(in) :: reach_other
@@ -104,9 +99,7 @@ contains
       real(wp), intent(in), contiguous :: polygon(:, :)
       integer(ip), intent(in) :: k
       real(wp), intent(in), contiguous :: other(:, :)
-      real(wp), intent(in) :: offset(2)
-      real(wp), intent(in) :: reach_other
-      real(wp), intent(in) :: scale
+      real(wp), intent(in) :: offset(2), reach_other, scale
       real(wp) :: start(2), end(2), edge(2), tolerance, level, depth
       integer(ip) :: i
 
@@ -133,10 +126,7 @@ contains
 
    !> Depth of a point below the line of an edge, positive on its inner side, times the length of the edge [m2]
    pure real(wp) function depth_of(point, start, end, scale)
-      real(wp), intent(in) :: point(2)
-      real(wp), intent(in) :: start(2)
-      real(wp), intent(in) :: end(2)
-      real(wp), intent(in) :: scale
+      real(wp), intent(in) :: point(2), start(2), end(2), scale
       real(wp) :: arm(2)
 
       arm = point - start
@@ -152,8 +142,7 @@ contains
    !> The normal and the moments are those of the clipper's outline inside the subject; `moment_a` is about
    !> the subject's centre, `moment_b` about the clipper's.
    pure subroutine clip(subject, clipper, offset, scale, by_shape, overlap)
-      real(wp), intent(in), contiguous :: subject(:, :)
-      real(wp), intent(in), contiguous :: clipper(:, :)
+      real(wp), intent(in), contiguous :: subject(:, :), clipper(:, :)
       !> Centre of the clipper minus centre of the subject
       real(wp), intent(in) :: offset(2)
       !> Size of the subject
@@ -177,10 +166,8 @@ contains
 
    !> As `clip`, with work arrays for `corners` vertices
    pure subroutine clip_many(subject, clipper, offset, scale, by_shape, corners, overlap)
-      real(wp), intent(in), contiguous :: subject(:, :)
-      real(wp), intent(in), contiguous :: clipper(:, :)
-      real(wp), intent(in) :: offset(2)
-      real(wp), intent(in) :: scale
+      real(wp), intent(in), contiguous :: subject(:, :), clipper(:, :)
+      real(wp), intent(in) :: offset(2), scale
       logical, intent(in) :: by_shape
       integer(ip), intent(in) :: corners
       type(overlap_t), intent(inout) :: overlap
@@ -192,10 +179,8 @@ contains
 
    !> As `clip`, in given work arrays; their last index selects the loop before or after a cut
    pure subroutine clip_in(subject, clipper, offset, scale, by_shape, corners, vertex, on_clipper, work, overlap)
-      real(wp), intent(in), contiguous :: subject(:, :)
-      real(wp), intent(in), contiguous :: clipper(:, :)
-      real(wp), intent(in) :: offset(2)
-      real(wp), intent(in) :: scale
+      real(wp), intent(in), contiguous :: subject(:, :), clipper(:, :)
+      real(wp), intent(in) :: offset(2), scale
       logical, intent(in) :: by_shape
       !> Capacity of the arrays, in vertices
       integer(ip), intent(in) :: corners
@@ -242,8 +227,7 @@ contains
    !> Depth of the subject's centre below all edges of the clipper
    pure subroutine find_levels(clipper, offset, scale, level, lowest)
       real(wp), intent(in), contiguous :: clipper(:, :)
-      real(wp), intent(in) :: offset(2)
-      real(wp), intent(in) :: scale
+      real(wp), intent(in) :: offset(2), scale
       real(wp), intent(inout) :: level(:)
       !> Edge with the least depth; the cuts start with it because it removes most of the subject
       integer(ip), intent(out) :: lowest
@@ -262,10 +246,8 @@ contains
 
    !> Depth of all vertices below a clip line; zero for those on it
    pure subroutine measure(n, corners, vertex, edge, level, scale, depth, lowest, highest)
-      integer(ip), intent(in) :: n
-      integer(ip), intent(in) :: corners
-      real(wp), intent(in) :: vertex(corners, 2)
-      real(wp), intent(in) :: edge(2)
+      integer(ip), intent(in) :: n, corners
+      real(wp), intent(in) :: vertex(corners, 2), edge(2)
       !> Depth of the origin, times the length of the edge
       real(wp), intent(in) :: level
       real(wp), intent(in) :: scale
@@ -346,8 +328,7 @@ contains
 
       !> Intersection of the line with the edge from a vertex below it to a vertex above it
       pure function crossing(below, above) result(point)
-         integer(ip), intent(in) :: below
-         integer(ip), intent(in) :: above
+         integer(ip), intent(in) :: below, above
          real(wp) :: point(2)
          real(wp) :: share
 

@@ -20,16 +20,12 @@ contains
 
    !> Overlap of polygons P and Q without memory, and what to remember.
    pure subroutine find_overlap(p, q, offset, radius_p, radius_q, effective, overlap, memory)
-      !> Vertices of P, anticlockwise, relative to its centre, which is inside, (2, n) [m]
-      real(wp), intent(in), contiguous :: p(:, :)
-      !> Vertices of Q, anticlockwise, relative to its own centre, (2, m) [m]
-      real(wp), intent(in), contiguous :: q(:, :)
+      !> Vertices of P and of Q, anticlockwise, each relative to its own centre, which is inside, (2, n) and (2, m) [m]
+      real(wp), intent(in), contiguous :: p(:, :), q(:, :)
       !> Centre of Q minus centre of P [m]
       real(wp), intent(in) :: offset(2)
-      !> Greatest distance of a vertex of P from its centre [m]
-      real(wp), intent(in) :: radius_p
-      !> The same of Q, at least that of P [m]
-      real(wp), intent(in) :: radius_q
+      !> Greatest distance of a vertex from the centre, of P and of Q, that of P not greater than that of Q [m]
+      real(wp), intent(in) :: radius_p, radius_q
       !> Whether area, normal and moments are those of the effective area (see `polydem_effective_area`)
       logical, intent(in) :: effective
       !> The overlap; a is P, b is Q
@@ -50,11 +46,8 @@ contains
 
    !> Evaluate one lens.
    pure subroutine evaluate_lens(p, q, offset, radius_p, radius_q, effective, memory, overlap, certified)
-      real(wp), intent(in), contiguous :: p(:, :)
-      real(wp), intent(in), contiguous :: q(:, :)
-      real(wp), intent(in) :: offset(2)
-      real(wp), intent(in) :: radius_p
-      real(wp), intent(in) :: radius_q
+      real(wp), intent(in), contiguous :: p(:, :), q(:, :)
+      real(wp), intent(in) :: offset(2), radius_p, radius_q
       logical, intent(in) :: effective
       !> The lens
       integer(ip), intent(in) :: memory
@@ -84,10 +77,8 @@ contains
 
    !> Overlap of two convex polygons in any order.
    pure subroutine overlap_polygons(a, b, offset, separating_edge, overlap, effective)
-      !> Vertices of the first polygon, anticlockwise, relative to its centre, which is inside, (2, n) [m]
-      real(wp), intent(in), contiguous :: a(:, :)
-      !> Vertices of the second polygon, anticlockwise, relative to its own centre, (2, m) [m]
-      real(wp), intent(in), contiguous :: b(:, :)
+      !> Vertices of both polygons, anticlockwise, each relative to its own centre inside it, (2, n) and (2, m) [m]
+      real(wp), intent(in), contiguous :: a(:, :), b(:, :)
       !> Centre of b minus centre of a [m]
       real(wp), intent(in) :: offset(2)
       !> Edge to try first: +k from vertex k of a, -k from vertex k of b, 0 none
@@ -114,11 +105,8 @@ contains
 
    !> As `overlap_polygons`, in the roles of P and Q
    pure subroutine overlap_in_roles(p, q, offset, radius_p, radius_q, separating_edge, effective, overlap)
-      real(wp), intent(in), contiguous :: p(:, :)
-      real(wp), intent(in), contiguous :: q(:, :)
-      real(wp), intent(in) :: offset(2)
-      real(wp), intent(in) :: radius_p
-      real(wp), intent(in) :: radius_q
+      real(wp), intent(in), contiguous :: p(:, :), q(:, :)
+      real(wp), intent(in) :: offset(2), radius_p, radius_q
       !> +k from vertex k of P, -k from vertex k of Q, 0 none
       integer(ip), intent(in) :: separating_edge
       logical, intent(in) :: effective

@@ -106,8 +106,7 @@ contains
 
    !> Coordinates of a loop along and across the line from its first vertex to the farthest one, scaled to about 1.
    pure subroutine straighten(n, corners, vertex, place, unit_area)
-      integer(ip), intent(in) :: n
-      integer(ip), intent(in) :: corners
+      integer(ip), intent(in) :: n, corners
       real(wp), intent(in) :: vertex(corners, 2)
       real(wp), intent(inout) :: place(corners, 2)
       !> Area of the unit square of the scaled coordinates [m2]
@@ -143,8 +142,7 @@ contains
    !> Second moments (xx, xy, yy) of a loop about its centroid, 0 if it has no area. `place` becomes relative to the
    !> centroid.
    pure subroutine measure(n, corners, place, moments)
-      integer(ip), intent(in) :: n
-      integer(ip), intent(in) :: corners
+      integer(ip), intent(in) :: n, corners
       !> Scaled coordinates; the first vertex is at the origin
       real(wp), intent(inout) :: place(corners, 2)
       real(wp), intent(out) :: moments(3)

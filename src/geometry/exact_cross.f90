@@ -36,10 +36,8 @@ contains
 
    !> Sum and its rounding error
    elemental subroutine add(a, b, rounded, error)
-      real(wp), intent(in) :: a
-      real(wp), intent(in) :: b
-      real(wp), intent(out) :: rounded
-      real(wp), intent(out) :: error
+      real(wp), intent(in) :: a, b
+      real(wp), intent(out) :: rounded, error
       real(wp) :: b_in_it
 
       rounded = a + b
@@ -49,10 +47,8 @@ contains
 
    !> Product and its rounding error
    pure subroutine multiply(a, b, rounded, error)
-      real(wp), intent(in) :: a
-      real(wp), intent(in) :: b
-      real(wp), intent(out) :: rounded
-      real(wp), intent(out) :: error
+      real(wp), intent(in) :: a, b
+      real(wp), intent(out) :: rounded, error
       real(wp), parameter :: splitter = 2.0_wp**ishft(digits(1.0_wp) + 1, -1) + 1.0_wp
       real(wp) :: a_high, a_low, b_high, b_low
 

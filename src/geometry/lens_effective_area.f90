@@ -133,8 +133,7 @@ contains
    !> Find the centroid relative to the middle of the chord.
    pure subroutine find_centroid(n, fan_p, fan_q, centroid)
       integer(ip), intent(in) :: n
-      real(wp), intent(in) :: fan_p(column_length, 3)
-      real(wp), intent(in) :: fan_q(column_length, 3)
+      real(wp), intent(in) :: fan_p(column_length, 3), fan_q(column_length, 3)
       real(wp), intent(inout) :: centroid(column_length, 2)
       real(wp) :: scale
       integer(ip) :: i
@@ -152,8 +151,7 @@ contains
    !> Integrate over an arc for the second moments about the centroid.
    pure subroutine find_second_moments(n, place, centroid, start, second)
       integer(ip), intent(in) :: n
-      real(wp), intent(in) :: place(column_length, 2, 2)
-      real(wp), intent(in) :: centroid(column_length, 2)
+      real(wp), intent(in) :: place(column_length, 2, 2), centroid(column_length, 2)
       !> Start of the arc, relative to the middle of the chord; the end is opposite
       real(wp), intent(in) :: start
       real(wp), intent(inout) :: second(column_length, 3)

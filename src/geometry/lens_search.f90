@@ -36,16 +36,12 @@ contains
    !> compute the same signs, and it has no other crossings. Edges of Q with a vertex that is not near are left out:
    !> no certified lens has them, and their signs are not certain. Complexity: O(n m) for n and m vertices
    pure subroutine search_pair(p, q, offset, radius_p, radius_q, memory)
-      !> Vertices of P, anticlockwise, relative to its centre, (2, n) [m]
-      real(wp), intent(in), contiguous :: p(:, :)
-      !> Vertices of Q, anticlockwise, relative to its centre, (2, m) [m]
-      real(wp), intent(in), contiguous :: q(:, :)
+      !> Vertices of P and of Q, anticlockwise, each relative to its own centre, (2, n) and (2, m) [m]
+      real(wp), intent(in), contiguous :: p(:, :), q(:, :)
       !> Centre of Q minus centre of P [m]
       real(wp), intent(in) :: offset(2)
-      !> Radius of P [m]
-      real(wp), intent(in) :: radius_p
-      !> Radius of Q, at least that of P [m]
-      real(wp), intent(in) :: radius_q
+      !> Radii of P and of Q, that of P not greater than that of Q [m]
+      real(wp), intent(in) :: radius_p, radius_q
       !> What to remember
       integer(ip), intent(out) :: memory
       type(placed_t) :: placed_p, placed_q
@@ -98,8 +94,7 @@ contains
 
    !> Find the proper crossings of an edge of Q with the edges of P, or that it surely separates the polygons.
    pure subroutine cross_line(p, q, j, s, found, memory)
-      type(placed_t), intent(in) :: p
-      type(placed_t), intent(in) :: q
+      type(placed_t), intent(in) :: p, q
       !> The edge of Q
       integer(ip), intent(in) :: j
       !> Radius of P [m]
@@ -143,8 +138,7 @@ contains
       integer(ip), intent(in) :: j
       type(placed_t), intent(in) :: b
       integer(ip), intent(in) :: i
-      real(wp), intent(in) :: s
-      real(wp), intent(in) :: side
+      real(wp), intent(in) :: s, side
       real(wp) :: limit, before, behind
 
       limit = sure*s*(abs(b%edge(1, i)) + abs(b%edge(2, i)))
@@ -155,8 +149,7 @@ contains
 
    !> Find the first edge of P that surely separates it from Q; all vertices must be near.
    pure subroutine find_separating_edge(p, q, s, memory)
-      type(placed_t), intent(in) :: p
-      type(placed_t), intent(in) :: q
+      type(placed_t), intent(in) :: p, q
       !> Radius of P [m]
       real(wp), intent(in) :: s
       !> The separating edge; not changed if there is none

@@ -61,10 +61,8 @@ contains
       integer(ip), intent(in) :: vertices(4)
       !> Centre of Q minus centre of P [m]
       real(wp), intent(in) :: offset(2)
-      !> Radius of P [m]
-      real(wp), intent(in) :: radius_p
-      !> Radius of Q, at least that of P [m]
-      real(wp), intent(in) :: radius_q
+      !> Radii of P and of Q, that of P not greater than that of Q [m]
+      real(wp), intent(in) :: radius_p, radius_q
 
       batch%memory(lane) = memory
       batch%start(lane, :) = vertices([1, 3])

@@ -32,10 +32,8 @@ contains
    pure integer(ip) function packed_edge(of_q, edge, corner)
       !> Whether the edge is one of Q
       logical, intent(in) :: of_q
-      !> The edge
-      integer(ip), intent(in) :: edge
-      !> The nearest corner of the other polygon
-      integer(ip), intent(in) :: corner
+      !> The edge, and the nearest corner of the other polygon
+      integer(ip), intent(in) :: edge, corner
 
       packed_edge = 0_ip
       if (max(edge, corner) >= 2_ip**edge_bits) return
@@ -48,10 +46,8 @@ contains
       integer(ip), intent(in) :: memory
       !> Whether the edge is one of Q
       logical, intent(out) :: of_q
-      !> The edge
-      integer(ip), intent(out) :: edge
-      !> The nearest corner of the other polygon
-      integer(ip), intent(out) :: corner
+      !> The edge, and the nearest corner of the other polygon
+      integer(ip), intent(out) :: edge, corner
 
       of_q = .not. btest(memory, 0)
       edge = ibits(not(memory), 1, edge_bits)

@@ -66,10 +66,8 @@ contains
 
    !> Drop vertices that repeat a neighbour or lie between their neighbours on one line.
    pure subroutine drop_redundant(vertices, tolerance, kept, m)
-      real(wp), intent(in) :: vertices(:, :)
-      real(wp), intent(in) :: tolerance
-      integer(ip), intent(inout) :: kept(:)
-      integer(ip), intent(inout) :: m
+      real(wp), intent(in) :: vertices(:, :), tolerance
+      integer(ip), intent(inout) :: kept(:), m
       integer(ip) :: k, in_order
       logical :: redundant
 
@@ -95,9 +93,7 @@ contains
    !> Whether a vertex is redundant: it repeats a neighbour or lies between its neighbours. The tip of a spike, where
    !> the outline turns back, is not redundant.
    pure logical function is_redundant(arriving, leaving, tolerance)
-      real(wp), intent(in) :: arriving(2)
-      real(wp), intent(in) :: leaving(2)
-      real(wp), intent(in) :: tolerance
+      real(wp), intent(in) :: arriving(2), leaving(2), tolerance
 
       if (hypotenuse(leaving(1), leaving(2)) <= tolerance) then
          is_redundant = .true.
@@ -266,8 +262,7 @@ contains
 
    !> Third component of the cross product
    pure real(wp) function cross(p, q)
-      real(wp), intent(in) :: p(2)
-      real(wp), intent(in) :: q(2)
+      real(wp), intent(in) :: p(2), q(2)
 
       cross = p(1)*q(2) - p(2)*q(1)
    end function cross

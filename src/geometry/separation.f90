@@ -124,10 +124,8 @@ contains
    !> polygons apart, no lens is certified, and general clipping finds no overlap. So the answer saves time and
    !> changes no result.
    pure subroutine test_separation(p, q, offset, radius_p, memory, apart)
-      !> Vertices of P, anticlockwise, relative to its centre, (2, n) [m]
-      real(wp), intent(in), contiguous :: p(:, :)
-      !> Vertices of Q, anticlockwise, relative to its centre, (2, m) [m]
-      real(wp), intent(in), contiguous :: q(:, :)
+      !> Vertices of P and of Q, anticlockwise, each relative to its own centre, (2, n) and (2, m) [m]
+      real(wp), intent(in), contiguous :: p(:, :), q(:, :)
       !> Centre of Q minus centre of P [m]
       real(wp), intent(in) :: offset(2)
       !> Radius of P, not greater than that of Q [m]
@@ -192,9 +190,7 @@ contains
 
    !> How much deeper one point is than another beyond rounding errors, which are 4 u of each product at most
    pure real(wp) function lead(edge, point, other)
-      real(wp), intent(in) :: edge(2)
-      real(wp), intent(in) :: point(2)
-      real(wp), intent(in) :: other(2)
+      real(wp), intent(in) :: edge(2), point(2), other(2)
       real(wp) :: plus, minus
 
       plus = edge(1)*(point(2) - other(2))
@@ -230,10 +226,8 @@ contains
 
    !> Memory of an edge that general clipping has found to separate the polygons
    pure integer(ip) function remembered_edge(p, q, separating_edge)
-      !> Vertices of P, (2, n)
-      real(wp), intent(in), contiguous :: p(:, :)
-      !> Vertices of Q, (2, m)
-      real(wp), intent(in), contiguous :: q(:, :)
+      !> Vertices of P and of Q, (2, n) and (2, m)
+      real(wp), intent(in), contiguous :: p(:, :), q(:, :)
       !> +k from vertex k of P, -k from vertex k of Q, 0 none
       integer(ip), intent(in) :: separating_edge
 
@@ -248,9 +242,8 @@ contains
 
    !> Corner of polygon B, from 0, that is farthest on the inner side of an edge of polygon A
    pure integer(ip) function nearest_corner(a, k, b)
-      real(wp), intent(in), contiguous :: a(:, :)
+      real(wp), intent(in), contiguous :: a(:, :), b(:, :)
       integer(ip), intent(in) :: k
-      real(wp), intent(in), contiguous :: b(:, :)
       real(wp) :: edge(2), depth, highest
       integer(ip) :: v
 

@@ -94,8 +94,7 @@ contains
    !> Find the lattice with the largest spacing on which all points fit; the spacing is 0 if it would be below `least`.
    subroutine spread_out(inside, least, centres, spacing)
       real(wp), intent(in) :: inside(2, 4), least
-      real(wp), intent(out) :: centres(:, :)
-      real(wp), intent(out) :: spacing
+      real(wp), intent(out) :: centres(:, :), spacing
       real(wp) :: area
       integer(ip) :: n_found
 

@@ -69,9 +69,7 @@ contains
    !> Find the part of a horizontal line that is inside a convex outline with a clearance from it. The part is empty if
    !> left > right.
    pure subroutine find_row(outline, clearance, y, left, right)
-      real(wp), intent(in) :: outline(:, :)
-      real(wp), intent(in) :: clearance
-      real(wp), intent(in) :: y
+      real(wp), intent(in) :: outline(:, :), clearance, y
       real(wp), intent(out) :: left, right
       real(wp) :: edge(2), length, bound
       integer :: k, next

@@ -10,14 +10,8 @@ contains
 
    !> Corners of an upright rectangle, anticlockwise, (2, 4) [m]
    pure function rectangle(left, right, bottom, top) result(corners)
-      !> Smallest x [m]
-      real(wp), intent(in) :: left
-      !> Largest x [m]
-      real(wp), intent(in) :: right
-      !> Smallest y [m]
-      real(wp), intent(in) :: bottom
-      !> Largest y [m]
-      real(wp), intent(in) :: top
+      !> Bounds in x and in y [m]
+      real(wp), intent(in) :: left, right, bottom, top
       real(wp) :: corners(2, 4)
 
       corners(:, 1) = [left, bottom]
