@@ -7,7 +7,7 @@ module polydem_convex_overlap
    use polydem_evaluate_batch, only: evaluate_batch
    use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, wp
-   use polydem_lens_search, only: search_pair
+   use polydem_lens_search, only: cross_at, search_pair
    use polydem_overlap_batch, only: add_lane, overlap_batch_t, overlap_columns_t
    use polydem_overlap_integrals, only: overlap_t
    use polydem_pair_memory, only: most_lens_corners, unpack_edge
@@ -19,7 +19,11 @@ module polydem_convex_overlap
 contains
 
    !> Overlap of polygons P and Q without memory, and what to remember.
-   pure subroutine find_overlap(p, q, offset, radius_p, radius_q, effective, overlap, memory)
+   !>
+   !> A lens that is not certified often lasts for many steps, for example where equal squares rest on each other. The
+   !> caller may remember it as `rejected`. While the polygons cross there, a search can find no other lens, and only
+   !> clipping remains.
+   pure subroutine find_overlap(p, q, offset, radius_p, radius_q, effective, overlap, memory, rejected)
       !> Vertices of P and of Q, anticlockwise, each relative to its own centre, which is inside, (2, n) and (2, m) [m]
       real(wp), intent(in), contiguous :: p(:, :), q(:, :)
       !> Centre of Q minus centre of P [m]
@@ -32,13 +36,23 @@ contains
       type(overlap_t), intent(out) :: overlap
       !> What to remember: a certified lens (positive), a separating edge (negative), or nothing (0)
       integer(ip), intent(out) :: memory
-      logical :: certified
+      !> A lens that the kernel has not certified for these polygons, or 0; on return the one that it does not certify
+      integer(ip), intent(inout), optional :: rejected
+      logical :: certified, searched
 
-      call search_pair(p, q, offset, radius_p, radius_q, memory)
-      if (memory < 0_ip) return
-      if (memory > 0_ip) then
-         call evaluate_lens(p, q, offset, radius_p, radius_q, effective, memory, overlap, certified)
-         if (certified) return
+      searched = .true.
+      if (present(rejected)) then
+         if (rejected > 0_ip) searched = .not. cross_at(p, q, offset, radius_p, radius_q, rejected)
+         if (searched) rejected = 0_ip
+      end if
+      if (searched) then
+         call search_pair(p, q, offset, radius_p, radius_q, memory)
+         if (memory < 0_ip) return
+         if (memory > 0_ip) then
+            call evaluate_lens(p, q, offset, radius_p, radius_q, effective, memory, overlap, certified)
+            if (certified) return
+            if (present(rejected)) rejected = memory
+         end if
       end if
       call clip_overlap(p, q, offset, radius_p, radius_q, effective, overlap)
       memory = remembered_edge(p, q, overlap%separating_edge)

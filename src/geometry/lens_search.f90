@@ -2,10 +2,10 @@
 module polydem_lens_search
    use polydem_kinds, only: ip, wp
    use polydem_overlap_tolerances, only: far, sure, surely_apart
-   use polydem_pair_memory, only: most_lens_corners, packed_edge, packed_lens
+   use polydem_pair_memory, only: lens_bits, most_lens_corners, packed_edge, packed_lens
    implicit none
    private
-   public :: search_pair
+   public :: search_pair, cross_at
 
    !> A polygon in the coordinates of the kernel; the first vertex is repeated behind the last
    type :: placed_t
@@ -69,6 +69,51 @@ contains
          call find_separating_edge(placed_p, placed_q, radius_p, memory)
       end if
    end subroutine search_pair
+
+   !> Whether two polygons surely cross at the edges of a lens. Then no edge separates them, and the search finds this
+   !> lens or, if they cross elsewhere too, none.
+   pure logical function cross_at(p, q, offset, radius_p, radius_q, lens)
+      !> Vertices of P and of Q, anticlockwise, each relative to its own centre, (2, n) and (2, m) [m]
+      real(wp), intent(in), contiguous :: p(:, :), q(:, :)
+      !> Centre of Q minus centre of P [m]
+      real(wp), intent(in) :: offset(2)
+      !> Radii of P and of Q, that of P not greater than that of Q [m]
+      real(wp), intent(in) :: radius_p, radius_q
+      !> The lens, any positive number
+      integer(ip), intent(in) :: lens
+      type(placed_t) :: placed_p, placed_q
+      real(wp) :: half, centre_p(2), s
+      integer(ip) :: edges(4), k
+
+      edges = [(ibits(lens, k*lens_bits, lens_bits), k=0_ip, 3_ip)]
+      cross_at = max(edges(1), edges(2)) < size(p, 2) .and. max(edges(3), edges(4)) < size(q, 2)
+      if (.not. cross_at) return
+      s = radius_p
+      half = merge(0.0_wp, 0.5_wp, radius_p < radius_q)
+      centre_p = -half*offset
+      call place(ends_of(p, edges(1), edges(2)), centre_p, (1.0_wp - half)*far*s, placed_p)
+      call place(ends_of(q, edges(3), edges(4)), offset + centre_p, (1.0_wp - half)*far*s, placed_q)
+      cross_at = all(placed_p%near(1:4)) .and. all(placed_q%near(1:4))
+      if (.not. cross_at) return
+      cross_at = enters(placed_p, 1_ip, placed_q, 3_ip, s, 1.0_wp) &
+         .and. enters(placed_q, 3_ip, placed_p, 1_ip, s, -1.0_wp) &
+         .and. enters(placed_p, 3_ip, placed_q, 1_ip, s, -1.0_wp) &
+         .and. enters(placed_q, 1_ip, placed_p, 3_ip, s, 1.0_wp)
+   end function cross_at
+
+   !> Ends of two edges of a polygon, which count from 0
+   pure function ends_of(vertices, edge, other) result(ends)
+      real(wp), intent(in), contiguous :: vertices(:, :)
+      integer(ip), intent(in) :: edge, other
+      real(wp) :: ends(2, 4)
+      integer(ip) :: n
+
+      n = size(vertices, 2, kind=ip)
+      ends(:, 1) = vertices(:, edge + 1_ip)
+      ends(:, 2) = vertices(:, merge(1_ip, edge + 2_ip, edge + 1_ip == n))
+      ends(:, 3) = vertices(:, other + 1_ip)
+      ends(:, 4) = vertices(:, merge(1_ip, other + 2_ip, other + 1_ip == n))
+   end function ends_of
 
    !> Place a polygon.
    pure subroutine place(vertices, centre, limit, placed)

@@ -214,7 +214,7 @@ contains
       if (.not. all(exists(:block%n))) call remove_others(exists, block)
    end subroutine search_others
 
-   !> Search the overlap of one pair without memory.
+   !> Search the overlap of one pair. What is remembered is no separating edge, and no lens that is certified.
    subroutine search(bodies, effective, c, history, block, exists)
       type(bodies_t), intent(in) :: bodies
       logical, intent(in) :: effective
@@ -225,14 +225,16 @@ contains
       !> Whether the polygons overlap
       logical, intent(out) :: exists
       type(overlap_t) :: overlap
-      integer(ip) :: memory
+      integer(ip) :: memory, rejected
       integer :: k
 
+      rejected = 0_ip
+      if (allocated(history%memory)) rejected = max(0_ip, history%memory(block%pair(c)))
       associate (start => bodies%vertex_start, turned => bodies%turned, radius => bodies%radius, i => block%first(c), &
                  j => block%second(c), p => block%pair(c))
          call find_overlap(turned(:, start(i):start(i + 1_ip) - 1_ip), turned(:, start(j):start(j + 1_ip) - 1_ip), &
-                           offset_of(bodies, i, j), radius(i), radius(j), effective, overlap, memory)
-         if (allocated(history%memory)) history%memory(p) = memory
+                           offset_of(bodies, i, j), radius(i), radius(j), effective, overlap, memory, rejected)
+         if (allocated(history%memory)) history%memory(p) = merge(rejected, memory, memory == 0_ip)
          exists = overlap%area > 0.0_wp
          if (.not. exists) then
             if (.not. allocated(history%column)) return

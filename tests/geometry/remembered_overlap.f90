@@ -25,7 +25,7 @@ module remembered_overlap
 
 contains
 
-   !> Overlap of a pair from what is remembered; `memory` becomes what the next step remembers
+   !> Overlap of a pair from what is remembered; `memory` becomes what the next step remembers, as in `fill_block`
    subroutine overlap_with_memory(pair, effective, memory, overlap)
       !> The pair, P first
       type(pair_t), intent(in) :: pair
@@ -35,13 +35,17 @@ contains
       integer(ip), intent(inout) :: memory
       !> The overlap
       type(overlap_t), intent(out) :: overlap
+      integer(ip) :: rejected
       logical :: done
 
       call separated_by(pair, memory, done)
       if (done) return
       call certified_lens(pair, effective, memory, overlap, done)
       if (done) return
-      call find_overlap(pair%p, pair%q, pair%offset, radius_of(pair%p), radius_of(pair%q), effective, overlap, memory)
+      rejected = max(0_ip, memory)
+      call find_overlap(pair%p, pair%q, pair%offset, radius_of(pair%p), radius_of(pair%q), effective, overlap, memory, &
+                        rejected)
+      if (memory == 0_ip) memory = rejected
    end subroutine overlap_with_memory
 
    !> Test whether a remembered edge separates a pair
