@@ -260,6 +260,17 @@ def test_a_piece_that_fails_does_not_lose_the_others(tmp_path):
     assert states == {"gases": "failed", "drums": "finished", "verification": "finished"}
 
 
+def test_pieces_may_be_left_out_and_the_page_says_so(tmp_path):
+    code, said = call(tmp_path / "paper", "--without", "drums,threads,verification")
+    assert code == 0 and re.search("^  drums +is left out ", said, re.MULTILINE), said
+    with (tmp_path / "paper" / "tables" / "pieces.csv").open(newline="", encoding="utf-8") as file:
+        states = {row["piece"]: row["state"] for row in csv.DictReader(file)}
+    assert states == {"drums": "left out", "threads": "left out", "gases": "finished", "verification": "left out"}
+    assert not (tmp_path / "paper" / "quick" / "drums").exists()
+    code, said = call(tmp_path / "paper", "--without", "drums,rods", "--dry-run")
+    assert code == 2 and "--without rods: no such piece; the pieces are drums, " in said, said
+
+
 @pytest.mark.parametrize("text", ["", "[]", '{"a": {}}', '{"a": {"bench": "no_such_file.nml"}}', '{"a": 3}'])
 def test_a_bad_plan_is_an_error_that_names_the_file(tmp_path, text):
     plan = tmp_path / "plan.json"

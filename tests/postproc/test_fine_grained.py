@@ -1,12 +1,15 @@
 """The model of the fine-grained sweep on samples whose truth it knows."""
 
+import os
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 from polydem_post.bench import read_bench
-from polydem_post.fine_grained import PARTITIONED, Waiting, contests, not_negative
+from polydem_post.fine_grained import MOVE_COST, PARTITIONED, SEARCH_COST, Waiting, contests, not_negative
 from polydem_post.fine_grained_tables import agreement, error_told, fine_grained_tables, span_of_error
 from polydem_post.series import TREE
 from polydem_post.sweep_parts import Exchanges, exchanges_down, exchanges_of, exchanges_up_to
@@ -14,19 +17,20 @@ from synthetic_bench import Truth, write_sample
 
 BOXES = 10000
 #: Time of a step on one thread [s]: of the sweep 100 us, of which threads share 90; of the tree 300 us,
-#: of which search and filter take 225
-SWEEP = Truth(10.0, 1.0, (0.9, 0.0, 0.05, 0.03, 0.02, 0.0), counts={"swaps": 0.5, "passes": 2.0 / BOXES})
-TREE_TRUTH = Truth(30.0, 1.0, (0.1, 0.5, 0.25, 0.1, 0.05, 0.0))
+#: of which structure, search and filter take 255
+PASSES = 5.0
+SWEEP = Truth(10.0, 1.0, (0.9, 0.0, 0.05, 0.03, 0.02, 0.0), counts={"swaps": 0.5, "passes": PASSES / BOXES})
+TREE_TRUTH = Truth(30.0, 1.0, (0.1, 0.5, 0.25, 0.1, 0.05, 0.0), counts={"left_leaf": 0.5, "candidates": 5.0})
 #: Cost of a barrier and of a region for each thread more [s]
 BARRIER, REGION = 22e-6, 2e-6
 
 
 def sweep_time(n):
-    return 10e-6 + 90e-6 / n + (n > 1) * (2 * BARRIER * n + REGION * n)
+    return 10e-6 + 90e-6 / n + (n > 1) * (PASSES * BARRIER * n + REGION * n)
 
 
 def tree_time(n):
-    return 75e-6 + 225e-6 / n + (n > 1) * 3 * REGION * n
+    return 45e-6 + 255e-6 / n + (n > 1) * (3 * BARRIER * n + REGION * n)
 
 
 @pytest.fixture(scope="module")
@@ -63,8 +67,8 @@ def test_it_says_with_how_many_threads_the_sweep_loses(contest):
 
 
 def test_work_per_part_halves_with_the_threads(contest):
-    assert contest.work_per_part(2) == pytest.approx(90e-6 / 2 / 2, rel=0.01)
-    assert contest.work_per_part(4) == pytest.approx(90e-6 / 4 / 2, rel=0.01)
+    assert contest.work_per_part(2) == pytest.approx(90e-6 / 2 / PASSES, rel=0.01)
+    assert contest.work_per_part(4) == pytest.approx(90e-6 / 4 / PASSES, rel=0.01)
 
 
 def test_a_wrong_model_is_seen_in_the_table(contest):
@@ -174,6 +178,54 @@ def test_the_part_with_most_work_decides_the_time(rows, n):
     assert span_of_error(rows, PARTITIONED, n) == pytest.approx((1.0, 1.0), abs=0.01)
     least, worst = span_of_error(rows, PARTITIONED, n, ("uneven", "fetched"))
     assert 1.0 < least < worst  # even parts alone do not explain the time
+
+
+# --- The first thread of the tree -------------------------------------------------------------------------------------
+
+#: What a step of the tree takes: to scan all boxes, and to compare all candidates; to repair the tree and to search for
+#: a box that left its leaf [s]
+SCAN, COMPARE, REPAIR, SEARCH = 20e-6, 50e-6, 1e-6, 3e-6
+
+
+def tree_step(moved, n):
+    """Time of a step with so many boxes that left their leaf [s]."""
+    repair, search = REPAIR * moved, SEARCH * moved
+    if moved <= 5 * BOXES / (n - 1 or 1) / (MOVE_COST + SEARCH_COST):
+        return SCAN / n + max(repair + search, (repair + search + COMPARE) / n)
+    return SCAN / n + max(repair, (repair + COMPARE) / n) + search / n
+
+
+@pytest.fixture(scope="module")
+def trees(tmp_path_factory):
+    """Scenes of one size in which 1, 20 and 200 boxes leave their leaf, on 1, 2 and 4 threads."""
+    folder = tmp_path_factory.mktemp("trees")
+    for moved in (1, 20, 200):
+        parts = np.array([SCAN + REPAIR * moved, SEARCH * moved, COMPARE, 0.0, 0.0, 0.0])
+        for n in (1, 2, 4):
+            truth = Truth(1e9 * tree_step(moved, n) / BOXES, 1.0, tuple(parts / parts.sum()),
+                          counts={"left_leaf": moved / BOXES, "candidates": 5.0})
+            for repeat in range(3):
+                for finder in (PARTITIONED, TREE):
+                    write_sample(folder, f"drum_{moved}", finder, truth, BOXES, repeat=repeat, threads=n, noise=1e-5)
+                    with h5py.File(folder / "samples" / f"drum_{moved}-{finder}-{n}-{repeat}.h5", "a") as file:
+                        file["case/barrier_cost"] = file["case/region_cost"] = 1e-15 if n > 1 else 0.0
+    return {int(found.one.scene.split("_")[1]): found for found in contests(read_bench([folder]))}
+
+
+@pytest.mark.parametrize("moved, first", [(1, True), (20, True), (200, False)])
+def test_the_others_wait_for_the_first_thread_of_the_tree(trees, moved, first):
+    contest = trees[moved]
+    assert contest.repairing == pytest.approx(REPAIR * moved / (SCAN + REPAIR * moved), rel=0.02)
+    assert contest.first_searches(2) == first
+    for n in (2, 4):
+        assert contest.predict(TREE, n).total == pytest.approx(tree_step(moved, n), rel=0.01)
+    assert (contest.wait_for_first(2) > 1e-6) == (moved > 1)
+
+
+def test_the_tree_expects_what_its_source_says():
+    source = (Path(os.environ["POLYDEM_SOURCE_DIR"]) / "src/neighbours/quadtree.f90").read_text(encoding="utf-8")
+    said = re.search(r"move_cost = (\d+)_ip, search_cost = (\d+)_ip", source).groups()
+    assert tuple(map(int, said)) == (MOVE_COST, SEARCH_COST)
 
 
 def test_a_trace_of_other_boxes_is_not_counted(tmp_path):

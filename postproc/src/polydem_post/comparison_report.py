@@ -159,7 +159,10 @@ def pieces_table(comparison: Comparison) -> Table:
                   texts=3)
     for piece in comparison.pieces:
         table.add(piece.name, piece.purpose, comparison.status(piece), number(comparison.seconds(piece), 3))
-    table.note = "cut: the time was over, and what had been measured counts; missing: there was no time for it."
+    table.note = (
+        "cut: the time was over, and what had been measured counts; missing: there was no time for it; "
+        "left out: by --without."
+    )
     return table
 
 

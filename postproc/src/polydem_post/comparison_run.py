@@ -85,6 +85,8 @@ class Comparison:
     dry: bool = False
     #: Time at which the present piece must end
     piece_deadline: float | None = None
+    #: Names of pieces that are not made in this call
+    without: frozenset = frozenset()
     state: dict = field(default_factory=dict)
 
     @property
@@ -142,8 +144,9 @@ class Comparison:
         return hashlib.sha256(piece.settings(self.folder).encode()).hexdigest()
 
     def status(self, piece: Piece) -> str:
-        """finished, cut (the time was over), begun, failed, or missing."""
-        return self.state["pieces"].get(piece.name, {}).get("status", "missing")
+        """finished, cut (the time was over), begun, failed, left out, or missing."""
+        absent = "left out" if piece.name in self.without else "missing"
+        return self.state["pieces"].get(piece.name, {}).get("status", absent)
 
     def seconds(self, piece: Piece) -> float:
         """Seconds that a piece took, in all calls."""
@@ -186,6 +189,8 @@ class Comparison:
             took = estimate(piece, rates, self.cores, self.mode)
             if self.status(piece) == "finished":
                 told = f"is there ({number(self.seconds(piece), 2)} s)"
+            elif piece.name in self.without:
+                told = "is left out"
             else:
                 told = f"about {round(took)} s"
                 total += took
@@ -202,8 +207,9 @@ class Comparison:
 
         A signal that ends the call raises KeyboardInterrupt.
         """
-        self._make_all([piece for piece in self.pieces if self.status(piece) != "finished"])
-        self._make_all([piece for piece in self.pieces if self.status(piece) == "cut"])
+        wanted = [piece for piece in self.pieces if piece.name not in self.without]
+        self._make_all([piece for piece in wanted if self.status(piece) != "finished"])
+        self._make_all([piece for piece in wanted if self.status(piece) == "cut"])
 
     def _make_all(self, wanted: list) -> None:
         for k, piece in enumerate(wanted):

@@ -4,12 +4,16 @@ From samples on one thread come the work that threads share and the rest, which 
 measured beside the samples, the cost of a barrier and of starting threads. With n threads
 
     sweep:  rest + work/n uneven(n) + fetched(n) + passes barrier(n) + region(n)
-    tree:   rest + work/n           + fetched(n) + regions region(n)
+    tree:   rest + work/n + wait(n) + fetched(n) +      3 barrier(n) + region(n)
 
 All threads of the sweep meet after every pass, so a pass takes as long as the part with most work. The work of a part
 is that of its ends, of which all parts have as many, and that of its exchanges, which are counted from the trace
-(`sweep_parts.py`); what an end and an exchange cost follows from the steps on one thread. The tree has three parallel
-regions in a step, none of which waits for another thread in its middle. The repair of the tree is no shared work.
+(`sweep_parts.py`); what an end and an exchange cost follows from the steps on one thread.
+
+The threads of the tree share the search for boxes that left their leaf. Then the first thread repairs the tree and, if
+few boxes moved, searches for them, while the others compare candidates, of which it takes so many that all end at the
+same time. wait(n) is the time by which repair and search alone take longer than that. If many boxes moved, all
+threads search afterwards. What the repair costs follows from the steps on one thread.
 
 fetched(n) = (cost per box * boxes + cost per search * searches) (n - 1)/n / n: of the boxes, and of the nodes that a
 search visits, the part (n - 1)/n has been written by another core. These costs are the only fitted numbers: one for the
@@ -34,7 +38,7 @@ from .sweep_parts import Exchanges, exchanges_of
 PARTITIONED = "partitioned_sweep"
 
 #: Finder -> phases whose work threads share
-SHARED = {PARTITIONED: ("structure",), TREE: ("search", "filter")}
+SHARED = {PARTITIONED: ("structure",), TREE: ("structure", "search", "filter")}
 
 #: Finder -> counts of a step, for each of which threads fetch what another core has written
 FETCHED: dict[str, tuple[str, ...]] = {PARTITIONED: ("boxes",), TREE: ("boxes", "searches")}
@@ -42,8 +46,12 @@ FETCHED: dict[str, tuple[str, ...]] = {PARTITIONED: ("boxes",), TREE: ("boxes", 
 #: All phases of a finder but waiting
 WORKING = ("structure", "search", "filter", "order", "merge")
 
-#: Parallel regions of the tree in a step; passes of the sweep where none were counted
-TREE_REGIONS, USUAL_PASSES = 3, 2.0
+#: Barriers of the tree in a step; passes of the sweep where none were counted
+TREE_BARRIERS, USUAL_PASSES = 3, 2.0
+
+#: Time in which the tree expects to repair and to search for one box that left its leaf, in comparisons of candidates
+#: (`src/neighbours/quadtree.f90`)
+MOVE_COST, SEARCH_COST = 500, 1600
 
 #: Most threads for which the model is asked
 MOST_THREADS = 256
@@ -76,6 +84,8 @@ class Split:
 
     shared: float
     rest: float
+    #: Phase -> its time
+    parts: dict[str, float]
 
 
 @dataclass(frozen=True)
@@ -112,6 +122,8 @@ class Contest:
     parts: Exchanges | None = None
     #: Part of the shared work of the sweep on one thread that exchanges are; the rest are ends
     exchanging: float = 0.0
+    #: Part of the structure of the tree on one thread that repair is; the rest finds boxes that left their leaf
+    repairing: float = 0.0
     #: Finder -> costs of fetching, as FETCHED names them [s]
     fetch: dict[str, np.ndarray] = field(default_factory=dict)
 
@@ -161,10 +173,27 @@ class Contest:
         if threads == 1:
             return Prediction(split.rest, work, 0.0)
         barrier, region = (self.waiting.of(which, threads) for which in ("barrier", "region"))
-        waits = self.passes(threads) * barrier + region if finder == PARTITIONED else TREE_REGIONS * region
-        uneven = work * (self.unevenness(threads) - 1.0) if finder == PARTITIONED else 0.0
+        if finder == PARTITIONED:
+            barriers, uneven = self.passes(threads), work * (self.unevenness(threads) - 1.0)
+        else:
+            barriers, uneven = TREE_BARRIERS, self.wait_for_first(threads)
         fetched = float(self.foreign(finder, threads) @ self.fetch[finder]) if finder in self.fetch else 0.0
-        return Prediction(split.rest, work, waits, uneven, fetched)
+        return Prediction(split.rest, work, barriers * barrier + region, uneven, fetched)
+
+    def wait_for_first(self, threads: int) -> float:
+        """Time by which the first thread of the tree takes longer than its share, with repair and search alone [s]."""
+        parts = self.splits[TREE].parts
+        alone = self.repairing * parts["structure"]
+        together = alone + parts["filter"]
+        if self.first_searches(threads):
+            alone, together = alone + parts["search"], together + parts["search"]
+        return max(0.0, alone - together / threads)
+
+    def first_searches(self, threads: int) -> bool:
+        """Whether so few boxes leave their leaf in a step that the first thread searches for all of them."""
+        one = self.tree[1]
+        share = one.count("candidates") / (threads - 1)
+        return bool(one.count("left_leaf") <= share / (MOVE_COST + SEARCH_COST))
 
     def foreign(self, finder: str, threads: int) -> np.ndarray:
         """How many of what FETCHED names a thread finds written by another core in a step."""
@@ -248,8 +277,9 @@ def split_of(case: Case) -> Split:
     """Shared work and rest of a step on one thread, by elapsed time in the proportion of the phases."""
     whole = 1e-9 * case.boxes * typical(series.elapsed_time(case)).value
     parts = {name: typical(case.phase(name)).value for name in WORKING}
-    share = sum(parts[name] for name in SHARED[case.finder]) / sum(parts.values())
-    return Split(share * whole, (1.0 - share) * whole)
+    parts = {name: whole * value / sum(parts.values()) for name, value in parts.items()}
+    shared = sum(parts[name] for name in SHARED[case.finder])
+    return Split(shared, whole - shared, parts)
 
 
 def waiting_of(bench: Bench) -> Waiting:
@@ -276,33 +306,35 @@ def contests(bench: Bench) -> list[Contest]:
             contest.parts = exchanges_of(contest.one, MOST_THREADS)
             found.append(contest)
     for boxes in {contest.one.boxes for contest in found}:
-        set_exchanging([contest for contest in found if contest.one.boxes == boxes])
+        same_size = [contest for contest in found if contest.one.boxes == boxes]
+        for contest, part in zip(same_size, growing_parts([contest.one for contest in same_size], "swaps")):
+            contest.exchanging = part
+        for contest, part in zip(same_size, growing_parts([contest.tree[1] for contest in same_size], "left_leaf")):
+            contest.repairing = part
     for finder in FETCHED:
         set_fetch(found, finder)
     return sorted(found, key=lambda each: (each.one.boxes, each.exchanges))
 
 
-def set_exchanging(same_size: list[Contest]) -> None:
-    """Tell the work of ends from that of exchanges, by a straight line through the steps of scenes of one size."""
-    steps = [points for contest in same_size if len(points := steps_of(contest.one))]
-    swaps, seconds = np.concatenate(steps).T if steps else (np.zeros(0), np.zeros(0))
-    if len(swaps) < 2 or np.ptp(swaps) == 0.0:
-        return
-    slope, constant = np.polyfit(swaps, seconds, 1)
-    for contest in same_size:
-        exchanging = max(slope, 0.0) * contest.one.count("swaps")
-        whole = exchanging + max(constant, 0.0)
-        contest.exchanging = float(exchanging / whole) if whole > 0.0 else 0.0
+def growing_parts(cases: list[Case], counted: str) -> list[float]:
+    """Part of the phase `structure` of each case that grows with a count, by one line for cases of one size."""
+    steps = [points for case in cases if len(points := steps_of(case, counted))]
+    counts, seconds = np.concatenate(steps).T if steps else (np.zeros(0), np.zeros(0))
+    if len(counts) < 2 or np.ptp(counts) == 0.0:
+        return [0.0] * len(cases)
+    slope, constant = np.maximum(np.polyfit(counts, seconds, 1), 0.0)
+    growing = [slope * case.count(counted) for case in cases]
+    return [float(each / (each + constant)) if each > 0.0 else 0.0 for each in growing]
 
 
-def steps_of(case: Case) -> np.ndarray:
-    """(exchanges, seconds of the sort) of the steps but the first, medians over repeats."""
-    swaps = next((sample.counts["swaps"] for sample in case.samples if "swaps" in sample.counts), np.empty(0))
+def steps_of(case: Case, counted: str) -> np.ndarray:
+    """(count, seconds of the phase `structure`) of the steps but the first, medians over repeats."""
+    counts = next((sample.counts[counted] for sample in case.samples if counted in sample.counts), np.empty(0))
     times = [sample.phases["structure"] for sample in case.samples
              if sample.repeat >= 1 and "structure" in sample.phases]
-    if not times or any(len(each) != len(swaps) for each in times):
+    if not times or any(len(each) != len(counts) for each in times):
         return np.empty((0, 2))
-    return np.column_stack([swaps, np.median(times, axis=0)])[1:]
+    return np.column_stack([counts, np.median(times, axis=0)])[1:]
 
 
 def set_fetch(found: list[Contest], finder: str) -> None:
