@@ -94,14 +94,14 @@ contains
 
       path = bench%folder//'/oracle/'//subject%case%scene//'.h5'
       if (exists(path)) then
-         call read_reference(path, subject%case%steps, subject%start, subject%reference, subject%finish, error)
+         call read_reference(path, subject%reference, error)
       else
          call bench%log%show_line(subject%case%scene//': '//to_text(subject%case%boxes)//' boxes, '// &
             to_text(subject%case%steps)//' steps; comparing all pairs')
          call find_reference(subject, bench%settings%finders(1)%text, error)
          if (allocated(error)) return
          call collect(bench, provenance)
-         call write_reference(path, subject%reference, subject%start, subject%finish, provenance, error)
+         call write_reference(path, subject%reference, provenance, error)
       end if
       if (.not. allocated(error)) call complete_case(subject)
    end subroutine provide_reference

@@ -25,8 +25,6 @@ module polydem_bench_subject
    type :: subject_t
       !> Properties common to all cases of the subject
       type(case_t) :: case
-      !> Hash of all recorded bounds, or of the initial state; identifies the reference lists
-      integer(lp) :: start = 0_lp
       !> Recorded boxes, if the bench replays them
       type(trace_t) :: trace
       !> Boxes of one step of the trace
@@ -35,8 +33,6 @@ module polydem_bench_subject
       type(simulation_t), allocatable :: simulation
       !> Reference lists of pairs
       type(reference_t) :: reference
-      !> Hash of the last state of a live bench; else 0
-      integer(lp) :: finish = 0_lp
    end type subject_t
 
 contains
@@ -95,8 +91,8 @@ contains
                end do
             end do
          end do
-         subject%start = case%identity
          call new_reference(reference, trace%n_steps)
+         reference%start = case%identity
          reference%other = 'the trace'
          if (allocated(trace%n_pairs)) reference%pairs = trace%n_pairs(:trace%n_steps)
          reference%has_number = allocated(trace%n_pairs)
@@ -159,7 +155,6 @@ contains
             call simulation%timers%end_step()
          end do
          if (allocated(error)) return
-         subject%start = state_hash(simulation%bodies)
          case%mode = 'live'
          case%boxes = simulation%boxes%n
          case%fixed = count(simulation%boxes%fixed(:case%boxes), kind=ip)
@@ -168,6 +163,8 @@ contains
          case%input = scene%settings%resolved
          case%steps = steps
          if (steps == 0_ip) case%steps = scene%settings%output%trace_steps
+         call new_reference(subject%reference, case%steps)
+         subject%reference%start = state_hash(simulation%bodies)
       end associate
    end subroutine load_simulation
 
@@ -186,9 +183,8 @@ contains
       sample%case = subject%case
       sample%case%finder = finder
       if (allocated(subject%simulation)) then
-         call new_reference(subject%reference, subject%case%steps)
          subject%reference%other = finder
-         call live_sample(subject%simulation, .true., subject%reference, sample, subject%finish, error, wanted)
+         call live_sample(subject%simulation, .true., subject%reference, sample, error, wanted)
       else
          call compare_all_pairs(subject, wanted, error)
          if (allocated(error)) return
@@ -206,7 +202,7 @@ contains
          case%pair_hash = total_hash(reference%hash)
          case%checked = 'all_pairs '//to_text(count(reference%by_oracle, kind=ip))//' steps'
          if (.not. all(reference%by_oracle)) case%checked = case%checked//', else '//reference%other
-         if (allocated(subject%simulation)) case%identity = subject%finish
+         if (allocated(subject%simulation)) case%identity = reference%finish
       end associate
    end subroutine complete_case
 
@@ -217,12 +213,11 @@ contains
       type(sample_t), intent(inout) :: sample
       !> Allocated if a list is wrong
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp) :: finish
       logical :: checked
 
       checked = sample%case%repeat == 0_ip
       if (allocated(subject%simulation)) then
-         call live_sample(subject%simulation, checked, subject%reference, sample, finish, error)
+         call live_sample(subject%simulation, checked, subject%reference, sample, error)
       else
          call replay_sample(subject%trace, subject%boxes, checked, subject%reference, sample, error)
       end if

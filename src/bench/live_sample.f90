@@ -25,17 +25,15 @@ module polydem_live_sample
 contains
 
    !> Run the steps of a case once.
-   subroutine live_sample(start, checked, reference, sample, finish, error, by_oracle)
+   subroutine live_sample(start, checked, reference, sample, error, by_oracle)
       !> Initial state of all samples
       type(simulation_t), intent(in) :: start
       !> Whether to check every list and to collect finder statistics
       logical, intent(in) :: checked
-      !> Reference lists; a checked sample adds missing ones
+      !> Reference lists; a checked sample adds missing ones, and each sets the hash of the last state
       type(reference_t), intent(inout) :: reference
       !> The sample; its case sets the finder and the number of steps
       type(sample_t), intent(inout) :: sample
-      !> Hash of the last state
-      integer(lp), intent(out) :: finish
       !> Allocated if the finder is unknown, a list is wrong or a step fails
       type(error_t), allocatable, intent(inout) :: error
       !> Whether to compare all pairs at each step, (steps); absent: at no step
@@ -47,7 +45,6 @@ contains
       type(step_clock_t) :: clock
       integer(ip) :: s
 
-      finish = 0_lp
       simulation = start
       simulation%timers = timers_t()
       call new_finder_or_variant(finder, sample%case%finder, error)
@@ -68,8 +65,8 @@ contains
          call check_step(simulation%neighbours, s, checked, meter, reference, sample, error)
          if (allocated(error)) return
       end do
-      finish = state_hash(simulation%bodies)
-      call check_finish(sample, finish, error)
+      reference%finish = state_hash(simulation%bodies)
+      call check_finish(sample, reference%finish, error)
    end subroutine live_sample
 
    !> Run and time one step; its elapsed time is the sum over stages.

@@ -19,6 +19,10 @@ module polydem_reference
 
    !> Reference lists of all steps
    type :: reference_t
+      !> Hash of all recorded bounds, or of the initial state; identifies the lists
+      integer(lp) :: start = 0_lp
+      !> Hash of the last state of a live bench; else 0
+      integer(lp) :: finish = 0_lp
       !> Number of pairs of each step, (steps)
       integer(ip), allocatable :: pairs(:)
       !> Sum of the hashes of the pairs of each step, (steps)
