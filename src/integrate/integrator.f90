@@ -11,7 +11,7 @@ module polydem_integrator
    use polydem_stability_limit, only: stability_table_t
    implicit none
    private
-   public :: integrator_t, clear_negligible, clear_negligible_motion
+   public :: integrator_t, clear_negligible, clear_negligible_motion, negligible
 
    !> An integration scheme and its state
    type, abstract :: integrator_t

@@ -4,7 +4,7 @@
 !> (W.C. Swope, H.C. Andersen, P.H. Berens & K.R. Wilson, J. Chem. Phys. 76 (1982) 637).
 module polydem_velocity_verlet
    use polydem_bodies, only: bodies_t
-   use polydem_integrator, only: integrator_t, clear_negligible_motion
+   use polydem_integrator, only: integrator_t, negligible
    use polydem_kinds, only: ip, wp
    use polydem_serializer, only: serializer_t
    use polydem_stability_limit, only: stability_table_t
@@ -43,23 +43,36 @@ contains
       !> Bodies; position, angle and velocities of these change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: s
-      real(wp) :: h, half(3)
+      real(wp) :: h, half(3), gain(3), rate(3)
 
       h = 0.5_wp*dt
-      call clear_negligible_motion(first, last, bodies)
       do s = first, last
-         half(1) = bodies%velocity(1, s) + h*bodies%acceleration(1, s)
-         half(2) = bodies%velocity(2, s) + h*bodies%acceleration(2, s)
-         half(3) = bodies%angular_velocity(s) + h*bodies%angular_acceleration(s)
+         rate(1) = cleared(bodies%acceleration(1, s))
+         rate(2) = cleared(bodies%acceleration(2, s))
+         rate(3) = cleared(bodies%angular_acceleration(s))
+         gain = h*rate
+         half(1) = cleared(bodies%velocity(1, s)) + gain(1)
+         half(2) = cleared(bodies%velocity(2, s)) + gain(2)
+         half(3) = cleared(bodies%angular_velocity(s)) + gain(3)
          bodies%position(1, s) = bodies%position(1, s) + dt*half(1)
          bodies%position(2, s) = bodies%position(2, s) + dt*half(2)
          bodies%angle(s) = bodies%angle(s) + dt*half(3)
-         bodies%velocity(1, s) = half(1) + h*bodies%acceleration(1, s)
-         bodies%velocity(2, s) = half(2) + h*bodies%acceleration(2, s)
-         bodies%angular_velocity(s) = half(3) + h*bodies%angular_acceleration(s)
+         bodies%velocity(1, s) = half(1) + gain(1)
+         bodies%velocity(2, s) = half(2) + gain(2)
+         bodies%angular_velocity(s) = half(3) + gain(3)
+         bodies%acceleration(1, s) = rate(1)
+         bodies%acceleration(2, s) = rate(2)
+         bodies%angular_acceleration(s) = rate(3)
          self%half(:, s) = half
       end do
    end subroutine predict
+
+   !> A velocity or an acceleration, or zero if it is too small to move a body, as in `clear_negligible_motion`
+   elemental real(wp) function cleared(value)
+      real(wp), intent(in) :: value
+
+      cleared = merge(0.0_wp, value, abs(value) < negligible)
+   end function cleared
 
    !> Compute final velocities and accelerations from the forces at the end of the step.
    subroutine correct(self, dt, first, last, force, bodies)
