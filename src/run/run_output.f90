@@ -129,7 +129,7 @@ contains
          call run%comm%all_reduce_max(is_not_finite)
          if (is_not_finite(1) == 1_lp) return
          call update_balance(run)
-         if (s%settings%output%contacts) call tabulate_contacts(s)
+         call tabulate_contacts(s)
       end associate
       call write_frame(run, error)
    end subroutine write_last_frame

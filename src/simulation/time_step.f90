@@ -1,5 +1,6 @@
 !> The time step of a simulation.
 module polydem_time_step
+   use polydem_bodies, only: turn_bodies
    use polydem_body_passes, only: complete_step, predict_bodies
    use polydem_box_maker, only: turn_and_bound
    use polydem_contact_incidence, only: index_contacts
@@ -86,18 +87,26 @@ contains
       call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, self%bodies%n, self%bodies)
    end subroutine compute_forces
 
-   !> After a failure, make the table of contacts of this step if the step has not kept it. The forces are those of a
-   !> time step of length 0 at the same poses and velocities. The table is empty if the step failed before it found
-   !> contacts.
+   !> After a failure, make the table of contacts of this step if the step has not kept it, and the forces on fixed bodies.
+   !> Collective. Such a table shows the contacts of the state at the stop, with the forces of a time step of length 0. It
+   !> is empty if the step failed before it found contacts.
    subroutine tabulate_contacts(self)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable :: known_error
+      integer(ip) :: k
 
-      if (self%keeps_contacts) return
-      self%contacts%n = 0_ip
-      if (self%walk%step /= self%step) return
-      self%keeps_contacts = .true.
-      call compute_forces(self, 0.0_wp, known_error)
+      if (self%walk%step /= self%step) then
+         self%contacts%n = 0_ip
+         return
+      end if
+      if (self%settings%output%contacts .and. .not. self%keeps_contacts) then
+         ! The end of the step changed velocities, and poses with some integrators.
+         if (self%comm%size > 1_ip) call self%domain%halo%follow(self%comm, self%bodies)
+         call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)], self%isa)
+         self%keeps_contacts = .true.
+         call sum_forces(self, 0.0_wp, known_error)
+      end if
+      call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, self%bodies%n, self%bodies)
    end subroutine tabulate_contacts
 
    !> Sum the contact forces on the bodies from their boxes: neighbours, contacts, force law. This is the middle of a

@@ -24,6 +24,8 @@ FAILURES = {
     "deep": ("--set", "guards.overlap=stop", "--set", "guards.overlap_limit=1e-6"),
     "through": ("--set", "guards.passing=stop", "--set", "forces.stiffness=5e3"),
 }
+#: Frames of the first and the last step only, so that the step at which the run stops is none of a frame
+FEW_FRAMES = "--set", "output.frame_interval=0", "--set", "output.frames_per_segment=0"
 CROSSING = """&scene name = 'file', bodies_file = '{bodies}' /
 &forces gravity = 0, -9.81, stiffness = 1e4 /
 &integrate dt = 1e-3, duration = 0.02 /
@@ -194,15 +196,19 @@ def test_the_program_without_mpi_refuses_to_be_several(whole, tmp_path):
 
 
 def write_crossing(path, places=(1.0, -9.0)):
-    """Away from a row of squares that move, small ones jump into large ones at these places, in the same step."""
+    """Away from a row of squares that move, small ones jump into large ones at these places, in the same step.
+
+    The last square is fixed, and the one before it moves into it.
+    """
     squares = [(0.0199 * k - 1.0, 0.0, 0.01, 0.1 * k) for k in range(6)]
     for x in places:
         squares += [(x, 0.0, 0.05, 0.0), (x + 0.08, 0.003, 0.005, -40.0)]
+    squares += [(3.053, 0.0, 0.005, -1.0), (3.0, 0.0, 0.05, 0.0)]
     with h5py.File(path, "w") as file:
         file["vertex"] = [(x + a * i, y + a * j) for x, y, a, _ in squares
                           for i, j in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
         file["vertex_start"] = [4 * k for k in range(len(squares) + 1)]
-        file["fixed"] = [0] * len(squares)
+        file["fixed"] = [0] * (len(squares) - 1) + [1]
         file["velocity"] = [(speed, 0.0) for _, _, _, speed in squares]
 
 
@@ -229,8 +235,8 @@ def test_no_number_in_a_checkpoint_is_found_with_its_body(ranks, whole, interrup
 
 def test_an_error_of_one_rank_is_told_once_as_by_one_process(whole, tmp_path):
     for name, options in FAILURES.items():
-        told = [message_of(run(whole / "scene.nml", tmp_path / f"{name}_{ranks}", ranks, 1, options, code=FAILED)[1])
-                for ranks in (None, 3)]
+        told = [message_of(run(whole / "scene.nml", tmp_path / f"{name}_{ranks}", ranks, 1, (*options, *FEW_FRAMES),
+                               code=FAILED)[1]) for ranks in (None, 3)]
         assert told[0] == told[1] and re.search(r"bod(y|ies) \d+", told[0]), told
         assert differences(frames(tmp_path / f"{name}_None"), frames(tmp_path / f"{name}_3")) == []
 
@@ -241,7 +247,7 @@ def test_a_contact_that_stops_the_run_stops_all_in_the_same_state(tmp_path):
     scene.write_text(CROSSING.format(bodies=tmp_path / "bodies.h5"), encoding="utf-8")
     results = {}
     for ranks in (None, 2, 3):
-        output, text = run(scene, tmp_path / f"of_{ranks}", ranks, 1, code=FAILED)
+        output, text = run(scene, tmp_path / f"of_{ranks}", ranks, 1, FEW_FRAMES, code=FAILED)
         results[ranks] = (message_of(text), state_hash(output), frames(tmp_path / f"of_{ranks}"))
     assert "has no direction" in results[None][0], results[None][0]
     assert all(result[:2] == results[None][:2] for result in results.values()), results
