@@ -158,14 +158,13 @@ contains
       integer(ip) :: c
 
       if (max(maxval(block%first(:block%n)), maxval(block%second(:block%n))) <= last) then
-         call add_pairs(block%n, block%first, block%second, terms, last, sums%value, sums%has_terms)
+         call add_pairs(1_ip, block%n, block%first, block%second, terms, last, sums%value, sums%has_terms)
          return
       end if
       call reserve_late(late, block%n)
       do c = 1_ip, block%n
          if (max(block%first(c), block%second(c)) <= last) then
-            call add_pair(block%first(c), block%second(c), terms%first(:, c), terms%second(:, c), last, sums%value, &
-                          sums%has_terms)
+            call add_pairs(c, c, block%first, block%second, terms, last, sums%value, sums%has_terms)
          else
             call add_or_keep(block%first(c), term_of(terms, c, .true.), last, sums, late)
             call add_or_keep(block%second(c), term_of(terms, c, .false.), last, sums, late)
@@ -174,33 +173,24 @@ contains
    end subroutine add_terms
 
    !> Add the terms of contacts to the sums of their bodies, in the order of the contacts.
-   pure subroutine add_pairs(n, i, j, terms, last, value, has_terms)
-      integer(ip), intent(in) :: n, i(n), j(n), last
+   pure subroutine add_pairs(low, high, i, j, terms, last, value, has_terms)
+      !> First and last of the contacts
+      integer(ip), intent(in) :: low, high
+      !> Slots of the first and of the second body of each contact
+      integer(ip), intent(in) :: i(high), j(high)
+      integer(ip), intent(in) :: last
       type(contact_terms_t), intent(in) :: terms
       real(wp), intent(inout) :: value(n_terms, last)
       logical, intent(inout) :: has_terms(last)
       integer(ip) :: c
 
-      do c = 1_ip, n
-         call add_pair(i(c), j(c), terms%first(:, c), terms%second(:, c), last, value, has_terms)
+      do c = low, high
+         call add(terms%first(:, c), value(:, i(c)))
+         call subtract(terms%first(:, c), terms%second(:, c), value(:, j(c)))
+         has_terms(i(c)) = .true.
+         has_terms(j(c)) = .true.
       end do
    end subroutine add_pairs
-
-   !> Add the terms of a contact to the sums of its bodies.
-   pure subroutine add_pair(i, j, first, second, last, value, has_terms)
-      !> Slots of the bodies
-      integer(ip), intent(in) :: i, j
-      !> Term of the first body, and rows of the second
-      real(wp), intent(in) :: first(n_terms), second(sum_torque(1):n_terms)
-      integer(ip), intent(in) :: last
-      real(wp), intent(inout) :: value(n_terms, last)
-      logical, intent(inout) :: has_terms(last)
-
-      call add(first, value(:, i))
-      call subtract(first, second, value(:, j))
-      has_terms(i) = .true.
-      has_terms(j) = .true.
-   end subroutine add_pair
 
    !> Add a term to the sums of a body. Arrays of their own let the compiler add two numbers at a time.
    pure subroutine add(term, value)
