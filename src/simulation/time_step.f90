@@ -87,9 +87,9 @@ contains
       call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, self%bodies%n, self%bodies)
    end subroutine compute_forces
 
-   !> After a failure, make the table of contacts of this step if the step has not kept it, and the forces on fixed bodies.
-   !> Collective. Such a table shows the contacts of the state at the stop, with the forces of a time step of length 0. It
-   !> is empty if the step failed before it found contacts.
+   !> After a failure, make the table of contacts of this step if the step has not kept it, and the forces on fixed
+   !> bodies. Collective. Such a table shows the contacts of the state at the stop, with the forces of a time step of
+   !> length 0. It is empty if the step failed before it found contacts.
    subroutine tabulate_contacts(self)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable :: known_error
