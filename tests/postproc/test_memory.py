@@ -17,10 +17,10 @@ SEGMENTS = int(os.environ.get("POLYDEM_SEGMENTS", "32"))
 MOST = 150
 
 READER = """
-import resource
 import sys
+from pathlib import Path
 from polydem_post import Trajectory
-peak = lambda: resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+peak = lambda: int(Path("/proc/self/status").read_text().split("VmHWM:")[1].split()[0]) / 1024
 before = peak()
 run = Trajectory(sys.argv[1])
 total = 0.0

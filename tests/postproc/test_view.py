@@ -6,13 +6,14 @@ import json
 import os
 import re
 import shutil
+import tempfile
 import zlib
 from pathlib import Path
 
 import numpy as np
 import polydem_post
 import pytest
-from polydem_post import Trajectory
+from polydem_post import Trajectory, view_data
 from polydem_post.__main__ import main
 from polydem_post.view import SCRIPTS, SOURCES
 
@@ -66,6 +67,16 @@ def test_positions_and_angles_are_rounded_as_stated(view, run):
 def test_wrong_options_are_explained(small_drum, capsys, arguments, message):
     assert main(["view", str(small_drum), *arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("path, why", [("/dev/full", "No space left on device"), ("/no/folder", "No such file")])
+def test_without_room_for_temporary_files_the_error_is_explained(small_drum, tmp_path, capsys, monkeypatch, path, why):
+    monkeypatch.setattr(tempfile, "TemporaryFile", lambda **_: open(path, "r+b"))  # noqa: SIM115  the real one is, too
+    monkeypatch.setattr(view_data, "MOST_KEPT", 1000)
+    assert main(["view", str(small_drum), "-o", str(tmp_path / "v.html")]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and f"temporary files, in TMPDIR or /tmp: cannot be written ({why}" in said
+    assert not list(tmp_path.iterdir())
 
 
 def test_without_contacts_the_page_is_smaller(small_drum, view, tmp_path):

@@ -43,7 +43,7 @@ LISTED_ENTRY = re.compile(r"([A-Za-z]\w*\.[A-Za-z]\w*)=(.*)", re.DOTALL)
 OWN_ENTRY = "output.folder"
 
 #: So many wrong rows are told
-MOST_TOLD = 10
+MOST_TOLD = 100
 
 
 @dataclass(frozen=True)

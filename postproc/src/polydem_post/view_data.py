@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import tempfile
 import zlib
 from dataclasses import dataclass, field
 
@@ -11,7 +12,7 @@ import numpy as np
 from .drawing import OVERLAYS
 from .frames import Frame
 from .quantities import QUANTITIES, range_of
-from .result_file import ResultError
+from .result_file import ResultError, reason
 from .trajectory import Trajectory
 from .tree_cells import cell_grid
 
@@ -23,6 +24,9 @@ FORCE_STEPS, DIRECTION_STEPS, ARM_STEPS = 255, 256, 127
 
 #: Deflate level: higher ones gain little
 LEVEL = 6
+
+#: Bytes of one kind of values that wait in memory rather than in a temporary file
+MOST_KEPT = 2**20
 
 
 @dataclass
@@ -40,23 +44,45 @@ class Packed:
     def add_series(self, name: str, values: np.ndarray, quantum: float) -> None:
         """Add one number per frame and body, rounded to a multiple of the quantum: differences in planes of bytes."""
         whole = np.rint(values / quantum).astype(np.int64)
-        change = np.diff(whole, axis=0, prepend=np.zeros((1, whole.shape[1]), dtype=np.int64))
-        folded = np.where(change >= 0, 2 * change, -2 * change - 1).astype(np.uint64).ravel()
+        whole[1:] -= whole[:-1].copy()
+        folded = np.where(whole >= 0, 2 * whole, -2 * whole - 1).astype(np.uint64).ravel()
+        del whole
         planes = max(1, (int(folded.max(initial=0)).bit_length() + 7) // 8)
         if planes > 6:
             raise OverflowError(f"{name} spans more than the viewer can hold")
-        data = np.stack([(folded >> np.uint64(8 * k)) & np.uint64(255) for k in range(planes)]).astype(np.uint8)
-        self.add(name, data)
+        self.add(name, np.stack([(folded >> np.uint64(8 * k)).astype(np.uint8) for k in range(planes)]))
         self.facts["series"][name] = {"quantum": quantum, "planes": planes}
+
+
+class _Rows:
+    """Values of all frames; many wait in a temporary file without a name: together they are larger than the rest."""
+
+    def __init__(self, kind) -> None:
+        self.kind = np.dtype(kind)
+        self.count: list[int] = []
+        self.file = tempfile.SpooledTemporaryFile(MOST_KEPT)  # noqa: SIM115  open as long as the values are needed
+
+    def add(self, values: np.ndarray) -> None:
+        """Append the values of a frame."""
+        self.count.append(len(values))
+        try:
+            self.file.write(values.astype(self.kind).tobytes())
+            self.file.flush()
+        except OSError as error:
+            where = "temporary files, in TMPDIR or /tmp"
+            raise ResultError(f"{where}: cannot be written ({reason(error)})") from error
+
+    def read(self) -> np.ndarray:
+        """All values."""
+        self.file.seek(0)
+        return np.frombuffer(self.file.read(), dtype=self.kind)
 
 
 class _Contacts:
     """The contacts of all frames, each with one row in the list of all pairs of the run."""
 
     def __init__(self) -> None:
-        self.keys: list[np.ndarray] = []
-        self.arms: list[np.ndarray] = []
-        self.forces: list[np.ndarray] = []
+        self.keys, self.arms, self.forces = _Rows(np.int64), _Rows(np.float32), _Rows(np.float32)
         self.bodies = 0
 
     def add(self, frame: Frame) -> None:
@@ -66,53 +92,59 @@ class _Contacts:
         order = np.lexsort((contacts.second_index, contacts.first_index))
         first, second = contacts.first_index[order], contacts.second_index[order]
         base = np.where(frame.fixed[first], second, first)
-        self.keys.append(first.astype(np.int64) * self.bodies + second)
-        self.arms.append((contacts.point[order] - frame.position[base]).astype(np.float32))
-        self.forces.append(contacts.force[order].astype(np.float32))
+        self.keys.add(first.astype(np.int64) * self.bodies + second)
+        self.arms.add(contacts.point[order] - frame.position[base])
+        self.forces.add(contacts.force[order])
 
     def pack(self, packed: Packed, reach: float) -> None:
         """Write the list of pairs, which of them each frame has, and arms and forces of these."""
-        pairs = np.unique(np.concatenate(self.keys))
-        changed = np.zeros((len(self.keys), -(-len(pairs) // 8)), dtype=np.uint8)
+        pairs = self._pack_pairs(packed)
+        for name, arm in zip(("arm_x", "arm_y"), self.arms.read().reshape(-1, 2).T):
+            packed.add(name, np.clip(np.rint(arm * (ARM_STEPS / reach)), -127, 127).astype(np.int8))
+        forces = self.forces.read().reshape(-1, 2)
+        size = np.hypot(forces[:, 0], forces[:, 1])
+        greatest = float(size.max(initial=0.0)) or 1.0
+        packed.add("force", np.rint(np.sqrt(size / greatest) * FORCE_STEPS).astype(np.uint8))
+        direction = np.rint(np.arctan2(forces[:, 1], forces[:, 0]) * (DIRECTION_STEPS / (2.0 * np.pi)))
+        packed.add("direction", (direction.astype(np.int16) % DIRECTION_STEPS).astype(np.uint8))
+        covered = float(np.percentile(size, 99.0)) if len(size) else 0.0
+        packed.facts["contacts"] = {"count": self.keys.count, "pairs": pairs, "reach": reach,
+                                    "greatest": greatest, "covered": covered or greatest}
+
+    def _pack_pairs(self, packed: Packed) -> int:
+        """Write all pairs and which of them each frame has; returns their number."""
+        keys, count = self.keys.read(), self.keys.count
+        pairs = np.unique(keys)
+        changed = np.zeros((len(count), -(-len(pairs) // 8)), dtype=np.uint8)
         before = changed[0]
-        for row, keys in zip(changed, self.keys):
+        for row, those in zip(changed, np.split(keys, np.cumsum(count)[:-1])):
             present = np.zeros(len(pairs), dtype=bool)
-            present[np.searchsorted(pairs, keys)] = True
+            present[np.searchsorted(pairs, those)] = True
             bits = np.packbits(present, bitorder="little")
             row[:] = bits ^ before
             before = bits
-        arms, forces = np.concatenate(self.arms), np.concatenate(self.forces)
-        size = np.hypot(forces[:, 0], forces[:, 1])
-        greatest = float(size.max(initial=0.0)) or 1.0
-        direction = np.rint(np.arctan2(forces[:, 1], forces[:, 0]) * (DIRECTION_STEPS / (2.0 * np.pi)))
         packed.add("pair_first", (pairs // self.bodies).astype(np.uint32))
         packed.add("pair_second", (pairs % self.bodies).astype(np.uint32))
         packed.add("present", changed)
-        packed.add("arm_x", np.clip(np.rint(arms[:, 0] * (ARM_STEPS / reach)), -127, 127).astype(np.int8))
-        packed.add("arm_y", np.clip(np.rint(arms[:, 1] * (ARM_STEPS / reach)), -127, 127).astype(np.int8))
-        packed.add("force", np.rint(np.sqrt(size / greatest) * FORCE_STEPS).astype(np.uint8))
-        packed.add("direction", (direction.astype(np.int64) % DIRECTION_STEPS).astype(np.uint8))
-        covered = float(np.percentile(size, 99.0)) if len(size) else 0.0
-        packed.facts["contacts"] = {"count": [len(keys) for keys in self.keys], "pairs": len(pairs), "reach": reach,
-                                    "greatest": greatest, "covered": covered or greatest}
+        return len(pairs)
 
 
 def pack_run(trajectory: Trajectory, numbers: list[int], contacts: bool = True, progress=None) -> Packed:
     """Read frames and pack them."""
     contacts = contacts and trajectory.has_contacts
     packed = Packed({"series": {}})
-    columns: dict[str, list] = {name: [] for name in ("x", "y", "angle", "vx", "vy", "spin")}
-    values: dict[str, list] = {name: [] for name, each in QUANTITIES.items() if contacts or not each.needs_contacts}
+    columns = {name: _Rows(np.float64) for name in ("x", "y", "angle", "vx", "vy", "spin")}
+    values = {name: _Rows(np.float32) for name, each in QUANTITIES.items() if contacts or not each.needs_contacts}
     table, first, low, high = _Contacts(), None, np.full(2, np.inf), np.full(2, -np.inf)
     for frame in trajectory[numbers]:
         if first is None:
             first = frame
             _pack_bodies(packed, frame)
         for name, column in zip(columns, (*frame.position.T, frame.angle, *frame.velocity.T, frame.angular_velocity)):
-            columns[name].append(column)
+            columns[name].add(column)
         for name, collected in values.items():
-            if not (QUANTITIES[name].constant and collected):
-                collected.append(QUANTITIES[name].values(frame)[~frame.fixed].astype(np.float32))
+            if not (QUANTITIES[name].constant and collected.count):
+                collected.add(QUANTITIES[name].values(frame)[~frame.fixed])
         low, high = np.minimum(low, frame.vertex.min(axis=0)), np.maximum(high, frame.vertex.max(axis=0))
         if contacts:
             table.add(frame)
@@ -146,22 +178,22 @@ def _pack_bodies(packed: Packed, frame: Frame) -> None:
     packed.facts["bodies"] = len(frame.id)
 
 
-def _pack_columns(packed: Packed, columns: dict, first: Frame) -> float:
+def _pack_columns(packed: Packed, columns: dict[str, _Rows], first: Frame) -> float:
     """Positions, angles and velocities; returns the greatest radius of the free bodies."""
     free = ~first.fixed
     chosen = free if free.any() else np.ones(len(free), dtype=bool)
     diameter = float(np.median(first.diameter[chosen]))
     quanta = {"x": POSITION_SHARE * diameter, "y": POSITION_SHARE * diameter, "angle": ANGLE_QUANTUM}
     for name, collected in columns.items():
-        series = np.array(collected)
+        series = collected.read().reshape(len(collected.count), -1)
         quantum = quanta.get(name) or (float(np.abs(series).max(initial=0.0)) * VELOCITY_SHARE or 1.0)
         packed.add_series(name, series, quantum)
-        collected.clear()
     packed.facts["diameter"] = diameter
     return float(first.radius[chosen].max())
 
 
-def _describe(packed: Packed, trajectory: Trajectory, numbers: list[int], values: dict) -> None:
+def _describe(packed: Packed, trajectory: Trajectory, numbers: list[int],
+              values: dict[str, _Rows]) -> None:
     """Times, names, ranges, colours and curves."""
     import matplotlib
 
@@ -175,7 +207,7 @@ def _describe(packed: Packed, trajectory: Trajectory, numbers: list[int], values
     for name, collected in values.items():
         quantity = QUANTITIES[name]
         facts["quantities"][name] = {"title": quantity.title, "unit": quantity.unit, "map": quantity.colours,
-                                     "range": range_of(quantity, np.concatenate(collected)), "count": quantity.count}
+                                     "range": range_of(quantity, collected.read()), "count": quantity.count}
         colours = matplotlib.colormaps[quantity.colours]
         table = colours(np.linspace(0.0, 1.0, 256)) if not quantity.count else colours(
             np.minimum(np.arange(256) * quantity.count // 256, colours.N - 1))
