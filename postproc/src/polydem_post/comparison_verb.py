@@ -28,7 +28,7 @@ def add_paper(verbs, program) -> None:
     paper.add_argument("--verifier", type=Path)
     paper.add_argument("--overlaps", type=Path)
     paper.add_argument("--spent", type=float, metavar="S")
-    paper.add_argument("--without", type=lambda text: frozenset(text.split(",")), default=frozenset(), metavar="PIECES")
+    paper.add_argument("--without", type=_names, default=[], metavar="PIECES")
     paper.add_argument("--plan", type=Path, metavar="FILE")
 
 
@@ -51,13 +51,13 @@ def run_paper(options: argparse.Namespace) -> int:
         raise ResultError(f"{folder}: namelists cannot name a folder with blanks or quotes; choose another --output")
     cores = len(os.sched_getaffinity(0))
     pieces = make_plan(mode, folder, cores, plan)
-    unknown = options.without - {piece.name for piece in pieces}
+    unknown = set(options.without) - {piece.name for piece in pieces}
     if unknown:
         raise ResultError(f"--without {','.join(sorted(unknown))}: no such piece; the pieces are "
                           f"{', '.join(piece.name for piece in pieces)}")
     deadline = began + QUICK_LIMIT if mode == "quick" else None
     dry = options.dry_run or options.report_only
-    comparison = Comparison(folder, mode, pieces, tools, deadline, _say, dry, without=options.without)
+    comparison = Comparison(folder, mode, pieces, tools, deadline, _say, dry, without=frozenset(options.without))
     comparison.open(as_it_is=options.report_only)
     if not options.report_only:
         signal.signal(signal.SIGTERM, _interrupt)
@@ -80,6 +80,11 @@ def run_paper(options: argparse.Namespace) -> int:
 def _folder(text: str) -> Path:
     """A folder, from where the command was called."""
     return Path(text).resolve()
+
+
+def _names(text: str) -> list[str]:
+    """Names between commas."""
+    return text.split(",")
 
 
 def _interrupt(*_) -> None:
