@@ -6,6 +6,7 @@ A help text has the call of its verb in its first line, the meaning in its secon
 help text names is completed, and nothing else, so completion and man page never differ from the help.
 """
 
+import os
 import re
 import sys
 from dataclasses import dataclass
@@ -147,7 +148,20 @@ def main():
     texts = {"bash": bash_text, "zsh": zsh_text, "fish": fish_text, "man": lambda found: man_text(found, version)}
     if kind not in texts:
         sys.exit(f"there is no text {kind}, but {', '.join(texts)}")
-    sys.stdout.write(texts[kind](verbs))
+    try:
+        sys.stdout.write(texts[kind](verbs))
+        sys.stdout.flush()
+    except BrokenPipeError:
+        give_up(141)  # as a shell says of a program that nobody reads any more
+    except OSError as error:
+        print(f"polydem: standard output: cannot be written ({error.strerror})", file=sys.stderr)
+        give_up(3)
+
+
+def give_up(code):
+    """End without what is still to be written."""
+    sys.stderr.flush()
+    os._exit(code)
 
 
 if __name__ == "__main__":

@@ -97,6 +97,13 @@ class Completion(unittest.TestCase):
                     Path(path).write_text(call(LAUNCHER, "completion", kind), encoding="utf-8")
                     call(*command, path)
 
+    def test_an_output_that_takes_no_more_is_named(self):
+        with open("/dev/full", "w", encoding="utf-8") as full:
+            done = subprocess.run([LAUNCHER, "completion", "bash"], stdout=full, stderr=subprocess.PIPE, text=True,
+                                  check=False)
+        self.assertEqual((done.returncode, done.stderr),
+                         (3, "polydem: standard output: cannot be written (No space left on device)\n"))
+
     def test_an_unknown_shell_is_named(self):
         for words in ([], ["csh"], ["bash", "zsh"]):
             done = subprocess.run([LAUNCHER, "completion", *words], capture_output=True, text=True, check=False)
