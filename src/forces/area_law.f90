@@ -8,7 +8,6 @@ module polydem_area_law
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t
-   use polydem_contacts, only: contacts_t
    use polydem_elementary, only: hypotenuse
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
    use polydem_kinds, only: ip, wp
@@ -26,7 +25,6 @@ module polydem_area_law
       procedure :: add
       procedure :: stiffen
       procedure :: static_depth
-      procedure :: undamped_warning
    end type area_law_t
 
    !> Least characteristic length as a share of the square root of the area. It acts only where the force point is at a
@@ -35,13 +33,15 @@ module polydem_area_law
 
 contains
 
-   !> Copy the parameters from the settings.
+   !> Copy the parameters from the settings. The force does work on closed paths, which only damping hides.
    subroutine configure(self, settings)
       class(area_law_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
 
       self%stage = stage_elastic
       self%stiffness = settings%stiffness
+      self%undamped_warning = 'the area law is not conservative: without damping it adds kinetic energy at '// &
+         'any time step (a third in 0.2 s in a gas); set law = ''conservative'' in &forces, or use damping'
    end subroutine configure
 
    !> Set the characteristic length and add the elastic force. It acts at the centroid of the overlap.
@@ -82,38 +82,14 @@ contains
 
    !> Add the stiffness E L/l. An expected contact is a face on the edge with the greatest ratio L/l, where l is twice
    !> the distance of the edge from the centre.
-   subroutine stiffen(self, bodies, contacts, element)
+   subroutine stiffen(self, element)
       class(area_law_t), intent(in) :: self
-      !> Bodies, for the shape of the body of an expected contact
-      type(bodies_t), intent(in) :: bodies
-      type(contacts_t), intent(in) :: contacts
       !> The contact; its normal stiffness changes, and its ratio if it is an expected contact
       type(contact_element_t), intent(inout) :: element
 
-      associate (unused_contacts => contacts)
-      end associate
-      if (element%contact == 0_ip) element%ratio = greatest_ratio(bodies, element%body)
+      if (element%is_expected) element%ratio = element%edge_ratio
       element%normal_stiffness = element%normal_stiffness + self%stiffness*element%ratio
    end subroutine stiffen
-
-   !> Greatest ratio of an edge of a body to twice its distance from the centre
-   pure real(wp) function greatest_ratio(bodies, s) result(ratio)
-      type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: s
-      real(wp) :: dx, dy, length, distance
-      integer(ip) :: v, w
-
-      ratio = 0.0_wp
-      w = bodies%vertex_start(s + 1_ip) - 1_ip
-      do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-         dx = bodies%shape(1, v) - bodies%shape(1, w)
-         dy = bodies%shape(2, v) - bodies%shape(2, w)
-         length = sqrt(dx*dx + dy*dy)
-         distance = abs(dx*bodies%shape(2, w) - dy*bodies%shape(1, w))/length
-         ratio = max(ratio, length/(2.0_wp*distance))
-         w = v
-      end do
-   end function greatest_ratio
 
    !> Depth at which a flat contact carries a block at rest [m]: inverse of Matuttis & Chen 2014, Eq. 7.6.
    !>
@@ -132,16 +108,5 @@ contains
          depth = block%load/(self%stiffness*block%width)*4.0_wp*r1*r2/(r1 + r2)
       end do
    end function static_depth
-
-   !> Warning: the elastic force does work on closed paths, which only damping hides
-   function undamped_warning(self) result(warning)
-      class(area_law_t), intent(in) :: self
-      character(len=:), allocatable :: warning
-
-      associate (unused_self => self)
-      end associate
-      warning = 'the area law is not conservative: without damping it adds kinetic energy at any time step '// &
-         '(a third in 0.2 s in a gas); set law = ''conservative'' in &forces, or use damping'
-   end function undamped_warning
 
 end module polydem_area_law

@@ -25,7 +25,6 @@ module polydem_conservative_law
    use polydem_contact_block, only: contact_block_t
    use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_history_t
-   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
@@ -133,46 +132,19 @@ contains
    !> frequency more than 8 % above it.)
    !>
    !> An expected contact is a face on the longest edge of two equal bodies, where l b is the area.
-   subroutine stiffen(self, bodies, contacts, element)
+   subroutine stiffen(self, element)
       class(conservative_law_t), intent(in) :: self
-      !> Bodies, for the shape of the body of an expected contact
-      type(bodies_t), intent(in) :: bodies
-      !> Contacts with their lengths
-      type(contacts_t), intent(in) :: contacts
       !> The contact; stiffness against approach and tilts changes, and its ratio if it is an expected contact
       type(contact_element_t), intent(inout) :: element
 
-      if (element%contact == 0_ip) then
-         element%ratio = longest_edge_over_area(bodies, element%body)
+      if (element%is_expected) then
+         element%ratio = element%square_ratio
          element%normal_stiffness = element%normal_stiffness + self%stiffness*element%ratio
       else
          element%normal_stiffness = element%normal_stiffness + steepening*(self%stiffness*element%ratio)
-         element%tilt_stiffness = element%tilt_stiffness &
-            + steepening*face_tilt_stiffness(self%stiffness, contacts, element%contact)
+         element%tilt_stiffness = element%tilt_stiffness + steepening*face_tilt_stiffness(self%stiffness, element)
       end if
    end subroutine stiffen
-
-   !> Ratio of the square of the longest edge of a body to its area
-   pure real(wp) function longest_edge_over_area(bodies, s) result(ratio)
-      type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: s
-      real(wp) :: dx, dy, length, distance, longest, area
-      integer(ip) :: v, w
-
-      longest = 0.0_wp
-      area = 0.0_wp
-      w = bodies%vertex_start(s + 1_ip) - 1_ip
-      do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-         dx = bodies%shape(1, v) - bodies%shape(1, w)
-         dy = bodies%shape(2, v) - bodies%shape(2, w)
-         length = sqrt(dx*dx + dy*dy)
-         distance = abs(dx*bodies%shape(2, w) - dy*bodies%shape(1, w))/length
-         longest = max(longest, length)
-         area = area + 0.5_wp*length*distance
-         w = v
-      end do
-      ratio = longest*longest/area
-   end function longest_edge_over_area
 
    !> Depth at which a flat contact of width w carries a block at rest, F l/(E w) [m]. The characteristic length is
    !> l = 2 s1 s2 min(s1, s2)/((s1 + s2) w), where s is the side of the square of a body's area.

@@ -16,7 +16,6 @@ module polydem_cundall_strack
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
-   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
@@ -36,14 +35,13 @@ module polydem_cundall_strack
       logical :: midstep = .false.
    contains
       procedure :: configure
-      procedure :: history_kinds
       procedure :: add
       procedure :: stiffen
    end type cundall_strack_t
 
 contains
 
-   !> Copy the parameters from the settings.
+   !> Copy the parameters from the settings. The contact history is the spring force.
    subroutine configure(self, settings)
       class(cundall_strack_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
@@ -54,17 +52,8 @@ contains
       self%damping = settings%tangential_damping
       self%midstep = settings%midstep_slip
       self%needs_accelerations = self%midstep
+      self%history_kinds = [history_kind_t('tangential', 'N/m', 'force of the tangential spring')]
    end subroutine configure
-
-   !> Contact history of this part: the spring force
-   function history_kinds(self) result(kinds)
-      class(cundall_strack_t), intent(in) :: self
-      type(history_kind_t), allocatable :: kinds(:)
-
-      associate (unused_self => self)
-      end associate
-      kinds = [history_kind_t('tangential', 'N/m', 'force of the tangential spring')]
-   end function history_kinds
 
    !> Add the tangential force and store the spring force.
    subroutine add(self, bodies, dt, block, history)
@@ -126,15 +115,11 @@ contains
    end subroutine stretch
 
    !> Add the spring and its dashpot.
-   subroutine stiffen(self, bodies, contacts, element)
+   subroutine stiffen(self, element)
       class(cundall_strack_t), intent(in) :: self
-      type(bodies_t), intent(in) :: bodies
-      type(contacts_t), intent(in) :: contacts
       !> The contact; tangential stiffness and dashpot change
       type(contact_element_t), intent(inout) :: element
 
-      associate (unused_bodies => bodies, unused_contacts => contacts)
-      end associate
       element%tangential_stiffness = element%tangential_stiffness + self%stiffness
       element%tangential_dashpot = element%tangential_dashpot &
          + self%damping*sqrt(element%tangential_mass*self%stiffness)

@@ -10,8 +10,9 @@ module polydem_damping_onset
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: contact_block_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
-   use polydem_force_part, only: force_part_t
+   use polydem_force_part, only: force_part_t, stage_on_damping
    use polydem_kinds, only: ip, wp
+   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: damping_onset_t
@@ -19,21 +20,22 @@ module polydem_damping_onset
    !> Weight of the normal damping in the first step of a contact
    type, extends(force_part_t) :: damping_onset_t
    contains
-      procedure :: history_kinds
+      procedure :: configure
       procedure :: add
    end type damping_onset_t
 
 contains
 
-   !> Contact history of this part: the overlap area of the last step
-   function history_kinds(self) result(kinds)
-      class(damping_onset_t), intent(in) :: self
-      type(history_kind_t), allocatable :: kinds(:)
+   !> There are no parameters. The contact history is the overlap area of the last step.
+   subroutine configure(self, settings)
+      class(damping_onset_t), intent(inout) :: self
+      type(forces_settings_t), intent(in) :: settings
 
-      associate (unused_self => self)
+      associate (unused => settings)
       end associate
-      kinds = [history_kind_t('area', 'm2', 'overlap area at the last step', zero_is_new=.true.)]
-   end function history_kinds
+      self%stage = stage_on_damping
+      self%history_kinds = [history_kind_t('area', 'm2', 'overlap area at the last step', zero_is_new=.true.)]
+   end subroutine configure
 
    !> Weight the damping of new contacts, limit the normal force to repulsion, and store the areas.
    subroutine add(self, bodies, dt, block, history)

@@ -61,7 +61,6 @@ module polydem_exact_friction
    contains
       procedure :: configure
       procedure :: check
-      procedure :: history_kinds
       procedure :: apply
       procedure :: report
    end type exact_friction_t
@@ -71,13 +70,14 @@ module polydem_exact_friction
 
 contains
 
-   !> Copy the parameters from the settings.
+   !> Copy the parameters from the settings. The contact history is the force, from which the next search starts.
    subroutine configure(self, settings)
       class(exact_friction_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
 
       self%coefficient = settings%friction_coefficient
       self%tolerance = settings%friction_tolerance
+      self%history_kinds = [history_kind_t('tangential', 'N/m', 'tangential force of the last step')]
    end subroutine configure
 
    !> Refuse integration schemes without a velocity in the middle of a step, and several ranks.
@@ -97,16 +97,6 @@ contains
          place_of(settings, 'forces', 'friction')//': exact friction couples all contacts and runs on one rank '// &
          'only; use threads instead of ranks, or friction = ''cundall_strack'' in &forces')
    end subroutine check
-
-   !> Contact history of this part: the force, from which the next search starts
-   function history_kinds(self) result(kinds)
-      class(exact_friction_t), intent(in) :: self
-      type(history_kind_t), allocatable :: kinds(:)
-
-      associate (unused_self => self)
-      end associate
-      kinds = [history_kind_t('tangential', 'N/m', 'tangential force of the last step')]
-   end function history_kinds
 
    !> Compute the friction of all contacts.
    subroutine apply(self, dt, incidence, bodies, contacts, history, error)

@@ -10,7 +10,6 @@ module polydem_force_law
    use polydem_contact_block, only: contact_block_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
-   use polydem_contacts, only: contacts_t
    use polydem_cundall_strack, only: cundall_strack_t
    use polydem_damping_onset, only: damping_onset_t
    use polydem_errors, only: error_t
@@ -98,7 +97,7 @@ contains
          if (s%damping == 'hunt_crossley') call law%add(hunt_crossley_t(name='Hunt-Crossley damping'), s)
          if (s%damping == 'matuttis_chen') call law%add(matuttis_chen_damping_t(name='Matuttis-Chen damping'), s)
          if (s%damping == 'rate' .and. s%damping_from_touch) &
-            call law%add(damping_onset_t(name='from first touch', stage=stage_on_damping), s)
+            call law%add(damping_onset_t(name='from first touch'), s)
          if (s%tilt_damping > 0.0_wp) call law%add(tilt_damping_t(name='damping of tilts'), s)
          if (s%friction_coefficient > 0.0_wp) then
             if (s%friction == 'cundall_strack') call law%add(cundall_strack_t(name='Cundall-Strack friction'), s)
@@ -163,15 +162,17 @@ contains
             law%needs_accelerations = law%needs_accelerations .or. part%needs_accelerations
             law%energy_is_quadratic = law%energy_is_quadratic .or. part%energy_is_quadratic
             part%first_column = size(law%history_kinds) + 1
-            law%history_kinds = [law%history_kinds, part%history_kinds()]
+            if (allocated(part%history_kinds)) law%history_kinds = [law%history_kinds, part%history_kinds]
             if (k > 1 .and. part%stage /= stage_on_damping) law%description = law%description//','
             law%description = law%description//' '//trim(part%name)
          end associate
       end do
       if (allocated(law%constraint)) then
-         law%constraint%first_column = size(law%history_kinds) + 1
-         law%history_kinds = [law%history_kinds, law%constraint%history_kinds()]
-         law%description = law%description//', '//trim(law%constraint%name)
+         associate (part => law%constraint)
+            part%first_column = size(law%history_kinds) + 1
+            if (allocated(part%history_kinds)) law%history_kinds = [law%history_kinds, part%history_kinds]
+            law%description = law%description//', '//trim(part%name)
+         end associate
       end if
       if (law%needs_cohesion) law%energy_is_quadratic = .false.
       law%description = trim(adjustl(law%description))
@@ -233,18 +234,16 @@ contains
    end subroutine apply
 
    !> Add the springs and dashpots of all parts to those of a contact.
-   subroutine stiffen(law, bodies, contacts, element)
+   subroutine stiffen(law, element)
       class(force_law_t), intent(in) :: law
-      type(bodies_t), intent(in) :: bodies
-      !> Contacts with their forces; empty for an expected contact
-      type(contacts_t), intent(in) :: contacts
+      !> The contact; masses and geometry are set
       type(contact_element_t), intent(inout) :: element
       integer :: k
 
       do k = 1, size(law%parts)
-         call law%parts(k)%part%stiffen(bodies, contacts, element)
+         call law%parts(k)%part%stiffen(element)
       end do
-      if (allocated(law%constraint)) call law%constraint%stiffen(bodies, contacts, element)
+      if (allocated(law%constraint)) call law%constraint%stiffen(element)
    end subroutine stiffen
 
    !> Depth at which a flat contact carries a block at rest [m]; 0 if no part carries a load
@@ -270,7 +269,9 @@ contains
          if (law%parts(k)%part%dissipates) return
       end do
       do k = 1, size(law%parts)
-         if (warning == '') warning = law%parts(k)%part%undamped_warning()
+         associate (part => law%parts(k)%part)
+            if (warning == '' .and. allocated(part%undamped_warning)) warning = part%undamped_warning
+         end associate
       end do
    end function undamped_warning
 

@@ -55,13 +55,13 @@ module polydem_force_part
       logical :: energy_is_quadratic = .false.
       !> Whether it dissipates energy in every normal impact
       logical :: dissipates = .false.
+      !> Warning if no part of the law dissipates; not allocated if there is none
+      character(len=:), allocatable :: undamped_warning
    contains
       !> Add this part to the forces of a block of contacts
       procedure(add), deferred :: add
       !> Depth at which this part carries a block at rest
       procedure :: static_depth
-      !> Warning if no part of the law dissipates
-      procedure :: undamped_warning
    end type force_part_t
 
    abstract interface
@@ -91,15 +91,5 @@ contains
       end associate
       static_depth = 0.0_wp
    end function static_depth
-
-   !> Warning if no part of the law dissipates. Default: blank, no warning
-   function undamped_warning(self) result(warning)
-      class(force_part_t), intent(in) :: self
-      character(len=:), allocatable :: warning
-
-      associate (unused_self => self)
-      end associate
-      warning = ''
-   end function undamped_warning
 
 end module polydem_force_part

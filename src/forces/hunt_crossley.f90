@@ -5,10 +5,8 @@
 !> order in the step. Slow impacts lose less: with u = a v before the impact, the restitution e follows from
 !> u - ln(1 + u) = -e u - ln(1 - e u), e = 1 - 2u/3 + ...
 module polydem_hunt_crossley
-   use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_element, only: contact_element_t
-   use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
    implicit none
@@ -41,26 +39,17 @@ contains
    end subroutine find_forces
 
    !> Add stiffness and dashpot from the present force. An expected contact has no force and gets neither.
-   subroutine stiffen(self, bodies, contacts, element)
+   subroutine stiffen(self, element)
       class(hunt_crossley_t), intent(in) :: self
-      type(bodies_t), intent(in) :: bodies
-      type(contacts_t), intent(in) :: contacts
       !> The contact; normal stiffness and dashpot change
       type(contact_element_t), intent(inout) :: element
-      real(wp) :: force
 
-      associate (unused_bodies => bodies)
-      end associate
-      if (element%contact == 0_ip) return
-      associate (c => element%contact)
-         force = contacts%normal_force(c)
-         if (contacts%has_cohesion) force = force - contacts%cohesion(c)
-         if (force > contacts%elastic(c)) &
-            element%normal_stiffness = element%normal_stiffness*(force/contacts%elastic(c))
-         element%normal_dashpot = element%normal_dashpot &
-            + self%coefficient*sqrt(1.0_wp/(element%normal_mobility*self%stiffness))*contacts%elastic(c)*element%ratio &
-            /max(contacts%length(c), sqrt(contacts%area(c)))
-      end associate
+      if (element%is_expected) return
+      if (element%repulsion > element%elastic) &
+         element%normal_stiffness = element%normal_stiffness*(element%repulsion/element%elastic)
+      element%normal_dashpot = element%normal_dashpot &
+         + self%coefficient*sqrt(1.0_wp/(element%normal_mobility*self%stiffness))*element%elastic*element%ratio &
+         /max(element%length, sqrt(element%area))
    end subroutine stiffen
 
 end module polydem_hunt_crossley

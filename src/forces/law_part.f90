@@ -8,7 +8,6 @@ module polydem_law_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: history_kind_t
-   use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip
    use polydem_settings, only: forces_settings_t, settings_t
@@ -22,15 +21,16 @@ module polydem_law_part
       character(len=40) :: name = ''
       !> Index of the first column of this member in `contact_history_t`; the law sets it
       integer :: first_column = 1
+      !> Its contact history: column(first_column), column(first_column + 1) ... of `contact_history_t`; not allocated
+      !> if there is none. Names must differ from those of other members of the same law
+      type(history_kind_t), allocatable :: history_kinds(:)
    contains
-      !> Copy its parameters from the settings
+      !> Copy its parameters from the settings, and set its other components
       procedure :: configure
       !> Refuse settings that exclude this member
       procedure :: check
       !> Measure the bodies
       procedure :: measure
-      !> Columns of its contact history
-      procedure :: history_kinds
       !> Add its springs and dashpots to those of a contact
       procedure :: stiffen
    end type law_part_t
@@ -69,28 +69,14 @@ contains
       end associate
    end subroutine measure
 
-   !> Columns of the contact history, in the order column(first_column), column(first_column + 1) ... of
-   !> `contact_history_t`. Default: none. Names must differ from those of other members of the same law.
-   function history_kinds(self) result(kinds)
-      class(law_part_t), intent(in) :: self
-      type(history_kind_t), allocatable :: kinds(:)
-
-      associate (unused_self => self)
-      end associate
-      allocate (kinds(0))
-   end function history_kinds
-
    !> Add the springs and dashpots to those of a contact, for the stable step. Default: none. The parts add theirs in
    !> the order of their stages.
-   subroutine stiffen(self, bodies, contacts, element)
+   subroutine stiffen(self, element)
       class(law_part_t), intent(in) :: self
-      type(bodies_t), intent(in) :: bodies
-      !> Contacts with their forces; only the contact `element%contact` may be read
-      type(contacts_t), intent(in) :: contacts
       !> The contact; masses and geometry are set
       type(contact_element_t), intent(inout) :: element
 
-      associate (unused_self => self, unused_bodies => bodies, unused_contacts => contacts, unused => element)
+      associate (unused_self => self, unused => element)
       end associate
    end subroutine stiffen
 

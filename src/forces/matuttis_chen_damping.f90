@@ -9,6 +9,7 @@ module polydem_matuttis_chen_damping
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
+   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: matuttis_chen_damping_t
@@ -16,7 +17,7 @@ module polydem_matuttis_chen_damping
    !> Damping by the backward difference of the area
    type, extends(normal_damping_t) :: matuttis_chen_damping_t
    contains
-      procedure :: history_kinds
+      procedure :: configure
       procedure :: add
    end type matuttis_chen_damping_t
 
@@ -25,15 +26,14 @@ module polydem_matuttis_chen_damping
 
 contains
 
-   !> Contact history of this part: the overlap area of the last step
-   function history_kinds(self) result(kinds)
-      class(matuttis_chen_damping_t), intent(in) :: self
-      type(history_kind_t), allocatable :: kinds(:)
+   !> Copy the parameters from the settings. The contact history is the overlap area of the last step.
+   subroutine configure(self, settings)
+      class(matuttis_chen_damping_t), intent(inout) :: self
+      type(forces_settings_t), intent(in) :: settings
 
-      associate (unused_self => self)
-      end associate
-      kinds = [history_kind_t('area', 'm2', 'overlap area at the last step', zero_is_new=.true.)]
-   end function history_kinds
+      call self%take_coefficients(settings)
+      self%history_kinds = [history_kind_t('area', 'm2', 'overlap area at the last step', zero_is_new=.true.)]
+   end subroutine configure
 
    !> Add the damping force, and store the areas.
    subroutine add(self, bodies, dt, block, history)

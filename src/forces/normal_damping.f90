@@ -7,7 +7,6 @@ module polydem_normal_damping
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t
-   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: force_part_t, stage_damping
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
@@ -77,15 +76,11 @@ contains
    end subroutine add_limited
 
    !> Add the dashpot gamma sqrt(m E) L/l.
-   subroutine stiffen(self, bodies, contacts, element)
+   subroutine stiffen(self, element)
       class(normal_damping_t), intent(in) :: self
-      type(bodies_t), intent(in) :: bodies
-      type(contacts_t), intent(in) :: contacts
       !> The contact; its normal dashpot changes
       type(contact_element_t), intent(inout) :: element
 
-      associate (unused_bodies => bodies, unused_contacts => contacts)
-      end associate
       element%normal_dashpot = element%normal_dashpot &
          + self%coefficient*sqrt(element%normal_mass*self%stiffness)*element%ratio
    end subroutine stiffen

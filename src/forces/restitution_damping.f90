@@ -13,10 +13,8 @@
 !> because k follows the depth (Y. Tsuji, T. Tanaka & T. Ishida, Powder Technol. 71 (1992) 239). The effective mass is
 !> that of a central impact; eccentric impacts lose more energy.
 module polydem_restitution_damping
-   use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_element, only: contact_element_t
-   use polydem_contacts, only: contacts_t
    use polydem_elementary, only: arc_cosine, exponential, logarithm
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
@@ -64,15 +62,11 @@ contains
    end subroutine find_forces
 
    !> Add the dashpot 2 zeta sqrt(m k).
-   subroutine stiffen(self, bodies, contacts, element)
+   subroutine stiffen(self, element)
       class(restitution_damping_t), intent(in) :: self
-      type(bodies_t), intent(in) :: bodies
-      type(contacts_t), intent(in) :: contacts
       !> The contact; its normal dashpot changes
       type(contact_element_t), intent(inout) :: element
 
-      associate (unused_bodies => bodies, unused_contacts => contacts)
-      end associate
       element%normal_dashpot = element%normal_dashpot &
          + 2.0_wp*self%ratio*sqrt(element%normal_mass*self%stiffness)*sqrt(element%ratio)
    end subroutine stiffen

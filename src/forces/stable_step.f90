@@ -66,7 +66,6 @@ contains
       !> Slot of the body that limits the step, 0 if there is no free body
       integer(ip), intent(out) :: critical
       type(contact_element_t) :: element
-      type(contacts_t) :: no_contacts
       real(wp) :: g(4), this
       integer(ip) :: k, s
 
@@ -74,8 +73,7 @@ contains
       critical = 0_ip
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
-         element = contact_element_t(body=s)
-         element%radius_square = greatest_radius_square(bodies, s)
+         call describe_shape(bodies, s, element)
          g(1) = assumed_contacts*bodies%inverse_mass(s)
          g(2) = assumed_contacts*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
          g(3) = 0.0_wp
@@ -83,7 +81,7 @@ contains
          element%normal_mass = 0.5_wp*bodies%mass(s)
          element%normal_mobility = 2.0_wp*bodies%inverse_mass(s)
          element%tangential_mass = 1.0_wp/(g(2)/assumed_contacts)
-         call law%stiffen(bodies, no_contacts, element)
+         call law%stiffen(element)
          this = step_of_element(table, element, g)
          if (this < step) then
             step = this
@@ -107,13 +105,18 @@ contains
       alone = 0.0_wp
       call add_body(contacts%first(c), contacts%arm_first(:, c))
       call add_body(contacts%second(c), contacts%arm_second(:, c))
-      element%contact = c
-      element%ratio = contacts%length(c)*contacts%inverse_length(c)
+      element%area = contacts%area(c)
+      element%length = contacts%length(c)
+      element%inverse_length = contacts%inverse_length(c)
+      element%ratio = element%length*element%inverse_length
+      element%elastic = contacts%elastic(c)
+      element%repulsion = contacts%normal_force(c)
+      if (contacts%has_cohesion) element%repulsion = element%repulsion - contacts%cohesion(c)
       element%normal_mobility = bodies%inverse_mass(contacts%first(c)) + bodies%inverse_mass(contacts%second(c))
       element%normal_mass = 1.0_wp/element%normal_mobility
       element%tangential_mass = 1.0_wp/alone(2)
       element%rotational_mobility = alone(4)
-      call law%stiffen(bodies, contacts, element)
+      call law%stiffen(element)
       step_of_contact = step_of_element(table, element, g)
 
    contains
@@ -172,16 +175,31 @@ contains
       end associate
    end function step_of_element
 
-   !> Square of the greatest radius of a body [m2]
-   pure real(wp) function greatest_radius_square(bodies, s) result(square)
+   !> Start an expected contact from the shape of its body.
+   pure subroutine describe_shape(bodies, s, element)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
-      integer(ip) :: v
+      type(contact_element_t), intent(out) :: element
+      real(wp) :: dx, dy, length, distance, longest, area
+      integer(ip) :: v, w
 
-      square = 0.0_wp
+      element%is_expected = .true.
+      element%inertia = bodies%inertia(s)
+      longest = 0.0_wp
+      area = 0.0_wp
+      w = bodies%vertex_start(s + 1_ip) - 1_ip
       do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-         square = max(square, bodies%shape(1, v)**2 + bodies%shape(2, v)**2)
+         dx = bodies%shape(1, v) - bodies%shape(1, w)
+         dy = bodies%shape(2, v) - bodies%shape(2, w)
+         length = sqrt(dx*dx + dy*dy)
+         distance = abs(dx*bodies%shape(2, w) - dy*bodies%shape(1, w))/length
+         longest = max(longest, length)
+         area = area + 0.5_wp*length*distance
+         element%edge_ratio = max(element%edge_ratio, length/(2.0_wp*distance))
+         element%radius_square = max(element%radius_square, bodies%shape(1, v)**2 + bodies%shape(2, v)**2)
+         w = v
       end do
-   end function greatest_radius_square
+      element%square_ratio = longest*longest/area
+   end subroutine describe_shape
 
 end module polydem_stable_step

@@ -13,7 +13,6 @@ module polydem_tilt_damping
    use polydem_contact_block, only: contact_block_t
    use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_history_t
-   use polydem_contacts, only: contacts_t
    use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
@@ -74,21 +73,17 @@ contains
    end subroutine add
 
    !> Add the dashpot s sqrt(k I_eff).
-   subroutine stiffen(self, bodies, contacts, element)
+   subroutine stiffen(self, element)
       class(tilt_damping_t), intent(in) :: self
-      !> Bodies, for the inertia of the body of an expected contact
-      type(bodies_t), intent(in) :: bodies
-      !> Contacts with their lengths
-      type(contacts_t), intent(in) :: contacts
       !> The contact; the dashpot against tilts changes
       type(contact_element_t), intent(inout) :: element
       real(wp) :: square
 
-      if (element%contact > 0_ip) then
-         square = face_tilt_stiffness(self%stiffness, contacts, element%contact)/element%rotational_mobility
-      else
+      if (element%is_expected) then
          ! An upper bound: no edge is longer than twice the greatest radius, and the other body may be fixed.
-         square = element%normal_stiffness*element%radius_square/3.0_wp*bodies%inertia(element%body)
+         square = element%normal_stiffness*element%radius_square/3.0_wp*element%inertia
+      else
+         square = face_tilt_stiffness(self%stiffness, element)/element%rotational_mobility
       end if
       element%tilt_dashpot = element%tilt_dashpot + self%share*sqrt(square)
    end subroutine stiffen
