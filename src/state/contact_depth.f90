@@ -9,7 +9,7 @@ module polydem_contact_depth
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: depth_share, deepest_contact, any_deeper, count_deeper, depth_text
+   public :: depth_share, deepest_contact, any_deeper, depth_text
 
 contains
 
@@ -64,21 +64,6 @@ contains
       !$omp end parallel do
       any_deeper = deeper
    end function any_deeper
-
-   !> Number of contacts deeper than a share of the thinner body
-   pure integer(ip) function count_deeper(contacts, thickness, limit)
-      type(contacts_t), intent(in) :: contacts
-      !> Thickness of each body, (slot) [m]
-      real(wp), intent(in) :: thickness(:)
-      !> Share of the thinner body
-      real(wp), intent(in) :: limit
-      integer(ip) :: c
-
-      count_deeper = 0_ip
-      do c = 1_ip, contacts%n
-         if (depth_share(contacts, thickness, c) > limit) count_deeper = count_deeper + 1_ip
-      end do
-   end function count_deeper
 
    !> Clause for a message: bodies, position and depth of a contact
    function depth_text(bodies, contacts, thickness, c) result(text)

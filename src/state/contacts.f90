@@ -107,22 +107,17 @@ contains
       type(contacts_t), intent(inout) :: contacts
       !> Number of contacts to make room for
       integer(ip), intent(in) :: capacity
-      type(contacts_t) :: larger
+      type(contacts_t) :: smaller
       integer(ip) :: c
 
       if (allocated(contacts%pair)) then
          if (size(contacts%pair) >= capacity) return
       end if
-      larger%has_cohesion = contacts%has_cohesion
-      larger%has_twist = contacts%has_twist
-      larger%area_is_effective = contacts%area_is_effective
-      larger%energy_is_quadratic = contacts%energy_is_quadratic
-      call reserve_contacts(larger, 2_ip*capacity)
-      larger%n = contacts%n
-      do c = 1_ip, contacts%n
-         call copy_contact(contacts, c, larger, c)
+      smaller = contacts
+      call reserve_contacts(contacts, 2_ip*capacity)
+      do c = 1_ip, smaller%n
+         call copy_contact(smaller, c, contacts, c)
       end do
-      call move_contacts(larger, contacts)
    end subroutine grow_contacts
 
    !> Copy a contact from one table to another.
@@ -168,31 +163,5 @@ contains
       contacts%force(2, c) = contacts%normal_force(c)*contacts%direction(2, c) &
          + contacts%tangential_force(c)*contacts%direction(1, c)
    end subroutine set_force_of_contact
-
-   !> Replace a table by another without copying its columns.
-   subroutine move_contacts(from, to)
-      type(contacts_t), intent(inout) :: from, to
-
-      to%n = from%n
-      call move_alloc(from%pair, to%pair)
-      call move_alloc(from%first, to%first)
-      call move_alloc(from%second, to%second)
-      call move_alloc(from%area, to%area)
-      call move_alloc(from%rate, to%rate)
-      call move_alloc(from%normal, to%normal)
-      call move_alloc(from%moment, to%moment)
-      call move_alloc(from%arm_first, to%arm_first)
-      call move_alloc(from%arm_second, to%arm_second)
-      call move_alloc(from%direction, to%direction)
-      call move_alloc(from%length, to%length)
-      call move_alloc(from%inverse_length, to%inverse_length)
-      call move_alloc(from%lever, to%lever)
-      call move_alloc(from%elastic, to%elastic)
-      if (from%has_cohesion) call move_alloc(from%cohesion, to%cohesion)
-      call move_alloc(from%normal_force, to%normal_force)
-      call move_alloc(from%tangential_force, to%tangential_force)
-      if (from%has_twist) call move_alloc(from%twist, to%twist)
-      call move_alloc(from%force, to%force)
-   end subroutine move_contacts
 
 end module polydem_contacts

@@ -72,26 +72,26 @@ contains
       real(wp), intent(in) :: time
       !> Bodies; position, angle, velocities and accelerations of the bodies of the motion change
       type(bodies_t), intent(inout) :: bodies
+      type(ramp_t) :: ramp
 
+      ramp = ramp_at(motion, time)
       select case (motion%kind)
       case ('rotation')
-         call rotate(motion, time, bodies)
+         call rotate(motion, ramp, bodies)
       case ('translation')
-         call translate(motion, time, bodies)
+         call shift(motion, motion%velocity, ramp%elapsed, ramp%factor, ramp%growth, bodies)
       case default
-         call oscillate(motion, time, bodies)
+         call oscillate(motion, ramp, bodies)
       end select
    end subroutine move_bodies
 
-   subroutine rotate(motion, time, bodies)
+   subroutine rotate(motion, ramp, bodies)
       type(motion_t), intent(in) :: motion
-      real(wp), intent(in) :: time
+      type(ramp_t), intent(in) :: ramp
       type(bodies_t), intent(inout) :: bodies
       real(wp) :: turn, rate, growth, c, s, arm(2)
-      type(ramp_t) :: ramp
       integer(ip) :: k, slot
 
-      ramp = ramp_at(motion, time)
       turn = motion%rate*ramp%elapsed
       rate = motion%rate*ramp%factor
       growth = motion%rate*ramp%growth
@@ -109,46 +109,34 @@ contains
       end do
    end subroutine rotate
 
-   subroutine translate(motion, time, bodies)
-      type(motion_t), intent(in) :: motion
-      real(wp), intent(in) :: time
-      type(bodies_t), intent(inout) :: bodies
-      type(ramp_t) :: ramp
-      integer(ip) :: k
-
-      ramp = ramp_at(motion, time)
-      do k = 1_ip, size(motion%slots, kind=ip)
-         associate (slot => motion%slots(k))
-            bodies%position(:, slot) = motion%position(:, k) + motion%velocity*ramp%elapsed
-            bodies%velocity(:, slot) = motion%velocity*ramp%factor
-            bodies%acceleration(:, slot) = motion%velocity*ramp%growth
-         end associate
-      end do
-   end subroutine translate
-
    !> x = x0 + a sin(w e(t)) with the ramped time e. The amplitude is full from the start; the frequency rises.
-   subroutine oscillate(motion, time, bodies)
+   subroutine oscillate(motion, ramp, bodies)
       type(motion_t), intent(in) :: motion
-      real(wp), intent(in) :: time
+      type(ramp_t), intent(in) :: ramp
       type(bodies_t), intent(inout) :: bodies
-      real(wp) :: phase, rate, speed, change, c, s
-      type(ramp_t) :: ramp
+      real(wp) :: rate, c, s
+
+      rate = motion%frequency*ramp%factor
+      call sine_and_cosine(motion%frequency*ramp%elapsed, s, c)
+      call shift(motion, motion%amplitude, s, rate*c, motion%frequency*ramp%growth*c - rate**2*s, bodies)
+   end subroutine oscillate
+
+   !> Shift the bodies of a motion along a vector.
+   subroutine shift(motion, vector, place, speed, change, bodies)
+      type(motion_t), intent(in) :: motion
+      !> The vector, and the multiples of it that are the displacement, the velocity and the acceleration
+      real(wp), intent(in) :: vector(2), place, speed, change
+      type(bodies_t), intent(inout) :: bodies
       integer(ip) :: k
 
-      ramp = ramp_at(motion, time)
-      phase = motion%frequency*ramp%elapsed
-      rate = motion%frequency*ramp%factor
-      call sine_and_cosine(phase, s, c)
-      speed = rate*c
-      change = motion%frequency*ramp%growth*c - rate**2*s
       do k = 1_ip, size(motion%slots, kind=ip)
          associate (slot => motion%slots(k))
-            bodies%position(:, slot) = motion%position(:, k) + motion%amplitude*s
-            bodies%velocity(:, slot) = motion%amplitude*speed
-            bodies%acceleration(:, slot) = motion%amplitude*change
+            bodies%position(:, slot) = motion%position(:, k) + vector*place
+            bodies%velocity(:, slot) = vector*speed
+            bodies%acceleration(:, slot) = vector*change
          end associate
       end do
-   end subroutine oscillate
+   end subroutine shift
 
    !> The ramp of a motion at a time
    pure type(ramp_t) function ramp_at(motion, time) result(ramp)
