@@ -1,7 +1,7 @@
 !> Replaces the former words of a namelist by the present ones. Comments, order and layout do not change.
 module polydem_convert_namelist
    use polydem_errors, only: error_t
-   use polydem_former_words, only: present_group, present_key, present_value, renaming
+   use polydem_former_words, only: present_name, renaming
    use polydem_namelist_tokens, only: bare_token, end_token, equals_token, group_token, quoted_token, source_t, &
       split_tokens, token_t
    use polydem_strings, only: lower_case, text_t
@@ -44,7 +44,7 @@ contains
          present = word
          select case (tokens(k)%kind)
          case (group_token)
-            present = present_group(lower_case(word))
+            present = present_name(lower_case(word))
             group = present
             key = ''
             change = renaming(lower_case(word), '', '', present)
@@ -53,11 +53,11 @@ contains
          case (bare_token, quoted_token)
             if (group == '') cycle
             if (tokens(k)%kind == bare_token .and. is_key(tokens, k)) then
-               present = present_key(group, lower_case(word))
+               present = present_name(group, lower_case(word))
                key = present
                change = renaming(group, lower_case(word), '', present)
             else
-               present = present_value(group, key, word)
+               present = present_name(group, key, word)
                change = renaming(group, key, trim(word), present)
             end if
          case default

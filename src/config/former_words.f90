@@ -7,7 +7,7 @@ module polydem_former_words
    use polydem_strings, only: quoted
    implicit none
    private
-   public :: former_word_t, former_words, present_group, present_key, present_value, renaming
+   public :: former_word_t, former_words, present_name, renaming
 
    !> A word that has another name now
    type :: former_word_t
@@ -31,48 +31,28 @@ module polydem_former_words
 
 contains
 
-   !> Present name of a group; the group itself if it was not renamed
-   pure function present_group(group) result(name)
-      !> Group in lower case
+   !> Present name of a group, a key or a value: of the last word that is given. The word itself if it was not renamed
+   pure function present_name(group, key, value) result(name)
+      !> Group in lower case; the present name if a key is given
       character(len=*), intent(in) :: group
-      character(len=:), allocatable :: name
-
-      name = present_name(group, '', '', group)
-   end function present_group
-
-   !> Present name of a key; the key itself if it was not renamed
-   pure function present_key(group, key) result(name)
-      !> Present group
-      character(len=*), intent(in) :: group
-      !> Key in lower case
-      character(len=*), intent(in) :: key
-      character(len=:), allocatable :: name
-
-      name = present_name(group, key, '', key)
-   end function present_key
-
-   !> Present name of a value; the value itself if it was not renamed
-   pure function present_value(group, key, value) result(name)
-      !> Present group and key
-      character(len=*), intent(in) :: group, key
+      !> Key in lower case; the present name if a value is given
+      character(len=*), intent(in), optional :: key
       !> Value without quotes
-      character(len=*), intent(in) :: value
-      character(len=:), allocatable :: name
-
-      name = present_name(group, key, value, value)
-   end function present_value
-
-   !> Present name of a word; the word itself if the table does not contain it
-   pure function present_name(group, key, value, word) result(name)
-      character(len=*), intent(in) :: group, key, value, word
-      character(len=:), allocatable :: name
+      character(len=*), intent(in), optional :: value
+      character(len=:), allocatable :: name, wanted_key, wanted_value
       integer :: k
 
-      name = word
-      if (word == '') return
+      name = group
+      wanted_key = ''
+      wanted_value = ''
+      if (present(key)) wanted_key = key
+      if (present(key)) name = key
+      if (present(value)) wanted_value = value
+      if (present(value)) name = value
+      if (name == '') return
       do k = 1, size(former_words)
-         if (former_words(k)%group /= group .or. former_words(k)%key /= key) cycle
-         if (former_words(k)%value == value) name = trim(former_words(k)%present)
+         if (former_words(k)%group /= group .or. former_words(k)%key /= wanted_key) cycle
+         if (former_words(k)%value == wanted_value) name = trim(former_words(k)%present)
       end do
    end function present_name
 

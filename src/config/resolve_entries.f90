@@ -6,7 +6,7 @@
 !> error.
 module polydem_resolve_entries
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_former_words, only: present_group, present_key, present_value, renaming
+   use polydem_former_words, only: present_name, renaming
    use polydem_kinds, only: ip, wp
    use polydem_namelist_entries, only: bench_group, entries, entry_t, first_row, group_length, groups, keys_of, required
    use polydem_namelist_statements, only: read_statements, statement_t
@@ -122,12 +122,12 @@ contains
       character(len=:), allocatable :: group, key, name, text, value
       integer :: k
 
-      group = present_group(statement%group)
-      key = present_key(group, statement%key)
+      group = present_name(statement%group)
+      key = present_name(group, statement%key)
       text = ''
       do k = size(statement%values), 1, -1
          value = trim(statement%values(k)%text)
-         name = present_value(group, key, value)
+         name = present_name(group, key, value)
          if (name /= value) text = renaming(group, key, value, name)
       end do
       if (key /= statement%key) text = renaming(group, statement%key, '', key)
