@@ -61,11 +61,8 @@ contains
       !> Angle [rad]
       real(wp), intent(in) :: angle
 
-      if (is_quadruple) then
-         sine = sin(angle)
-      else
-         sine = real(dp_sine(real(angle, dp)), wp)
-      end if
+      sine = real(dp_sine(real(angle, dp)), wp)
+      if (is_quadruple) sine = sin(angle)
    end function sine
 
    !> Cosine
@@ -73,11 +70,8 @@ contains
       !> Angle [rad]
       real(wp), intent(in) :: angle
 
-      if (is_quadruple) then
-         cosine = cos(angle)
-      else
-         cosine = real(dp_cosine(real(angle, dp)), wp)
-      end if
+      cosine = real(dp_cosine(real(angle, dp)), wp)
+      if (is_quadruple) cosine = cos(angle)
    end function cosine
 
    !> Tangent
@@ -85,11 +79,8 @@ contains
       !> Angle [rad]
       real(wp), intent(in) :: angle
 
-      if (is_quadruple) then
-         tangent = tan(angle)
-      else
-         tangent = real(dp_tangent(real(angle, dp)), wp)
-      end if
+      tangent = real(dp_tangent(real(angle, dp)), wp)
+      if (is_quadruple) tangent = tan(angle)
    end function tangent
 
    !> Exponential function
@@ -97,11 +88,8 @@ contains
       !> Exponent
       real(wp), intent(in) :: x
 
-      if (is_quadruple) then
-         exponential = exp(x)
-      else
-         exponential = real(dp_exponential(real(x, dp)), wp)
-      end if
+      exponential = real(dp_exponential(real(x, dp)), wp)
+      if (is_quadruple) exponential = exp(x)
    end function exponential
 
    !> Natural logarithm
@@ -109,11 +97,8 @@ contains
       !> Number, not negative
       real(wp), intent(in) :: x
 
-      if (is_quadruple) then
-         logarithm = log(x)
-      else
-         logarithm = real(dp_logarithm(real(x, dp)), wp)
-      end if
+      logarithm = real(dp_logarithm(real(x, dp)), wp)
+      if (is_quadruple) logarithm = log(x)
    end function logarithm
 
    !> Arc cosine, from 0 to pi [rad]
@@ -121,11 +106,8 @@ contains
       !> Cosine, from -1 to 1
       real(wp), intent(in) :: x
 
-      if (is_quadruple) then
-         arc_cosine = acos(x)
-      else
-         arc_cosine = real(dp_arc_cosine(real(x, dp)), wp)
-      end if
+      arc_cosine = real(dp_arc_cosine(real(x, dp)), wp)
+      if (is_quadruple) arc_cosine = acos(x)
    end function arc_cosine
 
    !> Length of the vector (x, y)
@@ -133,11 +115,8 @@ contains
       !> Components of the vector
       real(wp), intent(in) :: x, y
 
-      if (is_quadruple) then
-         hypotenuse = hypot(x, y)
-      else
-         hypotenuse = real(dp_hypotenuse(real(x, dp), real(y, dp)), wp)
-      end if
+      hypotenuse = real(dp_hypotenuse(real(x, dp), real(y, dp)), wp)
+      if (is_quadruple) hypotenuse = hypot(x, y)
    end function hypotenuse
 
 end module polydem_elementary

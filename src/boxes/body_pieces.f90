@@ -8,7 +8,7 @@
 module polydem_body_pieces
    use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
-   use polydem_polygon, only: clip_half_plane, diameter
+   use polydem_polygon, only: clip_half_plane, cross, diameter
    implicit none
    private
    public :: pieces_t, cut_body
@@ -182,13 +182,6 @@ contains
       from = minval(along)
       length = maxval(along) - from
    end subroutine extent
-
-   !> Third component of the cross product
-   pure real(wp) function cross(p, q)
-      real(wp), intent(in) :: p(2), q(2)
-
-      cross = p(1)*q(2) - p(2)*q(1)
-   end function cross
 
    !> Append a piece. A piece without vertices is a body that is not cut.
    pure subroutine append(self, vertices)

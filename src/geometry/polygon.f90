@@ -9,7 +9,7 @@ module polydem_polygon
    use polydem_strings, only: counted, to_text
    implicit none
    private
-   public :: clean_polygon, mass_properties, diameter, clip_half_plane
+   public :: clean_polygon, mass_properties, diameter, clip_half_plane, cross
 
    !> A vertex is dropped if it is closer to its neighbour, or to the line of its neighbours, than this fraction of
    !> the size: far above the rounding errors of a text file, far below any effect on a result.
@@ -262,6 +262,7 @@ contains
 
    !> Third component of the cross product
    pure real(wp) function cross(p, q)
+      !> The vectors
       real(wp), intent(in) :: p(2), q(2)
 
       cross = p(1)*q(2) - p(2)*q(1)
