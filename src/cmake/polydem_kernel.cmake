@@ -1,4 +1,4 @@
-# polydem_kernel(OUTPUT variable FILES /path/a.f90 /path/b.f90 ...)
+# polydem_kernel(OUTPUT variable FILES a.f90 b.f90 ...)
 #
 # A kernel compiled for several instruction sets within one program, as polydem_variant does: module polydem_b of the last
 # file becomes polydem_b_base, for every processor of the architecture, and polydem_b_avx2, for those with AVX2. Neither
