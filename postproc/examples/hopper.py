@@ -106,7 +106,7 @@ image = axes[1, 1].pcolormesh(fields.x, fields.y, shown, cmap="viridis", shading
 axes[1, 1].add_collection(PolyCollection(frame.vertices, facecolor="none", edgecolor="black", linewidth=0.4))
 axes[1, 1].set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title=f"pressure at t = {frame.time:.2f} s")
 axes[1, 1].autoscale_view()
-figure.colorbar(image, ax=axes[1, 1], label="N/m")
+figure.colorbar(image, ax=axes[1, 1], label="N/m$^2$")
 
 path = RESULT / "discharge.png"
 figure.savefig(path, dpi=150)

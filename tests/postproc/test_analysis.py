@@ -29,6 +29,7 @@ from polydem_post.analysis import (
     stress_tensor,
 )
 from polydem_post.columns import columns_of, field_names
+from polydem_post.polygons import area_of, clip
 
 SQUARE = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
@@ -343,6 +344,31 @@ def test_the_profile_of_a_shear_flow():
     assert along.mean[1, 0] == pytest.approx(4.0)
 
 
+def test_a_profile_across_a_slope_is_that_of_the_turned_scene():
+    heights = np.arange(6.0)
+    flat = squares([(x, y) for y in heights for x in range(4)], velocity=np.repeat(heights, 4)[:, None] * (1.0, 0.0))
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    sloped = Frame.from_polygons([outline @ turn.T for outline in flat.vertices], velocity=flat.velocity @ turn.T)
+    edges = [-0.2, 1.3, 3.0, 5.5]
+    level = profile(flat, "velocity", edges, between=(0.2, 2.9))
+    found = profile(sloped, "velocity", edges, axis=turn @ (0.0, 3.0), between=(0.2, 2.9))
+    assert_allclose(found.weight, level.weight, rtol=1e-12)
+    assert_allclose(found.mean @ turn, level.mean, atol=1e-12)
+    for wrong in ("z", (0, 0), (1, 2, 3)):
+        with pytest.raises(ResultError, match="axis x or y, or a vector"):
+            profile(flat, "velocity", edges, axis=wrong)
+
+
+def test_a_profile_over_frames_weighs_every_part_alike():
+    slow, fast = (squares([(0, 0.5 * k)], velocity=[(1.0 + k, 0.0)]) for k in range(2))
+    found = profile([slow, fast], "velocity", [-0.5, 0.0, 2.0])
+    # Of the first square half is in either slab, of the second all in the upper one.
+    assert_allclose(found.mean[:, 0], [1.0, (0.5 * 1.0 + 1.0 * 2.0) / 1.5])
+    assert_allclose(found.weight, [0.25, 0.75])
+    with pytest.raises(ResultError, match="at least one frame"):
+        profile([], "velocity", [0.0, 1.0])
+
+
 def falling(n_frames=5):
     """Squares that fall at 1 m/s in two columns, x = 0 and x = 5, one frame per second; a fixed one falls, too."""
     places = np.array([(0, y) for y in range(6)] + [(5, y) for y in range(3)] + [(0.2, 2.5)], dtype=float)
@@ -362,6 +388,9 @@ def test_flow_through_a_line():
     beyond = [mass_beyond(frame, (0, -0.5), (0, -1)) for frame in frames]
     assert_allclose(np.diff(beyond), flow_rate(frames, (-1, -0.5), (9, -0.5)).mass)
     assert mass_beyond(frames[0], (0, 0.2), (0, -1)) == pytest.approx(2 * 2 * 0.7)
+    assert mass_beyond(frames[0], (0, 1.2), (-2, -1)) == pytest.approx(
+        sum(frames[0].density[k] * area_of(clip(frames[0].vertices[k], np.array([0, 1.2]), np.array([2, 1])))
+            for k in range(9)))
 
 
 def test_mixing_of_separate_and_of_mixed_kinds():

@@ -252,6 +252,7 @@ def test_runs_several_at_once_and_never_more(sweep_of):
     at_once = [sum(begin <= moment < end for begin, end in spans) for moment, _ in spans]
     assert max(at_once) == 2
     assert [len(calls_of(run)) for run in sweep.runs] == [1] * 6
+    assert sweep.runs[5].values == {"toy.does": "finish", "toy.seconds": "0.3"}
     words = calls_of(sweep.runs[0])[0][0]
     assert words[:4] == ["run", str(sweep.runs[0].folder / "input.nml"), "--threads", "2"]
     assert words[-3:] == ["--set", f"output.folder={sweep.runs[0].result}", "--continue"]
@@ -301,7 +302,7 @@ def test_a_sweep_that_cannot_go_on_leaves_no_run_behind(sweep_of):
     (sweep.runs[1].folder / "attempts.csv").mkdir()
     runner = Runner(program, 2, 1, say=lambda _: None)
     with pytest.raises(ResultError, match="cannot go on: .*attempts.csv"):
-        runner.run([sweep.runs[0], BrokenRun(sweep.runs[1].name, sweep.runs[1].folder, ())])
+        runner.run([sweep.runs[0], BrokenRun(sweep.runs[1].name, sweep.runs[1].folder, {})])
     assert not any(slot.is_busy for slot in runner.slots)
 
 

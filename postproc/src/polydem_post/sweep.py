@@ -63,8 +63,8 @@ class Run:
 
     name: str
     folder: Path
-    #: Values of the columns as they were written
-    values: tuple[str, ...]
+    #: Value of each entry, as in values["scene.seed"], as it was written; empty: as in the namelist
+    values: dict[str, str]
 
     @property
     def result(self) -> Path:
@@ -105,7 +105,7 @@ class Sweep:
         except ResultError as error:
             # The program wrote this table, so it was damaged, and the first defect says enough.
             raise ResultError(str(error).splitlines()[0]) from error
-        self.runs = [Run(row.name, self.folder / RUNS / row.name, row.values) for row in rows]
+        self.runs = [Run(row.name, self.folder / RUNS / row.name, dict(zip(self.columns, row.values))) for row in rows]
 
     def choose(self, numbers: list[int] | None = None, names: list[str] | None = None) -> list[Run]:
         """The runs of some rows, counted from 1, and of some names; all if neither is given."""

@@ -76,7 +76,7 @@ def collect_sweep(sweep: Sweep, say=print) -> list[Outcome]:
 
 def read_outcome(sweep: Sweep, run: Run) -> Outcome:
     """All that is known of a run."""
-    outcome = Outcome(run.name, dict(zip(sweep.columns, run.values)))
+    outcome = Outcome(run.name, run.values)
     attempts = run.attempts()
     facts = outcome.facts
     facts.update(state=state_of(run), attempts=len(attempts))

@@ -80,7 +80,11 @@ def mass_beyond(frame: Frame, point: Any, direction: Any) -> float:
     The change of this mass over time is the flow through the whole line.
     """
     place, across = np.asarray(point, dtype=float), np.asarray(direction, dtype=float)
-    mass = 0.0
-    for k in np.flatnonzero(frame.free):
-        mass += frame.density[k] * area_of(clip(frame.vertices[k], place, -across))
-    return float(mass)
+    if len(frame) == 0:
+        return 0.0
+    beyond = (frame.vertex - place) @ across >= 0.0
+    whole, touched = (every.reduceat(beyond, frame.vertex_start[:-1]) for every in (np.logical_and, np.logical_or))
+    mass = float(frame.mass[frame.free & whole].sum())
+    for k in np.flatnonzero(frame.free & touched & ~whole):
+        mass += float(frame.density[k]) * area_of(clip(frame.vertices[k], place, -across))
+    return mass
