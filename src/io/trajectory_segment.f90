@@ -16,7 +16,7 @@
 module polydem_trajectory_segment
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_contacts, only: contacts_t
+   use polydem_contacts, only: contact_force, contacts_t
    use polydem_errors, only: error_t
    use polydem_global_order, only: component, global_order_t, vector
    use polydem_hdf5_file, only: hdf5_file_t, many_rows, one_row, part_t
@@ -230,7 +230,7 @@ contains
             values(1, c) = real(contacts%area(c), dp)
             values(2:3, c) = real(bodies%position(:, contacts%first(c)) + contacts%arm_first(:, c), dp)
             values(4:5, c) = real(contacts%normal(:, c), dp)
-            values(6:7, c) = real(contacts%force(:, c), dp)
+            values(6:7, c) = real(contact_force(contacts, c), dp)
          end do
          call order_pairs(comm, bodies, contacts%first(:n), contacts%second(:n), blocks)
       end associate

@@ -7,7 +7,7 @@
 !> the signs of normal, direction, lever and twist, and nothing else.
 module polydem_contact_block
    use polydem_bodies, only: bodies_t
-   use polydem_contacts, only: contacts_t, is_degenerate, set_force_of_contact
+   use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_kinds, only: ip, wp
    use polydem_overlap_batch, only: lanes, overlap_columns_t
    implicit none
@@ -87,18 +87,18 @@ contains
    end subroutine copy_motion
 
    !> Copy some contacts of a table into a block, without the motion of their bodies.
-   pure subroutine load_block(bodies, contacts, low, high, block)
+   pure subroutine load_block(bodies, contacts, high, block)
       !> Bodies with their radii
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
-      !> First and last contact, at most `block_size` contacts. They are copied in descending order
-      integer(ip), intent(in) :: low, high
+      !> First contact to copy; those before it follow in descending order, up to `block_size` contacts
+      integer(ip), intent(in) :: high
       type(contact_block_t), intent(inout) :: block
       real(wp) :: side
       integer(ip) :: b, c
       logical :: exchanged
 
-      block%n = high - low + 1_ip
+      block%n = min(high, block_size)
       do b = 1_ip, block%n
          c = high - b + 1_ip
          block%pair(b) = contacts%pair(c)
@@ -135,12 +135,12 @@ contains
       end do
    end subroutine load_block
 
-   !> Copy what the force law has computed for contact b of a block to contact c of a table, and set `force`.
+   !> Copy what the force law has computed for contact b of a block to contact c of a table.
    pure subroutine store_forces(block, b, contacts, c)
       type(contact_block_t), intent(in) :: block
       !> Index in the block
       integer(ip), intent(in) :: b
-      !> Table of contacts; `first` and `direction` of contact c must be set
+      !> Table of contacts; `first` of contact c must be set
       type(contacts_t), intent(inout) :: contacts
       !> Index in the table
       integer(ip), intent(in) :: c
@@ -154,7 +154,6 @@ contains
       contacts%tangential_force(c) = block%tangential_force(b)
       if (contacts%has_cohesion) contacts%cohesion(c) = block%cohesion(b)
       if (contacts%has_twist) contacts%twist(c) = side*block%twist(b)
-      call set_force_of_contact(contacts, c)
    end subroutine store_forces
 
    !> Copy contact b of a block to contact c of a table.

@@ -7,7 +7,7 @@ module polydem_contacts
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: contacts_t, reserve_contacts, grow_contacts, copy_contact, set_force_of_contact, is_degenerate
+   public :: contacts_t, reserve_contacts, grow_contacts, copy_contact, contact_force, is_degenerate
 
    !> Structure of arrays over contacts 1..n; the arrays may be longer
    type :: contacts_t
@@ -61,8 +61,6 @@ module polydem_contacts
       real(wp), allocatable :: tangential_force(:)
       !> Torque on the first body in addition to those of the forces; the opposite acts on the second [N]
       real(wp), allocatable :: twist(:)
-      !> Force on the first body; the opposite acts on the second, (2, contact) [N/m]
-      real(wp), allocatable :: force(:, :)
    end type contacts_t
 
 contains
@@ -88,7 +86,7 @@ contains
          deallocate (contacts%pair, contacts%first, contacts%second, contacts%area, contacts%rate, &
                      contacts%normal, contacts%moment, contacts%arm_first, contacts%arm_second, &
                      contacts%direction, contacts%length, contacts%inverse_length, contacts%lever, &
-                     contacts%elastic, contacts%normal_force, contacts%tangential_force, contacts%force)
+                     contacts%elastic, contacts%normal_force, contacts%tangential_force)
          if (allocated(contacts%cohesion)) deallocate (contacts%cohesion)
          if (allocated(contacts%twist)) deallocate (contacts%twist)
       end if
@@ -97,7 +95,7 @@ contains
       allocate (contacts%area(m), contacts%rate(m), contacts%length(m), contacts%inverse_length(m), contacts%lever(m), &
                 contacts%elastic(m), contacts%normal_force(m), contacts%tangential_force(m), source=0.0_wp)
       allocate (contacts%normal(2, m), contacts%moment(2, m), contacts%arm_first(2, m), contacts%arm_second(2, m), &
-                contacts%direction(2, m), contacts%force(2, m), source=0.0_wp)
+                contacts%direction(2, m), source=0.0_wp)
       if (contacts%has_cohesion) allocate (contacts%cohesion(m), source=0.0_wp)
       if (contacts%has_twist) allocate (contacts%twist(m), source=0.0_wp)
    end subroutine reserve_contacts
@@ -149,19 +147,19 @@ contains
       to%normal_force(d) = from%normal_force(c)
       to%tangential_force(d) = from%tangential_force(c)
       if (to%has_twist) to%twist(d) = from%twist(c)
-      to%force(:, d) = from%force(:, c)
    end subroutine copy_contact
 
-   !> Set the force of a contact from its normal and tangential force.
-   pure subroutine set_force_of_contact(contacts, c)
-      type(contacts_t), intent(inout) :: contacts
+   !> Force of a contact on its first body; the opposite acts on the second, (2) [N/m]
+   pure function contact_force(contacts, c) result(force)
+      type(contacts_t), intent(in) :: contacts
       !> Index of the contact
       integer(ip), intent(in) :: c
+      real(wp) :: force(2)
 
-      contacts%force(1, c) = contacts%normal_force(c)*contacts%direction(1, c) &
+      force(1) = contacts%normal_force(c)*contacts%direction(1, c) &
          - contacts%tangential_force(c)*contacts%direction(2, c)
-      contacts%force(2, c) = contacts%normal_force(c)*contacts%direction(2, c) &
+      force(2) = contacts%normal_force(c)*contacts%direction(2, c) &
          + contacts%tangential_force(c)*contacts%direction(1, c)
-   end subroutine set_force_of_contact
+   end function contact_force
 
 end module polydem_contacts

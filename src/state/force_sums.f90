@@ -11,7 +11,7 @@
 module polydem_force_sums
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t, load_block
-   use polydem_contacts, only: contacts_t, set_force_of_contact
+   use polydem_contacts, only: contacts_t
    use polydem_kinds, only: ip, wp
    implicit none
    private
@@ -277,24 +277,21 @@ contains
    subroutine assemble_forces(gravity, contacts, bodies, sums)
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
-      !> Contacts with normal and tangential forces, in ascending order; `force` is set
-      type(contacts_t), intent(inout) :: contacts
+      !> Contacts with normal and tangential forces, in ascending order
+      type(contacts_t), intent(in) :: contacts
       !> Bodies; `force` and `torque` are set
       type(bodies_t), intent(inout) :: bodies
       type(force_sums_t), intent(inout) :: sums
       type(contact_block_t) :: block
       type(contact_terms_t) :: terms
       type(late_terms_t) :: none
-      integer(ip) :: c, high
+      integer(ip) :: high
 
       call start_sums(bodies%n, sums)
       do high = contacts%n, 1_ip, -block_size
-         call load_block(bodies, contacts, max(1_ip, high - block_size + 1_ip), high, block)
+         call load_block(bodies, contacts, high, block)
          call terms_of_block(block, terms)
          call add_terms(block, terms, bodies%n, sums, none)
-      end do
-      do c = 1_ip, contacts%n
-         call set_force_of_contact(contacts, c)
       end do
       call total_forces(gravity, sums, 1_ip, bodies%n, bodies)
    end subroutine assemble_forces

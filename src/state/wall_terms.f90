@@ -101,7 +101,7 @@ contains
       walls%energy_is_quadratic = contacts%energy_is_quadratic
       walls%n = 0_ip
       do high = contacts%n, 1_ip, -block_size
-         call load_block(bodies, contacts, max(1_ip, high - block_size + 1_ip), high, block)
+         call load_block(bodies, contacts, high, block)
          call terms_of_block(block, terms)
          call append_walls(bodies%fixed, block, terms, walls)
       end do

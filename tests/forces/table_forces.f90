@@ -51,7 +51,7 @@ contains
       integer(ip) :: b, high
 
       do high = contacts%n, 1_ip, -block_size
-         call load_block(bodies, contacts, max(1_ip, high - block_size + 1_ip), high, block)
+         call load_block(bodies, contacts, high, block)
          call copy_motion(bodies, block)
          if (present(law)) call law%apply(bodies, dt, block, history)
          if (present(part)) call part%add(bodies, dt, block, history)

@@ -67,7 +67,9 @@ contains
          contacts%area(c) = real(step, wp) + real(c, wp)
          contacts%arm_first(:, c) = [0.25_wp, real(c, wp)]
          contacts%normal(:, c) = [0.0_wp, 0.125_wp]
-         contacts%force(:, c) = [real(c, wp), -real(step, wp)]
+         contacts%direction(:, c) = [1.0_wp, 0.0_wp]
+         contacts%normal_force(c) = real(c, wp)
+         contacts%tangential_force(c) = -real(step, wp)
       end do
    end subroutine sample_contacts
 
