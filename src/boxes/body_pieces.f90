@@ -9,21 +9,10 @@ module polydem_body_pieces
    use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
    use polydem_polygon, only: clip_half_plane, cross, diameter
+   use polydem_polygon_list, only: polygon_list_t
    implicit none
    private
-   public :: pieces_t, cut_body
-
-   !> A growing list of pieces
-   type :: pieces_t
-      !> Number of pieces
-      integer(ip) :: n = 0_ip
-      !> First vertex of each piece, and one past the last vertex of the last piece; may be longer than n + 1
-      integer(ip), allocatable :: start(:)
-      !> Vertices in the body frame, (2, vertex) [m]; may be longer than needed
-      real(wp), allocatable :: vertices(:, :)
-   contains
-      procedure :: append
-   end type pieces_t
+   public :: cut_body
 
    !> Grid for the division of a body; axis 1 is along its longest edge, axis 2 across
    type :: grid_t
@@ -49,8 +38,8 @@ contains
       real(wp), intent(in) :: largest_ratio
       !> Greatest number of pieces to append
       integer(ip), intent(in) :: room
-      !> Pieces of all bodies
-      type(pieces_t), intent(inout) :: pieces
+      !> Pieces of all bodies, in the body frame
+      type(polygon_list_t), intent(inout) :: pieces
       !> Whether there was room; if not, the pieces are incomplete
       logical, intent(out) :: fits
       type(grid_t) :: grid
@@ -95,7 +84,7 @@ contains
       real(wp), intent(in) :: part(:, :)
       !> Greatest number of pieces; beyond it the procedure returns
       integer(ip), intent(in) :: most
-      type(pieces_t), intent(inout) :: pieces
+      type(polygon_list_t), intent(inout) :: pieces
       real(wp) :: point(2), direction(2)
       real(wp), allocatable :: half(:, :)
       integer(ip) :: middle(2)
@@ -103,7 +92,7 @@ contains
 
       if (size(part, 2) == 0 .or. pieces%n > most) return
       if (all(high - low == 1_ip) .or. lies_deep(grid, outline, low, high)) then
-         call pieces%append(part)
+         call pieces%append_polygon(part)
          return
       end if
       a = merge(2, 1, high(2) - low(2) >= high(1) - low(1))
@@ -182,35 +171,5 @@ contains
       from = minval(along)
       length = maxval(along) - from
    end subroutine extent
-
-   !> Append a piece. A piece without vertices is a body that is not cut.
-   pure subroutine append(self, vertices)
-      class(pieces_t), intent(inout) :: self
-      !> Vertices in the body frame, (2, n) [m]
-      real(wp), intent(in) :: vertices(:, :)
-      integer(ip), allocatable :: longer(:)
-      real(wp), allocatable :: more(:, :)
-      integer(ip) :: first, last
-
-      if (.not. allocated(self%start)) then
-         allocate (self%start(64), self%vertices(2, 256))
-         self%start(1) = 1_ip
-      end if
-      first = self%start(self%n + 1_ip)
-      last = first + size(vertices, 2, kind=ip) - 1_ip
-      if (self%n + 2_ip > size(self%start)) then
-         allocate (longer(2_ip*self%n + 2_ip))
-         longer(1:self%n + 1_ip) = self%start(1:self%n + 1_ip)
-         call move_alloc(longer, self%start)
-      end if
-      if (last > size(self%vertices, 2)) then
-         allocate (more(2, 2_ip*last))
-         more(:, 1:first - 1_ip) = self%vertices(:, 1:first - 1_ip)
-         call move_alloc(more, self%vertices)
-      end if
-      self%vertices(:, first:last) = vertices
-      self%n = self%n + 1_ip
-      self%start(self%n + 1_ip) = last + 1_ip
-   end subroutine append
 
 end module polydem_body_pieces

@@ -12,12 +12,13 @@
 !> the margin, their boxes overlap.
 module polydem_box_maker
    use polydem_bodies, only: block_size, bodies_t, turn_block
-   use polydem_body_pieces, only: cut_body, pieces_t
+   use polydem_body_pieces, only: cut_body
    use polydem_boxes, only: boxes_t
    use polydem_elementary, only: sine_and_cosine
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_polygon, only: diameter
+   use polydem_polygon_list, only: polygon_list_t
    use polydem_sort_reals, only: sort_reals
    use polydem_strings, only: to_text
    implicit none
@@ -50,10 +51,8 @@ module polydem_box_maker
       integer(ip), allocatable :: box(:)
       !> Bodies that are cut
       type(cut_body_t), allocatable :: cut(:)
-      !> First vertex of each piece, (pieces + 1)
-      integer(ip), allocatable :: piece_start(:)
-      !> Vertices of the pieces in the body frame, (2, vertex) [m]
-      real(wp), allocatable :: piece(:, :)
+      !> Pieces of these bodies in the body frame
+      type(polygon_list_t) :: pieces
    end type box_maker_t
 
 contains
@@ -101,8 +100,7 @@ contains
       integer(ip), intent(out) :: n_boxes
       type(error_t), allocatable, intent(inout) :: error
       type(cut_body_t), allocatable :: longer(:)
-      type(pieces_t) :: pieces
-      integer(ip) :: s, room, n_cut, known
+      integer(ip) :: s, room, n_cut, n_pieces, known
       real(wp) :: length
       logical :: fits
 
@@ -111,18 +109,19 @@ contains
       n_cut = 0_ip
       allocate (maker%box(bodies%n), maker%cut(8))
       do s = 1_ip, bodies%n
-         known = pieces%n
-         call cut_body(body_shape(bodies, s), maker%median_diameter, largest_ratio, room, pieces, fits)
+         known = maker%pieces%n
+         call cut_body(body_shape(bodies, s), maker%median_diameter, largest_ratio, room, maker%pieces, fits)
+         n_pieces = maker%pieces%n - known
          if (.not. fits) then
             call refuse(bodies%id(s), diameter(body_shape(bodies, s))/maker%median_diameter, error)
             return
          end if
-         if (pieces%n == known) then
+         if (n_pieces == 0_ip) then
             n_boxes = n_boxes + 1_ip
             maker%box(s) = n_boxes
             cycle
          end if
-         room = room - (pieces%n - known)
+         room = room - n_pieces
          n_cut = n_cut + 1_ip
          if (n_cut > size(maker%cut)) then
             allocate (longer(2_ip*n_cut))
@@ -130,14 +129,11 @@ contains
             call move_alloc(longer, maker%cut)
          end if
          length = diameter(body_shape(bodies, s))
-         maker%cut(n_cut) = cut_body_t(first_box=n_boxes + 1_ip, first_piece=known + 1_ip, n=pieces%n - known, &
+         maker%cut(n_cut) = cut_body_t(first_box=n_boxes + 1_ip, first_piece=known + 1_ip, n=n_pieces, &
                                        padding=maker%margin + roundings*epsilon(1.0_wp)*length)
          maker%box(s) = -n_cut
-         n_boxes = n_boxes + (pieces%n - known)
+         n_boxes = n_boxes + n_pieces
       end do
-      if (n_cut == 0_ip) return
-      maker%piece_start = pieces%start(1:pieces%n + 1_ip)
-      maker%piece = pieces%vertices(:, 1:pieces%start(pieces%n + 1_ip) - 1_ip)
    end subroutine cut_bodies
 
    !> Report a body that would need too many boxes.
@@ -166,11 +162,11 @@ contains
          call describe_box(bodies, s, diameter(body_shape(bodies, s)), maker%margin, b, boxes)
          return
       end if
-      associate (cut => maker%cut(-b))
+      associate (cut => maker%cut(-b), pieces => maker%pieces)
          do b = 0_ip, cut%n - 1_ip
-            first = maker%piece_start(cut%first_piece + b)
-            last = maker%piece_start(cut%first_piece + b + 1_ip) - 1_ip
-            call describe_box(bodies, s, diameter(maker%piece(:, first:last)), cut%padding, cut%first_box + b, boxes)
+            first = pieces%first(cut%first_piece + b)
+            last = pieces%first(cut%first_piece + b + 1_ip) - 1_ip
+            call describe_box(bodies, s, diameter(pieces%vertex(:, first:last)), cut%padding, cut%first_box + b, boxes)
          end do
       end associate
    end subroutine describe_boxes
@@ -289,11 +285,11 @@ contains
          call place_box(extent, maker%margin, position, boxes%bounds(:, b))
          return
       end if
-      associate (cut => maker%cut(-b))
+      associate (cut => maker%cut(-b), pieces => maker%pieces)
          do b = 0_ip, cut%n - 1_ip
-            first = maker%piece_start(cut%first_piece + b)
-            last = maker%piece_start(cut%first_piece + b + 1_ip) - 1_ip
-            call place_box(extent_of(turn(maker%piece(:, first:last), direction)), cut%padding, position, &
+            first = pieces%first(cut%first_piece + b)
+            last = pieces%first(cut%first_piece + b + 1_ip) - 1_ip
+            call place_box(extent_of(turn(pieces%vertex(:, first:last), direction)), cut%padding, position, &
                            boxes%bounds(:, cut%first_box + b))
          end do
       end associate

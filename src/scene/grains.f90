@@ -8,6 +8,7 @@ module polydem_grains
    use polydem_elementary, only: sine_and_cosine
    use polydem_kinds, only: ip, lp, wp
    use polydem_polygon, only: mass_properties
+   use polydem_polygon_list, only: polygon_list_t
    use polydem_random, only: random_t
    use polydem_settings, only: scene_settings_t
    use polydem_sort_reals, only: sort_reals
@@ -31,58 +32,39 @@ module polydem_grains
       real(wp) :: area = 0.0_wp
    end type grain_t
 
-   !> Grains without positions, in little memory: their corners lie one after the other
-   type :: grains_t
+   !> Grains without positions, in little memory: a list of their corners
+   type, extends(polygon_list_t) :: grains_t
       !> As in `grain_t`, (grain)
       real(wp), allocatable :: length(:), area(:)
-      !> First corner of each grain, (grains + 1)
-      integer(ip), allocatable, private :: first(:)
-      !> Corners of all grains, (2, corner) [m]
-      real(wp), allocatable, private :: corner(:, :)
    contains
-      procedure :: reserve
-      procedure :: set
-      procedure :: corners
+      procedure :: start
+      procedure :: append
    end type grains_t
 
 contains
 
-   !> Make room for grains. Pages of memory beyond their last corner remain unused.
-   subroutine reserve(self, n, most_corners)
+   !> Make room for all grains.
+   subroutine start(self, n, most_corners)
       class(grains_t), intent(inout) :: self
       !> Number of grains
       integer(ip), intent(in) :: n
       !> Greatest number of corners of a grain
       integer(ip), intent(in) :: most_corners
 
-      allocate (self%length(n), self%area(n), self%first(n + 1_ip), &
-                self%corner(2, int(n, lp)*int(most_corners, lp)))
-      self%first(1) = 1_ip
-   end subroutine reserve
+      allocate (self%length(n), self%area(n))
+      call self%reserve(n, int(n, lp)*int(most_corners, lp))
+   end subroutine start
 
-   !> Set the next grain; grains must be set in ascending order.
-   pure subroutine set(self, k, corners, length, area)
+   !> Append a grain.
+   pure subroutine append(self, corners, length, area)
       class(grains_t), intent(inout) :: self
-      !> Number of the grain
-      integer(ip), intent(in) :: k
       !> Corners, length and area as in `grain_t`
       real(wp), intent(in) :: corners(:, :), length, area
 
-      self%length(k) = length
-      self%area(k) = area
-      self%first(k + 1_ip) = self%first(k) + size(corners, 2, kind=ip)
-      self%corner(:, self%first(k):self%first(k + 1_ip) - 1_ip) = corners
-   end subroutine set
-
-   !> Corners of a grain, (2, corner) [m]
-   pure function corners(self, k)
-      class(grains_t), intent(in) :: self
-      !> Number of the grain
-      integer(ip), intent(in) :: k
-      real(wp), allocatable :: corners(:, :)
-
-      corners = self%corner(:, self%first(k):self%first(k + 1_ip) - 1_ip)
-   end function corners
+      call self%append_polygon(corners)
+      self%length(self%n) = length
+      self%area(self%n) = area
+   end subroutine append
 
    !> Draw grains of random shape and orientation, in descending order of size.
    subroutine draw_grains(scene, random, n, grains)
@@ -97,12 +79,12 @@ contains
       real(wp) :: length, area, centroid(2), second_moment
       integer(ip) :: k
 
-      call grains%reserve(n, scene%corners_max)
+      call grains%start(n, scene%corners_max)
       sizes = draw_sizes(scene%size_ratio, n)
       do k = 1_ip, n
          call draw_corners(scene, sizes(k), random, corners, length)
          call mass_properties(corners, area, centroid, second_moment)
-         call grains%set(k, corners, length, area)
+         call grains%append(corners, length, area)
       end do
    end subroutine draw_grains
 
@@ -158,7 +140,7 @@ contains
             call list%skip()
             cycle
          end if
-         corners = grains%corners(k)
+         corners = grains%polygon(k)
          corners(1, :) = corners(1, :) + centres(1, k)
          corners(2, :) = corners(2, :) + centres(2, k)
          call list%append(corners, density=scene%density, velocity=velocities(:, k), angular_velocity=spins(k))

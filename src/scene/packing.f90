@@ -57,10 +57,10 @@ contains
       do k = 1_ip, size(patch%grains, kind=ip)
          most = max(most, size(patch%grains(k)%corners, 2, kind=ip))
       end do
-      call grains%reserve(n, most)
+      call grains%start(n, most)
       do k = 1_ip, n
          associate (grain => patch%grains(source(k)))
-            call grains%set(k, grain%corners, grain%length, grain%area)
+            call grains%append(grain%corners, grain%length, grain%area)
          end associate
       end do
    end subroutine pack_grains

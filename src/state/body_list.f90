@@ -5,18 +5,30 @@ module polydem_body_list
    use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
    use polydem_polygon, only: clean_polygon, mass_properties
+   use polydem_polygon_list, only: polygon_list_t
    use polydem_sort, only: sort_keys
    use polydem_strings, only: to_text
    implicit none
    private
    public :: body_list_t, new_bodies
 
-   !> Default density [kg/m3]
-   real(wp), parameter :: default_density = 2500.0_wp
-
    !> Least mass [kg/m] and moment of inertia [kg m]; the greatest is the inverse of this. In double precision products
    !> of two such values are normal numbers; in single precision only the values themselves are.
    real(wp), parameter :: least_mass = 10.0_wp**(-min(100, range(1.0_wp)))
+
+   !> What is given of a body
+   type :: given_body_t
+      !> Number in the list
+      integer(ip) :: entry = 0_ip
+      !> Whether it is fixed
+      logical :: fixed = .false.
+      !> Density [kg/m3]
+      real(wp) :: density = 2500.0_wp
+      !> Velocity of the centre of mass [m/s], and angular velocity [rad/s]
+      real(wp) :: velocity(2) = 0.0_wp, angular_velocity = 0.0_wp
+      !> Mass [kg/m] and moment of inertia [kg m], 0 if not given
+      real(wp) :: mass = 0.0_wp, inertia = 0.0_wp
+   end type given_body_t
 
    !> A growing list of bodies before their mass properties are computed. One of several ranks keeps all fixed bodies
    !> and its share of the free ones; the shares of the ranks are pieces of `piece` bodies in turn.
@@ -27,18 +39,10 @@ module polydem_body_list
       integer(ip) :: rank = 0_ip, n_ranks = 1_ip
       !> Identifiers of all bodies, (n)
       integer(ip), allocatable, private :: id(:)
-      !> Number of kept bodies
-      integer(ip), private :: n_kept = 0_ip
-      !> Number of each kept body in the list, (kept)
-      integer(ip), allocatable, private :: entry(:)
-      !> Whether it is fixed, (kept)
-      logical, allocatable, private :: fixed(:)
-      !> Density, velocity, angular velocity, mass and moment of inertia, 0 if not given, (6, kept)
-      real(wp), allocatable, private :: number(:, :)
-      !> First vertex of each kept body, (kept + 1)
-      integer(ip), allocatable, private :: first(:)
-      !> Vertices in world coordinates, (2, vertex) [m]
-      real(wp), allocatable, private :: vertex(:, :)
+      !> Kept bodies, (polygons%n) or longer
+      type(given_body_t), allocatable, private :: body(:)
+      !> Their vertices in world coordinates
+      type(polygon_list_t), private :: polygons
    contains
       procedure :: append
       procedure :: leaves_next
@@ -70,31 +74,30 @@ contains
       real(wp), intent(in), optional :: mass
       !> Moment of inertia instead of that of the polygon [kg m]
       real(wp), intent(in), optional :: inertia
-      real(wp) :: number(6)
-      logical :: is_fixed, is_left
-      integer(ip) :: k, last
+      type(given_body_t) :: body
+      type(given_body_t), allocatable :: longer(:)
+      logical :: is_left
 
-      is_fixed = .false.
-      if (present(fixed)) is_fixed = fixed
-      is_left = self%leaves_next() .and. .not. is_fixed
+      if (present(fixed)) body%fixed = fixed
+      is_left = self%leaves_next() .and. .not. body%fixed
       call self%skip(id)
       if (is_left) return
-      number = 0.0_wp
-      number(1) = default_density
-      if (present(density)) number(1) = density
-      if (present(velocity)) number(2:3) = velocity
-      if (present(angular_velocity)) number(4) = angular_velocity
-      if (present(mass)) number(5) = mass
-      if (present(inertia)) number(6) = inertia
-      k = self%n_kept + 1_ip
-      call make_room(self, k, size(vertices, 2, kind=ip))
-      self%n_kept = k
-      self%entry(k) = self%n
-      self%fixed(k) = is_fixed
-      self%number(:, k) = number
-      last = self%first(k) + size(vertices, 2, kind=ip) - 1_ip
-      self%vertex(:, self%first(k):last) = vertices
-      self%first(k + 1_ip) = last + 1_ip
+      body%entry = self%n
+      if (present(density)) body%density = density
+      if (present(velocity)) body%velocity = velocity
+      if (present(angular_velocity)) body%angular_velocity = angular_velocity
+      if (present(mass)) body%mass = mass
+      if (present(inertia)) body%inertia = inertia
+      associate (n => self%polygons%n)
+         if (.not. allocated(self%body)) allocate (self%body(64))
+         if (n == size(self%body)) then
+            allocate (longer(2_ip*n))
+            longer(:n) = self%body
+            call move_alloc(longer, self%body)
+         end if
+         call self%polygons%append_polygon(vertices)
+         self%body(n) = body
+      end associate
    end subroutine append
 
    !> Whether the rank leaves the next body to another rank if it is free
@@ -136,10 +139,10 @@ contains
       if (allocated(error)) return
       allocate (kept(list%n))
       kept = 0_ip
-      do k = 1_ip, list%n_kept
-         kept(list%entry(k)) = k
+      do k = 1_ip, list%polygons%n
+         kept(list%body(k)%entry) = k
       end do
-      call allocate_bodies(bodies, list%n_kept, 16_ip*list%n_kept)
+      call allocate_bodies(bodies, list%polygons%n, 16_ip*list%polygons%n)
       bodies%n_all = list%n
       s = 0_ip
       do k = 1_ip, list%n
@@ -178,39 +181,6 @@ contains
       end do
    end subroutine rank_identifiers
 
-   !> Make room for one more body with its vertices.
-   subroutine make_room(self, k, n_vertices)
-      type(body_list_t), intent(inout) :: self
-      !> Number of kept bodies with the new one, and of its vertices
-      integer(ip), intent(in) :: k, n_vertices
-      integer(ip), allocatable :: longer(:)
-      logical, allocatable :: longer_fixed(:)
-      real(wp), allocatable :: table(:, :)
-
-      if (.not. allocated(self%entry)) then
-         allocate (self%entry(64), self%fixed(64), self%number(6, 64), self%first(65), self%vertex(2, 512))
-         self%first(1) = 1_ip
-      end if
-      if (k > size(self%entry)) then
-         allocate (longer(2_ip*k), longer_fixed(2_ip*k), table(6, 2_ip*k))
-         longer(:k - 1_ip) = self%entry
-         call move_alloc(longer, self%entry)
-         longer_fixed(:k - 1_ip) = self%fixed
-         call move_alloc(longer_fixed, self%fixed)
-         table(:, :k - 1_ip) = self%number
-         call move_alloc(table, self%number)
-         allocate (longer(2_ip*k + 1_ip))
-         longer(:k) = self%first
-         call move_alloc(longer, self%first)
-      end if
-      associate (first => self%first(k))
-         if (first + n_vertices - 1_ip <= size(self%vertex, 2)) return
-         allocate (table(2, 2_ip*(first + n_vertices)))
-         table(:, :first - 1_ip) = self%vertex(:, :first - 1_ip)
-         call move_alloc(table, self%vertex)
-      end associate
-   end subroutine make_room
-
    !> Check one body and store it in its slot.
    subroutine place(list, k, s, bodies, error)
       type(body_list_t), intent(in) :: list
@@ -224,30 +194,30 @@ contains
       real(wp) :: area, centroid(2), second_moment
       integer(ip) :: v
 
-      bodies%id(s) = list%id(list%entry(k))
-      bodies%fixed(s) = list%fixed(k)
-      call clean_polygon(list%vertex(:, list%first(k):list%first(k + 1_ip) - 1_ip), cleaned, problem)
+      bodies%id(s) = list%id(list%body(k)%entry)
+      bodies%fixed(s) = list%body(k)%fixed
+      call clean_polygon(list%polygons%polygon(k), cleaned, problem)
       if (allocated(problem)) then
          call raise(error, input_error, 'body '//to_text(bodies%id(s))//': the polygon '//problem)
          return
       end if
-      associate (density => list%number(1, k), velocity => list%number(2:3, k), angular_velocity => list%number(4, k))
-         if (.not. density > 0.0_wp) then
+      associate (given => list%body(k))
+         if (.not. given%density > 0.0_wp) then
             call raise(error, input_error, 'body '//to_text(bodies%id(s))//': the density must be positive')
             return
          end if
-         if (bodies%fixed(s) .and. any(abs([velocity, angular_velocity]) > 0.0_wp)) then
+         if (bodies%fixed(s) .and. any(abs([given%velocity, given%angular_velocity]) > 0.0_wp)) then
             call raise(error, input_error, 'body '//to_text(bodies%id(s))//': it is fixed and cannot have a '// &
                        'velocity or an angular velocity; set motion in &scene of the namelist to move it')
             return
          end if
          call mass_properties(cleaned, area, centroid, second_moment)
          bodies%position(:, s) = centroid
-         bodies%velocity(:, s) = velocity
-         bodies%angular_velocity(s) = angular_velocity
-         bodies%mass(s) = list%number(5, k)
-         bodies%inertia(s) = list%number(6, k)
-         if (.not. bodies%fixed(s) .and. bodies%mass(s) <= 0.0_wp) bodies%mass(s) = density*area
+         bodies%velocity(:, s) = given%velocity
+         bodies%angular_velocity(s) = given%angular_velocity
+         bodies%mass(s) = given%mass
+         bodies%inertia(s) = given%inertia
+         if (.not. bodies%fixed(s) .and. bodies%mass(s) <= 0.0_wp) bodies%mass(s) = given%density*area
       end associate
       call check_mass('mass', bodies%mass(s), bodies%id(s), bodies%fixed(s), error)
       if (allocated(error)) return
