@@ -275,9 +275,8 @@ contains
       factor%n = n
       if (allocated(factor%owner)) then
          if (size(factor%n_near) >= n) return
-         deallocate (factor%contact, factor%lower, factor%n_entries, factor%n_near, factor%inverse_pivot, &
-                     factor%owner, factor%packed_contact, factor%packed, factor%last_group)
       end if
+      factor = friction_factor_t(n=n)
       m = n + n/4_ip + 16_ip
       allocate (factor%contact(most_entries, m), factor%lower(most_entries, m), factor%n_entries(m), factor%n_near(m), &
                 factor%inverse_pivot(m), factor%last_group(pieces_of(m)))

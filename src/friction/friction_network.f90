@@ -376,17 +376,13 @@ contains
       integer(ip) :: m
 
       if (allocated(network%taken)) then
-         if (size(network%taken) < n_bodies) deallocate (network%taken, network%inverse)
+         if (size(network%taken) >= n_bodies .and. size(network%order) >= n_contacts) return
       end if
-      if (.not. allocated(network%taken)) allocate (network%taken(n_bodies), network%inverse(2, n_bodies))
-      if (allocated(network%body)) then
-         if (size(network%body, 2) >= n_contacts) return
-         deallocate (network%body, network%row, network%mobility, network%inverse_mobility, network%limit, &
-                     network%noise, network%order, network%colour)
-      end if
+      network = friction_network_t()
       m = n_contacts + n_contacts/4_ip + 16_ip
-      allocate (network%body(2, m), network%row(4, m), network%mobility(m), network%inverse_mobility(m), &
-                network%limit(m), network%noise(m), network%order(m), network%colour(m))
+      allocate (network%taken(n_bodies), network%inverse(2, n_bodies), network%body(2, m), network%row(4, m), &
+                network%mobility(m), network%inverse_mobility(m), network%limit(m), network%noise(m), &
+                network%order(m), network%colour(m))
    end subroutine reserve
 
 end module polydem_friction_network

@@ -103,20 +103,12 @@ contains
          c = high - b + 1_ip
          block%pair(b) = contacts%pair(c)
          exchanged = is_exchanged(bodies, contacts%first(c), contacts%second(c))
-         if (exchanged) then
-            block%first(b) = contacts%second(c)
-            block%second(b) = contacts%first(c)
-            block%moment(b, :) = [-contacts%moment(2, c), -contacts%moment(1, c)]
-            block%arm_first(b, :) = contacts%arm_second(:, c)
-            block%arm_second(b, :) = contacts%arm_first(:, c)
-         else
-            block%first(b) = contacts%first(c)
-            block%second(b) = contacts%second(c)
-            block%moment(b, :) = contacts%moment(:, c)
-            block%arm_first(b, :) = contacts%arm_first(:, c)
-            block%arm_second(b, :) = contacts%arm_second(:, c)
-         end if
          side = merge(-1.0_wp, 1.0_wp, exchanged)
+         block%first(b) = merge(contacts%second(c), contacts%first(c), exchanged)
+         block%second(b) = merge(contacts%first(c), contacts%second(c), exchanged)
+         block%moment(b, :) = side*merge(contacts%moment([2, 1], c), contacts%moment(:, c), exchanged)
+         block%arm_first(b, :) = merge(contacts%arm_second(:, c), contacts%arm_first(:, c), exchanged)
+         block%arm_second(b, :) = merge(contacts%arm_first(:, c), contacts%arm_second(:, c), exchanged)
          block%area(b) = contacts%area(c)
          block%rate(b) = contacts%rate(c)
          block%normal(b, :) = side*contacts%normal(:, c)
@@ -165,23 +157,16 @@ contains
       !> Index in the table
       integer(ip), intent(in) :: c
       real(wp) :: side
+      logical :: exchanged
 
+      exchanged = block%first(b) > block%second(b)
+      side = merge(-1.0_wp, 1.0_wp, exchanged)
       contacts%pair(c) = block%pair(b)
-      if (block%first(b) < block%second(b)) then
-         side = 1.0_wp
-         contacts%first(c) = block%first(b)
-         contacts%second(c) = block%second(b)
-         contacts%moment(:, c) = block%moment(b, :)
-         contacts%arm_first(:, c) = block%arm_first(b, :)
-         contacts%arm_second(:, c) = block%arm_second(b, :)
-      else
-         side = -1.0_wp
-         contacts%first(c) = block%second(b)
-         contacts%second(c) = block%first(b)
-         contacts%moment(:, c) = [-block%moment(b, 2), -block%moment(b, 1)]
-         contacts%arm_first(:, c) = block%arm_second(b, :)
-         contacts%arm_second(:, c) = block%arm_first(b, :)
-      end if
+      contacts%first(c) = min(block%first(b), block%second(b))
+      contacts%second(c) = max(block%first(b), block%second(b))
+      contacts%moment(:, c) = side*merge(block%moment(b, [2, 1]), block%moment(b, :), exchanged)
+      contacts%arm_first(:, c) = merge(block%arm_second(b, :), block%arm_first(b, :), exchanged)
+      contacts%arm_second(:, c) = merge(block%arm_first(b, :), block%arm_second(b, :), exchanged)
       contacts%area(c) = block%area(b)
       contacts%rate(c) = block%rate(b)
       contacts%normal(:, c) = side*block%normal(b, :)
