@@ -152,7 +152,8 @@ contains
       if (status >= 0 .and. .not. is_hdf5) then
          call raise(error, io_error, path//': is not an HDF5 file')
       else
-         call raise(error, io_error, path//': cannot be opened as an HDF5 file'//locking_hint)
+         call raise(error, io_error, path//': cannot be opened as an HDF5 file; it may be truncated or damaged'// &
+                    locking_hint)
       end if
    end subroutine open_file
 

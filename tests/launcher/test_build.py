@@ -110,9 +110,20 @@ class Build(Toy):
         self.assertEqual(output, "<-m>\n<polydem_post>\n<scale>\n<my counts.csv>\n<--body>\n<1e-6>\n")
         self.assertFalse(os.path.exists(os.path.join(self.folder, "build", "release", "src")))
 
-    def test_workprecision_builds_three_precisions_and_hands_their_programs_on(self):
-        self.write(".venv/bin/python", '#!/bin/bash\nprintf "%s\\n" "$@"\n')
+    def write_python(self):
+        """A Python that prints its words, and refuses --wrong when it shall only parse them."""
+        self.write(".venv/bin/python", '#!/bin/bash\nif [ "$3" = --only-parse ]; then [[ $* != *--wrong* ]] || exit 2\n'
+                   'else printf "%s\\n" "$@"; fi\n')
         os.chmod(os.path.join(self.folder, ".venv", "bin", "python"), 0o755)
+
+    def test_wrong_words_of_verbs_that_build_for_minutes_are_refused_before(self):
+        self.write_python()
+        for verb in ("paper", "workprecision"):
+            self.assertEqual(self.call(verb, "--wrong"), (2, "", ""))
+        self.assertFalse(os.path.exists(os.path.join(self.folder, "build", "release", "src")))
+
+    def test_workprecision_builds_three_precisions_and_hands_their_programs_on(self):
+        self.write_python()
         code, output, messages = self.call("workprecision", "stack", "--repeats", "2")
         self.assertEqual(code, 0, messages)
         expected = ["-m", "polydem_post", "workprecision"]

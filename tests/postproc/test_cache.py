@@ -131,6 +131,17 @@ def test_without_valgrind_the_launcher_is_named(monkeypatch):
         cachegrind.simulate(["true"], MODEL, re.compile(""))
 
 
+def test_a_program_that_fails_is_heard_through_the_lines_of_valgrind(monkeypatch, tmp_path):
+    valgrind = tmp_path / "valgrind"
+    valgrind.write_text("#!/bin/sh\necho 'no such finder: foo' >&2\n"
+                        "for k in 1 2 3 4 5 6; do echo '==12== LL refs: 1' >&2; done\nexit 2\n", encoding="utf-8")
+    valgrind.chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path), prepend=":")
+    with pytest.raises(ResultError, match="no such finder: foo") as failure:
+        cachegrind.simulate(["program"], MODEL, re.compile(""))
+    assert "==12==" not in str(failure.value)
+
+
 def test_the_caches_of_the_machine_are_read_from_the_system(tmp_path):
     facts = {
         0: (1, "Data", "48K", 12),

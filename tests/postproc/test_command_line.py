@@ -78,6 +78,7 @@ def test_an_interrupted_verb_ends_with_a_sentence(monkeypatch, capsys):
         (["plot", "RESULT", "--show", "forces,walls"], "walls cannot be shown; there are contacts, forces"),
         (["plot", "RESULT", "--range", "2,1"], "--range: 2 is not below 1"),
         (["plot", "RESULT", "--limits", "0,1,2"], "--limits takes 4 numbers, as in X0,X1,Y0,Y1"),
+        (["plot", "RESULT", "--limits", "50,60,0,1"], "no body is within the limits 50,60,0,1; the bodies are at x "),
         (["plot", "RESULT", "--size", "5,100"], "--size takes a width and a height from 30"),
         (["plot", "RESULT", "--dpi", "0"], "--dpi takes a number from 10 to 2400"),
     ],
@@ -85,6 +86,27 @@ def test_an_interrupted_verb_ends_with_a_sentence(monkeypatch, capsys):
 def test_explains_errors_and_ends_with_code_2(finished, capsys, arguments, message):
     assert main([str(finished) if word == "RESULT" else word for word in arguments]) == 2
     assert message in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments, message", [
+    (["plot", "x", "--colr", "speed"], "plot: error: there is no option --colr; did you mean --color?"),
+    (["plot", "x", "--wall=1"], "plot: error: there is no option --wall; see polydem_post plot --help"),
+    (["plot", "x", "y"], "plot: error: there is no place for the argument 'y'"),
+    (["sweep", "run", "x", "--retyr"], "sweep run: error: there is no option --retyr; did you mean --retry?"),
+    (["--only-parse", "paper", "--quik"], "paper: error: there is no option --quik; did you mean --quick?"),
+])
+def test_a_word_that_a_verb_does_not_know_is_named_with_its_verb(capsys, arguments, message):
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    assert end.value.code == 2
+    said = capsys.readouterr().err.splitlines()
+    assert message in said[-1]
+    assert said[0].startswith(f"usage: polydem_post {arguments[-2] if arguments[0][0] == '-' else arguments[0]}")
+
+
+def test_words_can_be_parsed_without_doing_anything(capsys):
+    assert main(["--only-parse", "paper", "--dry-run", "--output", "no/such/folder"]) == 0
+    assert capsys.readouterr().out == ""
 
 
 @pytest.mark.parametrize("arguments", [[], ["paint", "x"], ["plot"], ["plot", "x", "--times", "1,b"]])

@@ -124,7 +124,7 @@ VERBS = {
     "workprecision": (["workprecision", "--report-only", "--output", "study"], ["study/samples.csv"]),
     "scale runs": (["scale", "runs.csv"], ["runs.csv"]),
     "scale counts": (["scale", "counts.csv", "--body", "1e-6"], ["counts.csv"]),
-    "scale a run": (["scale", "result"], ["result/profile.h5", "result/trajectory_0001.h5"]),
+    "scale a run": (["scale", "result", "--save", "saved.csv"], ["result/profile.h5", "result/trajectory_0001.h5"]),
     "sweep collect": (["sweep", "collect", "sweep"],
                       ["sweep/table.csv", "sweep/runs/a/attempts.csv", "sweep/runs/a/result/profile.h5",
                        "sweep/runs/b/result/trajectory_0003.h5"]),

@@ -146,3 +146,6 @@ def test_the_command_takes_folders_and_saved_files(shared, alone, tmp_path, caps
     assert capsys.readouterr().out == again
     assert main(["scale", saved, "--body", "1e-6"]) == 2
     assert "nothing was counted for run bisection 0" in capsys.readouterr().err
+    assert main(["scale", str(alone)]) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and "a run on one rank exchanges nothing" in said.err

@@ -57,7 +57,7 @@ contains
       logical, intent(out) :: chosen(:)
       logical, intent(out) :: thorough
       character(len=32) :: word
-      integer :: k
+      integer :: k, b
 
       thorough = .true.
       chosen = .false.
@@ -67,13 +67,13 @@ contains
             thorough = .false.
          else if (word == '-h' .or. word == '--help') then
             write (output_unit, '(a)') 'usage: verify [--quick] [NAME...]     all benchmarks or those named:'
-            write (output_unit, '(*(1x, a))') benchmark_names
+            write (output_unit, '(*(1x, a))') (trim(benchmark_names(b)), b=1, size(benchmark_names))
             call c_exit(0_c_int)
          else if (any(benchmark_names == word)) then
             where (benchmark_names == word) chosen = .true.
          else
             write (error_unit, '(3a, *(1x, a))') 'verify: unknown benchmark ', trim(word), '; choose from', &
-               benchmark_names
+               (trim(benchmark_names(b)), b=1, size(benchmark_names))
             call c_exit(2_c_int)
          end if
       end do

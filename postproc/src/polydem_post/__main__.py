@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import errno
 import math
 import os
@@ -46,6 +47,8 @@ TRACEBACK = "POLYDEM_TRACEBACK"
 def main(arguments: list[str] | None = None) -> int:
     """Do what the command line says; return the exit code."""
     options = _parser().parse_args(join_numbers(sys.argv[1:] if arguments is None else arguments))
+    if options.only_parse:
+        return 0
     warnings.showwarning = lambda message, *_: print(f"warning: {printable(str(message))}", file=sys.stderr)
     try:
         code = options.action(options) or 0
@@ -106,6 +109,21 @@ class _Parser(argparse.ArgumentParser):
     def format_usage(self) -> str:
         return self.format_help().splitlines()[0] + "\n"
 
+    def parse_known_args(self, args=None, namespace=None):
+        """Refuse what the verb does not know here, since the parser of all verbs could not name its options."""
+        found, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(self._about(unknown[0]))
+        return found, unknown
+
+    def _about(self, word: str) -> str:
+        if not word.startswith("-"):
+            return f"there is no place for the argument '{word}'"
+        name = word.partition("=")[0]
+        known = [option for option in self._option_string_actions if option.startswith("--")]
+        near = difflib.get_close_matches(name, known, 1)
+        return f"there is no option {name}; " + (f"did you mean {near[0]}?" if near else f"see {self.prog} --help")
+
 
 def help_text(verb: str) -> str:
     """What a verb does and takes; the first line is its call, the second one its meaning."""
@@ -115,6 +133,8 @@ def help_text(verb: str) -> str:
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog=os.environ.get(CALLED_AS) or "polydem_post")
     parser.add_argument("--version", action="version", version=f"polydem_post {__version__}")
+    # The launcher asks so before it builds for minutes.
+    parser.add_argument("--only-parse", action="store_true")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
     add_picture_verbs(verbs)
@@ -353,8 +373,10 @@ def _scale(options: argparse.Namespace) -> None:
     counts = [run.as_count() for run in runs if run.ranks > 1] + (read_counts(files) if files else [])
     if options.save:
         write_runs(runs, options.save)
+    if not counts and not options.save:
+        raise ResultError("a run on one rank exchanges nothing; give runs on several ranks, too (run --ranks R)")
     tables = runs_tables(runs) if runs else []
-    tables.append(strip_table(counts))
+    tables += [strip_table(counts)] if counts else []
     if options.body:
         machine = Machine(**{field.name: getattr(options, field.name) for field in fields(Machine)})
         shape = options.shape or (SHAPE if runs else "drum")

@@ -137,7 +137,9 @@ def _hardware_events(text: str) -> dict:
 def _run(command: list[str]) -> None:
     done = subprocess.run(command, env=_environment(), capture_output=True, text=True, check=False)
     if done.returncode != 0:
-        last = "\n".join((done.stderr or done.stdout).strip().splitlines()[-5:])
+        said = (done.stderr or done.stdout).strip().splitlines()
+        own = [line for line in said if not re.match(r"==\d+==|--\d+--", line)]  # of the program, not of valgrind
+        last = "\n".join((own or said)[-5:])
         hint = ""
         if "SIGILL" in done.stderr or "unrecognised instruction" in done.stderr.lower():
             hint = (

@@ -134,6 +134,10 @@ class _Extent:
                 raise ResultError("there are no bodies to draw")
             margin = 0.02 * max(self.high - self.low)
             limits = (self.low[0] - margin, self.high[0] + margin, self.low[1] - margin, self.high[1] + margin)
+        elif np.any(self.high < limits[::2]) or np.any(self.low > limits[1::2]):
+            spans = (f"{axis} {low:.4g} to {high:.4g} m" for axis, low, high in zip("xy", self.low, self.high))
+            raise ResultError(f"no body is within the limits {','.join(f'{side:g}' for side in limits)}; the bodies "
+                              f"are at {', '.join(spans)}")
         if colour_range is None:
             colour_range = range_of(look.quantity, _joined(self.values)) if look.quantity else (0.0, 1.0)
         return SettledLook(look.colour, look.show, limits, colour_range, look.colours,

@@ -48,8 +48,8 @@ class ResultFolder:
         try:
             manifest = read_manifest(self.folder)
             if manifest is None:
-                warnings.warn(f"{self.folder}: has no {MANIFEST}, since an older version wrote it; its "
-                              "files cannot be compared with what was written", NoManifest, stacklevel=4)
+                warnings.warn(f"{self.folder}: has no {MANIFEST}: an older version wrote it, or the file was "
+                              "removed; nothing can be compared with what was written", NoManifest, stacklevel=4)
                 return
             check_names(self.segments, manifest, whole)
             names = sorted(set(manifest.closed) & {segment.name for segment in self.segments})
