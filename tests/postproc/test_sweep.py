@@ -12,7 +12,7 @@ from pathlib import Path
 
 import h5py
 import pytest
-from polydem_post import Trajectory
+from polydem_post import Trajectory, sweep_run
 from polydem_post.__main__ import main
 from polydem_post.sweep import Row, Run, expand, make_sweep, read_table
 from polydem_post.sweep_collect import read_outcome
@@ -49,7 +49,7 @@ else:
         signal.signal(number, signal.SIG_DFL)
         open(os.path.join(result, "heard"), "w").close()
     signal.signal(signal.SIGUSR1, stop)
-    print("step", flush=True)
+    print("step  100   0:00:03    12.5%", flush=True)
     open(os.path.join(result, "under_way"), "w").close()
     seconds = entries.get("toy.seconds", "0")
     while seconds == "told" and not os.path.exists(os.path.join(result, "told")):
@@ -256,6 +256,17 @@ def test_runs_several_at_once_and_never_more(sweep_of):
     words = calls_of(sweep.runs[0])[0][0]
     assert words[:4] == ["run", str(sweep.runs[0].folder / "input.nml"), "--threads", "2"]
     assert words[-3:] == ["--set", f"output.folder={sweep.runs[0].result}", "--continue"]
+
+
+def test_a_sweep_says_how_far_its_runs_are(sweep_of, monkeypatch):
+    monkeypatch.setattr(sweep_run, "SILENCE", 0.3)
+    program, sweep = sweep_of(("long", "finish", "1.5"), ("next", "finish", "0"))
+    said = []
+    assert Runner(program, 1, 1, say=said.append).run(sweep.runs) == 0
+    progress = [line for line in said if line.startswith("running")]
+    assert progress and set(progress) == {"running: long 12.5%; 1 not started"}
+    many = sweep.runs[1:] * 10
+    assert sweep_run.progress_of(many, 3) == f"running: {', '.join(['next 12.5%'] * 8)}, 2 more; 3 not started"
 
 
 def test_goes_on_with_what_is_left(sweep_of):

@@ -11,6 +11,7 @@ import csv
 import fcntl
 import os
 import platform
+import re
 import signal
 import subprocess
 import time
@@ -45,6 +46,15 @@ SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGUSR1)
 
 #: Time between two looks at the runs [s]
 INTERVAL = 0.05
+
+#: Silence after which a sweep says how far its runs are: at first, and at most; each time it doubles [s]
+SILENCE, LONGEST_SILENCE = 10.0, 600.0
+
+#: So many runs are named with their progress
+MOST_NAMED = 8
+
+#: The share of its steps that a run has done, at the end of a line of its log
+SHARE = re.compile(r"\d+\.\d%$")
 
 
 def state_of(run: Run) -> str:
@@ -120,6 +130,14 @@ def describe(run: Run) -> str:
     return f"{run.name}: {state}" + (f" after {attempts[-1]['seconds']:.1f} s" if attempts else "")
 
 
+def progress_of(runs: list[Run], waiting: int) -> str:
+    """How far some runs are, as they say in their logs, and how many wait."""
+    shares = ((run.name, SHARE.search(last_words(run))) for run in runs[:MOST_NAMED])
+    named = [f"{name} {share[0]}" if share else name for name, share in shares]
+    more = [f"{len(runs) - MOST_NAMED} more"] if len(runs) > MOST_NAMED else []
+    return f"running: {', '.join([*named, *more])}; {waiting} not started"
+
+
 def available_cores() -> list[int]:
     """Numbers of the cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
@@ -183,12 +201,17 @@ class Runner:
 
     def _turns(self, due: list[tuple[Run, int]]) -> None:
         """Let runs, of which so many attempts are known, take their turns, until all are over or a signal comes."""
+        spoke, silence = time.monotonic(), SILENCE
         while (due and not self.stopping) or any(slot.is_busy for slot in self.slots):
             for slot in self.slots:
                 if slot.is_busy and slot.has_ended():
                     self.say(describe(slot.end()))
+                    spoke = time.monotonic()
                 while due and not slot.is_busy and not self.stopping:
                     self._start(slot, *due.pop(0))
+            if time.monotonic() - spoke > silence:
+                self.say(progress_of([slot.run for slot in self.slots if slot.run], len(due)))
+                spoke, silence = time.monotonic(), min(2.0 * silence, LONGEST_SILENCE)
             time.sleep(INTERVAL)
 
     def _start(self, slot: _Slot, run: Run, known: int) -> None:
