@@ -282,21 +282,6 @@ contains
       !$omp end parallel do
    end subroutine measure_slip
 
-   !> Slip of a contact that a change of its force could reduce [m/s]: any slip if the force is below the limit, slip
-   !> along the force if it is at the limit
-   elemental real(wp) function avoidable_slip(force, limit, slip)
-      !> Tangential force [N/m]
-      real(wp), intent(in) :: force
-      !> Greatest force [N/m]
-      real(wp), intent(in) :: limit
-      !> Slip velocity [m/s]
-      real(wp), intent(in) :: slip
-
-      avoidable_slip = slip
-      if (force >= limit) avoidable_slip = max(0.0_wp, avoidable_slip)
-      if (force <= -limit) avoidable_slip = min(0.0_wp, avoidable_slip)
-   end function avoidable_slip
-
    !> Force limited to -limit ... limit [N/m]
    elemental real(wp) function within(limit, force)
       !> Greatest force [N/m]
@@ -307,17 +292,21 @@ contains
       within = max(-limit, min(limit, force))
    end function within
 
-   !> Avoidable slip of a contact minus the rounding errors of its forces and velocities [m/s]
+   !> Avoidable slip of a contact minus the rounding errors of its forces and velocities [m/s]. Any slip is avoidable if
+   !> the force is below its limit, slip along the force if it is at the limit
    pure real(wp) function excess_slip(network, c, force, velocity)
       type(friction_network_t), intent(in) :: network
       integer(ip), intent(in) :: c
       real(wp), intent(in) :: force
       real(wp), intent(in), contiguous :: velocity(:, :)
+      real(wp) :: slip
 
+      slip = slip_of(network, c, velocity)
+      if (force >= network%limit(c)) slip = max(0.0_wp, slip)
+      if (force <= -network%limit(c)) slip = min(0.0_wp, slip)
       associate (i => network%body(1, c), j => network%body(2, c))
-         excess_slip = abs(avoidable_slip(force, network%limit(c), slip_of(network, c, velocity))) &
-            - (rounding*(sum_of(velocity(:, i), network%row(3, c)) + sum_of(velocity(:, j), network%row(4, c))) &
-               + network%noise(c))
+         excess_slip = abs(slip) - (rounding*(sum_of(velocity(:, i), network%row(3, c)) &
+                                              + sum_of(velocity(:, j), network%row(4, c))) + network%noise(c))
       end associate
    end function excess_slip
 

@@ -11,6 +11,7 @@ module polydem_convex_overlap
    use polydem_overlap_batch, only: add_lane, overlap_batch_t, overlap_columns_t
    use polydem_overlap_integrals, only: overlap_t
    use polydem_pair_memory, only: most_lens_corners, unpack_edge
+   use polydem_polygon, only: greatest_radius
    use polydem_separation, only: remembered_edge, test_separation
    implicit none
    private
@@ -37,21 +38,19 @@ contains
       !> What to remember: a certified lens (positive), a separating edge (negative), or nothing (0)
       integer(ip), intent(out) :: memory
       !> A lens that the kernel has not certified for these polygons, or 0; on return the one that it does not certify
-      integer(ip), intent(inout), optional :: rejected
+      integer(ip), intent(inout) :: rejected
       logical :: certified, searched
 
       searched = .true.
-      if (present(rejected)) then
-         if (rejected > 0_ip) searched = .not. cross_at(p, q, offset, radius_p, radius_q, rejected)
-         if (searched) rejected = 0_ip
-      end if
+      if (rejected > 0_ip) searched = .not. cross_at(p, q, offset, radius_p, radius_q, rejected)
       if (searched) then
+         rejected = 0_ip
          call search_pair(p, q, offset, radius_p, radius_q, memory)
          if (memory < 0_ip) return
          if (memory > 0_ip) then
             call evaluate_lens(p, q, offset, radius_p, radius_q, effective, memory, overlap, certified)
             if (certified) return
-            if (present(rejected)) rejected = memory
+            rejected = memory
          end if
       end if
       call clip_overlap(p, q, offset, radius_p, radius_q, effective, overlap)
@@ -105,8 +104,8 @@ contains
 
       by_shape = .false.
       if (present(effective)) by_shape = effective
-      radius_a = radius(a)
-      radius_b = radius(b)
+      radius_a = greatest_radius(a)
+      radius_b = greatest_radius(b)
       if (radius_a <= radius_b) then
          call overlap_in_roles(a, b, offset, radius_a, radius_b, separating_edge, by_shape, overlap)
       else
@@ -125,27 +124,16 @@ contains
       integer(ip), intent(in) :: separating_edge
       logical, intent(in) :: effective
       type(overlap_t), intent(out) :: overlap
-      integer(ip) :: memory, edge, corner
+      integer(ip) :: memory, rejected, edge, corner
       logical :: apart, of_q
 
       memory = remembered_edge(p, q, separating_edge)
       call test_separation(p, q, offset, radius_p, memory, apart)
-      if (.not. apart) call find_overlap(p, q, offset, radius_p, radius_q, effective, overlap, memory)
+      rejected = 0_ip
+      if (.not. apart) call find_overlap(p, q, offset, radius_p, radius_q, effective, overlap, memory, rejected)
       if (memory >= 0_ip) return
       call unpack_edge(memory, of_q, edge, corner)
       overlap%separating_edge = merge(-edge - 1_ip, edge + 1_ip, of_q)
    end subroutine overlap_in_roles
-
-   !> Greatest distance of a vertex from the centre [m]
-   pure real(wp) function radius(vertices)
-      real(wp), intent(in), contiguous :: vertices(:, :)
-      integer(ip) :: k
-
-      radius = 0.0_wp
-      do k = 1_ip, size(vertices, 2, kind=ip)
-         radius = max(radius, vertices(1, k)*vertices(1, k) + vertices(2, k)*vertices(2, k))
-      end do
-      radius = sqrt(radius)
-   end function radius
 
 end module polydem_convex_overlap

@@ -9,7 +9,7 @@ module polydem_polygon
    use polydem_strings, only: counted, to_text
    implicit none
    private
-   public :: clean_polygon, mass_properties, diameter, clip_half_plane, cross
+   public :: clean_polygon, mass_properties, diameter, greatest_radius, clip_half_plane, cross
 
    !> A vertex is dropped if it is closer to its neighbour, or to the line of its neighbours, than this fraction of
    !> the size: far above the rounding errors of a text file, far below any effect on a result.
@@ -210,6 +210,19 @@ contains
       end function square_of
 
    end function diameter
+
+   !> Greatest distance of a vertex from the origin [m]
+   pure real(wp) function greatest_radius(vertices)
+      !> Vertices in any order, (2, n) [m]
+      real(wp), intent(in) :: vertices(:, :)
+      integer(ip) :: k
+
+      greatest_radius = 0.0_wp
+      do k = 1_ip, size(vertices, 2, kind=ip)
+         greatest_radius = max(greatest_radius, square(vertices(:, k)))
+      end do
+      greatest_radius = sqrt(greatest_radius)
+   end function greatest_radius
 
    !> The part of a convex polygon on one side of a line: (r - point) . normal <= 0.
    !>

@@ -16,6 +16,7 @@ module polydem_bodies
    use polydem_elementary, only: sines_and_cosines
    use polydem_hash, only: mix_word
    use polydem_kinds, only: ip, lp, wp, dp, min_parallel_size
+   use polydem_polygon, only: greatest_radius
    implicit none
    private
    public :: bodies_t, allocate_bodies, turn_bodies, turn_block, block_size, measure_radii, state_hash, state_words
@@ -117,17 +118,14 @@ contains
    subroutine measure_radii(bodies)
       !> Bodies; only `radius` changes
       type(bodies_t), intent(inout) :: bodies
-      real(wp) :: square
-      integer(ip) :: s, v
+      integer(ip) :: s
 
       if (allocated(bodies%radius)) deallocate (bodies%radius)
       allocate (bodies%radius(bodies%n))
       do s = 1_ip, bodies%n
-         square = 0.0_wp
-         do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-            square = max(square, bodies%shape(1, v)*bodies%shape(1, v) + bodies%shape(2, v)*bodies%shape(2, v))
-         end do
-         bodies%radius(s) = sqrt(square)
+         associate (first => bodies%vertex_start(s), last => bodies%vertex_start(s + 1_ip) - 1_ip)
+            bodies%radius(s) = greatest_radius(bodies%shape(:, first:last))
+         end associate
       end do
    end subroutine measure_radii
 
