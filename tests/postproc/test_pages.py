@@ -55,6 +55,19 @@ def test_the_readme_is_one_screen():
     assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= MOST_LINES
 
 
+def test_the_page_of_the_log_explains_every_counter_and_stage():
+    sources = [path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.f90")]
+    named = {name for text in sources for name in re.findall(r"counters%set\('([^']*[^ '])'", text)}
+    for prefix, constant in (("finder ", "count_names(n_counts)"), ("", "stage_names(n_stages)")):
+        lists = re.findall(rf":: {re.escape(constant)} = &\n *\[[^]:]*::([^]]*)\]", "".join(sources))
+        assert len(lists) == 1
+        named |= {prefix + name for name in re.findall(r"'([^']+)'", lists[0])}
+    assert len(named) > 40
+    page = (ROOT / "inputs/log.md").read_text(encoding="utf-8")
+    most = "maximum per rank: "
+    assert {name for name in named if f"`{name}`" not in page and f"`{name.removeprefix(most)}`" not in page} == set()
+
+
 def test_every_page_can_be_reached_from_the_readme():
     reached, new = set(), {ROOT / "README.md"}
     while new:

@@ -32,6 +32,7 @@ OTHERS = {
     "inputs/README.md",
     "inputs/getting_started.md",
     "inputs/glossary.md",
+    "inputs/log.md",
     "src/README.md",
     "src/algorithms.md",
     "src/packaging/README.md",

@@ -166,7 +166,8 @@ def fit_law(counts: list[Count], shape: str, partition: str, margin: float) -> L
         raise ResultError(f"nothing was counted for {shape} {partition} {margin:g}; there are {', '.join(known)}")
     mine = [count for count in mine if count.ranks >= SURROUNDED and count.halo_bodies > 0]
     if not mine:
-        raise ResultError(f"{shape} {partition} {margin:g}: counts of at least {SURROUNDED} ranks are needed")
+        raise ResultError(f"a prediction needs counts of at least {SURROUNDED} ranks; there are none for "
+                          f"{shape} {partition} {margin:g} (packing, partition, margin)")
     strips = [count.strip for count in mine]
     return Law(
         strip=math.exp(sum(map(math.log, strips)) / len(strips)),
