@@ -15,6 +15,8 @@ module polydem_elementary
 
    !> Whether the working precision is quadruple
    logical, parameter :: is_quadruple = precision(1.0_wp) > precision(1.0_dp)
+   !> Number of angles of a block
+   integer, parameter :: block_size = 64
 
 contains
 
@@ -26,16 +28,22 @@ contains
       real(wp), intent(in) :: angle(:)
       !> Their sines and cosines
       real(wp), intent(out) :: sine(:), cosine(:)
-      real(dp) :: s(size(angle)), c(size(angle))
+      real(dp) :: a(block_size), s(block_size), c(block_size)
+      integer :: done, n
 
       if (is_quadruple) then
          sine = sin(angle)
          cosine = cos(angle)
-      else
-         call dp_sines_and_cosines(isa, real(angle, dp), s, c)
-         sine = real(s, wp)
-         cosine = real(c, wp)
+         return
       end if
+      ! Arrays of constant size take no memory from the heap.
+      do done = 0, size(angle) - 1, block_size
+         n = min(block_size, size(angle) - done)
+         a(:n) = real(angle(done + 1:done + n), dp)
+         call dp_sines_and_cosines(isa, a(:n), s(:n), c(:n))
+         sine(done + 1:done + n) = real(s(:n), wp)
+         cosine(done + 1:done + n) = real(c(:n), wp)
+      end do
    end subroutine sines_and_cosines
 
    !> Sine and cosine of an angle

@@ -304,7 +304,8 @@ contains
       self%known%n = 0_ip
       call self%append_candidates_of(i, self%known)
       do k = 1_ip, self%known%n
-         self%met_by(self%box(:, self%known%at(k))) = self%n_single
+         self%met_by(self%box(1, self%known%at(k))) = self%n_single
+         self%met_by(self%box(2, self%known%at(k))) = self%n_single
       end do
    end subroutine meet_candidates
 

@@ -12,6 +12,8 @@ module polydem_parallel_filter
    private
    public :: parallel_filter_t
 
+   !> Number of boxes, and of active candidates, above which a step tests them in parallel; one takes about 1 ns
+   integer(ip), parameter :: worth_testing = 4096_ip
    !> Number of boxes above which the review of their candidates is parallel; a box takes about 100 ns
    integer(ip), parameter :: worth_reviewing = 128_ip
 
@@ -73,7 +75,7 @@ contains
       integer(ip) :: low, high
       integer :: w
 
-      !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
+      !$omp parallel do if (boxes%n > worth_testing) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes, limits) private(w, low, high)
       do w = 1, size(self%worker)
          call part(boxes%n, size(self%worker), w, low, high)
@@ -260,7 +262,7 @@ contains
       integer(ip) :: low, high
       integer :: w
 
-      !$omp parallel do if (self%active%n > min_parallel_size) schedule(static, 1) default(none) &
+      !$omp parallel do if (self%active%n > worth_testing) schedule(static, 1) default(none) &
       !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, size(self%worker)
          call part(self%active%n, size(self%worker), w, low, high)

@@ -2,7 +2,7 @@
 !>
 !> Each pass does all that it can do for a block of bodies while the block is in the cache.
 module polydem_body_passes
-   use omp_lib, only: omp_get_thread_num
+   use omp_lib, only: omp_get_max_threads
    use polydem_bodies, only: block_size
    use polydem_box_maker, only: turn_and_bound_block
    use polydem_clock, only: wall_seconds
@@ -13,6 +13,7 @@ module polydem_body_passes
    use polydem_kinds, only: dp, ip, wp, min_parallel_size
    use polydem_prescribed_motion, only: move_bodies
    use polydem_simulation, only: simulation_t, time_of
+   use polydem_thread_changes, only: part
    implicit none
    private
    public :: predict_bodies, complete_step, keep_forces, move_walls
@@ -31,32 +32,20 @@ contains
       real(dp), intent(out) :: boxes_share
       !> Names a body with an invalid pose
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: n, k, next, high, first, last
-      real(dp) :: clock(3), seconds(2)
-      logical :: good, valid, timed
+      integer(ip) :: n, low, high, k
+      integer :: n_parts, p
+      real(dp) :: seconds(2)
+      logical :: good
 
       n = size(self%bodies%free, kind=ip)
+      n_parts = number_of_parts(n)
       good = .true.
       seconds = 0.0_dp
-      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(self, n, seconds) &
-      !$omp    private(next, high, first, last, clock, valid, timed) reduction(.and.:good)
-      do k = 1_ip, n, block_size
-         timed = omp_get_thread_num() == 0 .and. mod(k, timed_blocks*block_size) == 1_ip
-         if (timed) clock(1) = wall_seconds()
-         high = min(k + block_size - 1_ip, n)
-         next = k
-         valid = .true.
-         do while (next <= high)
-            call find_run(self%bodies%free, high, next, first, last)
-            call self%integrator%predict(self%dt, first, last, self%bodies)
-            valid = valid .and. have_valid_poses(self%bodies, first, last)
-         end do
-         if (timed) clock(2) = wall_seconds()
-         if (valid) call turn_and_bound_block(self%maker, self%bodies%free(k:high), self%isa, self%bodies, self%boxes)
-         good = good .and. valid
-         if (.not. timed) cycle
-         clock(3) = wall_seconds()
-         seconds = seconds + (clock(2:3) - clock(1:2))
+      !$omp parallel do num_threads(n_parts) schedule(static, 1) default(none) shared(self, n, n_parts, seconds) &
+      !$omp    private(p, low, high) reduction(.and.:good)
+      do p = 1, n_parts
+         call part(n, n_parts, p, low, high)
+         call predict_part(self, low, high, p == 1, good, seconds)
       end do
       !$omp end parallel do
       boxes_share = 0.0_dp
@@ -68,6 +57,51 @@ contains
       if (.not. good) call check_poses(self%guard, self%bodies, self%step, error)
    end subroutine predict_bodies
 
+   !> Predict a part of the free bodies, turn their vertices and update their boxes, block by block.
+   subroutine predict_part(self, low, high, is_first, good, seconds)
+      type(simulation_t), intent(inout) :: self
+      !> Index of the first and of the last body in the list of free bodies
+      integer(ip), intent(in) :: low, high
+      !> Whether this is the part of the first thread, of which some blocks are timed
+      logical, intent(in) :: is_first
+      !> Becomes false if a body has an invalid pose
+      logical, intent(inout) :: good
+      !> Time of the prediction, and of vertices and boxes, in the timed blocks [s]
+      real(dp), intent(inout) :: seconds(2)
+      integer(ip) :: k, next, end_of_block, first, last
+      real(dp) :: clock(3)
+      logical :: valid, timed
+
+      do k = low, high, block_size
+         timed = is_first .and. mod(k, timed_blocks*block_size) == 1_ip
+         if (timed) clock(1) = wall_seconds()
+         end_of_block = min(k + block_size - 1_ip, high)
+         next = k
+         valid = .true.
+         do while (next <= end_of_block)
+            call find_run(self%bodies%free, end_of_block, next, first, last)
+            call self%integrator%predict(self%dt, first, last, self%bodies)
+            valid = valid .and. have_valid_poses(self%bodies, first, last)
+         end do
+         if (timed) clock(2) = wall_seconds()
+         if (valid) call turn_and_bound_block(self%maker, self%bodies%free(k:end_of_block), self%isa, self%bodies, &
+                                              self%boxes)
+         good = good .and. valid
+         if (.not. timed) cycle
+         clock(3) = wall_seconds()
+         seconds = seconds + (clock(2:3) - clock(1:2))
+      end do
+   end subroutine predict_part
+
+   !> Number of parts of the free bodies, one per thread; a single part if they are few
+   integer function number_of_parts(n)
+      !> Number of free bodies
+      integer(ip), intent(in) :: n
+
+      number_of_parts = 1
+      if (n > min_parallel_size) number_of_parts = omp_get_max_threads()
+   end function number_of_parts
+
    !> Complete the step from the sums of the contact forces: total forces, final velocities, energy balance, and the
    !> guard of the motion, in one pass over the bodies. Of the total forces, only those on fixed bodies are kept.
    subroutine complete_step(self, error)
@@ -75,25 +109,18 @@ contains
       type(simulation_t), intent(inout) :: self
       !> Names a body that moves too far
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: n, k, high, next, done, first, last
+      integer(ip) :: n, low, high, k, done
+      integer :: n_parts, p
       logical :: good
 
       n = size(self%bodies%free, kind=ip)
+      n_parts = number_of_parts(n)
       good = .true.
-      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) shared(self, n) &
-      !$omp    private(high, next, done, first, last) reduction(.and.:good)
-      do k = 1_ip, n, block_size
-         high = min(k + block_size - 1_ip, n)
-         done = 0_ip
-         if (k > 1_ip) done = self%bodies%free(k - 1_ip)
-         next = k
-         do while (next <= high)
-            call find_run(self%bodies%free, high, next, first, last)
-            call total_forces(self%settings%forces%gravity, self%force_sums, done + 1_ip, first - 1_ip, self%bodies)
-            call complete_run(self, first, last)
-            good = good .and. move_within_limit(self%guard, self%bodies, first, last, self%dt)
-            done = last
-         end do
+      !$omp parallel do num_threads(n_parts) schedule(static, 1) default(none) shared(self, n, n_parts) &
+      !$omp    private(p, low, high) reduction(.and.:good)
+      do p = 1, n_parts
+         call part(n, n_parts, p, low, high)
+         call complete_part(self, low, high, good)
       end do
       !$omp end parallel do
       done = 0_ip
@@ -106,6 +133,30 @@ contains
       end do
       if (.not. good) call check_motion(self%guard, self%bodies, self%step, self%dt, error)
    end subroutine complete_step
+
+   !> Complete the step of a part of the free bodies, block by block, and set the total forces on bodies between them.
+   subroutine complete_part(self, low, high, good)
+      type(simulation_t), intent(inout) :: self
+      !> Index of the first and of the last body in the list of free bodies
+      integer(ip), intent(in) :: low, high
+      !> Becomes false if a body moves too far
+      logical, intent(inout) :: good
+      integer(ip) :: k, end_of_block, next, done, first, last
+
+      do k = low, high, block_size
+         end_of_block = min(k + block_size - 1_ip, high)
+         done = 0_ip
+         if (k > 1_ip) done = self%bodies%free(k - 1_ip)
+         next = k
+         do while (next <= end_of_block)
+            call find_run(self%bodies%free, end_of_block, next, first, last)
+            call total_forces(self%settings%forces%gravity, self%force_sums, done + 1_ip, first - 1_ip, self%bodies)
+            call complete_run(self, first, last)
+            good = good .and. move_within_limit(self%guard, self%bodies, first, last, self%dt)
+            done = last
+         end do
+      end do
+   end subroutine complete_part
 
    !> Compute final velocities of a run of free bodies, and accumulate their energy balance.
    subroutine complete_run(self, first, last)

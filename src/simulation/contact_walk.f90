@@ -17,6 +17,7 @@ module polydem_contact_walk
    use polydem_passing, only: test_block
    use polydem_range_results, only: range_results_t
    use polydem_simulation, only: simulation_t, sum_contacts_own => sum_contacts, sum_degenerate
+   use polydem_walk_results, only: walk_results_t
    use polydem_wall_terms, only: append_walls, join_walls
    implicit none
    private
@@ -41,7 +42,7 @@ contains
       associate (pairs => self%neighbours%pairs)
          n = min(int(omp_get_max_threads(), ip), most_ranges)
          call divide_pairs(pairs%n, pairs%first, n, self%walk%upto, ends)
-         call reserve_ranges(self, n)
+         call reserve_ranges(n, self%walk)
          last(0) = 0_ip
          do r = 1_ip, n - 1_ip
             last(r) = pairs%first(ends(r))
@@ -52,7 +53,7 @@ contains
       !$omp parallel num_threads(n) default(none) shared(self, dt, ends, last, n) private(r, k, low, high)
       !$omp do schedule(static, 1)
       do r = 1_ip, n
-         call walk_range(self, dt, ends(r - 1_ip:r), last(r - 1_ip:r), self%walk%ranges(r))
+         call walk_range(self, dt, r, ends(r - 1_ip:r), last(r - 1_ip:r))
       end do
       !$omp end do
       ! Bodies beyond the first range share their late terms out evenly.
@@ -67,7 +68,7 @@ contains
       !$omp end do nowait
       !$omp end parallel
       self%walk%step = self%step
-      call balance_ranges(self%walk%ranges(:n)%elapsed, self%walk%upto)
+      call balance_ranges(self%walk%elapsed(:n), self%walk%upto)
       call gather_results(self, n)
       overlap_share = 0.5_dp
       associate (seconds => self%walk%ranges(1)%seconds)
@@ -83,26 +84,27 @@ contains
    end function share_of
 
    !> Make room for the results of n ranges.
-   subroutine reserve_ranges(self, n)
-      type(simulation_t), intent(inout) :: self
+   subroutine reserve_ranges(n, walk)
       integer(ip), intent(in) :: n
+      type(walk_results_t), intent(inout) :: walk
 
-      if (allocated(self%walk%ranges)) then
-         if (size(self%walk%ranges) >= n) return
-         deallocate (self%walk%ranges)
+      if (allocated(walk%ranges)) then
+         if (size(walk%ranges) >= n) return
+         deallocate (walk%ranges, walk%all_of, walk%walls_of, walk%suspects_of, walk%elapsed)
       end if
-      allocate (self%walk%ranges(n))
+      allocate (walk%ranges(n), walk%all_of(n), walk%walls_of(n), walk%suspects_of(n), walk%elapsed(n))
    end subroutine reserve_ranges
 
    !> Walk over the pairs of one range in descending order.
-   subroutine walk_range(self, dt, ends, last, results)
+   subroutine walk_range(self, dt, r, ends, last)
       type(simulation_t), intent(inout) :: self
       real(wp), intent(in) :: dt
+      !> Index of the range
+      integer(ip), intent(in) :: r
       !> Index of the last pair before the range, and of its last pair
       integer(ip), intent(in) :: ends(2)
       !> Last slot of the range before, and last slot whose sums this thread may change; it sets those between
       integer(ip), intent(in) :: last(2)
-      type(range_results_t), intent(inout) :: results
       type(contact_block_t) :: block
       type(contact_terms_t) :: terms
       real(dp) :: clock(3), began
@@ -110,7 +112,7 @@ contains
       logical :: timed
 
       began = wall_seconds()
-      call start_results(self%contacts, results)
+      call start_results(self%contacts, r, self%walk)
       next = ends(2)
       tested = next + 1_ip
       n_blocks = 0_ip
@@ -132,44 +134,52 @@ contains
             call clear_sums(low, high, self%force_sums)
             high = min(high, low - 1_ip)
          end if
-         call add_terms(block, terms, last(2), self%force_sums, results%late)
-         call keep_contacts(self, block, terms, results)
+         call add_terms(block, terms, last(2), self%force_sums, self%walk%ranges(r)%late)
+         call keep_contacts(self, r, block, terms)
          if (.not. timed) cycle
          clock(3) = wall_seconds()
-         results%seconds = results%seconds + (clock(2:3) - clock(1:2))
+         self%walk%ranges(r)%seconds = self%walk%ranges(r)%seconds + (clock(2:3) - clock(1:2))
       end do
       call clear_sums(last(1) + 1_ip, high, self%force_sums)
-      results%elapsed = max(wall_seconds() - began, tiny(began))
+      self%walk%elapsed(r) = max(wall_seconds() - began, tiny(began))
    end subroutine walk_range
 
    !> Empty the results of a range.
-   subroutine start_results(contacts, results)
+   subroutine start_results(contacts, r, walk)
       type(contacts_t), intent(in) :: contacts
-      type(range_results_t), intent(inout) :: results
+      !> Index of the range
+      integer(ip), intent(in) :: r
+      type(walk_results_t), intent(inout) :: walk
 
-      results%late%n = 0_ip
-      call start_rows(contacts, results%all)
-      results%walls%n = 0_ip
-      call start_rows(contacts, results%suspects)
-      results%n_contacts = 0_ip
-      results%n_degenerate = 0_ip
-      results%passing_pair = 0_ip
-      results%seconds = 0.0_dp
+      call start_rows(contacts, walk%all_of(r))
+      call start_rows(contacts, walk%suspects_of(r))
+      walk%walls_of(r)%n = 0_ip
+      associate (results => walk%ranges(r))
+         results%late%n = 0_ip
+         results%n_contacts = 0_ip
+         results%n_degenerate = 0_ip
+         results%passing_pair = 0_ip
+         results%seconds = 0.0_dp
+      end associate
    end subroutine start_results
 
    !> Count the contacts of a block, test them by the guards, and keep those that are needed after the walk.
-   subroutine keep_contacts(self, block, terms, results)
+   subroutine keep_contacts(self, r, block, terms)
       type(simulation_t), intent(inout) :: self
+      !> Index of the range
+      integer(ip), intent(in) :: r
       type(contact_block_t), intent(in) :: block
       type(contact_terms_t), intent(in) :: terms
-      type(range_results_t), intent(inout) :: results
       logical :: suspect(block_size), some
 
-      call count_block(self, block, results)
-      if (self%keeps_contacts) call append_rows(block, results%all, with_forces=.true.)
-      call append_walls(self%bodies%fixed, block, terms, results%walls)
-      call test_block(self%walk%contact_guard, self%bodies, block, self%history, suspect, some, results%passing_pair)
-      if (some) call append_rows(block, results%suspects, with_forces=.true., chosen=suspect)
+      associate (walk => self%walk)
+         call count_block(self, block, walk%ranges(r))
+         if (self%keeps_contacts) call append_rows(block, walk%all_of(r), with_forces=.true.)
+         call append_walls(self%bodies%fixed, block, terms, walk%walls_of(r))
+         call test_block(walk%contact_guard, self%bodies, block, self%history, suspect, some, &
+                         walk%ranges(r)%passing_pair)
+         if (some) call append_rows(block, walk%suspects_of(r), with_forces=.true., chosen=suspect)
+      end associate
    end subroutine keep_contacts
 
    !> Count the contacts that this rank owns, and those without direction.
@@ -203,20 +213,23 @@ contains
       n_degenerate = 0_ip
       self%n_contacts = 0_ip
       self%walk%passing_pair = 0_ip
-      associate (ranges => self%walk%ranges(:n))
+      associate (walk => self%walk)
          do r = n, 1_ip, -1_ip
-            self%n_contacts = self%n_contacts + ranges(r)%n_contacts
-            n_degenerate = n_degenerate + ranges(r)%n_degenerate
-            if (ranges(r)%passing_pair > 0_ip) self%walk%passing_pair = ranges(r)%passing_pair
+            self%n_contacts = self%n_contacts + walk%ranges(r)%n_contacts
+            n_degenerate = n_degenerate + walk%ranges(r)%n_degenerate
+            if (walk%ranges(r)%passing_pair > 0_ip) walk%passing_pair = walk%ranges(r)%passing_pair
          end do
-         if (self%keeps_contacts) call gather_rows(ranges%all, self%contacts)
-         call join_walls(ranges%walls, self%walk%walls)
-         call gather_rows(ranges%suspects, self%walk%suspects)
+         if (self%keeps_contacts) call gather_rows(walk%all_of(:n), self%contacts)
+         call join_walls(walk%walls_of(:n), walk%walls)
+         call gather_rows(walk%suspects_of(:n), walk%suspects)
       end associate
       associate (suspects => self%walk%suspects)
-         suspects%n_degenerate = count([(is_degenerate(suspects, c), c=1_ip, suspects%n)], kind=ip)
+         suspects%n_degenerate = 0_ip
+         do c = 1_ip, suspects%n
+            if (is_degenerate(suspects, c)) suspects%n_degenerate = suspects%n_degenerate + 1_ip
+         end do
+         self%contacts%n_degenerate = suspects%n_degenerate
       end associate
-      self%contacts%n_degenerate = self%walk%suspects%n_degenerate
       self%sums(sum_contacts_own) = self%sums(sum_contacts_own) + int(self%n_contacts, lp)
       self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(n_degenerate, lp)
    end subroutine gather_results

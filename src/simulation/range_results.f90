@@ -1,9 +1,8 @@
-!> What one thread finds in its range of pairs. The arrays stay from step to step, so that a step allocates no memory.
+!> What one thread finds in its range of pairs, as sums and single values. The arrays stay from step to step, so that a
+!> step allocates no memory.
 module polydem_range_results
-   use polydem_contact_rows, only: contact_rows_t
    use polydem_force_sums, only: late_terms_t
    use polydem_kinds, only: dp, ip
-   use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
    public :: range_results_t
@@ -12,20 +11,12 @@ module polydem_range_results
    type :: range_results_t
       !> Terms of bodies beyond the range
       type(late_terms_t) :: late
-      !> All contacts, if the table is asked for
-      type(contact_rows_t) :: all
-      !> Contacts with fixed bodies
-      type(wall_terms_t) :: walls
-      !> Contacts that are deep or degenerate
-      type(contact_rows_t) :: suspects
       !> Number of contacts that this rank owns, and of those without direction
       integer(ip) :: n_contacts = 0_ip, n_degenerate = 0_ip
       !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none
       integer(ip) :: passing_pair = 0_ip
       !> Time spent in the search for overlaps and in the forces, measured for some of the blocks [s]
       real(dp) :: seconds(2) = 0.0_dp
-      !> Time of the walk over the range [s]
-      real(dp) :: elapsed = 0.0_dp
    end type range_results_t
 
 end module polydem_range_results

@@ -1,6 +1,7 @@
 !> Results of the walk over the contacts of a step.
 module polydem_walk_results
    use polydem_contact_incidence, only: incidence_t
+   use polydem_contact_rows, only: contact_rows_t
    use polydem_contacts, only: contacts_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_passing, only: contact_guard_t
@@ -16,6 +17,11 @@ module polydem_walk_results
       integer(lp) :: step = -1_lp
       !> Results of the ranges of pairs, one per thread
       type(range_results_t), allocatable :: ranges(:)
+      !> Their contacts, if the table is asked for, those with fixed bodies, and those that are deep or degenerate
+      type(contact_rows_t), allocatable :: all_of(:), suspects_of(:)
+      type(wall_terms_t), allocatable :: walls_of(:)
+      !> Time of the walk over each range [s]
+      real(dp), allocatable :: elapsed(:)
       !> Part of all pairs up to the end of each range, (0:number of ranges)
       real(dp), allocatable :: upto(:)
       !> Contacts with fixed bodies

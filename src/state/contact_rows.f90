@@ -5,6 +5,7 @@ module polydem_contact_rows
    use polydem_contact_block, only: contact_block_t, store_contact, store_forces
    use polydem_contacts, only: contacts_t, copy_contact, grow_contacts, reserve_contacts
    use polydem_kinds, only: ip, min_parallel_size
+   use polydem_pair_ranges, only: most_ranges
    implicit none
    private
    public :: contact_rows_t, start_rows, append_rows, gather_rows
@@ -52,11 +53,11 @@ contains
 
    !> Join the rows of all threads in one table.
    subroutine gather_rows(rows, contacts)
-      !> Rows of the ranges, in ascending order of the ranges
+      !> Rows of the ranges, in ascending order of the ranges, at most `most_ranges`
       type(contact_rows_t), intent(in) :: rows(:)
       !> The table; its columns are replaced
       type(contacts_t), intent(inout) :: contacts
-      integer(ip) :: base(0:size(rows)), c
+      integer(ip) :: base(0:most_ranges), c
       integer :: r
 
       base(0) = 0_ip

@@ -155,21 +155,20 @@ contains
       type(force_sums_t), intent(inout) :: sums
       !> Terms of the bodies after `last`
       type(late_terms_t), intent(inout) :: late
-      integer(ip) :: c
+      integer(ip) :: c, low
 
-      if (max(maxval(block%first(:block%n)), maxval(block%second(:block%n))) <= last) then
-         call add_pairs(1_ip, block%n, block%first, block%second, terms, last, sums%value, sums%has_terms)
-         return
-      end if
-      call reserve_late(late, block%n)
-      do c = 1_ip, block%n
-         if (max(block%first(c), block%second(c)) <= last) then
-            call add_pairs(c, c, block%first, block%second, terms, last, sums%value, sums%has_terms)
-         else
+      low = 1_ip
+      if (max(maxval(block%first(:block%n)), maxval(block%second(:block%n))) > last) then
+         call reserve_late(late, block%n)
+         do c = 1_ip, block%n
+            if (max(block%first(c), block%second(c)) <= last) cycle
+            call add_pairs(low, c - 1_ip, block%first, block%second, terms, last, sums%value, sums%has_terms)
             call add_or_keep(block%first(c), term_of(terms, c, .true.), last, sums, late)
             call add_or_keep(block%second(c), term_of(terms, c, .false.), last, sums, late)
-         end if
-      end do
+            low = c + 1_ip
+         end do
+      end if
+      call add_pairs(low, block%n, block%first, block%second, terms, last, sums%value, sums%has_terms)
    end subroutine add_terms
 
    !> Add the terms of contacts to the sums of their bodies, in the order of the contacts.

@@ -52,14 +52,14 @@ contains
 
    !> Move the ends of the ranges such that all take more equal times.
    pure subroutine balance_ranges(seconds, upto)
-      !> Time that each range took, greater than 0 [s]
+      !> Time that each range took, greater than 0, (at most `most_ranges`) [s]
       real(dp), intent(in) :: seconds(:)
       !> Part of all pairs up to the end of each range, from 0 to 1
       real(dp), intent(inout) :: upto(0:)
-      real(dp) :: ends(0:size(seconds)), passed, share
+      real(dp) :: ends(0:most_ranges), passed, share
       integer :: r, k
 
-      ends = upto
+      ends(:size(seconds)) = upto
       passed = 0.0_dp
       k = 1
       do r = 1, size(seconds) - 1
