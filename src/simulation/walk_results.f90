@@ -17,8 +17,9 @@ module polydem_walk_results
       integer(lp) :: step = -1_lp
       !> Results of the ranges of pairs, one per thread
       type(range_results_t), allocatable :: ranges(:)
-      !> Their contacts, if the table is asked for, those with fixed bodies, and those that are deep or degenerate
+      !> Their contacts, if the table is asked for, and those of them that are deep or degenerate
       type(contact_rows_t), allocatable :: all_of(:), suspects_of(:)
+      !> Their contacts with fixed bodies
       type(wall_terms_t), allocatable :: walls_of(:)
       !> Time of the walk over each range [s]
       real(dp), allocatable :: elapsed(:)
