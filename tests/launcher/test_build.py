@@ -102,6 +102,16 @@ class Build(Toy):
         self.assertEqual((code, output), (0, "<info>\n"))
         self.assertIn("building", messages)
 
+    def test_info_reads_what_a_run_is_writing(self):
+        self.assertEqual(self.call("info")[:2], (0, "<info>\n"))
+        program = os.path.join("build", "release", "src", "app", "polydem")
+        os.remove(os.path.join(self.folder, program))
+        self.write(program, '#!/bin/bash\necho "$1 ${HDF5_USE_FILE_LOCKING:-as usual}"\n')
+        os.chmod(os.path.join(self.folder, program), 0o755)
+        self.assertEqual(self.call("info"), (0, "info FALSE\n", ""))
+        self.assertEqual(self.call("info", HDF5_USE_FILE_LOCKING="TRUE"), (0, "info TRUE\n", ""))
+        self.assertEqual(self.call("check"), (0, "check as usual\n", ""))
+
     def test_scale_needs_only_python(self):
         self.write(".venv/bin/python", '#!/bin/bash\nprintf "<%s>\\n" "$@"\n')
         os.chmod(os.path.join(self.folder, ".venv", "bin", "python"), 0o755)
