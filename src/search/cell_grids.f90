@@ -13,14 +13,13 @@
 !>
 !> Fixed boxes are few and often large (walls). They belong to no cell, so they do not enlarge the cells, and are stored
 !> behind all grids. The search for the partners of a fixed box covers all grids; other boxes do not search for fixed
-!> boxes.
-!>
-!> The comparison writes each pair and increases the count only if the pair overlaps; this needs no branch.
+!> boxes. Searches in windows find guests of the cells (`polydem_cell_guests`) in addition.
 module polydem_cell_grids
    use omp_lib, only: omp_get_max_threads
    use polydem_box_pairs, only: found_pairs_t
    use polydem_boxes, only: boxes_t
    use polydem_cell_grid, only: cell_grid_t, extent_t, measure, measure_levels, new_grid
+   use polydem_cell_guests, only: cell_block_t, cell_guests_t
    use polydem_cell_order, only: cell_order_t
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
@@ -57,6 +56,8 @@ module polydem_cell_grids
       type(cell_order_t), private :: order
       !> Cell of each box, (box)
       integer(ip), allocatable, private :: cell_of(:)
+      !> Boxes registered in cells after the sort
+      type(cell_guests_t) :: guests
       !> Pairs of each thread in the last search, (thread); those of a search for one box are adjacent, this box first
       type(found_pairs_t), allocatable :: found(:)
       !> Counts summed over all searches
@@ -65,7 +66,10 @@ module polydem_cell_grids
       procedure :: set_levels
       procedure :: build
       procedure :: search
+      procedure :: receive_fixed
+      procedure :: add_guest
       procedure :: search_window
+      procedure :: search_guests
       procedure :: bytes
    end type cell_grids_t
 
@@ -268,7 +272,60 @@ contains
       tally%searches = tally%searches + 1_lp
    end subroutine search_other_grid
 
-   !> List the boxes that overlap a window.
+   !> Remove all guests, and make all fixed boxes guests, after `build`.
+   pure subroutine receive_fixed(self, bounds)
+      class(cell_grids_t), intent(inout) :: self
+      !> Bounds of the boxes, (4, box) [m]
+      real(wp), intent(in), contiguous :: bounds(:, :)
+      integer(ip) :: k
+
+      call self%guests%clear(self%n_cells)
+      do k = self%grid(self%n_levels + 1)%first_box, self%grid(self%n_levels + 1)%last_box
+         call self%add_guest(self%order%box(k), bounds(:, self%order%box(k)))
+      end do
+   end subroutine receive_fixed
+
+   !> Register a box in the cells of its grid that it covers, a fixed box in the coarsest grid.
+   pure subroutine add_guest(self, i, bounds)
+      class(cell_grids_t), intent(inout) :: self
+      !> Box
+      integer(ip), intent(in) :: i
+      !> Its bounds xmin, ymin, xmax, ymax [m]
+      real(wp), intent(in) :: bounds(4)
+
+      call self%guests%add(i, cells_of(self%grid(min(self%level(i), int(self%n_levels, ip))), bounds))
+   end subroutine add_guest
+
+   !> Cells that a window covers; none if its bounds are not numbers
+   pure type(cell_block_t) function cells_of(grid, window)
+      type(cell_grid_t), intent(in) :: grid
+      real(wp), intent(in) :: window(4)
+      integer(ip) :: left, low
+
+      left = max(column(grid, window(1)), 0_ip)
+      low = max(row(grid, window(2)), 0_ip)
+      cells_of = cell_block_t(grid%offset + low*grid%stride + left + 1_ip, column(grid, window(3)) - left + 1_ip, &
+                              row(grid, window(4)) - low + 1_ip, grid%stride)
+   end function cells_of
+
+   !> List the guests that overlap a window.
+   pure subroutine search_guests(self, window, bounds, near)
+      class(cell_grids_t), intent(inout) :: self
+      !> Bounds xmin, ymin, xmax, ymax of the window [m]
+      real(wp), intent(in) :: window(4)
+      !> Present bounds of the boxes, (4, box) [m]
+      real(wp), intent(in), contiguous :: bounds(:, :)
+      !> List to which the boxes are appended; a box can be appended several times
+      type(index_list_t), intent(inout) :: near
+      integer :: l
+
+      do l = 1, self%n_levels
+         call self%guests%append_near(cells_of(self%grid(l), window), window, bounds, near, self%total%tests)
+      end do
+      call self%guests%append_wide(window, bounds, near, self%total%tests)
+   end subroutine search_guests
+
+   !> List the boxes that were not fixed and overlapped a window when they were binned.
    subroutine search_window(self, window, near)
       class(cell_grids_t), intent(inout) :: self
       !> Bounds xmin, ymin, xmax, ymax of the window [m]
@@ -278,7 +335,7 @@ contains
       integer(ip) :: j, r, left, right, from, to
       integer :: l
 
-      do l = 1, self%n_levels + 1
+      do l = 1, self%n_levels
          associate (grid => self%grid(l))
             if (grid%last_box < grid%first_box) cycle
             left = max(column(grid, window(1)) - 1_ip, 0_ip)
@@ -331,7 +388,7 @@ contains
 
       bytes = 0_lp
       if (.not. allocated(self%cell_of)) return
-      bytes = self%order%bytes() + &
+      bytes = self%order%bytes() + self%guests%bytes() + &
          int(storage_size(self%first)/8, lp)*(2_lp*size(self%cell_of, kind=lp) + size(self%first, kind=lp))
       do w = 1, size(self%found)
          if (allocated(self%found(w)%box)) bytes = bytes + int(storage_size(self%found(w)%box)/8, lp)* &

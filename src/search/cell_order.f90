@@ -1,5 +1,6 @@
 !> Boxes in the order of cells: copies of their bounds, one array for each bound. Boxes of neighbouring cells of a row
-!> are adjacent in memory.
+!> are adjacent in memory. The comparison writes each pair and increases the count only if the pair overlaps; this needs
+!> no branch.
 module polydem_cell_order
    use polydem_kinds, only: ip, lp, wp
    implicit none

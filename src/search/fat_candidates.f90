@@ -4,7 +4,7 @@
 !> Pairs of boxes whose fat boxes overlap are candidates. `search_all` makes all fat boxes and finds all candidates in
 !> cells (`polydem_cell_grids`); they form rows. `search_single` makes a new fat box for one box, finds its new
 !> candidates in the cells of the last `search_all`, and appends them behind the rows. Boxes with such a fat box are
-!> *moved*; they are kept in a list, since the cells contain their former fat boxes.
+!> *moved*; the cells contain their former fat boxes, so they are guests of the cells that the new ones cover.
 !>
 !> The margin is set where two costs are equal: the searches, and the work that is done on candidates that are separate.
 !> Both are counted, so runs are reproducible. `must_search` asks for a search of all boxes when single searches have
@@ -27,7 +27,7 @@ module polydem_fat_candidates
 
    !> Costs in units of a comparison of two boxes (measured): a search for all boxes, per box and per candidate; a
    !> search for a single box without its comparisons
-   real(dp), parameter :: box_cost = 25.0_dp, candidate_cost = 14.0_dp, single_cost = 200.0_dp
+   real(dp), parameter :: box_cost = 50.0_dp, candidate_cost = 22.0_dp, single_cost = 800.0_dp
    !> Initial value, lower and upper bound of the margin in units of the typical side of a box
    real(wp), parameter :: first_margin = 0.2_wp, least_margin = 2.0_wp**(-10), greatest_margin = 1.0_wp
    !> Largest extension of a fat box in the direction of motion, in units of the margin
@@ -51,8 +51,6 @@ module polydem_fat_candidates
       logical, private :: searched = .false.
       !> Margin of the fat boxes [m]
       real(wp), private :: margin = 0.0_wp
-      !> Number of fixed boxes; every single search compares all of them
-      integer(ip), private :: n_fixed = 0_ip
       !> Number of candidates in the rows
       integer(ip), private :: n_listed = 0_ip
       !> First link of each box to the candidates behind the rows, (box), 0: none. The link 2(k - 1) + s is box s of
@@ -96,7 +94,6 @@ contains
       self%margin = first_margin*self%side
       call choose_levels(boxes, 2.0_wp*self%margin, n_levels, level, largest)
       call self%grids%set_levels(n_levels, level, boxes%fixed(1:boxes%n))
-      self%n_fixed = count(boxes%fixed(1:boxes%n), kind=ip)
       call self%start(boxes%n)
       allocate (self%fat(4, boxes%n))
       self%fat = spread([1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]*huge(1.0_wp), 2, boxes%n)
@@ -143,7 +140,7 @@ contains
       integer(ip), intent(in) :: n_strays
 
       cost_of_singles = real(n_strays, dp)* &
-         (single_cost + real(self%n_fixed + self%moved%n, dp) + 0.5_dp*real(n_strays, dp))
+         (single_cost + real(self%grids%guests%n_wide(), dp))
    end function cost_of_singles
 
    !> Set the margin, make all fat boxes, and search for all candidates. Their states are not found. The number of
@@ -169,6 +166,7 @@ contains
          self%margin = self%margin*real(min(max(widen, 1.0_dp), 2.0_dp), wp)
          if (widen > 1.0_dp) call find_candidates(self, boxes, lines)
       end if
+      call self%grids%receive_fixed(self%fat)
       call self%replace(self%grids%found, boxes, changes, with_states=.false.)
       self%n_listed = self%n
       self%searched = .true.
@@ -270,20 +268,21 @@ contains
       integer(ip) :: k, j
 
       call fatten(self, i, i, boxes%bounds, lines)
-      self%near%n = 0_ip
       tests = self%grids%total%tests
-      call self%grids%search_window(self%fat(:, i), self%near)
-      tests = self%grids%total%tests - tests + int(self%moved%n, lp)
-      self%singles = self%singles + single_cost + real(tests, dp)
       call meet_candidates(self, i)
+      self%near%n = 0_ip
+      call self%grids%search_window(self%fat(:, i), self%near)
       do k = 1_ip, self%near%n
          j = self%near%at(k)
          if (self%is_moved(j) == 0_bp) call add_candidate(self, i, j, boxes, changes)
       end do
-      do k = 1_ip, self%moved%n
-         j = self%moved%at(k)
-         if (overlapping(self%fat(:, i), self%fat(:, j))) call add_candidate(self, i, j, boxes, changes)
+      self%near%n = 0_ip
+      call self%grids%search_guests(self%fat(:, i), self%fat, self%near)
+      do k = 1_ip, self%near%n
+         call add_candidate(self, i, self%near%at(k), boxes, changes)
       end do
+      self%singles = self%singles + single_cost + real(self%grids%total%tests - tests, dp)
+      call self%grids%add_guest(i, self%fat(:, i))
       if (self%is_moved(i) /= 0_bp) return
       self%is_moved(i) = 1_bp
       call self%moved%push(i)
@@ -337,6 +336,7 @@ contains
       logical :: overlap
 
       if (self%met_by(j) == self%n_single) return
+      self%met_by(j) = self%n_single
       if (boxes%body(i) == boxes%body(j) .or. (boxes%passive(i) .and. boxes%passive(j))) return
       overlap = overlapping(boxes%bounds(:, i), boxes%bounds(:, j))
       if (overlap) call changes%record(boxes%body(i), boxes%body(j), 1_ip)

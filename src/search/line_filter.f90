@@ -14,17 +14,23 @@
 !> reviewed: those that are not sure between s and T become active. A box that leaves its lines often is *off*: all its
 !> candidates are active until the next interval.
 !>
-!> Rounding. Let u be the unit roundoff, and let |p| + T|v| <= L for all lines of boxes that are not off.
+!> Rounding. Lines and their gaps are numbers of single precision, with unit roundoff u; places count from an origin o.
+!> Let |p| + T|v| <= L for all lines of boxes that are not off, and let L be 100 d or more.
 !>
-!>  * A predicted position q = fl(p + fl(v s)) differs from p + v s by less than 2.1 u L.
-!>  * A side x with fl|x - q| <= d fulfils |x - q| <= d (1 + 2u). So it is less than d (1 + 2u) + 2.1 u L from p + v s,
-!>    and a gap of two boxes is less than 2 d (1 + 2u) + 4.2 u L from g(s).
+!>  * The place x - o of a side, rounded to single precision, has an error below 2.1 u |x - o|.
+!>  * The line moved up by the tolerance, fl(p + fl(fl(v s) + d)), has an error below 1.01 u (3 L + 2 d).
+!>  * A side whose computed distance from it lies between -2 d and 0 is less than d (1 + 2.1 u) plus these errors from
+!>    p + v s. With |x - o| < 1.02 L the sum is less than d + 5.4 u L. So a gap of two boxes is less than 2 d + 10.8 u L
+!>    from g(s).
 !>  * The gaps between lines at step s are computed as fl(fl(p_a - p_b) + fl(fl(v_a - v_b) s)), with an error of less
-!>    than 10.5 u L.
+!>    than 8.3 u L.
 !>
-!> All errors together are less than 15 u L + 4 u d. Lines with |p| + T|v| > L = d/(1024 u) are not used: their boxes
-!> are off. The errors are then less than d/64, and m = (2 + 1/32) d covers them and the rounding of m itself. For the
-!> same reason a box on its lines is closer than (1 + 1/32) d to the straight tubes of `find_room`.
+!> All errors together are less than 19.1 u L, and m = 2 d + 20 u L covers them and the rounding of m itself. For the
+!> same reason a box on its lines is inside the straight tubes of half width d + 20 u L.
+!>
+!> L follows from the places of the boxes at the start of the interval, but at most 2^19 d of it: the margin then grows
+!> by less than d. Lines beyond L are not used: their boxes are off. So are all boxes if the tolerance is so small that
+!> products could underflow.
 !>
 !> The tolerance and the length of the intervals follow from exact counts of comparisons, never from a clock, so runs
 !> are reproducible. Both are set where two costs are equal (`adapt`).
@@ -98,12 +104,12 @@ contains
       !> Typical side of a box [m]
       real(wp), intent(in) :: side
 
-      allocate (self%place(4, n_boxes), source=0.0_wp)
+      allocate (self%place(4, n_boxes), source=0.0_sp)
       allocate (self%speed(4, n_boxes), source=0.0_sp)
       allocate (self%drawn(n_boxes), source=0_ip)
       allocate (self%left(n_boxes), source=0_bp)
       self%side = side
-      self%tolerance = first_tolerance*side
+      self%tolerance = real(first_tolerance*side, sp)
       self%active%isa = self%isa
       call self%active%reserve(64_ip)
    end subroutine start
@@ -180,8 +186,8 @@ contains
       self%exact_length = min(max(self%exact_length, least_length), greatest_length)
       if (self%share < trust) return
       factor = sqrt(max(off, 1.0_dp)/max(touching, 1.0_dp))
-      self%tolerance = self%tolerance*real(min(max(factor, 0.5_dp), 2.0_dp), wp)
-      self%tolerance = min(max(self%tolerance, least_tolerance*self%side), greatest_tolerance*self%side)
+      self%tolerance = real(min(max(real(self%tolerance, wp)*real(min(max(factor, 0.5_dp), 2.0_dp), wp), &
+                                    least_tolerance*self%side), greatest_tolerance*self%side), sp)
    end subroutine adapt
 
    !> Classify a range of candidates at the start of an interval. The present boxes are those of `draw_lines`. If the

@@ -2,10 +2,11 @@
 !> candidates or of the active candidates. The results do not depend on the number of threads.
 module polydem_parallel_filter
    use polydem_active_pairs, only: active_pairs_t
+   use polydem_box_lines, only: median_corner
    use polydem_boxes, only: boxes_t
    use polydem_candidates, only: candidates_t
    use polydem_index_list, only: index_list_t
-   use polydem_kinds, only: ip, lp, wp, min_parallel_size
+   use polydem_kinds, only: ip, lp, sp, wp, min_parallel_size
    use polydem_line_filter, only: line_filter_t
    use polydem_thread_changes, only: part, thread_changes_t
    implicit none
@@ -183,16 +184,20 @@ contains
       class(parallel_filter_t), intent(inout) :: self
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
+      real(wp) :: origin(2)
+      real(sp) :: reach(size(self%worker))
       integer(ip) :: low, high
       integer :: w
 
+      origin = median_corner(boxes%n, boxes%bounds)
       !$omp parallel do if (boxes%n > min_parallel_size) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes) private(w, low, high)
+      !$omp    shared(self, boxes, origin, reach) private(w, low, high)
       do w = 1, size(self%worker)
          call part(boxes%n, size(self%worker), w, low, high)
-         call self%draw_lines(low, high, boxes%n, boxes%bounds)
+         call self%draw_lines(low, high, boxes%n, boxes%bounds, origin, reach(w))
       end do
       !$omp end parallel do
+      call self%set_limit(origin, maxval(reach))
    end subroutine draw_all_lines
 
    !> List the boxes that do not stay inside given bounds in an interval that begins.
