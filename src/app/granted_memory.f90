@@ -5,13 +5,10 @@
 module polydem_granted_memory
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_new_line, c_ptr, c_size_t
    use polydem_errors, only: run_error
-   use polydem_posix, only: c_write
+   use polydem_posix, only: c_write, standard_error
    use polydem_posix_processes, only: c_exit_now
    implicit none
    private
-
-   !> Descriptor of standard error
-   integer(c_int), parameter :: standard_error = 2_c_int
 
    interface
       !> C malloc

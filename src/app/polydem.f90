@@ -7,6 +7,7 @@ program polydem
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: start_library
    use polydem_kinds, only: ip
+   use polydem_posix_processes, only: c_exit
    use polydem_process_limits, only: check_stack
    use polydem_screen, only: warn
    use polydem_signals, only: hold_usr1, ignore_write_signals
@@ -14,14 +15,6 @@ program polydem
    use polydem_verbs, only: execute
    use polydem_world_communicator, only: create_world
    implicit none
-
-   interface
-      !> C function exit: ends the program with an exit code and without output
-      subroutine c_exit(code) bind(C, name='exit')
-         import :: c_int
-         integer(c_int), value :: code
-      end subroutine c_exit
-   end interface
 
    type(command_t) :: command
    type(error_t), allocatable :: error

@@ -4,7 +4,7 @@ module polydem_file_system
    use polydem_errors, only: error_t, io_error, raise
    use polydem_kinds, only: lp
    use polydem_posix, only: c_access, c_close, c_fallocate, c_fsync, c_lseek, c_mkdir, c_open, c_rename, c_strerror, &
-      c_unlink, error_number, is_written, text_at
+      c_unlink, error_number, existence, is_written, read_and_write, read_only, text_at, write_only
    use polydem_posix_processes, only: c_umask, c_user
    implicit none
    private
@@ -16,14 +16,8 @@ module polydem_file_system
       '. Is the disk full, or the file size limited (ulimit -f)? Free space or choose another folder, and run '// &
       'again; files that were closed earlier are complete'
 
-   !> F_OK of access(2)
-   integer(c_int), parameter :: existence = 0_c_int
    !> R_OK of access(2)
    integer(c_int), parameter :: may_read = 4_c_int
-   !> O_RDONLY of open(2)
-   integer(c_int), parameter :: read_only = 0_c_int
-   !> O_WRONLY and O_RDWR of open(2)
-   integer(c_int), parameter :: write_only = 1_c_int, read_and_write = 2_c_int
    !> FALLOC_FL_KEEP_SIZE of fallocate(2): the length of the file does not change
    integer(c_int), parameter :: keep_size = 1_c_int
    !> SEEK_END of lseek(2)

@@ -5,7 +5,7 @@ module polydem_folders
       c_ptr
    use polydem_errors, only: error_t, io_error, raise
    use polydem_file_system, only: last_failure
-   use polydem_posix, only: c_closedir, c_faccessat, c_opendir, c_readdir, c_realpath, c_rmdir, text_at
+   use polydem_posix, only: c_closedir, c_faccessat, c_opendir, c_readdir, c_realpath, c_rmdir, existence, text_at
    use polydem_posix_processes, only: c_free
    implicit none
    private
@@ -15,8 +15,6 @@ module polydem_folders
    integer(c_int), parameter :: working_directory = -100_c_int
    !> AT_SYMLINK_NOFOLLOW of openat(2)
    integer(c_int), parameter :: link_itself = 256_c_int
-   !> F_OK of access(2)
-   integer(c_int), parameter :: existence = 0_c_int
    !> Offset of d_name in struct dirent of 64-bit Linux, after inode number, offset, length and type [B]
    integer, parameter :: name_offset = 19
    !> Maximum length of a file name (NAME_MAX of Linux)

@@ -10,7 +10,7 @@ module polydem_heartbeat
    use polydem_clock, only: wall_seconds
    use polydem_kinds, only: dp
    use polydem_lock_file, only: lock_file_t, read_record, record_length
-   use polydem_posix, only: c_close
+   use polydem_posix, only: c_close, close_on_exec
    use polydem_posix_processes, only: c_free, c_malloc, c_pipe2, c_poll, pthread_create, pthread_join
    implicit none
    private
@@ -68,8 +68,6 @@ module polydem_heartbeat
       integer(c_short) :: wanted, found
    end type pollfd_t
 
-   !> O_CLOEXEC of pipe2(2) on Linux
-   integer(c_int), parameter :: close_on_exec = int(o'2000000', c_int)
    !> POLLIN of poll(2)
    integer(c_short), parameter :: readable = 1_c_short
 

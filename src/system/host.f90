@@ -2,6 +2,7 @@
 module polydem_host
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_null_char, c_null_ptr, c_size_t
    use polydem_kinds, only: dp, ip, lp
+   use polydem_posix, only: standard_output
    use polydem_posix_processes, only: c_time, gethostname, gmtime, isatty, strftime, sysconf
    use polydem_strings, only: decimal, to_text
    implicit none
@@ -12,12 +13,12 @@ module polydem_host
 
    !> Text for facts that the system does not report
    character(len=*), parameter :: unknown = 'unknown'
+   !> File with a line per fact of each processor
+   character(len=*), parameter :: processor_facts = '/proc/cpuinfo'
    !> Length that holds a line of a file in /sys
    integer, parameter :: line_length = 64
    !> _SC_NPROCESSORS_ONLN of sysconf(3) on Linux
    integer(c_int), parameter :: online = 84_c_int
-   !> File descriptor of standard output
-   integer(c_int), parameter :: standard_output = 1_c_int
 
 contains
 
@@ -36,7 +37,7 @@ contains
    function processor_name() result(name)
       character(len=:), allocatable :: name
 
-      name = processor_fact('model name')
+      name = fact_in(processor_facts, 'model name')
    end function processor_name
 
    !> Current clock rate of the first processor, like '2.596 GHz'
@@ -45,7 +46,7 @@ contains
       real(dp) :: megahertz
       integer :: status
 
-      text = processor_fact('cpu MHz')
+      text = fact_in(processor_facts, 'cpu MHz')
       read (text, *, iostat=status) megahertz
       if (status /= 0) then
          text = unknown
@@ -60,18 +61,18 @@ contains
       !> Name of the feature
       character(len=*), intent(in) :: feature
 
-      processor_has = index(' '//processor_fact('flags')//' ', ' '//feature//' ') > 0
+      processor_has = index(' '//fact_in(processor_facts, 'flags')//' ', ' '//feature//' ') > 0
    end function processor_has
 
-   !> First entry of a name in /proc/cpuinfo
-   function processor_fact(name) result(fact)
-      character(len=*), intent(in) :: name
+   !> First entry of a name in a file of /proc with lines like 'name: entry'
+   function fact_in(path, name) result(fact)
+      character(len=*), intent(in) :: path, name
       character(len=:), allocatable :: fact
       character(len=8192) :: line
       integer :: unit, status
 
       fact = unknown
-      open (newunit=unit, file='/proc/cpuinfo', status='old', action='read', iostat=status)
+      open (newunit=unit, file=path, status='old', action='read', iostat=status)
       if (status /= 0) return
       do
          read (unit, '(a)', iostat=status) line
@@ -81,7 +82,7 @@ contains
          exit
       end do
       close (unit)
-   end function processor_fact
+   end function fact_in
 
    !> Caches of the first processor, like 'L1d 48K, L1i 32K, L2 2048K, L3 107520K', from /sys
    function cache_sizes() result(text)
@@ -109,15 +110,11 @@ contains
    !> Size of the main memory, like '32768 MiB', from /proc/meminfo
    function memory_size() result(text)
       character(len=:), allocatable :: text
-      character(len=line_length) :: line
-      integer :: kibibytes, status
+      integer(lp) :: kibibytes
 
+      kibibytes = kibibytes_in('/proc/meminfo', 'MemTotal')
       text = unknown
-      line = first_line('/proc/meminfo')
-      if (index(line, 'MemTotal:') /= 1) return
-      read (line(10:), *, iostat=status) kibibytes
-      if (status /= 0) return
-      text = to_text(kibibytes/1024)//' MiB'
+      if (kibibytes > 0_lp) text = to_text(kibibytes/1024_lp)//' MiB'
    end function memory_size
 
    !> Frequency governor of the first processor, like 'performance', from /sys
@@ -205,18 +202,18 @@ contains
 
    !> Resident memory of this process (VmRSS of Linux) [KiB]; 0 if unknown
    integer(lp) function resident_memory()
-      character(len=128) :: line
-      integer :: unit, status
-
-      resident_memory = 0_lp
-      open (newunit=unit, file='/proc/self/status', action='read', status='old', iostat=status)
-      do while (status == 0)
-         read (unit, '(a)', iostat=status) line
-         if (status /= 0 .or. line(1:6) /= 'VmRSS:') cycle
-         read (line(7:), *, iostat=status) resident_memory
-         exit
-      end do
-      close (unit, iostat=status)
+      resident_memory = kibibytes_in('/proc/self/status', 'VmRSS')
    end function resident_memory
+
+   !> Number in an entry of a file of /proc [KiB]; 0 if unknown
+   integer(lp) function kibibytes_in(path, name)
+      character(len=*), intent(in) :: path, name
+      character(len=:), allocatable :: fact
+      integer :: status
+
+      fact = fact_in(path, name)
+      read (fact, *, iostat=status) kibibytes_in
+      if (status /= 0) kibibytes_in = 0_lp
+   end function kibibytes_in
 
 end module polydem_host

@@ -7,7 +7,8 @@ module polydem_line_writer
    use, intrinsic :: iso_fortran_env, only: output_unit
    use polydem_errors, only: error_t, io_error, raise
    use polydem_file_system, only: exists, last_failure
-   use polydem_posix, only: c_close, c_creat, c_open, error_number, is_written
+   use polydem_posix, only: c_close, c_creat, c_open, error_number, is_written, standard_error, &
+      standard_output
    implicit none
    private
    public :: line_writer_t
@@ -32,10 +33,6 @@ module polydem_line_writer
       procedure, private :: is_screen
    end type line_writer_t
 
-   !> Descriptor of standard output
-   integer(c_int), parameter :: standard_output = 1_c_int
-   !> Descriptor of standard error
-   integer(c_int), parameter :: standard_error = 2_c_int
    !> EPIPE of errno on Linux: the reader of the pipe has closed it
    integer(c_int), parameter :: broken_pipe = 32_c_int
    !> Permissions of a new file before umask: rw-rw-rw-

@@ -7,7 +7,8 @@
 module polydem_lock_file
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char, c_size_t
    use polydem_file_system, only: last_failure
-   use polydem_posix, only: c_close, c_flock, c_open, c_pread, c_pwrite, error_number
+   use polydem_posix, only: c_close, c_flock, c_open, c_pread, c_pwrite, close_on_exec, error_number, &
+      read_and_write, read_only
    implicit none
    private
    public :: lock_file_t, read_record, record_length
@@ -29,10 +30,10 @@ module polydem_lock_file
       procedure :: close => close_file
    end type lock_file_t
 
-   !> O_RDONLY, O_RDWR, O_CREAT, O_EXCL, O_DSYNC and O_CLOEXEC of open(2) on Linux. With O_DSYNC, a write returns when
-   !> the data are on the disk or server, and a network file system writes only these bytes, not the whole page
-   integer(c_int), parameter :: read_only = 0_c_int, read_write = 2_c_int, create = int(o'100', c_int), &
-      exclusive = int(o'200', c_int), synchronous = int(o'10000', c_int), close_on_exec = int(o'2000000', c_int)
+   !> O_CREAT, O_EXCL and O_DSYNC of open(2) on Linux. With O_DSYNC, a write returns when the data are on the disk or
+   !> server, and a network file system writes only these bytes, not the whole page
+   integer(c_int), parameter :: create = int(o'100', c_int), exclusive = int(o'200', c_int), &
+      synchronous = int(o'10000', c_int)
    !> Permissions of a new file before umask: rw-rw-rw-
    integer(c_int), parameter :: permissions = int(o'666', c_int)
    !> LOCK_SH, LOCK_EX and LOCK_NB of flock(2)
@@ -56,7 +57,7 @@ contains
       integer(c_int) :: flags, number
 
       call self%close()
-      flags = ior(ior(read_write, synchronous), close_on_exec)
+      flags = ior(ior(read_and_write, synchronous), close_on_exec)
       self%descriptor = c_open(path//c_null_char, ior(flags, ior(create, exclusive)), permissions)
       is_new = self%descriptor >= 0_c_int
       if (is_new) return

@@ -6,6 +6,15 @@ module polydem_posix
    public :: c_access, c_close, c_closedir, c_creat, c_faccessat, c_fallocate, c_flock, c_fsync, c_lseek, c_mkdir, &
       c_open, c_opendir, c_pread, c_pwrite, c_readdir, c_realpath, c_rename, c_rmdir, c_strerror, c_strlen, &
       c_unlink, c_write, error_number, is_written, text_at
+   public :: close_on_exec, existence, read_and_write, read_only, standard_error, standard_output, write_only
+
+   !> Descriptors of standard output and standard error
+   integer(c_int), parameter :: standard_output = 1_c_int, standard_error = 2_c_int
+   !> F_OK of access(2)
+   integer(c_int), parameter :: existence = 0_c_int
+   !> O_RDONLY, O_WRONLY, O_RDWR and O_CLOEXEC of open(2) on Linux
+   integer(c_int), parameter :: read_only = 0_c_int, write_only = 1_c_int, read_and_write = 2_c_int, &
+      close_on_exec = int(o'2000000', c_int)
 
    interface
       !> open(2): a descriptor, or -1

@@ -4,7 +4,7 @@ module polydem_posix_processes
    use, intrinsic :: iso_c_binding, only: c_char, c_funptr, c_int, c_int64_t, c_intptr_t, c_long, c_ptr, c_size_t
    implicit none
    private
-   public :: c_attributes_init, c_attributes_stack, c_exit_now, c_free, c_getaffinity, c_getpid, c_getrandom, &
+   public :: c_attributes_init, c_attributes_stack, c_exit, c_exit_now, c_free, c_getaffinity, c_getpid, c_getrandom, &
       c_getrlimit, c_kill, c_malloc, c_pipe2, c_poll, c_read, c_sigaction, c_strdup, c_time, c_umask, &
       c_user, event_t, gethostname, gmtime, isatty, limit_t, pthread_create, pthread_join, pthread_sigmask, strftime, &
       sysconf, timer_create, timer_delete, timer_settime, times_t
@@ -232,7 +232,13 @@ module polydem_posix_processes
          character(kind=c_char), intent(in) :: text(*)
       end function c_strdup
 
-      !> POSIX _exit(2)
+      !> exit(3): flush and close files, and end the process without a message
+      subroutine c_exit(code) bind(C, name='exit')
+         import :: c_int
+         integer(c_int), value :: code
+      end subroutine c_exit
+
+      !> _exit(2): end the process at once
       subroutine c_exit_now(code) bind(C, name='_exit')
          import :: c_int
          integer(c_int), value :: code

@@ -1,15 +1,10 @@
 !> Standard input, output and error of this process (POSIX).
 module polydem_standard_streams
    use, intrinsic :: iso_c_binding, only: c_int, c_null_char
-   use polydem_posix, only: c_close, c_open
+   use polydem_posix, only: c_close, c_open, read_and_write, standard_error
    implicit none
    private
    public :: open_closed_streams
-
-   !> Descriptor of standard error, the last of the three
-   integer(c_int), parameter :: standard_error = 2_c_int
-   !> O_RDWR of open(2)
-   integer(c_int), parameter :: read_and_write = 2_c_int
 
 contains
 
@@ -19,7 +14,7 @@ contains
       integer(c_int) :: descriptor, ignored
 
       descriptor = 0_c_int
-      ! A new descriptor gets the lowest free number.
+      ! A new descriptor gets the lowest free number; that of standard error is the last of the three.
       do while (descriptor >= 0_c_int .and. descriptor <= standard_error)
          descriptor = c_open('/dev/null'//c_null_char, read_and_write, 0_c_int)
       end do

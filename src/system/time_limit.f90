@@ -9,7 +9,7 @@ module polydem_time_limit
       c_null_char, c_null_ptr, c_ptr, c_size_t
    use polydem_errors, only: io_error
    use polydem_kinds, only: dp, ip, lp
-   use polydem_posix, only: c_strlen, c_write
+   use polydem_posix, only: c_strlen, c_write, standard_error
    use polydem_posix_processes, only: c_exit_now, c_free, c_strdup, event_t, timer_create, timer_delete, &
       timer_settime, times_t
    use polydem_strings, only: to_text
@@ -23,8 +23,8 @@ module polydem_time_limit
    real(dp), parameter :: default_patience = 600.0_dp
    !> Minimum write rate of any disk [B/s]
    real(dp), parameter :: min_rate = 1.0e6_dp
-   !> CLOCK_MONOTONIC and SIGEV_THREAD of Linux, and the descriptor of standard error
-   integer(c_int), parameter :: monotonic_clock = 1_c_int, by_thread = 2_c_int, standard_error = 2_c_int
+   !> CLOCK_MONOTONIC and SIGEV_THREAD of Linux
+   integer(c_int), parameter :: monotonic_clock = 1_c_int, by_thread = 2_c_int
 
    !> A time limit, which may be set or not
    type :: time_limit_t

@@ -12,18 +12,11 @@ program write_sample
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_named_values, only: named_values_t
+   use polydem_posix_processes, only: c_exit
    use polydem_provenance, only: provenance_t
    use polydem_trajectory_writer, only: trajectory_writer_t
    use sample, only: sample_bodies, sample_contacts, sample_provenance, sample_row, write_sample_profile
    implicit none
-
-   interface
-      !> C function exit: ends the program with an exit code and without output
-      subroutine c_exit(code) bind(C, name='exit')
-         import :: c_int
-         integer(c_int), value :: code
-      end subroutine c_exit
-   end interface
 
    type(error_t), allocatable :: error
    character(len=1024) :: folder, word

@@ -19,6 +19,7 @@ program write_together
    use polydem_kinds, only: ip, lp, wp
    use polydem_named_values, only: named_values_t
    use polydem_ownership, only: order_bodies, order_pairs
+   use polydem_posix_processes, only: c_exit
    use polydem_provenance, only: provenance_t
    use polydem_strings, only: to_text
    use polydem_trajectory_writer, only: trajectory_writer_t
@@ -28,14 +29,6 @@ program write_together
    use sample, only: sample_provenance, sample_row
    use spread_world, only: part_of_world, whole_world, world_t
    implicit none
-
-   interface
-      !> C function exit: ends the program with an exit code and without output
-      subroutine c_exit(code) bind(C, name='exit')
-         import :: c_int
-         integer(c_int), value :: code
-      end subroutine c_exit
-   end interface
 
    !> Number of frames, and frames per segment
    integer(lp), parameter :: n_frames = 3_lp

@@ -15,18 +15,11 @@ program verify
    use polydem_line_writer, only: line_writer_t
    use polydem_kinds, only: ip
    use polydem_file_system, only: make_folder
+   use polydem_posix_processes, only: c_exit
    use polydem_provenance, only: collect_provenance, provenance_t
    use polydem_strings, only: to_text
    use verification_table, only: table_t
    implicit none
-
-   interface
-      !> C exit: ends the program with an exit code and without a message
-      subroutine c_exit(code) bind(C, name='exit')
-         import :: c_int
-         integer(c_int), value :: code
-      end subroutine c_exit
-   end interface
 
    character(len=*), parameter :: folder = 'results/verify'
    type(table_t) :: table
