@@ -15,7 +15,7 @@ module polydem_hdf5_dataset
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_hyperslab, only: read_slab, slab_t, write_slab
    use polydem_hdf5_links, only: check_storage, disable_external_links, raise_external, is_external_link
-   use polydem_hdf5_location, only: check_status, dataset_location_t
+   use polydem_hdf5_location, only: check_status, dataset_location_t, reject
    use polydem_kinds, only: dp, ip, lp
    use polydem_strings, only: to_text
    implicit none
@@ -328,11 +328,7 @@ contains
       if (allocated(error)) return
       if (wanted == holds_reals .and. (class == h5t_float_f .or. class == h5t_integer_f)) return
       if (wanted == holds_integers .and. (class == h5t_integer_f .or. class == h5t_enum_f)) return
-      if (wanted == holds_reals) then
-         call raise(error, input_error, location%path//': '//location%name//' does not hold numbers')
-      else
-         call raise(error, input_error, location%path//': '//location%name//' does not hold integers')
-      end if
+      call reject(location, 'does not hold '//trim(merge('numbers ', 'integers', wanted == holds_reals)), error)
    end subroutine check_class
 
 end module polydem_hdf5_dataset

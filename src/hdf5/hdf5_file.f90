@@ -7,10 +7,10 @@
 module polydem_hdf5_file
    use, intrinsic :: iso_c_binding, only: c_loc
    use hdf5, only: h5_real_kind, h5kind_to_type, hsize_t
-   use polydem_errors, only: error_t, input_error, raise
+   use polydem_errors, only: error_t
    use polydem_hdf5_dataset, only: holds_integers, holds_reals, library_version, read_dataset, start_library
    use polydem_hdf5_hyperslab, only: part_t
-   use polydem_hdf5_location, only: dataset_location_t
+   use polydem_hdf5_location, only: dataset_location_t, reject
    use polydem_hdf5_shape_check, only: checked_shape, shape_text
    use polydem_hdf5_strings, only: read_attribute_value, read_text
    use polydem_hdf5_writer, only: hdf5_writer_t, many_rows, one_row
@@ -25,7 +25,8 @@ module polydem_hdf5_file
    type, extends(hdf5_writer_t) :: hdf5_file_t
    contains
       !> Read a data set into an allocatable: read(name, values, error). Integers in the file may have any width, or be
-      !> booleans of h5py. With `rows` only some rows along the slowest dimension are read.
+      !> booleans of h5py. With `rows` only some rows along the slowest dimension are read. Nothing happens if `error`
+      !> is allocated before.
       generic :: read => read_reals, read_real_table, read_real_block, read_integers, read_longs, &
          read_one_text
       procedure :: read_real_attribute
@@ -103,16 +104,14 @@ contains
       integer(ip), allocatable, intent(out) :: values(:)
       type(error_t), allocatable, intent(inout) :: error
       integer(lp), allocatable :: wide(:)
-      type(dataset_location_t) :: location
 
-      location = self%location_of(name)
       call self%read_longs(name, wide, error)
       if (allocated(error)) return
       if (any(wide > huge(1_ip) .or. wide < -huge(1_ip))) then
-         call raise(error, input_error, location%path//': '//name//' holds numbers beyond 32 bits')
-         return
+         call reject(self%location_of(name), 'holds numbers beyond 32 bits', error)
+      else
+         values = int(wide, ip)
       end if
-      values = int(wide, ip)
    end subroutine read_integers
 
    subroutine read_one_text(self, name, text, error)
@@ -121,6 +120,7 @@ contains
       character(len=:), allocatable, intent(out) :: text
       type(error_t), allocatable, intent(inout) :: error
 
+      if (allocated(error)) return
       call read_text(self%location_of(name), text, error)
    end subroutine read_one_text
 
@@ -131,10 +131,11 @@ contains
       character(len=*), intent(in) :: object, name
       !> The number; unchanged if the attribute does not exist
       real(dp), intent(inout), target :: value
-      !> Allocated if the attribute cannot be read
+      !> Allocated if the attribute cannot be read; nothing happens if it is allocated before
       type(error_t), allocatable, intent(inout) :: error
       logical :: there
 
+      if (allocated(error)) return
       call read_attribute_value(self%location_of(object), name, h5kind_to_type(dp, h5_real_kind), c_loc(value), there, &
                                 error)
    end subroutine read_real_attribute
@@ -148,37 +149,24 @@ contains
       integer(lp), intent(in), optional :: rows(2)
       !> Start and shape of the part, fastest dimension first
       integer(hsize_t), allocatable, intent(out) :: start(:), extent(:)
+      !> Allocated if the data set is missing, has another number of dimensions, or claims more data than the file can
+      !> hold; nothing happens if it is allocated before
       type(error_t), allocatable, intent(inout) :: error
 
-      call expect_rank(location, rank, extent, error)
+      if (.not. allocated(error)) call checked_shape(location, extent, error)
       if (allocated(error)) return
-      start = 0*extent
-      if (.not. present(rows)) return
-      if (rows(1) + rows(2) > extent(rank)) then
-         call raise(error, input_error, location%path//': '//location%name//' has only '// &
-                    to_text(int(extent(rank), lp))//' rows')
+      if (size(extent) /= rank) then
+         call reject(location, 'has the shape '//shape_text(extent)//' but must have '//to_text(int(rank, ip))// &
+                     ' dimensions', error)
          return
       end if
+      start = 0*extent
+      if (.not. present(rows)) return
+      if (rows(1) + rows(2) > extent(rank)) call reject(location, 'has only '//to_text(int(extent(rank), lp))// &
+                                                        ' rows', error)
+      if (allocated(error)) return
       start(rank) = rows(1)
       extent(rank) = rows(2)
    end subroutine choose_rows
-
-   !> Read the shape of a data set and check its number of dimensions.
-   subroutine expect_rank(location, rank, extent, error)
-      type(dataset_location_t), intent(in) :: location
-      !> Required number of dimensions
-      integer, intent(in) :: rank
-      !> Shape, fastest dimension first
-      integer(hsize_t), allocatable, intent(out) :: extent(:)
-      !> Allocated if the data set is missing, has another number of dimensions, or claims more data than the file can
-      !> hold
-      type(error_t), allocatable, intent(inout) :: error
-
-      call checked_shape(location, extent, error)
-      if (allocated(error)) return
-      if (size(extent) == rank) return
-      call raise(error, input_error, location%path//': '//location%name//' has the shape '//shape_text(extent)// &
-                 ' but must have '//to_text(int(rank, ip))//' dimensions')
-   end subroutine expect_rank
 
 end module polydem_hdf5_file

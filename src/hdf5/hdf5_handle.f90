@@ -37,6 +37,7 @@ module polydem_hdf5_handle
       procedure :: has
       procedure :: shape_of
       procedure :: location_of
+      procedure :: reject
       procedure, private :: check
    end type hdf5_handle_t
 
@@ -229,14 +230,27 @@ contains
       character(len=*), intent(in) :: name
       !> Shape; empty for a scalar
       integer(lp), allocatable, intent(out) :: shape(:)
-      !> Allocated if the data set is missing, or if it claims more data than the file can hold
+      !> Allocated if the data set is missing, or if it claims more data than the file can hold; nothing happens if it
+      !> is allocated before
       type(error_t), allocatable, intent(inout) :: error
       integer(hsize_t), allocatable :: extent(:)
 
+      if (allocated(error)) return
       call checked_shape(self%location_of(name), extent, error)
       if (allocated(error)) return
       shape = int(extent(size(extent):1:-1), lp)
    end subroutine shape_of
+
+   !> Report that the contents of the file are not as they must be.
+   pure subroutine reject(self, problem, error)
+      class(hdf5_handle_t), intent(in) :: self
+      !> The defect; the message names the file before it
+      character(len=*), intent(in) :: problem
+      !> Always allocated afterwards
+      type(error_t), allocatable, intent(inout) :: error
+
+      call raise(error, input_error, self%path//': '//problem)
+   end subroutine reject
 
    !> Location of a data set, for the procedures of `polydem_hdf5_dataset`
    function location_of(self, name) result(location)

@@ -7,8 +7,8 @@ module polydem_hdf5_links
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_null_char, c_size_t
    use hdf5, only: h5d_virtual_f, h5dget_create_plist_f, h5l_type_external_f, h5l_type_soft_f, h5lget_info_f, &
       h5p_default_f, h5pclose_f, h5pget_external_count_f, h5pget_layout_f, hid_t, size_t
-   use polydem_errors, only: error_t, input_error, raise
-   use polydem_hdf5_location, only: check_status, dataset_location_t
+   use polydem_errors, only: error_t
+   use polydem_hdf5_location, only: check_status, dataset_location_t, reject
    implicit none
    private
    public :: disable_external_links, is_external_link, check_storage, raise_external
@@ -126,8 +126,8 @@ contains
       !> Always allocated afterwards
       type(error_t), allocatable, intent(inout) :: error
 
-      call raise(error, input_error, location%path//': '//location%name//' lies in another file. External '// &
-                 'links and external storage are not followed; copy the data set into this file')
+      call reject(location, 'lies in another file. External links and external storage are not followed; copy the '// &
+                  'data set into this file', error)
    end subroutine raise_external
 
 end module polydem_hdf5_links

@@ -1,12 +1,12 @@
 !> Locations of data sets, and errors of HDF5 calls that name the location.
 module polydem_hdf5_location
    use hdf5, only: hid_t
-   use polydem_errors, only: error_t, io_error, raise
+   use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_access, only: abort_all
    use polydem_kinds, only: lp
    implicit none
    private
-   public :: dataset_location_t, check_status
+   public :: dataset_location_t, check_status, reject
 
    !> Location of a data set, for calls and for messages
    type :: dataset_location_t
@@ -41,5 +41,16 @@ contains
       if (location%together) call abort_all(location%path//': cannot '//action//' '//location%name)
       call raise(error, io_error, location%path//': cannot '//action//' '//location%name)
    end subroutine check_status
+
+   !> Report that a data set is not as it must be.
+   subroutine reject(location, problem, error)
+      type(dataset_location_t), intent(in) :: location
+      !> The defect; it completes the message 'FILE: NAME ...'
+      character(len=*), intent(in) :: problem
+      !> Always allocated afterwards
+      type(error_t), allocatable, intent(inout) :: error
+
+      call raise(error, input_error, location%path//': '//location%name//' '//problem)
+   end subroutine reject
 
 end module polydem_hdf5_location

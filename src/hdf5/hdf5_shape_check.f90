@@ -2,9 +2,9 @@
 module polydem_hdf5_shape_check
    use hdf5, only: h5dclose_f, h5dget_storage_size_f, h5dget_type_f, h5dopen_f, h5fget_filesize_f, h5tclose_f, &
       h5tget_size_f, hid_t, hsize_t, size_t
-   use polydem_errors, only: error_t, input_error, raise
+   use polydem_errors, only: error_t
    use polydem_hdf5_dataset, only: dataset_shape
-   use polydem_hdf5_location, only: check_status, dataset_location_t
+   use polydem_hdf5_location, only: check_status, dataset_location_t, reject
    use polydem_kinds, only: dp, lp
    use polydem_strings, only: join, to_text
    implicit none
@@ -52,8 +52,8 @@ contains
       if (allocated(error)) return
       claimed = real(bytes, dp)*product(real(extent, dp))
       if (claimed <= max(max_unchecked, max_ratio*real(stored, dp)) .and. all(extent >= 0_hsize_t)) return
-      call raise(error, input_error, location%path//': '//location%name//' claims the shape '//shape_text(extent)// &
-                 ', but the file holds '//to_text(int(stored, lp))//' bytes of it: it is damaged or was never written')
+      call reject(location, 'claims the shape '//shape_text(extent)//', but the file holds '// &
+                  to_text(int(stored, lp))//' bytes of it: it is damaged or was never written', error)
    end subroutine checked_shape
 
    !> Text of a shape in the order of h5py, with the slowest dimension first

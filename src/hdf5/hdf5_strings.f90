@@ -13,7 +13,7 @@ module polydem_hdf5_strings
    use polydem_hdf5_dataset, only: dataset_shape, write_dataset
    use polydem_hdf5_hyperslab, only: slab_of
    use polydem_hdf5_links, only: raise_external, is_external_link
-   use polydem_hdf5_location, only: check_status, dataset_location_t
+   use polydem_hdf5_location, only: check_status, dataset_location_t, reject
    use polydem_posix, only: text_at
    implicit none
    private
@@ -111,8 +111,7 @@ contains
             call h5sclose_f(space, ignored)
          end if
       else
-         call raise(error, input_error, location%path//': '//location%name// &
-                    ' does not hold one text of variable length')
+         call reject(location, 'does not hold one text of variable length', error)
       end if
       call h5tclose_f(kind_in_file, ignored)
       call h5dclose_f(dataset, ignored)

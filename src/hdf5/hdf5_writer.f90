@@ -59,32 +59,38 @@ contains
 
    !> Write contiguous values as a new data set, as another part of one, or as rows of an extendible one. A new data set
    !> gets its attributes.
-   subroutine put(self, name, type, shape, address, error, unit, meaning, part, rows)
+   subroutine put(self, name, kind_in_file, values, error, unit, meaning, part, rows)
       class(hdf5_writer_t), intent(in) :: self
       character(len=*), intent(in) :: name
-      integer(hid_t), intent(in) :: type
-      integer, intent(in) :: shape(:)
-      type(c_ptr), intent(in) :: address
+      integer(hid_t), intent(in) :: kind_in_file
+      type(*), intent(in), target, contiguous :: values(..)
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
       integer, intent(in), optional :: rows
       type(dataset_location_t) :: location
+      type(c_ptr) :: address
       integer(hsize_t), allocatable :: extent(:)
+      integer :: n_dimensions
       logical :: is_new
 
       if (allocated(error)) return
       location = self%location_of(name)
+      address = c_null_ptr
+      if (size(values) > 0) address = c_loc(values)
       ! gfortran 12 passes an empty array constructor with the extent -1 to an array of assumed rank.
-      extent = int(max(0, shape), hsize_t)
+      extent = int(max(0, shape(values)), hsize_t)
+      n_dimensions = size(extent)
       is_new = .true.
       if (present(rows) .or. present(part)) is_new = .not. self%has(name)
       if (present(rows)) then
          if (rows == one_row) extent = [extent, 1_hsize_t]
          location%expected_rows = self%expected(rows)
-         call append_rows_to(location, type, slab_of(location, extent, address, max(1, size(shape)), part), error)
+         call append_rows_to(location, kind_in_file, &
+                             slab_of(location, extent, address, max(1, n_dimensions), part), error)
       else
-         call write_dataset(location, type, slab_of(location, extent, address, size(shape), part), is_new, error)
+         call write_dataset(location, kind_in_file, slab_of(location, extent, address, n_dimensions, part), is_new, &
+                            error)
       end if
       if (is_new) call self%describe(name, error, unit, meaning)
    end subroutine put
@@ -121,11 +127,8 @@ contains
       type(part_t), intent(in), optional :: part
       !> one_row or many_rows: append to an extendible data set; a new data set if absent
       integer, intent(in), optional :: rows
-      type(c_ptr) :: address
 
-      address = c_null_ptr
-      if (size(values) > 0) address = c_loc(values)
-      call self%put(name, h5kind_to_type(dp, h5_real_kind), shape(values), address, error, unit, meaning, part, rows)
+      call self%put(name, h5kind_to_type(dp, h5_real_kind), values, error, unit, meaning, part, rows)
    end subroutine write_reals
 
    subroutine write_integers(self, name, values, error, unit, meaning, part, rows)
@@ -136,11 +139,8 @@ contains
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
       integer, intent(in), optional :: rows
-      type(c_ptr) :: address
 
-      address = c_null_ptr
-      if (size(values) > 0) address = c_loc(values)
-      call self%put(name, h5kind_to_type(ip, h5_integer_kind), shape(values), address, error, unit, meaning, part, rows)
+      call self%put(name, h5kind_to_type(ip, h5_integer_kind), values, error, unit, meaning, part, rows)
    end subroutine write_integers
 
    subroutine write_longs(self, name, values, error, unit, meaning, part, rows)
@@ -151,11 +151,8 @@ contains
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
       integer, intent(in), optional :: rows
-      type(c_ptr) :: address
 
-      address = c_null_ptr
-      if (size(values) > 0) address = c_loc(values)
-      call self%put(name, h5kind_to_type(lp, h5_integer_kind), shape(values), address, error, unit, meaning, part, rows)
+      call self%put(name, h5kind_to_type(lp, h5_integer_kind), values, error, unit, meaning, part, rows)
    end subroutine write_longs
 
    subroutine write_bytes(self, name, values, error, unit, meaning, part, rows)
@@ -166,11 +163,8 @@ contains
       character(len=*), intent(in), optional :: unit, meaning
       type(part_t), intent(in), optional :: part
       integer, intent(in), optional :: rows
-      type(c_ptr) :: address
 
-      address = c_null_ptr
-      if (size(values) > 0) address = c_loc(values)
-      call self%put(name, h5kind_to_type(bp, h5_integer_kind), shape(values), address, error, unit, meaning, part, rows)
+      call self%put(name, h5kind_to_type(bp, h5_integer_kind), values, error, unit, meaning, part, rows)
    end subroutine write_bytes
 
    subroutine write_text(self, name, values, error, unit, meaning)

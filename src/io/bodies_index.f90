@@ -1,7 +1,7 @@
 !> What must be known of all bodies of a bodies file at once: data sets and their shapes, vertices per body, which
 !> bodies are fixed, identifiers.
 module polydem_bodies_index
-   use polydem_errors, only: error_t, input_error, raise
+   use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_hdf5_members, only: count_names, is_dataset, read_name
    use polydem_kinds, only: dp, ip, lp
@@ -35,10 +35,8 @@ module polydem_bodies_index
 contains
 
    !> Read and check what is needed of all bodies at once, and the shapes of all data sets.
-   subroutine read_index(file, path, table, error)
+   subroutine read_index(file, table, error)
       type(hdf5_file_t), intent(in) :: file
-      !> Its path
-      character(len=*), intent(in) :: path
       !> What is known of all bodies
       type(bodies_index_t), intent(out) :: table
       !> Names the file, the data set and the entry
@@ -46,28 +44,26 @@ contains
       integer(lp) :: n_vertices
       integer :: k
 
-      call check_names(file, path, error)
-      if (.not. allocated(error)) call file%read('vertex_start', table%vertex_start, error)
+      call check_names(file, error)
+      call file%read('vertex_start', table%vertex_start, error)
       if (allocated(error)) return
       table%n = size(table%vertex_start, kind=ip) - 1_ip
       if (table%n < 1_ip) then
-         call raise(error, input_error, path//': vertex_start must have n + 1 entries for n bodies, with n '// &
-                    'at least 1')
+         call file%reject('vertex_start must have n + 1 entries for n bodies, with n at least 1', error)
          return
       end if
-      call count_points(file, path, 'vertex', n_vertices, error)
-      call check_starts(path, table, n_vertices, error)
-      call read_flags(file, path, table, error)
-      call read_identifiers(file, path, table, error)
+      call count_points(file, 'vertex', n_vertices, error)
+      call check_starts(file, table, n_vertices, error)
+      call read_flags(file, table, error)
+      call read_identifiers(file, table, error)
       do k = 1, size(optional_columns)
-         call check_rows(file, path, trim(optional_columns(k)), table%n, error)
+         call check_rows(file, trim(optional_columns(k)), table%n, error)
       end do
    end subroutine read_index
 
    !> Reject data sets with unknown names, and groups or links with the name of a data set.
-   subroutine check_names(file, path, error)
+   subroutine check_names(file, error)
       type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: name
       integer :: k, n
@@ -78,40 +74,39 @@ contains
          if (allocated(error)) return
          if (any(known_names == name) .eqv. is_dataset(file%location_of(name))) cycle
          if (any(known_names == name)) then
-            call raise(error, input_error, path//': '//name//' must be a data set, but is a group or a link')
+            call file%reject(name//' must be a data set, but is a group or a link', error)
          else
-            call raise(error, input_error, path//': unknown data set '//quoted(name)//suggestion(name, known_names))
+            call file%reject('unknown data set '//quoted(name)//suggestion(name, known_names), error)
          end if
          return
       end do
    end subroutine check_names
 
    !> Count the rows of a data set with the columns x and y.
-   subroutine count_points(file, path, name, n_rows, error)
+   subroutine count_points(file, name, n_rows, error)
       type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path, name
+      character(len=*), intent(in) :: name
       integer(lp), intent(out) :: n_rows
       type(error_t), allocatable, intent(inout) :: error
       integer(lp), allocatable :: extent(:)
       real(dp), allocatable :: unread(:, :)
 
       n_rows = 0_lp
-      if (allocated(error)) return
       call file%shape_of(name, extent, error)
       if (allocated(error)) return
       if (size(extent) /= 2) then
          ! The reader refuses another number of dimensions before it reads anything.
          call file%read(name, unread, error)
       else if (extent(2) /= 2_lp) then
-         call raise(error, input_error, path//': '//name//' must have two columns, x and y (shape in h5py: (n, 2))')
+         call file%reject(name//' must have two columns, x and y (shape in h5py: (n, 2))', error)
       else
          n_rows = extent(1)
       end if
    end subroutine count_points
 
    !> Check the distribution of the vertices over bodies: every body has at least one.
-   pure subroutine check_starts(path, table, n_vertices, error)
-      character(len=*), intent(in) :: path
+   pure subroutine check_starts(file, table, n_vertices, error)
+      type(hdf5_file_t), intent(in) :: file
       type(bodies_index_t), intent(in) :: table
       integer(lp), intent(in) :: n_vertices
       type(error_t), allocatable, intent(inout) :: error
@@ -119,29 +114,27 @@ contains
 
       if (allocated(error)) return
       if (table%vertex_start(1) /= 0_ip) then
-         call raise(error, input_error, path//': '//entry_text('vertex_start', 1_ip)//' is ' &
-                    //to_text(table%vertex_start(1))//', but must be 0')
+         call file%reject(entry_text('vertex_start', 1_ip)//' is '//to_text(table%vertex_start(1))// &
+                          ', but must be 0', error)
       else if (table%vertex_start(table%n + 1_ip) /= n_vertices) then
-         call raise(error, input_error, path//': '//entry_text('vertex_start', table%n + 1_ip)//' is ' &
-                    //to_text(table%vertex_start(table%n + 1_ip))//', but vertex has ' &
-                    //to_text(n_vertices)//' rows')
+         call file%reject(entry_text('vertex_start', table%n + 1_ip)//' is '// &
+                          to_text(table%vertex_start(table%n + 1_ip))//', but vertex has '//to_text(n_vertices)// &
+                          ' rows', error)
       else if (n_vertices > most_vertices) then
-         call raise(error, input_error, path//': vertex has '//to_text(n_vertices)//' rows, but at most '// &
-                    '2^30 are allowed')
+         call file%reject('vertex has '//to_text(n_vertices)//' rows, but at most 2^30 are allowed', error)
       end if
       do k = 1_ip, table%n
          if (allocated(error)) return
          if (table%vertex_start(k + 1_ip) <= table%vertex_start(k)) then
-            call raise(error, input_error, path//': '//entry_text('vertex_start', k + 1_ip)// &
-                       ' must be greater than the entry before it')
+            call file%reject(entry_text('vertex_start', k + 1_ip)//' must be greater than the entry before it', error)
          end if
       end do
    end subroutine check_starts
 
    !> Check that an optional data set has one row per body.
-   subroutine check_rows(file, path, name, n, error)
+   subroutine check_rows(file, name, n, error)
       type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path, name
+      character(len=*), intent(in) :: name
       integer(ip), intent(in) :: n
       type(error_t), allocatable, intent(inout) :: error
       integer(lp), allocatable :: extent(:)
@@ -150,40 +143,36 @@ contains
       if (allocated(error)) return
       if (.not. file%has(name)) return
       if (name == 'velocity') then
-         call count_points(file, path, name, n_rows, error)
+         call count_points(file, name, n_rows, error)
       else
          call file%shape_of(name, extent, error)
          if (allocated(error)) return
          if (size(extent) /= 1) return
          n_rows = extent(1)
       end if
-      if (.not. allocated(error)) call check_length(path, name, n_rows, n, error)
+      if (.not. allocated(error)) call check_length(file, name, n_rows, n, error)
    end subroutine check_rows
 
    !> Read the flags of fixed bodies.
-   subroutine read_flags(file, path, table, error)
+   subroutine read_flags(file, table, error)
       type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path
       type(bodies_index_t), intent(inout) :: table
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: k
 
-      if (allocated(error)) return
       call file%read('fixed', table%fixed, error)
       if (allocated(error)) return
-      call check_length(path, 'fixed', size(table%fixed, kind=lp), table%n, error)
+      call check_length(file, 'fixed', size(table%fixed, kind=lp), table%n, error)
       do k = 1_ip, size(table%fixed, kind=ip)
          if (allocated(error)) return
          if (any(table%fixed(k) == [0_ip, 1_ip])) cycle
-         call raise(error, input_error, path//': '//entry_text('fixed', k)//' is ' &
-                    //to_text(table%fixed(k))//', but must be 0 or 1')
+         call file%reject(entry_text('fixed', k)//' is '//to_text(table%fixed(k))//', but must be 0 or 1', error)
       end do
    end subroutine read_flags
 
    !> Read the identifiers; number the bodies from 1 if the data set is absent.
-   subroutine read_identifiers(file, path, table, error)
+   subroutine read_identifiers(file, table, error)
       type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path
       type(bodies_index_t), intent(inout) :: table
       type(error_t), allocatable, intent(inout) :: error
       integer(lp), allocatable :: key(:), spare_key(:)
@@ -201,7 +190,7 @@ contains
       end if
       call file%read('id', table%id, error)
       if (allocated(error)) return
-      call check_length(path, 'id', size(table%id, kind=lp), table%n, error)
+      call check_length(file, 'id', size(table%id, kind=lp), table%n, error)
       if (allocated(error)) return
       if (table%id(1) >= 0_ip .and. all(table%id(2:) > table%id(:table%n - 1_ip))) return
       key = int(table%id, lp)
@@ -210,25 +199,24 @@ contains
       do k = 1_ip, table%n
          if (allocated(error)) return
          if (key(k) < 0_lp) then
-            call raise(error, input_error, path//': '//entry_text('id', order(k))//' is '//to_text(key(k))// &
-                       ', but must not be negative')
+            call file%reject(entry_text('id', order(k))//' is '//to_text(key(k))//', but must not be negative', error)
          else if (key(k) == key(max(k - 1_ip, 1_ip)) .and. k > 1_ip) then
-            call raise(error, input_error, path//': '//entry_text('id', order(k))//' is '//to_text(key(k))// &
-                       ', the same as '//entry_text('id', order(k - 1_ip))//'; identifiers must be unique')
+            call file%reject(entry_text('id', order(k))//' is '//to_text(key(k))//', the same as '// &
+                             entry_text('id', order(k - 1_ip))//'; identifiers must be unique', error)
          end if
       end do
    end subroutine read_identifiers
 
    !> Check that a data set has one row per body.
-   pure subroutine check_length(path, name, length, n, error)
-      character(len=*), intent(in) :: path, name
+   pure subroutine check_length(file, name, length, n, error)
+      type(hdf5_file_t), intent(in) :: file
+      character(len=*), intent(in) :: name
       integer(lp), intent(in) :: length
       integer(ip), intent(in) :: n
       type(error_t), allocatable, intent(inout) :: error
 
       if (length == n) return
-      call raise(error, input_error, path//': '//name//' has '//to_text(length)//' rows, but '// &
-                 'vertex_start defines '//to_text(n)//' bodies')
+      call file%reject(name//' has '//to_text(length)//' rows, but vertex_start defines '//to_text(n)//' bodies', error)
    end subroutine check_length
 
    !> Name of an entry in Python notation, counted from 0

@@ -72,15 +72,14 @@ contains
       end if
       call file%open(path, error)
       if (allocated(error)) return
-      call read_index(file, path, table, error)
-      if (.not. allocated(error)) call list_blocks(file, path, real(density, dp), table, list, error)
+      call read_index(file, table, error)
+      if (.not. allocated(error)) call list_blocks(file, real(density, dp), table, list, error)
       call file%close(error)
    end subroutine read_bodies_file
 
    !> Append the bodies of the file to a list, block by block.
-   subroutine list_blocks(file, path, density, table, list, error)
+   subroutine list_blocks(file, density, table, list, error)
       type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path
       real(dp), intent(in) :: density
       type(bodies_index_t), intent(in) :: table
       type(body_list_t), intent(inout) :: list
@@ -96,12 +95,12 @@ contains
          v = table%vertex_start(block%first)
          w = table%vertex_start(block%last + 1_ip)
          call file%read('vertex', block%vertex, error, rows=int([v, w - v], lp))
-         call read_velocity(file, path, rows, block%velocity, error)
-         call read_column(file, path, 'angular_velocity', table, rows, 0.0_dp, -huge(1.0_dp), block%angular_velocity, &
+         call read_velocity(file, rows, block%velocity, error)
+         call read_column(file, 'angular_velocity', table, rows, 0.0_dp, -huge(1.0_dp), block%angular_velocity, &
                           error)
-         call read_column(file, path, 'density', table, rows, density, tiny(1.0_dp), block%density, error)
-         call read_column(file, path, 'mass', table, rows, 0.0_dp, 0.0_dp, block%mass, error)
-         call read_column(file, path, 'inertia', table, rows, 0.0_dp, 0.0_dp, block%inertia, error)
+         call read_column(file, 'density', table, rows, density, tiny(1.0_dp), block%density, error)
+         call read_column(file, 'mass', table, rows, 0.0_dp, 0.0_dp, block%mass, error)
+         call read_column(file, 'inertia', table, rows, 0.0_dp, 0.0_dp, block%inertia, error)
          if (allocated(error)) return
          call list_block(table, block, list)
       end do
@@ -130,9 +129,8 @@ contains
    end subroutine list_block
 
    !> Read the velocities of a block; default: zero.
-   subroutine read_velocity(file, path, rows, velocity, error)
+   subroutine read_velocity(file, rows, velocity, error)
       type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path
       !> Number of rows before the block, and number of its rows
       integer(lp), intent(in) :: rows(2)
       real(dp), allocatable, intent(inout) :: velocity(:, :)
@@ -149,14 +147,14 @@ contains
       do k = 1_ip, size(velocity, 2, kind=ip)
          if (allocated(error)) return
          if (all(ieee_is_finite(velocity(:, k)))) cycle
-         call raise(error, input_error, path//': '//entry_text('velocity', int(rows(1), ip) + k)//' is not finite')
+         call file%reject(entry_text('velocity', int(rows(1), ip) + k)//' is not finite', error)
       end do
    end subroutine read_velocity
 
    !> Read one finite number per body of a block, not below a lower bound. An absent data set yields the default.
-   subroutine read_column(file, path, name, table, rows, default, least, values, error)
+   subroutine read_column(file, name, table, rows, default, least, values, error)
       type(hdf5_file_t), intent(in) :: file
-      character(len=*), intent(in) :: path, name
+      character(len=*), intent(in) :: name
       type(bodies_index_t), intent(in) :: table
       integer(lp), intent(in) :: rows(2)
       real(dp), intent(in) :: default, least
@@ -175,13 +173,13 @@ contains
          if (allocated(error)) return
          s = int(rows(1), ip) + k
          if (.not. ieee_is_finite(values(k))) then
-            call raise(error, input_error, path//': '//entry_text(name, s)//' is not finite')
+            call file%reject(entry_text(name, s)//' is not finite', error)
          else if (values(k) < least) then
-            call raise(error, input_error, path//': '//entry_text(name, s)//' is '// &
-                       to_text(real(values(k), wp))//', but must '//bound_text(least))
+            call file%reject(entry_text(name, s)//' is '//to_text(real(values(k), wp))//', but must '// &
+                             bound_text(least), error)
          else if (least >= 0.0_dp .and. values(k) > 0.0_dp .and. real(values(k), wp) < tiny(1.0_wp)) then
-            call raise(error, input_error, path//': '//entry_text(name, s)//' of body '//to_text(table%id(s))// &
-                       ' is positive, but below the smallest normal number of the working precision')
+            call file%reject(entry_text(name, s)//' of body '//to_text(table%id(s))// &
+                             ' is positive, but below the smallest normal number of the working precision', error)
          end if
       end do
    end subroutine read_column

@@ -80,19 +80,12 @@ contains
       self%is_reading = .false.
       self%is_spread = .false.
       call choose_communicator(self%comm, comm)
-      if (self%comm%is_root()) call write_origin(self, provenance)
+      if (self%comm%is_root()) then
+         call begin_file(self%file, path, self%error, with_checksum=.true.)
+         call write_provenance(self%file, 'checkpoint by polydem', provenance, self%error)
+      end if
       call open_on_all_ranks(self%comm, self%file, path//unfinished, bytes, self%error)
    end subroutine create
-
-   !> Create the file and write its attributes and provenance.
-   subroutine write_origin(self, provenance)
-      class(checkpoint_file_t), intent(inout) :: self
-      type(provenance_t), intent(in) :: provenance
-
-      call begin_file(self%file, self%path, self%error, with_checksum=.true.)
-      if (allocated(self%error)) return
-      call write_provenance(self%file, 'checkpoint by polydem', provenance, self%error)
-   end subroutine write_origin
 
    !> Set the distribution of the rows of a group over ranks. Call it before the columns of the group are written or
    !> read.
@@ -212,7 +205,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       call self%file%read('/provenance/revision', revision, error)
-      if (.not. allocated(error)) call self%file%read('/provenance/resolved_input', settings, error)
+      call self%file%read('/provenance/resolved_input', settings, error)
    end subroutine read_origin
 
    !> Write or read real numbers.

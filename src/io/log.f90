@@ -118,12 +118,9 @@ contains
          self%last_step = step
       end if
       now = wall_seconds()
+      rate = rate_until(self, step, now)
       rate_text = '-'
-      rate = 0.0_dp
-      if (step > self%last_step .and. now > self%last_seconds) then
-         rate = real(step - self%last_step, dp)/(now - self%last_seconds)
-         write (rate_text, '(f12.1)') min(rate, 9.9e8_dp)
-      end if
+      if (rate > 0.0_dp) write (rate_text, '(f12.1)') min(rate, 9.9e8_dp)
       energy_texts = repeat(' ', 11)//'-'
       if (present(energies)) write (energy_texts, '(es12.4)') energies
       write (line, '(i10,es12.4,es12.3,2a12,i12,a12,a10,f10.1,a)') step, time, dt, energy_texts, &
@@ -147,10 +144,7 @@ contains
       if (.not. self%is_interactive) return
       now = wall_seconds()
       if (now - self%live_seconds < live_interval) return
-      rate = 0.0_dp
-      if (self%has_heading .and. now > self%last_seconds) then
-         rate = real(step - self%last_step, dp)/(now - self%last_seconds)
-      end if
+      rate = rate_until(self, step, now)
       write (text, '(i10,a,i0,a,f5.1,2a)') step, ' of ', n_steps, ' steps,', percent(step, n_steps), &
          '%, to go', time_to_go(n_steps - step, rate)
       call write_live(self, trim(text))
@@ -201,6 +195,19 @@ contains
       call self%screen%put(achar(13)//text//repeat(' ', max(0, self%live_length - len(text))))
       self%live_length = len(text)
    end subroutine write_live
+
+   !> Steps per second since the last interval line; 0 if unknown
+   pure real(dp) function rate_until(self, step, now)
+      type(log_t), intent(in) :: self
+      !> Current step
+      integer(lp), intent(in) :: step
+      !> Wall-clock time [s]
+      real(dp), intent(in) :: now
+
+      rate_until = 0.0_dp
+      if (self%has_heading .and. step > self%last_step .and. now > self%last_seconds) &
+         rate_until = real(step - self%last_step, dp)/(now - self%last_seconds)
+   end function rate_until
 
    !> Progress of the run [%]
    pure real(dp) function percent(step, n_steps)

@@ -39,7 +39,21 @@ contains
       path = folder//'/'//profile_name
       call begin_file(file, path, error)
       call write_provenance(file, 'profile of a run by polydem', provenance, error)
-      call fill_profile(file, timers, seconds, counters, state_hash, status, error)
+      call file%write('/profile/stage', stage_names, error, '1', 'stages of the time step')
+      call file%write('/profile/calls', timers%calls, error, '1', 'steps in which each stage ran')
+      call file%write('/profile/total', timers%total, error, 's', 'time spent in each stage')
+      call file%write('/profile/least', merge(timers%least, 0.0_dp, timers%calls > 0_lp), error, 's', &
+                      'shortest time in a step')
+      call file%write('/profile/most', timers%most, error, 's', 'longest time in a step')
+      call file%write('/profile/seconds', seconds, error, 's', 'elapsed time of the whole run')
+      if (allocated(counters%name)) then
+         call file%write('/counters/name', counters%name, error, '1', 'name of each counter')
+         call file%write('/counters/value', counters%value, error, '1', 'value of each counter')
+         call file%write('/counters/scope', counters%scope, error, '1', 'what the value of each counter belongs to')
+      end if
+      call file%write('/state_hash', hexadecimal(state_hash), error, '1', &
+                      'hash of the bits of identifiers, positions, angles and velocities at the end')
+      call file%write('/status', status, error, '1', 'how the run ended')
       if (present(memory)) call file%write('/profile/memory', memory, error, 'KiB', 'resident after the last step')
       call complete_file(file, path, error)
    end subroutine write_profile
@@ -56,46 +70,9 @@ contains
       type(hdf5_file_t) :: file
 
       call file%open(path, error)
-      if (.not. allocated(error)) call file%read('/status', status, error)
-      if (.not. allocated(error)) call file%read('/state_hash', state_hash, error)
+      call file%read('/status', status, error)
+      call file%read('/state_hash', state_hash, error)
       call file%close(error)
    end subroutine read_final_status
-
-   !> Write the timings, counters, hash and status.
-   subroutine fill_profile(file, timers, seconds, counters, state_hash, status, error)
-      type(hdf5_file_t), intent(inout) :: file
-      type(timers_t), intent(in) :: timers
-      real(dp), intent(in) :: seconds
-      type(counters_t), intent(in) :: counters
-      integer(lp), intent(in) :: state_hash
-      character(len=*), intent(in) :: status
-      type(error_t), allocatable, intent(inout) :: error
-
-      call write_timers(file, timers, seconds, error)
-      if (allocated(counters%name)) then
-         call file%write('/counters/name', counters%name, error, '1', 'name of each counter')
-         call file%write('/counters/value', counters%value, error, '1', 'value of each counter')
-         call file%write('/counters/scope', counters%scope, error, '1', 'what the value of each counter belongs to')
-      end if
-      call file%write('/state_hash', hexadecimal(state_hash), error, '1', &
-                      'hash of the bits of identifiers, positions, angles and velocities at the end')
-      call file%write('/status', status, error, '1', 'how the run ended')
-   end subroutine fill_profile
-
-   !> Write the group /profile.
-   subroutine write_timers(file, timers, seconds, error)
-      type(hdf5_file_t), intent(inout) :: file
-      type(timers_t), intent(in) :: timers
-      real(dp), intent(in) :: seconds
-      type(error_t), allocatable, intent(inout) :: error
-
-      call file%write('/profile/stage', stage_names, error, '1', 'stages of the time step')
-      call file%write('/profile/calls', timers%calls, error, '1', 'steps in which each stage ran')
-      call file%write('/profile/total', timers%total, error, 's', 'time spent in each stage')
-      call file%write('/profile/least', merge(timers%least, 0.0_dp, timers%calls > 0_lp), error, 's', &
-                      'shortest time in a step')
-      call file%write('/profile/most', timers%most, error, 's', 'longest time in a step')
-      call file%write('/profile/seconds', seconds, error, 's', 'elapsed time of the whole run')
-   end subroutine write_timers
 
 end module polydem_profile_file

@@ -211,7 +211,7 @@ contains
 
       text = ''
       call file%open(path, error)
-      if (.not. allocated(error)) call file%read('/provenance/'//entry, text, error)
+      call file%read('/provenance/'//entry, text, error)
       call file%close(error)
       if (allocated(error)) text = ''
    end function origin_of

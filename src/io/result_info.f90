@@ -3,7 +3,7 @@ module polydem_result_info
    use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_checksum, only: verify_checksum
-   use polydem_file_system, only: exists
+   use polydem_file_system, only: exists, is_folder
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
@@ -53,7 +53,7 @@ contains
       call log%open('', error)
       if (.not. exists(path)) then
          call raise(error, input_error, path//': no such file or folder')
-      else if (exists(path//'/.')) then
+      else if (is_folder(path)) then
          call describe_folder(path, log, error)
       else
          call describe_file(path, log, error)
@@ -135,7 +135,7 @@ contains
 
       if (.not. file%has('/frames/time')) return
       call file%read('/frames/time', times, error)
-      if (.not. allocated(error)) call file%shape_of('/frames/position', shape, error)
+      call file%shape_of('/frames/position', shape, error)
       if (allocated(error)) return
       if (size(times) == 0 .or. size(shape) /= 3) return
       call log%write_line('   frames          '//to_text(size(times, kind=ip))//' of '//to_text(shape(2))// &

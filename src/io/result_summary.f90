@@ -69,8 +69,8 @@ contains
       number = 1_ip
       do while (exists(segment_path(folder, number)))
          call file%open(segment_path(folder, number), error)
-         if (.not. allocated(error)) call file%read('/frames/time', times, error)
-         if (.not. allocated(error)) call file%shape_of('/bodies/id', shape, error)
+         call file%read('/frames/time', times, error)
+         call file%shape_of('/bodies/id', shape, error)
          if (.not. allocated(error) .and. number == 1_ip) then
             if (file%has('/provenance/resolved_input')) call file%read('/provenance/resolved_input', text, error)
             if (allocated(text)) frames%scene = scene_of(text)

@@ -14,7 +14,7 @@
 !> In messages steps and boxes are counted from 0, as in the file.
 module polydem_trace_reader
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use polydem_errors, only: error_t, input_error, raise
+   use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: far, dp, ip, lp, wp
    use polydem_polygon, only: diameter
@@ -64,24 +64,21 @@ contains
       call file%open(path, error)
       if (allocated(error)) return
       if (present(most_steps)) trace%n_steps = most_steps
-      call read_boxes(path, file, trace, error)
-      if (.not. allocated(error)) call read_bodies(path, file, trace, error)
-      if (.not. allocated(error)) call read_numbers(path, file, trace, error)
-      if (.not. allocated(error)) call read_reach(path, file, trace, error)
-      if (.not. allocated(error)) call read_polygons(path, file, trace, error)
-      if (.not. allocated(error)) call file%read_real_attribute('/', 'dt', trace%dt, error)
+      call read_boxes(file, trace, error)
+      if (.not. allocated(error)) call read_bodies(file, trace, error)
+      if (.not. allocated(error)) call read_numbers(file, trace, error)
+      if (.not. allocated(error)) call read_reach(file, trace, error)
+      if (.not. allocated(error)) call read_polygons(file, trace, error)
+      call file%read_real_attribute('/', 'dt', trace%dt, error)
       trace%input = ''
-      if (.not. allocated(error)) then
-         if (file%has('/provenance/resolved_input')) call file%read('/provenance/resolved_input', trace%input, error)
-      end if
-      if (.not. ieee_is_finite(trace%dt) .or. trace%dt < 0.0_dp) call raise(error, input_error, path// &
-         ': the attribute dt must be finite and not negative')
+      if (file%has('/provenance/resolved_input')) call file%read('/provenance/resolved_input', trace%input, error)
+      if (.not. ieee_is_finite(trace%dt) .or. trace%dt < 0.0_dp) &
+         call file%reject('the attribute dt must be finite and not negative', error)
       call file%close(error)
    end subroutine read_trace
 
    !> Read the bounds of all boxes and the flags of fixed ones. The reach is set to the greatest recorded half side.
-   subroutine read_boxes(path, file, trace, error)
-      character(len=*), intent(in) :: path
+   subroutine read_boxes(file, trace, error)
       type(hdf5_file_t), intent(in) :: file
       type(trace_t), intent(inout) :: trace
       type(error_t), allocatable, intent(inout) :: error
@@ -93,24 +90,24 @@ contains
       logical :: fit
 
       call file%shape_of('/aabb', extent, error)
-      if (.not. allocated(error)) call file%read('/is_wall', is_wall, error)
+      call file%read('/is_wall', is_wall, error)
       if (allocated(error)) return
       fit = size(extent) == 3
       if (fit) fit = minval(extent) >= 1_lp .and. maxval(extent) < huge(1_ip) .and. extent(3) == 4_lp
       if (.not. fit) then
-         call raise(error, input_error, path//': aabb must have the shape (steps, boxes, 4), from 1 to '// &
-                    to_text(huge(1_ip) - 1_ip)//' steps and boxes')
+         call file%reject('aabb must have the shape (steps, boxes, 4), from 1 to '//to_text(huge(1_ip) - 1_ip)// &
+                          ' steps and boxes', error)
          return
       end if
-      call check_size(path, 'is_wall', size(is_wall, kind=lp), extent(2), 'boxes', error)
+      call check_size(file, 'is_wall', size(is_wall, kind=lp), extent(2), 'boxes', error)
       if (allocated(error)) return
       if (trace%n_steps == 0_ip) trace%n_steps = int(extent(1), ip)
       trace%n_steps = min(trace%n_steps, int(extent(1), ip))
       trace%fixed = is_wall /= 0_ip
       allocate (trace%bounds(4, extent(2), trace%n_steps), stat=status)
       if (status /= 0) then
-         call raise(error, input_error, path//': not enough memory for '//to_text(trace%n_steps)//' steps of '// &
-                    to_text(extent(2))//' boxes; replay fewer steps with --steps')
+         call file%reject('not enough memory for '//to_text(trace%n_steps)//' steps of '//to_text(extent(2))// &
+                          ' boxes; replay fewer steps with --steps', error)
          return
       end if
       ! Several steps are read at once: in a compressed trace, one step costs as much as its whole chunk.
@@ -123,24 +120,23 @@ contains
             trace%bounds(:, :, first + s - 1_ip) = real(bounds(:, :, s), wp)
          end do
       end do
-      call check_boxes(path, trace, error)
+      call check_boxes(file, trace, error)
    end subroutine read_boxes
 
    !> Check that a data set has one entry per box or per step.
-   subroutine check_size(path, name, n, expected, what, error)
-      character(len=*), intent(in) :: path, name, what
+   subroutine check_size(file, name, n, expected, what, error)
+      type(hdf5_file_t), intent(in) :: file
+      character(len=*), intent(in) :: name, what
       integer(lp), intent(in) :: n, expected
       type(error_t), allocatable, intent(inout) :: error
 
       if (allocated(error) .or. n == expected) return
-      call raise(error, input_error, path//': '//name//' has '//to_text(n)//' entries, but aabb has '// &
-                 to_text(expected)//' '//what)
+      call file%reject(name//' has '//to_text(n)//' entries, but aabb has '//to_text(expected)//' '//what, error)
    end subroutine check_size
 
    !> Read the body of each box. Without this data set every box is a body. The boxes of a body must be all fixed or all
    !> free.
-   subroutine read_bodies(path, file, trace, error)
-      character(len=*), intent(in) :: path
+   subroutine read_bodies(file, trace, error)
       type(hdf5_file_t), intent(in) :: file
       type(trace_t), intent(inout) :: trace
       type(error_t), allocatable, intent(inout) :: error
@@ -154,7 +150,7 @@ contains
       end if
       call file%read('/body', trace%body, error)
       if (allocated(error)) return
-      call check_size(path, 'body', size(trace%body, kind=lp), int(n, lp), 'boxes', error)
+      call check_size(file, 'body', size(trace%body, kind=lp), int(n, lp), 'boxes', error)
       if (allocated(error)) return
       sound = trace%body(1) == 1_ip
       do k = 2_ip, n
@@ -162,20 +158,19 @@ contains
          sound = trace%body(k) == trace%body(k - 1_ip) .or. trace%body(k) == trace%body(k - 1_ip) + 1_ip
       end do
       if (.not. sound) then
-         call raise(error, input_error, path//': body must start with 1 and ascend without gaps')
+         call file%reject('body must start with 1 and ascend without gaps', error)
          return
       end if
       do k = 2_ip, n
          if (trace%body(k) /= trace%body(k - 1_ip)) cycle
          if (trace%fixed(k) .eqv. trace%fixed(k - 1_ip)) cycle
-         call raise(error, input_error, path//': is_wall differs between the boxes of body '//to_text(trace%body(k)))
+         call file%reject('is_wall differs between the boxes of body '//to_text(trace%body(k)), error)
          return
       end do
    end subroutine read_bodies
 
    !> Read the greatest half sides at any angle, if present. The recorded bounds remain lower limits.
-   subroutine read_reach(path, file, trace, error)
-      character(len=*), intent(in) :: path
+   subroutine read_reach(file, trace, error)
       type(hdf5_file_t), intent(in) :: file
       type(trace_t), intent(inout) :: trace
       type(error_t), allocatable, intent(inout) :: error
@@ -185,21 +180,21 @@ contains
       if (.not. file%has('/reach')) return
       call file%read('/reach', reach, error)
       if (allocated(error)) return
-      call check_size(path, 'reach', size(reach, kind=lp), size(trace%fixed, kind=lp), 'boxes', error)
+      call check_size(file, 'reach', size(reach, kind=lp), size(trace%fixed, kind=lp), 'boxes', error)
       if (allocated(error)) return
       good = all(ieee_is_finite(reach))
       ! The comparison is in the working precision, because `far` may not be representable in double precision.
       if (good) good = all(reach >= 0.0_dp .and. real(reach, wp) <= far)
       if (.not. good) then
-         call raise(error, input_error, path//': every entry of reach must be from 0 to '//to_text(far))
+         call file%reject('every entry of reach must be from 0 to '//to_text(far), error)
          return
       end if
       trace%reach = max(trace%reach, real(reach, wp))
    end subroutine read_reach
 
    !> Check that all bounds are finite and ordered. Set the reach to the greatest recorded half side.
-   subroutine check_boxes(path, trace, error)
-      character(len=*), intent(in) :: path
+   subroutine check_boxes(file, trace, error)
+      type(hdf5_file_t), intent(in) :: file
       type(trace_t), intent(inout) :: trace
       type(error_t), allocatable, intent(inout) :: error
       real(wp) :: box(4)
@@ -213,9 +208,9 @@ contains
             sound = all(ieee_is_finite(box))
             if (sound) sound = all(abs(box) <= far) .and. all(box(1:2) <= box(3:4))
             if (.not. sound) then
-               call raise(error, input_error, path//': aabb of step '//to_text(s - 1_ip)//', box '// &
-                          to_text(b - 1_ip)//': bounds must be finite and at most '//to_text(far)// &
-                          ' in magnitude, with xmin <= xmax and ymin <= ymax')
+               call file%reject('aabb of step '//to_text(s - 1_ip)//', box '//to_text(b - 1_ip)// &
+                                ': bounds must be finite and at most '//to_text(far)// &
+                                ' in magnitude, with xmin <= xmax and ymin <= ymax', error)
                return
             end if
             trace%reach(b) = max(trace%reach(b), maxval(0.5_wp*box(3:4) - 0.5_wp*box(1:2)))
@@ -224,12 +219,10 @@ contains
    end subroutine check_boxes
 
    !> Read the numbers of pairs and their hashes, if present.
-   subroutine read_numbers(path, file, trace, error)
-      character(len=*), intent(in) :: path
+   subroutine read_numbers(file, trace, error)
       type(hdf5_file_t), intent(in) :: file
       type(trace_t), intent(inout) :: trace
       type(error_t), allocatable, intent(inout) :: error
-
       integer(lp), allocatable :: extent(:)
 
       call file%shape_of('/aabb', extent, error)
@@ -237,18 +230,17 @@ contains
       if (file%has('/npairs')) then
          call file%read('/npairs', trace%n_pairs, error)
          if (allocated(error)) return
-         call check_size(path, 'npairs', size(trace%n_pairs, kind=lp), extent(1), 'steps', error)
+         call check_size(file, 'npairs', size(trace%n_pairs, kind=lp), extent(1), 'steps', error)
       end if
       if (file%has('/pair_hash')) then
          call file%read('/pair_hash', trace%pair_hash, error)
          if (allocated(error)) return
-         call check_size(path, 'pair_hash', size(trace%pair_hash, kind=lp), extent(1), 'steps', error)
+         call check_size(file, 'pair_hash', size(trace%pair_hash, kind=lp), extent(1), 'steps', error)
       end if
    end subroutine read_numbers
 
    !> Read the polygons, if present. Half their diameter is an upper bound of the recorded half sides.
-   subroutine read_polygons(path, file, trace, error)
-      character(len=*), intent(in) :: path
+   subroutine read_polygons(file, trace, error)
       type(hdf5_file_t), intent(in) :: file
       type(trace_t), intent(inout) :: trace
       type(error_t), allocatable, intent(inout) :: error
@@ -258,8 +250,8 @@ contains
 
       if (.not. file%has('/vertices')) return
       call file%read('/vertices', vertices, error)
-      if (.not. allocated(error)) call file%read('/vertex_offset', offset, error)
-      if (.not. allocated(error)) call check_polygons(path, vertices, offset, size(trace%fixed, kind=ip), error)
+      call file%read('/vertex_offset', offset, error)
+      if (.not. allocated(error)) call check_polygons(file, vertices, offset, size(trace%fixed, kind=ip), error)
       if (allocated(error)) return
       n = size(trace%fixed, kind=ip)
       do b = 1_ip, n
@@ -269,28 +261,28 @@ contains
    end subroutine read_polygons
 
    !> Check the shape and the values of `vertices` and `vertex_offset`.
-   subroutine check_polygons(path, vertices, offset, n_boxes, error)
-      character(len=*), intent(in) :: path
+   subroutine check_polygons(file, vertices, offset, n_boxes, error)
+      type(hdf5_file_t), intent(in) :: file
       real(dp), intent(in) :: vertices(:, :)
       integer(ip), intent(in) :: offset(:), n_boxes
       type(error_t), allocatable, intent(inout) :: error
       logical :: fit
 
       if (size(vertices, 1) /= 2) then
-         call raise(error, input_error, path//': vertices must have the shape (n, 2)')
+         call file%reject('vertices must have the shape (n, 2)', error)
          return
       end if
       fit = all(ieee_is_finite(vertices))
       if (fit) fit = all(abs(real(vertices, wp)) <= far)
       if (.not. fit) then
-         call raise(error, input_error, path//': vertices must be finite and at most '//to_text(far)//' in magnitude')
+         call file%reject('vertices must be finite and at most '//to_text(far)//' in magnitude', error)
          return
       end if
       fit = size(offset) == n_boxes + 1_ip
       if (fit) fit = offset(1) == 0_ip .and. offset(n_boxes + 1_ip) == size(vertices, 2) .and. &
                      all(offset(2:) >= offset(:n_boxes))
-      if (.not. fit) call raise(error, input_error, path//': vertex_offset must ascend from 0 to the number of '// &
-                                'vertices and have one entry more than there are boxes')
+      if (.not. fit) call file%reject('vertex_offset must ascend from 0 to the number of vertices and have one '// &
+                                      'entry more than there are boxes', error)
    end subroutine check_polygons
 
 end module polydem_trace_reader

@@ -56,10 +56,10 @@ contains
       integer(ip) :: k, v, last
 
       call file%read('/bodies/fixed', fixed, error)
-      if (.not. allocated(error)) call file%read('/bodies/vertex_start', start, error)
-      if (.not. allocated(error)) call file%read('/bodies/vertex', shape, error)
-      if (.not. allocated(error)) call file%read('/frames/position', position, error)
-      if (.not. allocated(error)) call file%read('/frames/angle', angle, error)
+      call file%read('/bodies/vertex_start', start, error)
+      call file%read('/bodies/vertex', shape, error)
+      call file%read('/frames/position', position, error)
+      call file%read('/frames/angle', angle, error)
       if (allocated(error)) return
       if (.not. fit(fixed, start, shape, position, angle)) then
          call raise(error, input_error, 'the data sets of its segment of a trajectory are inconsistent')

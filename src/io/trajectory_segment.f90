@@ -12,7 +12,7 @@
 !> the first body that is inside the second body. The force of a contact acts on the first body.
 !>
 !> All ranks write a segment collectively. Each rank writes a block of rows in ascending order of identifiers. All
-!> procedures except `start_segment` are collective.
+!> procedures are collective.
 module polydem_trajectory_segment
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
@@ -23,25 +23,14 @@ module polydem_trajectory_segment
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_named_values, only: named_values_t
    use polydem_ownership, only: order_bodies, order_pairs, order_parts
-   use polydem_provenance, only: provenance_t, write_provenance
    implicit none
    private
-   public :: start_segment, write_bodies, add_frame, add_walls, add_contacts, add_balance
+   public :: write_bodies, add_frame, add_walls, add_contacts, add_balance
 
    !> Number of vertices that one rank writes at once, so that it needs little memory
    integer(ip), parameter :: vertices_at_once = 100000_ip
 
 contains
-
-   !> Write the attributes and the provenance of a segment. Called by the root rank only.
-   subroutine start_segment(file, provenance, error)
-      !> New file
-      type(hdf5_file_t), intent(inout) :: file
-      type(provenance_t), intent(in) :: provenance
-      type(error_t), allocatable, intent(inout) :: error
-
-      call write_provenance(file, 'segment of a trajectory by polydem', provenance, error)
-   end subroutine start_segment
 
    !> Write the constant properties of the bodies: identifier, fixed flag, mass, inertia and shape.
    subroutine write_bodies(file, comm, bodies, error)

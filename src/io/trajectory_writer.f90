@@ -17,10 +17,10 @@ module polydem_trajectory_writer
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_manifest, only: manifest_t
    use polydem_named_values, only: named_values_t
-   use polydem_provenance, only: provenance_t
+   use polydem_provenance, only: provenance_t, write_provenance
    use polydem_result_files, only: open_suffix, segment_path
    use polydem_time_limit, only: time_limit_t
-   use polydem_trajectory_segment, only: add_contacts, add_frame, add_balance, add_walls, start_segment, write_bodies
+   use polydem_trajectory_segment, only: add_contacts, add_frame, add_balance, add_walls, write_bodies
    implicit none
    private
    public :: trajectory_writer_t
@@ -180,7 +180,7 @@ contains
       if (self%comm%is_root()) then
          if (present(manifest)) call manifest%add_file(segment_path(self%folder, self%number), error)
          if (.not. allocated(error)) call self%file%create(path, error)
-         if (.not. allocated(error)) call start_segment(self%file, self%provenance, error)
+         call write_provenance(self%file, 'segment of a trajectory by polydem', self%provenance, error)
       end if
       call open_on_all_ranks(self%comm, self%file, path, room_for(bodies), error)
       if (allocated(error)) return
