@@ -240,6 +240,12 @@ def test_make_takes_one_namelist_and_one_table(words, capsys):
     assert "takes one namelist" in capsys.readouterr().err
 
 
+def test_make_names_the_next_command_as_a_shell_takes_it(toy, tmp_path, capsys):
+    words = ["make", str(tmp_path / "base.nml"), "toy.seconds=0,1", "--output", str(tmp_path / "my sweep")]
+    assert main(["sweep", "--program", str(toy()), *words]) == 0
+    assert capsys.readouterr().out.strip().endswith(f"next: ./polydem sweep run '{tmp_path}/my sweep'")
+
+
 # --- running -----------------------------------------------------------------------------------------------------
 
 

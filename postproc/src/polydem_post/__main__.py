@@ -8,6 +8,7 @@ import errno
 import math
 import os
 import re
+import shlex
 import sys
 import warnings
 from dataclasses import fields, replace
@@ -335,7 +336,8 @@ def _sweep_make(options: argparse.Namespace) -> None:
         raise ResultError("sweep make takes one namelist, and a table (.csv) or lists as scene.seed=1,2,3; see --help")
     table = Path(tables[0]) if tables else None
     sweep = make_sweep(Path(bases[0]), options.output, _sweep_program(options), table, lists, options.cores)
-    _say(f"{sweep.folder}: {len(sweep.runs)} runs; next: ./polydem sweep run {sweep.folder}")
+    _say(f"{sweep.folder}: {len(sweep.runs)} runs; next: ./polydem sweep run "
+         f"{shlex.quote(str(sweep.folder))}")
 
 
 def _sweep_run(options: argparse.Namespace) -> int:
