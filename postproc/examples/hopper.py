@@ -61,19 +61,20 @@ print(f"E = {run.settings.forces.stiffness:g} N/m2, friction {run.settings.force
 # %% Flow
 flow = measure.flow_rate(run, (-0.5 * OPENING, 0.0), (0.5 * OPENING, 0.0))
 passed = np.concatenate([[0.0], np.cumsum(flow.mass)])
-first, last = np.flatnonzero(flow.mass > 0.0)[[0, -1]]
-steady = slice(first, first + max(1, (last - first) // 2))
-rate = flow.mass[steady].sum() / (flow.times[steady.stop] - flow.times[steady.start])
+first, last = np.searchsorted(passed, [0.2 * passed[-1], 0.6 * passed[-1]])    # neither start nor end
+steady = slice(first, max(first + 1, last))
+rate = (passed[steady.stop] - passed[steady.start]) / (flow.times[steady.stop] - flow.times[steady.start])
 print(f"{int(flow.bodies.sum())} of {BODIES} bodies fall; {rate:.1f} kg/(m s) while the hopper is full")
 
 # %% [markdown]
 # ## Inside the hopper
 #
-# One frame in the middle of the discharge: velocity across the opening, forces, and the stress field.
+# The velocity across the opening while the flow is steady, and one frame in the middle of that time: forces, and the
+# stress field.
 
-# %% Measures of one frame
+# %% Measures inside
 frame = run.at(0.5 * (flow.times[steady.start] + flow.times[steady.stop]))
-across = measure.profile(frame, "velocity", np.linspace(-0.5 * OPENING, 0.5 * OPENING, 7), axis="x",
+across = measure.profile(run[steady], "velocity", np.linspace(-0.5 * OPENING, 0.5 * OPENING, 7), axis="x",
                          between=(-0.01, 0.02), weight="mass")
 forces = measure.force_distribution(frame, bins=np.linspace(0.0, 6.0, 13))
 diameter = float(np.median(frame.diameter[frame.free]))
@@ -86,27 +87,29 @@ print(f"t = {frame.time:.3f} s: coordination {measure.coordination_number(frame)
 # ## The figure
 
 # %% Figure
-figure = Figure(figsize=(10.0, 8.0), layout="constrained")
-axes = figure.subplots(2, 2)
+figure = Figure(figsize=(11.0, 7.0), layout="constrained")
+axes = figure.subplot_mosaic([["flow", "velocity", "pressure"], ["forces", "forces", "pressure"]],
+                             width_ratios=[1.0, 1.0, 0.8])
 
-axes[0, 0].plot(flow.times, passed, color="black")
-axes[0, 0].plot(flow.times[[steady.start, steady.stop]], passed[[steady.start, steady.stop]], color="tab:red",
-                linewidth=3, label=f"{rate:.1f} kg/(m s)")
-axes[0, 0].set(xlabel="time [s]", ylabel="discharged mass [kg/m]", title="flow through the opening")
-axes[0, 0].legend(frameon=False)
+axes["flow"].plot(flow.times, passed, color="black")
+axes["flow"].plot(flow.times[[steady.start, steady.stop]], passed[[steady.start, steady.stop]], color="tab:red",
+                  linewidth=3, label=f"{rate:.1f} kg/(m s)")
+axes["flow"].set(xlabel="time [s]", ylabel="discharged mass [kg/m]", title="flow through the opening")
+axes["flow"].legend(frameon=False)
 
-axes[0, 1].plot(across.centres, -across.mean[:, 1], "o-", color="black")
-axes[0, 1].set(xlabel="x [m]", ylabel="speed downwards [m/s]", title="velocity across the opening", ylim=(0, None))
+axes["velocity"].plot(across.centres, -across.mean[:, 1], "o-", color="black")
+axes["velocity"].set(xlabel="x [m]", ylabel="speed downwards [m/s]", title="velocity across the opening")
+axes["velocity"].set_ylim(bottom=0.0)
 
-axes[1, 0].semilogy(forces.centres, np.where(forces.density > 0.0, forces.density, np.nan), "s", color="black")
-axes[1, 0].set(xlabel="normal force / mean", ylabel="probability density", title="contact forces")
+axes["forces"].semilogy(forces.centres, np.where(forces.density > 0.0, forces.density, np.nan), "s", color="black")
+axes["forces"].set(xlabel="normal force / mean", ylabel="probability density", title="contact forces")
 
 shown = np.where(fields.density > 0.05 * fields.density.max(), pressure, np.nan)
-image = axes[1, 1].pcolormesh(fields.x, fields.y, shown, cmap="viridis", shading="nearest", vmin=0.0)
-axes[1, 1].add_collection(PolyCollection(frame.vertices, facecolor="none", edgecolor="black", linewidth=0.4))
-axes[1, 1].set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title=f"pressure at t = {frame.time:.2f} s")
-axes[1, 1].autoscale_view()
-figure.colorbar(image, ax=axes[1, 1], label="N/m$^2$")
+image = axes["pressure"].pcolormesh(fields.x, fields.y, shown, cmap="viridis", shading="nearest", vmin=0.0)
+axes["pressure"].add_collection(PolyCollection(frame.vertices, facecolor="none", edgecolor="black", linewidth=0.4))
+axes["pressure"].set(xlabel="x [m]", ylabel="y [m]", aspect="equal", title=f"pressure at t = {frame.time:.2f} s")
+axes["pressure"].autoscale_view()
+figure.colorbar(image, ax=axes["pressure"], label="N/m$^2$")
 
 path = RESULT / "discharge.png"
 figure.savefig(path, dpi=150)
