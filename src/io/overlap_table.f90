@@ -6,13 +6,20 @@ module polydem_overlap_table
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
    use polydem_global_order, only: global_order_t
-   use polydem_kinds, only: dp, ip, wp
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_line_writer, only: line_writer_t
    use polydem_ownership, only: order_pairs
    use polydem_strings, only: to_text
    implicit none
    private
    public :: write_overlap_table
+
+   !> Binary exponents below this one have decimal exponents of two digits
+   integer, parameter :: greatest_exponent = 328
+   !> Rows that are gathered and written at a time
+   integer(ip), parameter :: piece = 10000_ip
+   !> Bytes that no row exceeds
+   integer, parameter :: longest_row = 128
 
 contains
 
@@ -30,15 +37,54 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       class(communicator_t), intent(inout) :: comm
       type(line_writer_t) :: file
-      type(global_order_t) :: rows
-      real(dp), allocatable :: values(:, :), block(:, :), of_rank(:)
-      integer(ip), allocatable :: deep(:)
-      integer(ip) :: c, k, rank
+      real(dp), allocatable :: block(:, :), of_rank(:)
+      integer(lp) :: most(1)
+      integer(ip) :: low, n, rank
 
-      deep = pack([(c, c=1_ip, contacts%n)], [(depth_share(contacts, thickness, c) > limit, c=1_ip, contacts%n)])
-      allocate (values(7, size(deep)))
-      do k = 1_ip, size(deep, kind=ip)
-         c = deep(k)
+      call collect_rows(bodies, contacts, thickness, limit, comm, block)
+      if (comm%is_root()) call file%open(path, error)
+      call comm%all_reduce_error(error)
+      if (allocated(error)) return
+      if (comm%is_root()) &
+         call file%put_line('first,second,x [m],y [m],area [m2],depth [m],depth/thinner body')
+      ! A piece of a block at a time, as no rank has memory for all of them.
+      most = size(block, 2, lp)
+      call comm%all_reduce_max(most)
+      do rank = 0_ip, comm%size - 1_ip
+         do low = 1_ip, int(most(1), ip), piece
+            n = merge(max(0_ip, min(piece, size(block, 2, ip) - low + 1_ip)), 0_ip, rank == comm%rank)
+            call gather_rows(comm, 7*int(n), block(:, low:low + n - 1_ip), of_rank)
+            if (comm%is_root()) call put_rows(file, size(of_rank)/7, of_rank)
+         end do
+      end do
+      if (comm%is_root()) call file%close(error)
+      call comm%all_reduce_error(error)
+   end subroutine write_overlap_table
+
+   !> Collect the rows of this rank: blocks of ranks are consecutive parts of the table. Collective.
+   subroutine collect_rows(bodies, contacts, thickness, limit, comm, block)
+      type(bodies_t), intent(in) :: bodies
+      type(contacts_t), intent(in) :: contacts
+      real(wp), intent(in) :: thickness(:), limit
+      class(communicator_t), intent(inout) :: comm
+      !> Identifiers, position, area, depth, and depth over thickness, (7, row)
+      real(dp), allocatable, intent(out) :: block(:, :)
+      type(global_order_t) :: rows
+      real(dp), allocatable :: values(:, :)
+      logical, allocatable :: is_deep(:)
+      integer(ip), allocatable :: deep(:)
+      integer(ip) :: c, k
+
+      allocate (is_deep(contacts%n))
+      do c = 1_ip, contacts%n
+         is_deep(c) = depth_share(contacts, thickness, c) > limit
+      end do
+      allocate (deep(count(is_deep)), values(7, count(is_deep)))
+      k = 0_ip
+      do c = 1_ip, contacts%n
+         if (.not. is_deep(c)) cycle
+         k = k + 1_ip
+         deep(k) = c
          associate (i => contacts%first(c), j => contacts%second(c))
             values(:, k) = real([real(bodies%id(i), wp), real(bodies%id(j), wp), &
                                  bodies%position(:, i) + contacts%arm_first(:, c), contacts%area(c), &
@@ -47,19 +93,7 @@ contains
       end do
       call order_pairs(comm, bodies, contacts%first(deep), contacts%second(deep), rows)
       call rows%to_blocks(comm, values, block)
-      if (comm%is_root()) call file%open(path, error)
-      call comm%all_reduce_error(error)
-      if (allocated(error)) return
-      if (comm%is_root()) &
-         call file%put_line('first,second,x [m],y [m],area [m2],depth [m],depth/thinner body')
-      ! One block at a time, as no rank has memory for all of them.
-      do rank = 0_ip, comm%size - 1_ip
-         call gather_rows(comm, 7*int(merge(rows%n, 0_ip, rank == comm%rank)), block, of_rank)
-         if (comm%is_root()) call put_rows(file, size(of_rank)/7, of_rank)
-      end do
-      if (comm%is_root()) call file%close(error)
-      call comm%all_reduce_error(error)
-   end subroutine write_overlap_table
+   end subroutine collect_rows
 
    !> Gather the rows of all ranks; collective.
    subroutine gather_rows(comm, n, values, of_rank)
@@ -73,22 +107,50 @@ contains
       call comm%gather(values, of_rank, counts)
    end subroutine gather_rows
 
-   !> Write the rows of a block.
+   !> Write some rows.
    subroutine put_rows(file, n, block)
       type(line_writer_t), intent(inout) :: file
       !> Number of rows
       integer, intent(in) :: n
       !> Identifiers, position, area, depth, and depth over thickness, (7, row)
       real(dp), intent(in) :: block(7, n)
+      character(len=:), allocatable :: text
+      integer :: k, length
+
+      allocate (character(len=n*longest_row) :: text)
+      length = 0
+      do k = 1, n
+         call append_row(nint(block(:2, k), ip), real(block(3:, k), wp), text, length)
+      end do
+      call file%put(text(:length))
+   end subroutine put_rows
+
+   !> Append a row to a text, with its numbers as `to_text` writes them. Usual numbers are written together: a table may
+   !> have millions of rows.
+   subroutine append_row(identifiers, values, text, length)
+      !> Identifiers of the two bodies
+      integer(ip), intent(in) :: identifiers(2)
+      !> Position, area, depth, and depth over thickness
+      real(wp), intent(in) :: values(5)
+      !> The text and its length, with room for the row
+      character(len=*), intent(inout) :: text
+      integer, intent(inout) :: length
+      character(len=longest_row) :: row
       integer :: k
 
-      do k = 1, n
-         associate (row => real(block(:, k), wp))
-            call file%put_line(to_text(nint(block(1, k), ip))//','//to_text(nint(block(2, k), ip))//','// &
-                               to_text(row(3), 9)//','//to_text(row(4), 9)//','//to_text(row(5))//','// &
-                               to_text(row(6))//','//to_text(row(7)))
-         end associate
+      if (all(abs(exponent(values)) < greatest_exponent)) then
+         write (row, '(i0, ",", i0, 2(",", es15.8e2), 3(",", es12.5e2))') identifiers, values
+      else
+         row = to_text(identifiers(1))//','//to_text(identifiers(2))//','//to_text(values(1), 9)//','// &
+            to_text(values(2), 9)//','//to_text(values(3))//','//to_text(values(4))//','//to_text(values(5))
+      end if
+      do k = 1, len_trim(row)
+         if (row(k:k) == ' ') cycle
+         length = length + 1
+         text(length:length) = row(k:k)
       end do
-   end subroutine put_rows
+      length = length + 1
+      text(length:length) = new_line('a')
+   end subroutine append_row
 
 end module polydem_overlap_table

@@ -7,7 +7,7 @@ module polydem_contact_walk
    use omp_lib, only: omp_get_max_threads
    use polydem_clock, only: wall_seconds
    use polydem_contact_block, only: block_size, contact_block_t
-   use polydem_contact_rows, only: append_rows, gather_rows, start_rows
+   use polydem_contact_rows, only: append_rows, gather_rows, release_rows, start_rows
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_fill_block, only: fill_block
    use polydem_force_sums, only: add_late_terms, add_terms, clear_sums, contact_terms_t, reserve_sums, terms_of_block
@@ -220,6 +220,8 @@ contains
             if (walk%ranges(r)%passing_pair > 0_ip) walk%passing_pair = walk%ranges(r)%passing_pair
          end do
          if (self%keeps_contacts) call gather_rows(walk%all_of(:n), self%contacts)
+         ! Most tables are for a frame. Then the memory of the rows serves better elsewhere.
+         if (self%keeps_contacts .and. .not. allocated(self%law%constraint)) call release_rows(walk%all_of)
          call join_walls(walk%walls_of(:n), walk%walls)
          call gather_rows(walk%suspects_of(:n), walk%suspects)
       end associate

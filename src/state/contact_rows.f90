@@ -8,7 +8,7 @@ module polydem_contact_rows
    use polydem_pair_ranges, only: most_ranges
    implicit none
    private
-   public :: contact_rows_t, start_rows, append_rows, gather_rows
+   public :: contact_rows_t, start_rows, append_rows, gather_rows, release_rows
 
    !> Contacts of one thread
    type :: contact_rows_t
@@ -76,5 +76,16 @@ contains
       end do
       !$omp end parallel do
    end subroutine gather_rows
+
+   !> Give the memory of rows back.
+   pure subroutine release_rows(rows)
+      type(contact_rows_t), intent(inout) :: rows(:)
+      type(contact_rows_t) :: empty
+      integer :: r
+
+      do r = 1, size(rows)
+         rows(r) = empty
+      end do
+   end subroutine release_rows
 
 end module polydem_contact_rows

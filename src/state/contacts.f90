@@ -112,7 +112,7 @@ contains
          if (size(contacts%pair) >= capacity) return
       end if
       smaller = contacts
-      call reserve_contacts(contacts, 2_ip*capacity)
+      call reserve_contacts(contacts, capacity + capacity/2_ip)
       do c = 1_ip, smaller%n
          call copy_contact(smaller, c, contacts, c)
       end do
