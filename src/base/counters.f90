@@ -42,23 +42,19 @@ contains
       integer(lp), intent(in) :: value
       !> What the value belongs to: at_end (if absent), at_start, over_steps or greatest_step
       character(len=*), intent(in), optional :: scope
-      character(len=counter_name_length) :: padded
-      character(len=scope_length) :: belongs_to
       integer :: k
 
       if (.not. allocated(self%name)) allocate (self%name(0), self%value(0), self%scope(0))
-      padded = name
-      belongs_to = at_end
-      if (present(scope)) belongs_to = scope
       k = index_of(name, self%name)
-      if (k > 0) then
-         self%value(k) = value
-         self%scope(k) = belongs_to
-         return
+      if (k == 0) then
+         self%name = [character(len=counter_name_length) :: self%name, name]
+         self%value = [self%value, value]
+         self%scope = [character(len=scope_length) :: self%scope, at_end]
+         k = size(self%name)
       end if
-      self%name = [self%name, padded]
-      self%value = [self%value, value]
-      self%scope = [self%scope, belongs_to]
+      self%value(k) = value
+      self%scope(k) = at_end
+      if (present(scope)) self%scope(k) = scope
    end subroutine set
 
    !> Value of a counter; zero if it was never set

@@ -41,24 +41,18 @@ contains
       character(len=*), intent(in) :: unit
       !> Meaning in a few words
       character(len=*), intent(in) :: meaning
-      character(len=name_length) :: padded_name
-      character(len=unit_length) :: padded_unit
-      character(len=meaning_length) :: padded_meaning
       integer :: k
 
       if (.not. allocated(self%name)) allocate (self%name(0), self%unit(0), self%meaning(0), self%value(0))
-      padded_name = name
-      padded_unit = unit
-      padded_meaning = meaning
       k = index_of(name, self%name)
-      if (k > 0) then
-         self%value(k) = real(value, dp)
-         return
+      if (k == 0) then
+         self%name = [character(len=name_length) :: self%name, name]
+         self%unit = [character(len=unit_length) :: self%unit, unit]
+         self%meaning = [character(len=meaning_length) :: self%meaning, meaning]
+         self%value = [self%value, 0.0_dp]
+         k = size(self%name)
       end if
-      self%name = [self%name, padded_name]
-      self%unit = [self%unit, padded_unit]
-      self%meaning = [self%meaning, padded_meaning]
-      self%value = [self%value, real(value, dp)]
+      self%value(k) = real(value, dp)
    end subroutine set
 
 end module polydem_named_values

@@ -3,7 +3,7 @@ module polydem_sort
    use polydem_kinds, only: ip, lp
    implicit none
    private
-   public :: sort_keys, place_in
+   public :: ascending_order, place_in, sort_keys
 
 contains
 
@@ -26,6 +26,24 @@ contains
          end if
       end do
    end function place_in
+
+   !> Indices of keys in ascending order of the keys. The sort is stable.
+   pure function ascending_order(keys) result(order)
+      !> The keys, (n)
+      integer(lp), intent(in) :: keys(:)
+      !> Index of the k-th smallest key, (n)
+      integer(ip), allocatable :: order(:)
+      integer(lp), allocatable :: sorted(:), spare_keys(:)
+      integer(ip), allocatable :: spare(:)
+      integer(ip) :: k, n
+
+      n = size(keys, kind=ip)
+      order = [(k, k=1_ip, n)]
+      if (all(keys(2:) >= keys(:n - 1_ip))) return
+      allocate (sorted(n), spare_keys(n), spare(n))
+      sorted = keys
+      call sort_keys(n, sorted, order, spare_keys, spare)
+   end function ascending_order
 
    !> Sort keys in ascending order, and permute one integer per key in the same way.
    pure subroutine sort_keys(n, keys, carried, spare_keys, spare_carried)

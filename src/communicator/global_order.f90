@@ -7,7 +7,7 @@ module polydem_global_order
    use polydem_communicator, only: communicator_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_rank_order, only: sort_by_rank
-   use polydem_sort, only: sort_keys
+   use polydem_sort, only: ascending_order
    implicit none
    private
    public :: global_order_t, row_key, component, vector
@@ -86,7 +86,7 @@ contains
       self%slot = slot(self%slot)
       call comm%all_to_all(sent, self%counts, received, self%counts_received)
       self%n = size(received, 2, kind=ip)
-      call rank_keys(received(1, :), self%source)
+      self%source = ascending_order(received(1, :))
       call comm%gather([int(self%n, lp)], sizes, counts)
       self%first = sum(sizes(:comm%rank))
       self%total = sum(sizes)
@@ -206,24 +206,5 @@ contains
       ! The largest integer r below body P/n.
       destination_of = int((shiftr(key, 32)*int(n_ranks, lp) - 1_lp)/int(n_bodies, lp), ip)
    end function destination_of
-
-   !> Permutation that sorts keys in ascending order
-   pure subroutine rank_keys(keys, ranked)
-      integer(lp), intent(in) :: keys(:)
-      integer(ip), allocatable, intent(out) :: ranked(:)
-      integer(lp), allocatable :: sorted(:), spare_keys(:)
-      integer(ip), allocatable :: spare(:)
-      integer(ip) :: k, n
-
-      n = size(keys, kind=ip)
-      allocate (ranked(n))
-      do k = 1_ip, n
-         ranked(k) = k
-      end do
-      if (all(keys(2:) > keys(:n - 1_ip))) return
-      allocate (sorted(n), spare_keys(n), spare(n))
-      sorted = keys
-      call sort_keys(n, sorted, ranked, spare_keys, spare)
-   end subroutine rank_keys
 
 end module polydem_global_order

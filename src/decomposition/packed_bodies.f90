@@ -5,7 +5,7 @@ module polydem_packed_bodies
    use polydem_communicator, only: communicator_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_migration_buffer, only: migration_buffer_t
-   use polydem_sort, only: sort_keys
+   use polydem_sort, only: ascending_order
    implicit none
    private
    public :: packed_bodies_t, pack_bodies, all_to_all_bodies, join_packed, unpack_bodies
@@ -97,8 +97,7 @@ contains
       type(bodies_t), intent(out) :: bodies
       !> Slot of each packed body
       integer(ip), allocatable, intent(out) :: slots(:)
-      integer(lp), allocatable :: key(:), spare_key(:)
-      integer(ip), allocatable :: order(:), spare(:), start(:)
+      integer(ip), allocatable :: order(:), start(:)
       integer(ip) :: k, n, s
 
       n = size(packed%corners, kind=ip)
@@ -108,10 +107,8 @@ contains
       ! In the order of the list first: the global indices then give the slots.
       call packed%constants%restore_to([(k, k=1_ip, n)])
       call serialize_constants(packed%constants, bodies)
-      key = int(bodies%global_index, lp)
-      order = packed%constants%slots
-      allocate (spare_key(n), spare(n), slots(n), start(n + 1_ip))
-      call sort_keys(n, key, order, spare_key, spare)
+      order = ascending_order(int(bodies%global_index, lp))
+      allocate (slots(n), start(n + 1_ip))
       slots(order) = [(s, s=1_ip, n)]
       call packed%constants%restore_to(slots)
       call serialize_constants(packed%constants, bodies)

@@ -5,7 +5,7 @@ module polydem_packed_history
    use polydem_contact_history, only: contact_history_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_rank_order, only: sort_by_rank
-   use polydem_sort, only: place_in, sort_keys
+   use polydem_sort, only: ascending_order, place_in
    implicit none
    private
    public :: packed_history_t, pack_pairs, send_pairs, receive_pairs, slots_of_pair
@@ -145,16 +145,11 @@ contains
       integer(lp), intent(in) :: received(:, :)
       real(wp), intent(in) :: value_received(:, :)
       type(packed_history_t), intent(out) :: packed
-      integer(lp), allocatable :: key(:), spare_key(:)
-      integer(ip), allocatable :: order(:), spare(:)
-      integer(ip) :: k, n
+      integer(ip), allocatable :: order(:)
+      integer(ip) :: k
 
-      n = size(received, 2, kind=ip)
-      allocate (spare(n), spare_key(n))
-      key = received(1, :)
-      order = [(k, k=1_ip, n)]
-      call sort_keys(n, key, order, spare_key, spare)
-      order = pack(order, [(is_new(k), k=1_ip, n)])
+      order = ascending_order(received(1, :))
+      order = pack(order, [(is_new(k), k=1_ip, size(order, kind=ip))])
       packed%key = received(1, order)
       packed%memory = int(received(2, order), ip)
       packed%value = value_received(:, order)
@@ -166,7 +161,7 @@ contains
          integer(ip), intent(in) :: at
 
          is_new = .true.
-         if (at > 1_ip) is_new = key(at) /= key(at - 1_ip)
+         if (at > 1_ip) is_new = received(1, order(at)) /= received(1, order(at - 1_ip))
       end function is_new
 
    end subroutine sort_pairs

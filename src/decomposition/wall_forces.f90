@@ -5,7 +5,7 @@ module polydem_wall_forces
    use polydem_force_sums, only: n_terms, set_force
    use polydem_global_order, only: row_key
    use polydem_kinds, only: ip, lp, wp
-   use polydem_sort, only: sort_keys
+   use polydem_sort, only: ascending_order
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
@@ -59,23 +59,18 @@ contains
       integer(lp), intent(in) :: keys(:)
       real(wp), intent(in) :: terms(:, :)
       type(bodies_t), intent(inout) :: bodies
-      integer(lp), allocatable :: sorted(:), spare_keys(:)
-      integer(ip), allocatable :: place(:), spare(:)
+      integer(ip), allocatable :: order(:)
       real(wp) :: total(n_terms)
-      integer(ip) :: k, n, s
+      integer(ip) :: k, s
 
-      n = size(keys, kind=ip)
-      allocate (sorted(n), spare_keys(n), place(n), spare(n))
-      sorted = keys
-      place = [(k, k=1_ip, n)]
-      call sort_keys(n, sorted, place, spare_keys, spare)
-      k = n
+      order = ascending_order(keys)
+      k = size(order, kind=ip)
       do s = bodies%n, 1_ip, -1_ip
          if (.not. bodies%fixed(s)) cycle
          total = 0.0_wp
          do while (k > 0_ip)
-            if (shiftr(sorted(k), 32) /= int(bodies%global_index(s), lp)) exit
-            total = total + terms(:, place(k))
+            if (shiftr(keys(order(k)), 32) /= int(bodies%global_index(s), lp)) exit
+            total = total + terms(:, order(k))
             k = k - 1_ip
          end do
          call set_force(total, s, bodies)

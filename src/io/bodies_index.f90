@@ -5,7 +5,7 @@ module polydem_bodies_index
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_hdf5_members, only: count_names, is_dataset, read_name
    use polydem_kinds, only: dp, ip, lp
-   use polydem_sort, only: sort_keys
+   use polydem_sort, only: ascending_order
    use polydem_strings, only: to_text, quoted, suggestion
    implicit none
    private
@@ -175,17 +175,11 @@ contains
       type(hdf5_file_t), intent(in) :: file
       type(bodies_index_t), intent(inout) :: table
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp), allocatable :: key(:), spare_key(:)
-      integer(ip), allocatable :: order(:), spare(:)
+      integer(ip), allocatable :: order(:)
       integer(ip) :: k
 
-      if (allocated(error)) return
-      allocate (order(table%n))
-      do k = 1_ip, table%n
-         order(k) = k
-      end do
       if (.not. file%has('id')) then
-         table%id = order
+         table%id = [(k, k=1_ip, table%n)]
          return
       end if
       call file%read('id', table%id, error)
@@ -193,17 +187,17 @@ contains
       call check_length(file, 'id', size(table%id, kind=lp), table%n, error)
       if (allocated(error)) return
       if (table%id(1) >= 0_ip .and. all(table%id(2:) > table%id(:table%n - 1_ip))) return
-      key = int(table%id, lp)
-      allocate (spare_key(table%n), spare(table%n))
-      call sort_keys(table%n, key, order, spare_key, spare)
+      order = ascending_order(int(table%id, lp))
       do k = 1_ip, table%n
          if (allocated(error)) return
-         if (key(k) < 0_lp) then
-            call file%reject(entry_text('id', order(k))//' is '//to_text(key(k))//', but must not be negative', error)
-         else if (key(k) == key(max(k - 1_ip, 1_ip)) .and. k > 1_ip) then
-            call file%reject(entry_text('id', order(k))//' is '//to_text(key(k))//', the same as '// &
-                             entry_text('id', order(k - 1_ip))//'; identifiers must be unique', error)
-         end if
+         associate (id => table%id(order(k)), former => table%id(order(max(k - 1_ip, 1_ip))))
+            if (id < 0_ip) then
+               call file%reject(entry_text('id', order(k))//' is '//to_text(id)//', but must not be negative', error)
+            else if (id == former .and. k > 1_ip) then
+               call file%reject(entry_text('id', order(k))//' is '//to_text(id)//', the same as '// &
+                                entry_text('id', order(k - 1_ip))//'; identifiers must be unique', error)
+            end if
+         end associate
       end do
    end subroutine read_identifiers
 

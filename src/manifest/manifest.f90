@@ -89,16 +89,7 @@ contains
 
       path = folder//'/'//manifest_name
       if (present(name)) path = folder//'/'//name
-      self%folder = folder
-      self%text = ''
-      self%chain = 0_lp
-      self%is_active = .false.
-      self%has_failed = .false.
-      self%is_truncated = .false.
-      self%is_foreign = .false.
-      if (allocated(self%problem)) deallocate (self%problem)
-      self%n = 0
-      if (.not. allocated(self%entry)) allocate (self%entry(16))
+      call clear(self, folder)
       self%is_found = link_exists(path)
       if (.not. self%is_found) return
       call read_bytes(path, text, problem)
@@ -106,6 +97,16 @@ contains
       if (.not. allocated(problem)) return
       self%problem = path//': '//problem
    end subroutine read_manifest
+
+   !> Forget everything: the manifest of a folder without files.
+   subroutine clear(self, folder)
+      type(manifest_t), intent(out) :: self
+      character(len=*), intent(in) :: folder
+
+      self%folder = folder
+      self%text = ''
+      allocate (self%entry(16))
+   end subroutine clear
 
    subroutine read_lines(self, text, problem)
       type(manifest_t), intent(inout) :: self
@@ -201,12 +202,7 @@ contains
       character(len=:), allocatable :: line
       integer :: k
 
-      self%folder = folder
-      self%is_truncated = .false.
-      self%has_failed = .false.
-      self%chain = 0_lp
-      self%n = 0
-      if (.not. allocated(self%entry)) allocate (self%entry(16))
+      call clear(self, folder)
       call chain_line(first_text, self%chain, line)
       self%text = line//line_end
       do k = 1, size(names)

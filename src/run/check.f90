@@ -39,7 +39,8 @@ contains
       after = resident_memory()
       call log%open('', error)
       if (allocated(error)) return
-      call write_lines(log, settings%resolved)
+      ! The log adds the last line end.
+      call log%write_line(settings%resolved(:len(settings%resolved) - 1))
       call measure_scene(simulation, measures)
       call describe(simulation, measures, log)
       call list_overlaps(simulation, measures, '', log, error)
@@ -80,20 +81,5 @@ contains
       frame_size = 48_lp*int(simulation%bodies%n, lp)
       if (simulation%settings%output%contacts) frame_size = frame_size + 72_lp*int(simulation%contacts%n, lp)
    end function frame_size
-
-   !> Write a text of several lines to the log.
-   subroutine write_lines(log, text)
-      type(log_t), intent(inout) :: log
-      character(len=*), intent(in) :: text
-      integer :: first, length
-
-      first = 1
-      do while (first <= len(text))
-         length = index(text(first:), new_line('a')) - 1
-         if (length < 0) length = len(text) - first + 1
-         call log%write_line(text(first:first + length - 1))
-         first = first + length + 1
-      end do
-   end subroutine write_lines
 
 end module polydem_check

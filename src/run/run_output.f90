@@ -96,17 +96,11 @@ contains
       if (run%simulation%step <= run%earlier%last_frame) return
       associate (s => run%simulation, output => run%simulation%settings%output)
          call complete_wall_forces(run%comm, s%walk%walls, s%bodies)
-         if (output%contacts .and. output%energy_balance) then
-            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, row=run%row, &
-                                            manifest=run%manifest)
-         else if (output%contacts) then
-            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, contacts=s%contacts, &
-                                            manifest=run%manifest)
-         else if (output%energy_balance) then
-            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, row=run%row, &
-                                            manifest=run%manifest)
+         ! The row has no entries if the run computes no energy balance.
+         if (output%contacts) then
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, s%contacts, run%row, run%manifest)
          else
-            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, manifest=run%manifest)
+            call run%trajectory%write_frame(s%step, time_of(s), s%bodies, error, row=run%row, manifest=run%manifest)
          end if
          run%last_frame = s%step
       end associate

@@ -3,7 +3,7 @@ module polydem_run_simulation
    use polydem_check_ranks, only: check_ranks
    use polydem_checkpoint_fields, only: attempts_t
    use polydem_clock, only: wall_seconds
-   use polydem_communicator, only: communicator_t
+   use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_errors, only: error_t, raise, stopped_early
    use polydem_finished_result, only: find_finished_result, is_finished
    use polydem_kinds, only: ip, lp
@@ -40,8 +40,7 @@ contains
 
       run%began = wall_seconds()
       if (present(attempt)) run%attempt = attempt
-      if (present(comm)) allocate (run%comm, source=comm)
-      if (.not. allocated(run%comm)) allocate (communicator_t :: run%comm)
+      call choose_communicator(run%comm, comm)
       run%folder = result_folder(settings)
       if (run%attempt%continues) call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return

@@ -2,7 +2,7 @@
 module polydem_start
    use polydem_broadcaster, only: broadcaster_t
    use polydem_checkpoint_fields, only: hash_scene_of
-   use polydem_communicator, only: communicator_t
+   use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_errors, only: error_t
    use polydem_force_law, only: check_law
    use polydem_hash, only: hexadecimal
@@ -34,8 +34,7 @@ contains
       class(communicator_t), intent(in), optional :: comm
       class(communicator_t), allocatable :: ranks
 
-      if (present(comm)) allocate (ranks, source=comm)
-      if (.not. allocated(ranks)) allocate (communicator_t :: ranks)
+      call choose_communicator(ranks, comm)
       call check_law(settings, 1_ip, error)
       if (allocated(error)) return
       call build_scene(settings, self%bodies, self%motions, error, ranks%rank, ranks%size)

@@ -6,7 +6,7 @@ module polydem_body_list
    use polydem_kinds, only: ip, lp, wp
    use polydem_polygon, only: clean_polygon, mass_properties
    use polydem_polygon_list, only: polygon_list_t
-   use polydem_sort, only: sort_keys
+   use polydem_sort, only: ascending_order
    use polydem_strings, only: to_text
    implicit none
    private
@@ -163,19 +163,14 @@ contains
       !> Number in the list of the body with the k-th identifier, (n)
       integer(ip), allocatable, intent(out) :: order(:)
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp), allocatable :: key(:), spare_key(:)
-      integer(ip), allocatable :: spare(:)
       integer(ip) :: k
 
       order = [(k, k=1_ip, list%n)]
-      if (list%n == 0_ip) return
       if (all(list%id(2:list%n) > list%id(:list%n - 1_ip))) return
-      allocate (spare_key(list%n), spare(list%n))
-      key = int(list%id(:list%n), lp)
-      call sort_keys(list%n, key, order, spare_key, spare)
+      order = ascending_order(int(list%id(:list%n), lp))
       do k = 2_ip, list%n
-         if (key(k) > key(k - 1_ip)) cycle
-         call raise(error, input_error, 'body '//to_text(key(k))// &
+         if (list%id(order(k)) > list%id(order(k - 1_ip))) cycle
+         call raise(error, input_error, 'body '//to_text(list%id(order(k)))// &
                     ': the identifier is used twice; each body needs its own')
          return
       end do
