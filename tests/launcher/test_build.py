@@ -3,8 +3,10 @@
 import os
 import re
 import shutil
+import signal
 import subprocess
 import tempfile
+import time
 
 from toy import PROGRAM, Toy
 
@@ -111,6 +113,21 @@ class Build(Toy):
         self.assertEqual(self.call("info"), (0, "info FALSE\n", ""))
         self.assertEqual(self.call("info", HDF5_USE_FILE_LOCKING="TRUE"), (0, "info TRUE\n", ""))
         self.assertEqual(self.call("check"), (0, "check as usual\n", ""))
+
+    def test_an_interrupted_build_did_not_fail(self):
+        self.write("src/app/CMakeLists.txt",
+                   'add_custom_command(OUTPUT slow.f90 COMMAND "${CMAKE_COMMAND}" -E touch under_way\n'
+                   '  COMMAND "${CMAKE_COMMAND}" -E sleep 60)\nadd_executable(polydem main.f90 slow.f90)\n')
+        call = subprocess.Popen([self.launcher, "info"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                                env=self.environment, start_new_session=True)
+        signs = os.path.join(self.folder, "build", "release", "src", "app", "under_way")
+        while not os.path.exists(signs) and call.poll() is None:
+            time.sleep(0.02)
+        os.killpg(call.pid, signal.SIGINT)
+        output, messages = call.communicate()
+        self.assertEqual((call.returncode, output), (130, ""), messages)
+        self.assertEqual(messages.splitlines()[-1], "polydem: interrupted")
+        self.assertNotIn("failed", messages)
 
     def test_scale_needs_only_python(self):
         self.write(".venv/bin/python", '#!/bin/bash\nprintf "<%s>\\n" "$@"\n')

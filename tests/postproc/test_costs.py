@@ -90,6 +90,17 @@ def test_models_run_in_turns_and_an_interrupted_study_goes_on(study):
     assert study.calls == ["bench/drum.nml"] * (len(samples) + len(MODELS) - 8)
 
 
+def test_a_study_says_what_it_will_do_and_how_far_it_is(study, monkeypatch):
+    monkeypatch.setattr(costs, "SILENCE", 0.0)
+    said = []
+    count = len(costs.measure_costs(study, 0, say=said.append))
+    assert said[0].startswith(f"{count} samples to take, 0 found in {study.output}")
+    assert said[1:4] == [f"count 1: {number} of {len(MODELS)} models" for number in (1, 2, 3)]
+    said.clear()
+    costs.measure_costs(study, 0, say=said.append)
+    assert said[0].startswith(f"0 samples to take, {count} found") and not any("models" in line for line in said)
+
+
 def test_the_table_tells_what_was_measured(study):
     table = costs.write_costs(costs.measure_costs(study, 2, say=lambda _: None), study.output)
     rows = {row[0]: row for row in table.rows}

@@ -16,6 +16,7 @@ from __future__ import annotations
 import os
 import re
 import subprocess
+import time
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -36,6 +37,9 @@ COUNTED = ((20, 600), (120, 600))
 
 #: How often memory is measured
 WEIGHINGS = 3
+
+#: Silence after which a study says how far it is [s]
+SILENCE = 10.0
 
 #: Every optional model off
 BARE = (
@@ -194,15 +198,21 @@ def measure_costs(study: Study, repeats: int, say=print) -> list[Sample]:
     wanted = [("count", 1)] + [("memory", k) for k in range(1, WEIGHINGS + 1)]
     if repeats > 0:
         wanted += [("time", k) for k in range(repeats + 1)]
+    taken = {(sample.kind, sample.repeat, sample.model) for sample in samples}
+    left = sum((*each, model.name) not in taken for each in wanted for model in MODELS)
+    say(f"{left} samples to take, {len(samples)} found in {study.output}; a bed settles first if there is none")
+    spoke = time.monotonic()
     for kind, repeat in wanted:
-        taken = {sample.model for sample in samples if (sample.kind, sample.repeat) == (kind, repeat)}
-        for model in MODELS:
-            if model.name in taken:
+        for number, model in enumerate(MODELS, 1):
+            if (kind, repeat, model.name) in taken:
                 continue
             sample = study.sample(model, kind, repeat)
             _compare(study.output / FILE, samples, sample)
             samples.append(sample)
             write_records(study.output / FILE, samples)
+            if time.monotonic() - spoke > SILENCE:
+                say(f"{kind} {repeat}: {number} of {len(MODELS)} models")
+                spoke = time.monotonic()
         say(f"{kind} {repeat}: done")
     return samples
 
