@@ -1,7 +1,7 @@
 !> What one thread finds in its range of pairs, as sums and single values. The arrays stay from step to step, so that a
 !> step allocates no memory.
 module polydem_range_results
-   use polydem_force_sums, only: late_terms_t
+   use polydem_force_sums, only: term_list_t
    use polydem_kinds, only: dp, ip
    implicit none
    private
@@ -10,7 +10,7 @@ module polydem_range_results
    !> Results of a range of pairs
    type :: range_results_t
       !> Terms of bodies beyond the range
-      type(late_terms_t) :: late
+      type(term_list_t) :: late
       !> Number of contacts that this rank owns, and of those without direction
       integer(ip) :: n_contacts = 0_ip, n_degenerate = 0_ip
       !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none

@@ -15,9 +15,10 @@ module polydem_force_sums
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: force_sums_t, contact_terms_t, late_terms_t, n_terms, of_elastic, of_normal, of_tangential
+   public :: force_sums_t, contact_terms_t, term_list_t, n_terms, of_elastic, of_normal, of_tangential
    public :: sum_x, sum_y, sum_torque, sum_energy, reserve_sums, start_sums, clear_sums, terms_of_block, term_of
-   public :: add_terms, add_late_terms, assemble_forces, total_forces, find_forces, set_force
+   public :: reserve_terms, append_term, add_terms, add_late_terms, assemble_forces, total_forces, find_forces
+   public :: set_force
 
    !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
    integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
@@ -42,15 +43,15 @@ module polydem_force_sums
       real(wp) :: second(sum_torque(1):n_terms, block_size)
    end type contact_terms_t
 
-   !> Terms of bodies beyond the range of a thread
-   type :: late_terms_t
+   !> A list of terms
+   type :: term_list_t
       !> Number of terms
       integer(ip) :: n = 0_ip
-      !> Slot of the body of each term, (n) or longer
-      integer(ip), allocatable :: slot(:)
+      !> Slots of the body of each term and of its partner, (2, n) or longer
+      integer(ip), allocatable :: slots(:, :)
       !> The terms, (n_terms, n) or longer
-      real(wp), allocatable :: value(:, :)
-   end type late_terms_t
+      real(wp), allocatable :: term(:, :)
+   end type term_list_t
 
 contains
 
@@ -154,17 +155,19 @@ contains
       integer(ip), intent(in) :: last
       type(force_sums_t), intent(inout) :: sums
       !> Terms of the bodies after `last`
-      type(late_terms_t), intent(inout) :: late
+      type(term_list_t), intent(inout) :: late
       integer(ip) :: c, low
 
       low = 1_ip
       if (max(maxval(block%first(:block%n)), maxval(block%second(:block%n))) > last) then
-         call reserve_late(late, block%n)
+         call reserve_terms(late%n + block%n, late)
          do c = 1_ip, block%n
             if (max(block%first(c), block%second(c)) <= last) cycle
             call add_pairs(low, c - 1_ip, block%first, block%second, terms, last, sums%value, sums%has_terms)
-            call add_or_keep(block%first(c), term_of(terms, c, .true.), last, sums, late)
-            call add_or_keep(block%second(c), term_of(terms, c, .false.), last, sums, late)
+            associate (i => block%first(c), j => block%second(c))
+               call add_or_keep([i, j], term_of(terms, c, .true.), last, sums, late)
+               call add_or_keep([j, i], term_of(terms, c, .false.), last, sums, late)
+            end associate
             low = c + 1_ip
          end do
       end if
@@ -210,63 +213,65 @@ contains
    end subroutine subtract
 
    !> Add a term to the sums of a body, or append it to the late terms.
-   pure subroutine add_or_keep(slot, term, last, sums, late)
-      integer(ip), intent(in) :: slot
+   pure subroutine add_or_keep(slots, term, last, sums, late)
+      !> Slots of the body and of its partner
+      integer(ip), intent(in) :: slots(2)
       real(wp), intent(in) :: term(n_terms)
       integer(ip), intent(in) :: last
       type(force_sums_t), intent(inout) :: sums
-      type(late_terms_t), intent(inout) :: late
+      type(term_list_t), intent(inout) :: late
 
-      if (slot > last) then
-         call append_late(slot, term, late)
+      if (slots(1) > last) then
+         call append_term(slots, term, late)
       else
-         sums%value(:, slot) = sums%value(:, slot) + term
-         sums%has_terms(slot) = .true.
+         sums%value(:, slots(1)) = sums%value(:, slots(1)) + term
+         sums%has_terms(slots(1)) = .true.
       end if
    end subroutine add_or_keep
 
-   !> Make room for more late terms.
-   pure subroutine reserve_late(late, more)
-      type(late_terms_t), intent(inout) :: late
-      integer(ip), intent(in) :: more
-      integer(ip), allocatable :: slot(:)
-      real(wp), allocatable :: value(:, :)
-      integer(ip) :: m
+   !> Make room for terms.
+   pure subroutine reserve_terms(n, list)
+      !> Number of terms in all
+      integer(ip), intent(in) :: n
+      type(term_list_t), intent(inout) :: list
+      integer(ip), allocatable :: slots(:, :)
+      real(wp), allocatable :: term(:, :)
 
-      if (.not. allocated(late%slot)) allocate (late%slot(block_size), late%value(n_terms, block_size))
-      if (late%n + more <= size(late%slot)) return
-      m = 2_ip*(late%n + more)
-      allocate (slot(m), value(n_terms, m))
-      slot(:late%n) = late%slot(:late%n)
-      value(:, :late%n) = late%value(:, :late%n)
-      call move_alloc(slot, late%slot)
-      call move_alloc(value, late%value)
-   end subroutine reserve_late
+      if (.not. allocated(list%slots)) allocate (list%slots(2, 0), list%term(n_terms, 0))
+      if (n <= size(list%slots, 2)) return
+      allocate (slots(2, 2_ip*n), term(n_terms, 2_ip*n))
+      slots(:, :list%n) = list%slots(:, :list%n)
+      term(:, :list%n) = list%term(:, :list%n)
+      call move_alloc(slots, list%slots)
+      call move_alloc(term, list%term)
+   end subroutine reserve_terms
 
-   !> Append a term to the late terms.
-   pure subroutine append_late(slot, term, late)
-      integer(ip), intent(in) :: slot
+   !> Append a term; there must be room.
+   pure subroutine append_term(slots, term, list)
+      !> Slots of its body and of the partner
+      integer(ip), intent(in) :: slots(2)
+      !> The term
       real(wp), intent(in) :: term(n_terms)
-      type(late_terms_t), intent(inout) :: late
+      type(term_list_t), intent(inout) :: list
 
-      late%n = late%n + 1_ip
-      late%slot(late%n) = slot
-      late%value(:, late%n) = term
-   end subroutine append_late
+      list%n = list%n + 1_ip
+      list%slots(:, list%n) = slots
+      list%term(:, list%n) = term
+   end subroutine append_term
 
    !> Add late terms to the sums of some bodies, in the order of the terms.
    pure subroutine add_late_terms(late, low, high, sums)
       !> Late terms of one thread
-      type(late_terms_t), intent(in) :: late
+      type(term_list_t), intent(in) :: late
       !> First and last slot whose sums may change
       integer(ip), intent(in) :: low, high
       type(force_sums_t), intent(inout) :: sums
       integer(ip) :: k
 
       do k = 1_ip, late%n
-         associate (s => late%slot(k))
+         associate (s => late%slots(1, k))
             if (s < low .or. s > high) cycle
-            sums%value(:, s) = sums%value(:, s) + late%value(:, k)
+            sums%value(:, s) = sums%value(:, s) + late%term(:, k)
             sums%has_terms(s) = .true.
          end associate
       end do
@@ -283,7 +288,7 @@ contains
       type(force_sums_t), intent(inout) :: sums
       type(contact_block_t) :: block
       type(contact_terms_t) :: terms
-      type(late_terms_t) :: none
+      type(term_list_t) :: none
       integer(ip) :: high
 
       call start_sums(bodies%n, sums)

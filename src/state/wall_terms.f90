@@ -3,22 +3,16 @@ module polydem_wall_terms
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t, load_block
    use polydem_contacts, only: contacts_t
-   use polydem_force_sums, only: contact_terms_t, n_terms, term_of, terms_of_block
-   use polydem_kinds, only: ip, wp
+   use polydem_force_sums, only: append_term, contact_terms_t, reserve_terms, term_list_t, term_of, terms_of_block
+   use polydem_kinds, only: ip
    implicit none
    private
    public :: wall_terms_t, append_walls, join_walls, select_walls
 
-   !> Terms of contacts 1..n with fixed bodies, in descending order; the arrays may be longer
-   type :: wall_terms_t
-      !> Number of contacts
-      integer(ip) :: n = 0_ip
+   !> Terms of the fixed bodies of contacts, in descending order of the contacts. The partners are the free bodies
+   type, extends(term_list_t) :: wall_terms_t
       !> Whether the elastic force has an energy (see `contacts_t`)
       logical :: energy_is_quadratic = .false.
-      !> Slots of the fixed and of the free body of each contact, (2, n) or longer
-      integer(ip), allocatable :: slots(:, :)
-      !> Term of the fixed body of each contact (see `polydem_force_sums`), (n_terms, n) or longer
-      real(wp), allocatable :: term(:, :)
    end type wall_terms_t
 
 contains
@@ -39,33 +33,14 @@ contains
          n = n + merge(1_ip, 0_ip, fixed(block%first(c)) .or. fixed(block%second(c)))
       end do
       if (n == 0_ip) return
-      call reserve_walls(walls%n + n, walls)
+      call reserve_terms(walls%n + n, walls%term_list_t)
       do k = 1_ip, n
          c = found(k)
-         walls%n = walls%n + 1_ip
          associate (i => block%first(c), j => block%second(c))
-            walls%slots(:, walls%n) = merge([i, j], [j, i], fixed(i))
-            walls%term(:, walls%n) = term_of(terms, c, fixed(i))
+            call append_term(merge([i, j], [j, i], fixed(i)), term_of(terms, c, fixed(i)), walls%term_list_t)
          end associate
       end do
    end subroutine append_walls
-
-   !> Make room for more contacts.
-   pure subroutine reserve_walls(n, walls)
-      !> Number of contacts to make room for
-      integer(ip), intent(in) :: n
-      type(wall_terms_t), intent(inout) :: walls
-      integer(ip), allocatable :: slots(:, :)
-      real(wp), allocatable :: term(:, :)
-
-      if (.not. allocated(walls%slots)) allocate (walls%slots(2, 0), walls%term(n_terms, 0))
-      if (n <= size(walls%slots, 2)) return
-      allocate (slots(2, 2_ip*n), term(n_terms, 2_ip*n))
-      slots(:, :walls%n) = walls%slots(:, :walls%n)
-      term(:, :walls%n) = walls%term(:, :walls%n)
-      call move_alloc(slots, walls%slots)
-      call move_alloc(term, walls%term)
-   end subroutine reserve_walls
 
    !> Join the contacts of several ranges of pairs.
    pure subroutine join_walls(ranges, walls)
@@ -76,7 +51,7 @@ contains
       integer :: r
 
       walls%n = 0_ip
-      call reserve_walls(sum(ranges%n), walls)
+      call reserve_terms(sum(ranges%n), walls%term_list_t)
       do r = size(ranges), 1, -1
          associate (n => ranges(r)%n, low => walls%n + 1_ip)
             if (n == 0_ip) cycle
