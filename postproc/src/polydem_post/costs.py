@@ -203,7 +203,7 @@ def measure_costs(study: Study, repeats: int, say=print) -> list[Sample]:
     say(f"{left} samples to take, {len(samples)} found in {study.output}; a bed settles first if there is none")
     spoke = time.monotonic()
     for kind, repeat in wanted:
-        for number, model in enumerate(MODELS, 1):
+        for turn, model in enumerate(MODELS, 1):
             if (kind, repeat, model.name) in taken:
                 continue
             sample = study.sample(model, kind, repeat)
@@ -211,7 +211,7 @@ def measure_costs(study: Study, repeats: int, say=print) -> list[Sample]:
             samples.append(sample)
             write_records(study.output / FILE, samples)
             if time.monotonic() - spoke > SILENCE:
-                say(f"{kind} {repeat}: {number} of {len(MODELS)} models")
+                say(f"{kind} {repeat}: {turn} of {len(MODELS)} models")
                 spoke = time.monotonic()
         say(f"{kind} {repeat}: done")
     return samples
