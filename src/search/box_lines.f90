@@ -10,7 +10,6 @@ module polydem_box_lines
    use polydem_line_lanes_avx2, only: classify_avx2 => classify, draw_avx2 => draw, find_off_avx2 => find_off, &
       list_strays_avx2 => list_strays
    use polydem_line_lanes_base, only: classify, draw, find_off, list_strays, most_place
-   use polydem_sort_reals, only: sort_reals
    implicit none
    private
    public :: box_lines_t, list_differences, median_corner
@@ -87,19 +86,25 @@ contains
       integer(ip), intent(in) :: n_boxes
       !> Bounds of the boxes, (4, box) [m]
       real(wp), intent(in) :: bounds(4, n_boxes)
-      real(wp) :: corner(2)
-      real(wp), allocatable :: sample(:)
-      integer(ip), allocatable :: ranked(:)
+      real(wp) :: corner(2), sample(sample_size), x
+      integer(ip) :: n, k, place
       integer :: a
 
       corner = 0.0_wp
-      if (n_boxes == 0_ip) return
+      n = min(n_boxes, sample_size)
       do a = 1, 2
-         sample = bounds(a, ::max(1_ip, n_boxes/sample_size))
-         if (a == 1) allocate (ranked(size(sample)))
-         call sort_reals(sample, ranked)
-         corner(a) = sample(ranked(1 + size(ranked)/2))
-         if (.not. abs(corner(a)) <= far) corner(a) = 0.0_wp
+         do k = 1_ip, n
+            x = bounds(a, 1_ip + (k - 1_ip)*(n_boxes/n))
+            place = k
+            do while (place > 1_ip)
+               if (sample(place - 1_ip) <= x) exit
+               sample(place) = sample(place - 1_ip)
+               place = place - 1_ip
+            end do
+            sample(place) = x
+         end do
+         if (n == 0_ip) cycle
+         if (abs(sample(1_ip + n/2_ip)) <= far) corner(a) = sample(1_ip + n/2_ip)
       end do
    end function median_corner
 

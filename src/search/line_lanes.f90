@@ -47,11 +47,12 @@ contains
       !> The list
       integer(ip), intent(out) :: off(range(2) - range(1) + 2_ip)
       real(wp) :: base(n_joined)
-      real(sp) :: on(n_sides), below
-      integer(bits) :: joined(n_joined), least
-      integer(ip) :: from, to, sides, i, k, l
+      ! Bits of the distances of the sides of a block from their lines moved up
+      integer(bits) :: below(n_sides), joined(n_joined), least
+      integer(ip) :: from, to, sides, k, l
 
       n_off = 0_ip
+      below = 0_bits
       base = [origin, origin, origin, origin]
       least = transfer(-2.0_sp*tolerance, least)
       do from = range(1), range(2), box_block
@@ -59,30 +60,51 @@ contains
          sides = 4_ip*(from - 1_ip)
          if (to - from == box_block - 1_ip) then
             ! Each side is compared with its line moved up by the tolerance. On its line it is between zero and two
-            ! tolerances below. The bits of such negative numbers, as integers, are below those of all others.
+            ! tolerances below. The bits of such negative numbers, as integers, are below those of all others. Zero
+            ! itself is accepted when the boxes are looked at one by one.
             joined = -huge(joined) - 1_bits
             do k = 0_ip, n_sides - n_joined, n_joined
                do l = 1_ip, n_joined
-                  joined(l) = max(joined(l), transfer(real(bounds(sides + k + l) - base(l), sp) - &
-                                         (place(sides + k + l) + (speed(sides + k + l)*step + tolerance)), least))
+                  below(k + l) = transfer(real(bounds(sides + k + l) - base(l), sp) - &
+                                          (place(sides + k + l) + (speed(sides + k + l)*step + tolerance)), least)
+                  joined(l) = max(joined(l), below(k + l))
                end do
             end do
             if (maxval(joined) <= least) cycle
-         end if
-         do k = 0_ip, 4_ip*(to - from), 4_ip
-            do l = 1_ip, 4_ip
-               below = real(bounds(sides + k + l) - base(l), sp) - &
-                  (place(sides + k + l) + (speed(sides + k + l)*step + tolerance))
-               on(k + l) = merge(1.0_sp, 0.0_sp, below <= 0.0_sp .and. below >= -2.0_sp*tolerance)
+         else
+            do k = 0_ip, 4_ip*(to - from), 4_ip
+               do l = 1_ip, 4_ip
+                  below(k + l) = transfer(real(bounds(sides + k + l) - base(l), sp) - &
+                                          (place(sides + k + l) + (speed(sides + k + l)*step + tolerance)), least)
+               end do
             end do
-         end do
-         do i = from, to
-            k = 4_ip*(i - from)
-            off(n_off + 1_ip) = i
-            n_off = n_off + merge(0_ip, 1_ip, (on(k + 1_ip) + on(k + 2_ip)) + (on(k + 3_ip) + on(k + 4_ip)) > 3.5_sp)
-         end do
+         end if
+         call append_off(from, to, below, least, n_off, off)
       end do
    end subroutine find_off
+
+   !> Append the boxes of a block of which a side is off its line to a list.
+   pure subroutine append_off(from, to, below, least, n_off, off)
+      !> First and last box
+      integer(ip), intent(in) :: from, to
+      !> Bits of the distances of all sides from their lines moved up by the tolerance, and of the least one on a line
+      integer(bits), intent(in) :: below(n_sides), least
+      !> Number of boxes in the list
+      integer(ip), intent(inout) :: n_off
+      !> The list; must have room for one box more than it can get
+      integer(ip), intent(inout) :: off(*)
+      real(sp) :: on(n_sides)
+      integer(ip) :: i, k
+
+      do k = 1_ip, n_sides
+         on(k) = merge(1.0_sp, 0.0_sp, below(k) <= least .or. below(k) == 0_bits)
+      end do
+      do i = from, to
+         k = 4_ip*(i - from)
+         off(n_off + 1_ip) = i
+         n_off = n_off + merge(0_ip, 1_ip, (on(k + 1_ip) + on(k + 2_ip)) + (on(k + 3_ip) + on(k + 4_ip)) > 3.5_sp)
+      end do
+   end subroutine append_off
 
    !> List the boxes whose tubes, of a given half width around their lines, leave given bounds between two steps, or
    !> whose lines go beyond a limit.
