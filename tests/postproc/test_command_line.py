@@ -91,6 +91,7 @@ def test_explains_errors_and_ends_with_code_2(finished, capsys, arguments, messa
 @pytest.mark.parametrize("arguments, message", [
     (["plot", "x", "--colr", "speed"], "plot: error: there is no option --colr; did you mean --color?"),
     (["plot", "x", "--wall=1"], "plot: error: there is no option --wall; see polydem_post plot --help"),
+    (["costs", "--program", "x", "--wrong"], "costs: error: there is no option --wrong; see polydem_post costs --help"),
     (["plot", "x", "y"], "plot: error: there is no place for the argument 'y'"),
     (["sweep", "run", "x", "--retyr"], "sweep run: error: there is no option --retyr; did you mean --retry?"),
     (["--only-parse", "paper", "--quik"], "paper: error: there is no option --quik; did you mean --quick?"),

@@ -122,7 +122,7 @@ class _Parser(argparse.ArgumentParser):
             return f"there is no place for the argument '{word}'"
         name = word.partition("=")[0]
         known = [option for option in self._option_string_actions if option.startswith("--")]
-        near = difflib.get_close_matches(name, known, 1)
+        near = difflib.get_close_matches(name, known, 1, cutoff=0.75)
         return f"there is no option {name}; " + (f"did you mean {near[0]}?" if near else f"see {self.prog} --help")
 
 
