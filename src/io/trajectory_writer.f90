@@ -7,12 +7,12 @@
 !> All ranks of a run write each segment collectively, and all procedures are collective unless stated otherwise. An
 !> error on entry must be allocated on all ranks or on none.
 module polydem_trajectory_writer
-   use polydem_atomic_file, only: check_file_length, reserve_on_all_ranks, open_on_all_ranks
+   use polydem_atomic_file, only: give_final_name, reserve_on_all_ranks, open_on_all_ranks
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
-   use polydem_file_system, only: make_folder, rename_file, sync_file
+   use polydem_file_system, only: make_folder, sync_file
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_manifest, only: manifest_t
@@ -210,10 +210,7 @@ contains
       self%is_open = .false.
       call self%file%close(error)
       if (self%comm%is_root()) then
-         if (.not. allocated(error)) call sync_file(path//open_suffix, error)
-         if (.not. allocated(error)) call check_file_length(path//open_suffix, error)
-         if (.not. allocated(error)) call rename_file(path//open_suffix, path, error)
-         if (.not. allocated(error)) call sync_file(self%folder, error)
+         call give_final_name(path//open_suffix, path, error)
          if (present(manifest)) call manifest%close_file(path, error, [int(self%n_frames, lp), self%steps])
       end if
       call self%comm%all_reduce_error(error)

@@ -7,13 +7,13 @@ module polydem_atomic_file
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t
    use polydem_file_checksum, only: append_checksum, checksum_length
-   use polydem_file_system, only: exists, remove_file, rename_file, reserve_space, sync_file
+   use polydem_file_system, only: exists, folder_of, remove_file, rename_file, reserve_space, sync_file
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: ip, lp
    use polydem_result_files, only: unfinished
    implicit none
    private
-   public :: begin_file, open_on_all_ranks, reserve_on_all_ranks, complete_file, discard_file, check_file_length
+   public :: begin_file, open_on_all_ranks, reserve_on_all_ranks, complete_file, discard_file, give_final_name
 
 contains
 
@@ -103,24 +103,27 @@ contains
       if (present(with_checksum) .and. .not. allocated(error)) then
          if (with_checksum) call append_checksum(path//unfinished, error)
       end if
-      if (.not. allocated(error)) call sync_file(path//unfinished, error)
-      if (.not. allocated(error)) call check_file_length(path//unfinished, error)
-      if (.not. allocated(error)) call rename_file(path//unfinished, path, error)
-      if (.not. allocated(error)) call sync_file(folder_of(path), error)
+      call give_final_name(path//unfinished, path, error)
       if (exists(path//unfinished)) call remove_file(path//unfinished, ignored)
    end subroutine name_file
 
-   !> Check that a closed file has the length that HDF5 recorded, before it replaces an older complete file.
-   subroutine check_file_length(path, error)
+   !> Flush a closed file to disk and rename it. Its length must be that which HDF5 recorded, so that a truncated file
+   !> never replaces a complete one. Nothing happens after a failure.
+   subroutine give_final_name(from, to, error)
       !> Current path of the file
-      character(len=*), intent(in) :: path
-      !> Allocated if HDF5 cannot open the file, for example because it is truncated
+      character(len=*), intent(in) :: from
+      !> Final path in the same folder
+      character(len=*), intent(in) :: to
+      !> Allocated if the file is truncated, or cannot be flushed or renamed
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
 
-      call file%open(path, error)
+      if (.not. allocated(error)) call sync_file(from, error)
+      if (.not. allocated(error)) call file%open(from, error)
       call file%close(error)
-   end subroutine check_file_length
+      if (.not. allocated(error)) call rename_file(from, to, error)
+      if (.not. allocated(error)) call sync_file(folder_of(to), error)
+   end subroutine give_final_name
 
    !> Close the file and remove it.
    subroutine discard_file(file, path, error)
@@ -134,16 +137,5 @@ contains
       call file%close(error)
       if (exists(path//unfinished)) call remove_file(path//unfinished, error)
    end subroutine discard_file
-
-   !> Folder of a path; '.' if the path has none
-   pure function folder_of(path) result(folder)
-      character(len=*), intent(in) :: path
-      character(len=:), allocatable :: folder
-      integer :: slash
-
-      slash = index(path, '/', back=.true.)
-      folder = '.'
-      if (slash > 0) folder = path(:slash)
-   end function folder_of
 
 end module polydem_atomic_file

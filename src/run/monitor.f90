@@ -18,8 +18,7 @@ module polydem_monitor
    implicit none
    private
    public :: monitor_t, new_monitor, check_step, checks_contacts, report_pending_warnings, write_warning_counts, &
-      serialize_monitor, &
-      warning_counts, set_warning_counts
+      serialize_monitor, warning_counts, set_warning_counts
 
    !> Guards and their findings
    type :: monitor_t

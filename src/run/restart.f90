@@ -180,8 +180,7 @@ contains
       if (int(earlier%segments, lp) < earlier%segments_at_checkpoint) then
          call raise(error, io_error, segment_path(folder, earlier%segments + 1_ip)//' is missing, but it existed '// &
                     'at the checkpoint of step '//to_text(earlier%step)//'. Put the file back, or start the run '// &
-                    'again '// &
-                    'with --force instead of --continue')
+                    'again with --force instead of --continue')
       end if
       do while (earlier%segments > 0_ip .and. .not. allocated(error))
          path = segment_path(folder, earlier%segments)

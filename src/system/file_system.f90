@@ -9,7 +9,7 @@ module polydem_file_system
    implicit none
    private
    public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_space, sync_file, overwrite_start
-   public :: check_access, last_failure, errno_message, disk_hint
+   public :: check_access, folder_of, last_failure, errno_message, disk_hint
 
    !> Hint for messages about files that cannot be written
    character(len=*), parameter :: disk_hint = &
@@ -104,10 +104,19 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: above
 
-      above = path(:index(path, '/', back=.true.))
-      if (above == '') above = '.'
+      above = folder_of(path)
       if (c_access(above//c_null_char, may_read) == 0_c_int) call sync_file(above, error)
    end subroutine sync_folder_of
+
+   !> Folder of a path, with the last slash; '.' if the path has none
+   pure function folder_of(path) result(folder)
+      !> Path of a file or folder
+      character(len=*), intent(in) :: path
+      character(len=:), allocatable :: folder
+
+      folder = path(:index(path, '/', back=.true.))
+      if (folder == '') folder = '.'
+   end function folder_of
 
    !> Rename a file atomically. An existing file of the new name is replaced.
    subroutine rename_file(from, to, error)

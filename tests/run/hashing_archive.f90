@@ -48,15 +48,10 @@ contains
       integer, intent(in) :: width
       real(dp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
-      integer :: k
+      integer(lp), allocatable :: words(:)
 
-      associate (unused => [len(unit), len(meaning)])
-      end associate
-      if (.not. counts(name)) return
-      self%hash = mix_word(mix_word(self%hash, int(width, lp)), size(values, kind=lp))
-      do k = 1, size(values)
-         self%hash = mix_word(self%hash, transfer(values(k), 0_lp))
-      end do
+      words = transfer(values, 0_lp, size(values))
+      call self%transfer_longs(name, width, words, unit, meaning)
    end subroutine transfer_reals
 
    !> Hash a field of integers.

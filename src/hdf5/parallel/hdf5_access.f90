@@ -1,9 +1,8 @@
 !> Parallel access to HDF5 files through MPI-IO (build with MPI).
 !>
 !> `serial/hdf5_access.f90` is the same module for builds without MPI. `enable_parallel_access` and
-!> `enable_collective_write` only
-!> set properties; the HDF5 calls that use these properties are collective. HDF5 duplicates MPI_COMM_WORLD, so its
-!> messages do not mix with those of the program.
+!> `enable_collective_write` only set properties; the HDF5 calls that use these properties are collective. HDF5
+!> duplicates MPI_COMM_WORLD, so its messages do not mix with those of the program.
 !>
 !> A rank whose call to the file system fails cannot inform the other ranks: they wait for it inside HDF5 or MPI-IO.
 !> Therefore this rank prints the reason and aborts all ranks at once, before HDF5 makes another call that waits for
