@@ -81,8 +81,8 @@ contains
          call serializer%match('/run/time_step', s%dt, 's', 'time step')
          call serializer%match('/run/scene', [attempts%scene], '1', 'hash of the bodies at the start')
          call serializer%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
-         call serializer%field('/run/sums', s%sums, '1', 'sums over steps: pairs, contacts, pairs that began, '// &
-                           'pairs that ended, contacts without direction')
+         call serializer%field('/run/sums', s%sums, '1', 'sums over steps: contacts, pairs that began, pairs that '// &
+                           'ended, contacts without direction')
          call serializer%field('/run/displacement_warnings', s%guard%warning%count, '1', &
                                'steps in which a body moved too far')
          call serializer%field('/run/stage_calls', s%timers%calls, '1', 'steps in which each stage ran')

@@ -23,12 +23,12 @@ module polydem_simulation
    implicit none
    private
    public :: simulation_t, former_direction, time_of, compute_balance
-   public :: sum_pairs, sum_contacts, sum_began, sum_ended, sum_degenerate
+   public :: sum_contacts, sum_began, sum_ended, sum_degenerate
 
-   !> Elements of `sums`: pairs, contacts, pairs that began, pairs that ended, contacts without direction
-   integer, parameter :: sum_pairs = 1, sum_contacts = 2, sum_began = 3, sum_ended = 4, sum_degenerate = 5
+   !> Elements of `sums`: contacts, pairs that began, pairs that ended, contacts without direction
+   integer, parameter :: sum_contacts = 1, sum_began = 2, sum_ended = 3, sum_degenerate = 4
    !> Number of these elements
-   integer, parameter :: n_sums = 5
+   integer, parameter :: n_sums = 4
 
    !> Summary of the relaxation before time 0
    type :: relaxation_t
@@ -100,7 +100,7 @@ module polydem_simulation
       type(relaxation_t) :: relaxation
       !> Slots that may move: free bodies, then bodies with prescribed motion, then halo bodies
       integer(ip), allocatable :: moving(:)
-      !> Sums over all steps, (`sum_pairs` to `sum_degenerate`)
+      !> Sums over all steps, (`sum_contacts` to `sum_degenerate`)
       integer(lp) :: sums(n_sums) = 0_lp
    end type simulation_t
 

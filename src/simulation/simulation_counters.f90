@@ -3,11 +3,10 @@ module polydem_simulation_counters
    use polydem_communication_counters, only: report_communication
    use polydem_counters, only: counters_t, over_steps
    use polydem_kinds, only: ip, lp
-   use polydem_ownership, only: owns_pair
-   use polydem_simulation, only: simulation_t, sum_pairs, sum_contacts, sum_began, sum_ended, sum_degenerate
+   use polydem_simulation, only: simulation_t, sum_contacts, sum_began, sum_ended, sum_degenerate
    implicit none
    private
-   public :: collect_counts, report_counters, count_pairs, count_contacts
+   public :: collect_counts, report_counters, count_contacts
 
 contains
 
@@ -39,7 +38,6 @@ contains
       call counters%set('steps', self%step)
       call counters%set('bodies', int(self%bodies%n_all, lp))
       call counters%set('boxes', counts(1))
-      call counters%set('pairs', self%sums(sum_pairs), over_steps)
       call counters%set('pairs began', self%sums(sum_began), over_steps)
       call counters%set('pairs ended', self%sums(sum_ended), over_steps)
       call counters%set('contacts', self%sums(sum_contacts), over_steps)
@@ -50,23 +48,6 @@ contains
       call report_communication(self%comm, self%domain, size(self%bodies%free, kind=lp), &
                            int(self%neighbours%pairs%n, lp), counters)
    end subroutine report_counters
-
-   !> Count the pairs that this rank owns.
-   subroutine count_pairs(self)
-      type(simulation_t), intent(inout) :: self
-      integer(lp) :: n
-      integer(ip) :: p
-
-      associate (pairs => self%neighbours%pairs)
-         n = int(pairs%n, lp)
-         if (self%comm%size > 1_ip) then
-            do p = 1_ip, pairs%n
-               if (.not. owns_pair(self%bodies, pairs%first(p), pairs%second(p))) n = n - 1_lp
-            end do
-         end if
-      end associate
-      self%sums(sum_pairs) = self%sums(sum_pairs) + n
-   end subroutine count_pairs
 
    !> Count the contacts of all ranks. Collective.
    subroutine count_contacts(simulation, n)

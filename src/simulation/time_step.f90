@@ -11,7 +11,6 @@ module polydem_time_step
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_redistribution, only: restore_history, redistribute
    use polydem_simulation, only: simulation_t, sum_began, sum_ended
-   use polydem_simulation_counters, only: count_pairs
    use polydem_strings, only: to_text
    use polydem_timers, only: stage_boxes, stage_decomposition, stage_forces, stage_integrate, stage_neighbours, &
       stage_overlap
@@ -134,7 +133,6 @@ contains
          self%sums(sum_began) = self%sums(sum_began) + int(pairs%n_began, lp)
          self%sums(sum_ended) = self%sums(sum_ended) + int(pairs%n_ended, lp)
       end associate
-      call count_pairs(self)
       if (allocated(self%law%constraint)) self%keeps_contacts = .true.
       call walk_contacts(self, dt, overlap_share)
       call self%timers%divide_lap(stage_overlap, stage_forces, overlap_share)
