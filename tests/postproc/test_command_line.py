@@ -96,7 +96,8 @@ def test_explains_errors_and_ends_with_code_2(finished, capsys, arguments, messa
     (["sweep", "run", "x", "--retyr"], "sweep run: error: there is no option --retyr; did you mean --retry?"),
     (["--only-parse", "paper", "--quik"], "paper: error: there is no option --quik; did you mean --quick?"),
 ])
-def test_a_word_that_a_verb_does_not_know_is_named_with_its_verb(capsys, arguments, message):
+def test_a_word_that_a_verb_does_not_know_is_named_with_its_verb(monkeypatch, capsys, arguments, message):
+    monkeypatch.delenv("POLYDEM_CALL", raising=False)
     with pytest.raises(SystemExit) as end:
         main(arguments)
     assert end.value.code == 2
