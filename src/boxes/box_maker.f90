@@ -23,7 +23,8 @@ module polydem_box_maker
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: box_maker_t, new_box_maker, turn_and_bound, turn_and_bound_block, update_boxes, diameters_of
+   public :: box_maker_t, new_box_maker, turn_and_bound, turn_and_bound_block, update_boxes, have_boxes_within, &
+      diameters_of
 
    !> Allowance for rounding, in units of epsilon times the diameter of a body
    real(wp), parameter :: roundings = 64.0_wp
@@ -101,7 +102,6 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(cut_body_t), allocatable :: longer(:)
       integer(ip) :: s, room, n_cut, n_pieces, known
-      real(wp) :: length
       logical :: fits
 
       room = most_pieces
@@ -110,7 +110,10 @@ contains
       allocate (maker%box(bodies%n), maker%cut(8))
       do s = 1_ip, bodies%n
          known = maker%pieces%n
-         call cut_body(body_shape(bodies, s), maker%median_diameter, largest_ratio, room, maker%pieces, fits)
+         fits = .true.
+         ! A body of small radius is small enough for certain.
+         if (2.0_wp*bodies%radius(s)*(1.0_wp + roundings*epsilon(1.0_wp)) > largest_ratio*maker%median_diameter) &
+            call cut_body(body_shape(bodies, s), maker%median_diameter, largest_ratio, room, maker%pieces, fits)
          n_pieces = maker%pieces%n - known
          if (.not. fits) then
             call refuse(bodies%id(s), diameter(body_shape(bodies, s))/maker%median_diameter, error)
@@ -128,9 +131,8 @@ contains
             longer(:n_cut - 1_ip) = maker%cut
             call move_alloc(longer, maker%cut)
          end if
-         length = diameter(body_shape(bodies, s))
          maker%cut(n_cut) = cut_body_t(first_box=n_boxes + 1_ip, first_piece=known + 1_ip, n=n_pieces, &
-                                       padding=maker%margin + roundings*epsilon(1.0_wp)*length)
+                                       padding=maker%margin + roundings*epsilon(1.0_wp)*diameter(body_shape(bodies, s)))
          maker%box(s) = -n_cut
          n_boxes = n_boxes + n_pieces
       end do
@@ -186,6 +188,29 @@ contains
       boxes%passive(b) = bodies%fixed(s) .or. bodies%in_halo(s)
       boxes%reach(b) = (0.5_wp*length + padding)*(1.0_wp + roundings*epsilon(1.0_wp))
    end subroutine describe_box
+
+   !> Whether every box of some bodies lies within a limit of its own. It may touch the limit.
+   pure logical function have_boxes_within(maker, slots, boxes, limit)
+      type(box_maker_t), intent(in) :: maker
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      type(boxes_t), intent(in) :: boxes
+      !> xmin, ymin, xmax, ymax of the limit of each box, (4, box) [m]
+      real(wp), intent(in) :: limit(:, :)
+      integer(ip) :: k, first, last
+
+      have_boxes_within = .true.
+      do k = 1_ip, size(slots, kind=ip)
+         first = maker%box(slots(k))
+         last = first
+         if (first < 0_ip) then
+            last = maker%cut(-first)%first_box + maker%cut(-first)%n - 1_ip
+            first = maker%cut(-first)%first_box
+         end if
+         have_boxes_within = have_boxes_within .and. all(boxes%bounds(1:2, first:last) >= limit(1:2, first:last)) &
+            .and. all(boxes%bounds(3:4, first:last) <= limit(3:4, first:last))
+      end do
+   end function have_boxes_within
 
    !> Turn bodies to their angles and update their boxes in one pass: the same as `turn_bodies` and then `update_boxes`.
    subroutine turn_and_bound(maker, moving, isa, bodies, boxes)

@@ -3,9 +3,9 @@
 !> `communicator_t` is the communicator of one process: its calls are copies or no-ops. `mpi_communicator_t` of builds
 !> with MPI overrides what needs messages. Callers use one interface.
 !>
-!> All procedures are collective except `exchange`, `receive_from_previous` and `send_to_next`: every rank of the
-!> communicator must call them in the same order. Only integers are summed, so a sum does not depend on the distribution
-!> of its terms over the ranks.
+!> All procedures are collective except the exchange with neighbour ranks, `receive_from_previous` and `send_to_next`:
+!> every rank of the communicator must call them in the same order. Only integers are summed, so a sum does not depend
+!> on the distribution of its terms over the ranks.
 module polydem_communicator
    use polydem_errors, only: error_t
    use polydem_kinds, only: dp, ip, lp, wp
@@ -53,7 +53,9 @@ module polydem_communicator
       generic :: all_to_all => all_to_all_longs, all_to_all_reals
       procedure :: all_to_all_longs
       procedure, private :: all_to_all_reals
-      procedure :: exchange
+      procedure, non_overridable :: exchange
+      procedure :: begin_exchange
+      procedure :: finish_exchange
       !> Receive numbers from rank - 1, or send them to rank + 1. Nothing happens if that rank does not exist
       procedure :: receive_from_previous => unchanged_longs
       procedure :: send_to_next => unchanged_longs
@@ -117,9 +119,35 @@ contains
       !> Received rows, in the order of the route, (width, row)
       real(wp), intent(inout), contiguous, target :: received(:, :)
 
+      call self%begin_exchange(route, sent, received)
+      call self%finish_exchange(sent, received)
+   end subroutine exchange
+
+   !> Begin an exchange of rows with neighbour ranks. The caller must leave both buffers alone until it is finished.
+   subroutine begin_exchange(self, route, sent, received)
+      class(communicator_t), intent(inout) :: self
+      !> Neighbour ranks
+      type(neighbour_ranks_t), intent(in) :: route
+      !> Rows to send, (width, row)
+      real(wp), intent(in), contiguous, target :: sent(:, :)
+      !> Received rows, (width, row)
+      real(wp), intent(inout), contiguous, target :: received(:, :)
+
       associate (unused => self%size, unused_route => route, unused_rows => sent, unused_values => received)
       end associate
-   end subroutine exchange
+   end subroutine begin_exchange
+
+   !> Finish the exchange that was begun with the same buffers.
+   subroutine finish_exchange(self, sent, received)
+      class(communicator_t), intent(inout) :: self
+      !> Rows to send, (width, row)
+      real(wp), intent(in), contiguous, target :: sent(:, :)
+      !> Received rows, (width, row)
+      real(wp), intent(inout), contiguous, target :: received(:, :)
+
+      associate (unused => self%size, unused_rows => sent, unused_values => received)
+      end associate
+   end subroutine finish_exchange
 
    !> End the communication. No other call is allowed afterwards.
    subroutine finalize(self)

@@ -5,10 +5,11 @@
 !> body leaves the padded box recorded at the last redistribution. The next redistribution then takes place in the
 !> middle of the step, after the prediction and before the search for pairs: no pair can be missed.
 module polydem_domain
+   use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t
    use polydem_halo, only: halo_t
-   use polydem_kinds, only: dp, ip, lp, wp, min_parallel_size
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_partition, only: partition_t
    use polydem_partition_factory, only: new_partition
    use polydem_rank_bounds, only: rank_bounds_t
@@ -35,6 +36,8 @@ module polydem_domain
       real(wp) :: halo_share = 0.0_wp
       !> Padded boxes recorded at the last redistribution, (4, box) [m]
       real(wp), allocatable :: reference(:, :)
+      !> Whether a box has left it in this step
+      logical :: has_left = .false.
       !> Step of the last redistribution; -1 before the first
       integer(lp) :: last_step = -1_lp
       !> Step of the last partition of space; -1 before the first
@@ -51,12 +54,16 @@ module polydem_domain
       integer(lp) :: step_messages = 0_lp, step_bytes = 0_lp
    contains
       procedure :: must_redistribute
+      procedure :: choose_margin
       procedure :: set_reference
       procedure :: adapt_margin
+      procedure :: send_border
    end type domain_t
 
-   !> Margin at the start, and bounds of later margins, in median diameters
+   !> Least margin at the start, and bounds of later margins, in median diameters
    real(wp), parameter :: first_margin = 0.15_wp, least_margin = 0.02_wp, greatest_margin = 2.0_wp
+   !> Steps until the fastest body leaves the margin at the start
+   real(wp), parameter :: first_interval = 100.0_wp
    !> Cost of a redistribution in steps, and of a halo body in bodies (measured; see postproc/verdicts/scale)
    real(wp), parameter :: redistribution_cost = 4.0_wp, halo_body_cost = 0.5_wp
    !> Greatest factor by which the margin changes in a redistribution
@@ -81,30 +88,25 @@ contains
       if (comm%size > 1_ip) call new_partition(domain%partition, settings%partition, error)
    end subroutine new_domain
 
-   !> Whether a box of a body of this rank has left its padded box recorded at the last redistribution. In a run on
-   !> several ranks it is true before the first redistribution.
-   logical function must_redistribute(self, bounds, passive)
+   !> Whether a redistribution is necessary: a box of a body of this rank has left its padded box recorded at the last
+   !> one, or there was none yet.
+   pure logical function must_redistribute(self)
       class(domain_t), intent(in) :: self
-      !> xmin, ymin, xmax, ymax of the boxes in the middle of a step, (4, box) [m]
-      real(wp), intent(in) :: bounds(:, :)
-      !> Whether the body of a box is fixed or in the halo, (box)
-      logical, intent(in) :: passive(:)
-      integer(ip) :: b
-      logical :: inside
 
-      must_redistribute = allocated(self%partition) .and. .not. allocated(self%reference)
-      if (.not. allocated(self%reference)) return
-      inside = .true.
-      !$omp parallel do if (size(passive) > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(self, bounds, passive) private(b) reduction(.and.:inside)
-      do b = 1_ip, size(passive, kind=ip)
-         if (passive(b)) cycle
-         inside = inside .and. all(bounds(1:2, b) >= self%reference(1:2, b)) &
-            .and. all(bounds(3:4, b) <= self%reference(3:4, b))
-      end do
-      !$omp end parallel do
-      must_redistribute = .not. inside
+      must_redistribute = allocated(self%partition)
+      if (allocated(self%reference)) must_redistribute = self%has_left
    end function must_redistribute
+
+   !> Choose the margin of the first redistribution, unless the settings give one.
+   subroutine choose_margin(self, move)
+      class(domain_t), intent(inout) :: self
+      !> Greatest displacement of a body of any rank in the next step [m]
+      real(wp), intent(in) :: move
+
+      if (self%settings%margin > 0.0_wp) return
+      self%margin = min(max(first_interval*move, first_margin*self%median_diameter), &
+                        greatest_margin*self%median_diameter)
+   end subroutine choose_margin
 
    !> Record the padded boxes of a redistribution.
    subroutine set_reference(self, bounds, step)
@@ -114,6 +116,7 @@ contains
       !> The step
       integer(lp), intent(in) :: step
 
+      self%has_left = .false.
       if (allocated(self%reference)) deallocate (self%reference)
       allocate (self%reference(4, size(bounds, 2)))
       self%reference(1:2, :) = bounds(1:2, :) - self%margin
@@ -139,5 +142,18 @@ contains
       self%margin = max(least_margin*self%median_diameter, min(factor*self%margin, &
          greatest_margin*self%median_diameter))
    end subroutine adapt_margin
+
+   !> Begin the halo exchange of a step: send the bodies of the border.
+   subroutine send_border(self, comm, bodies)
+      class(domain_t), intent(inout) :: self
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+
+      self%step_messages = self%step_messages - comm%messages
+      self%step_bytes = self%step_bytes - comm%bytes
+      call self%halo%send_border(comm, bodies)
+      self%step_messages = self%step_messages + comm%messages
+      self%step_bytes = self%step_bytes + comm%bytes
+   end subroutine send_border
 
 end module polydem_domain

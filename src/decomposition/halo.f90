@@ -1,4 +1,7 @@
 !> Halo: copies of nearby bodies that other ranks move. The halo exchange updates them in every step.
+!>
+!> `follow` is the whole exchange. `send_border` and `receive_halo` are its two parts: a step computes the bodies of the
+!> interior between them.
 module polydem_halo
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: neighbour_ranks_t, communicator_t
@@ -11,6 +14,9 @@ module polydem_halo
    type :: halo_t
       !> Neighbouring ranks, with the rows to send and to receive
       type(neighbour_ranks_t), private :: route
+      !> Slots of the free bodies that are in the halo of another rank, and of all other free bodies; ascending. Not
+      !> allocated before the first redistribution
+      integer(ip), allocatable :: border(:), interior(:)
       !> Slots of the bodies to send, in the order of the route
       integer(ip), allocatable, private :: sent(:)
       !> Slots of the halo bodies, in the order of the route
@@ -21,14 +27,18 @@ module polydem_halo
       real(wp), allocatable, private :: send_buffer(:, :), receive_buffer(:, :)
    contains
       procedure :: follow
+      procedure :: send_border
+      procedure :: receive_halo
       procedure :: exchange_column
    end type halo_t
 
 contains
 
    !> Prepare the halo exchange.
-   subroutine new_halo(halo, counts_sent, sent, counts_received, received, with_acceleration)
+   subroutine new_halo(halo, free, counts_sent, sent, counts_received, received, with_acceleration)
       type(halo_t), intent(out) :: halo
+      !> Slots of the free bodies of this rank, ascending
+      integer(ip), intent(in) :: free(:)
       !> Number of bodies to send to each rank, (0:size - 1)
       integer(ip), intent(in) :: counts_sent(0:)
       !> Their slots, in the order of these ranks
@@ -39,8 +49,13 @@ contains
       integer(ip), intent(in) :: received(:)
       !> Whether forces depend on accelerations
       logical, intent(in) :: with_acceleration
+      logical :: in_border(maxval([0_ip, free]))
       integer(ip) :: k, r, width
 
+      in_border = .false.
+      in_border(sent) = .true.
+      halo%border = pack(free, in_border(free))
+      halo%interior = pack(free,.not. in_border(free))
       associate (route => halo%route)
          route%rank = pack([(r, r=0_ip, size(counts_sent, kind=ip) - 1_ip)], &
                            counts_sent > 0_ip .or. counts_received > 0_ip)
@@ -66,6 +81,16 @@ contains
       class(communicator_t), intent(inout) :: comm
       !> Bodies; positions, angles, velocities and, if required, accelerations of halo bodies change
       type(bodies_t), intent(inout) :: bodies
+
+      call self%send_border(comm, bodies)
+      call self%receive_halo(comm, bodies)
+   end subroutine follow
+
+   !> Begin the halo exchange: send the bodies of the border.
+   subroutine send_border(self, comm, bodies)
+      class(halo_t), intent(inout) :: self
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
       integer(ip) :: k, s
 
       if (.not. allocated(self%sent)) return
@@ -79,7 +104,18 @@ contains
          self%send_buffer(7:8, k) = bodies%acceleration(:, s)
          self%send_buffer(9, k) = bodies%angular_acceleration(s)
       end do
-      call comm%exchange(self%route, self%send_buffer, self%receive_buffer)
+      call comm%begin_exchange(self%route, self%send_buffer, self%receive_buffer)
+   end subroutine send_border
+
+   !> Finish the halo exchange: receive the halo bodies.
+   subroutine receive_halo(self, comm, bodies)
+      class(halo_t), intent(inout) :: self
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: k, s
+
+      if (.not. allocated(self%sent)) return
+      call comm%finish_exchange(self%send_buffer, self%receive_buffer)
       do k = 1_ip, size(self%slots, kind=ip)
          s = self%slots(k)
          bodies%position(:, s) = self%receive_buffer(1:2, k)
@@ -90,7 +126,7 @@ contains
          bodies%acceleration(:, s) = self%receive_buffer(7:8, k)
          bodies%angular_acceleration(s) = self%receive_buffer(9, k)
       end do
-   end subroutine follow
+   end subroutine receive_halo
 
    !> Halo exchange of one value per body. All ranks of the route must call this.
    subroutine exchange_column(self, comm, values)

@@ -5,6 +5,7 @@ module polydem_packed_bodies
    use polydem_communicator, only: communicator_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_migration_buffer, only: migration_buffer_t
+   use polydem_serializer, only: serializer_t
    use polydem_sort, only: ascending_order
    implicit none
    private
@@ -13,12 +14,12 @@ module polydem_packed_bodies
    !> Constant fields and shapes of a list of bodies
    type :: packed_bodies_t
       private
-      !> Constant fields of `serialize_constants`
+      !> Global index and number of vertices of each body
+      type(migration_buffer_t) :: list
+      !> Other constant fields
       type(migration_buffer_t) :: constants
-      !> Number of vertices, (1, body)
-      integer(lp), allocatable :: corners(:, :)
-      !> Vertices in the body frame, (2, vertex) [m]
-      real(wp), allocatable :: shape(:, :)
+      !> Vertices in the body frame, those of each body in order
+      type(migration_buffer_t) :: vertices
    end type packed_bodies_t
 
 contains
@@ -31,21 +32,64 @@ contains
       integer(ip), intent(in) :: slots(:)
       !> The packed bodies, in the order of the slots
       type(packed_bodies_t), intent(out) :: packed
-      integer(ip) :: k, n, v
+      integer(ip), allocatable :: corners(:)
 
+      corners = bodies%vertex_start(2:) - bodies%vertex_start(:bodies%n)
+      packed%list%slots = slots
+      call serialize_list(packed%list, bodies%global_index, corners)
       packed%constants%slots = slots
       call serialize_constants(packed%constants, bodies)
-      associate (start => bodies%vertex_start)
-         packed%corners = reshape(int(start(slots + 1_ip) - start(slots), lp), [1, size(slots)])
-         allocate (packed%shape(2, sum(packed%corners)))
-         v = 0_ip
-         do k = 1_ip, size(slots, kind=ip)
-            n = int(packed%corners(1, k), ip)
-            packed%shape(:, v + 1_ip:v + n) = bodies%shape(:, start(slots(k)):start(slots(k)) + n - 1_ip)
-            v = v + n
-         end do
-      end associate
+      packed%vertices%slots = vertices_of(bodies%vertex_start(slots), corners(slots))
+      call serialize_shapes(packed%vertices, bodies)
    end subroutine pack_bodies
+
+   !> Serialize the list of packed bodies.
+   subroutine serialize_list(serializer, global_index, corners)
+      class(serializer_t), intent(inout) :: serializer
+      !> Global index and number of vertices of each body
+      integer(ip), intent(inout), contiguous :: global_index(:), corners(:)
+
+      call serializer%field('/bodies/global_index', global_index, '1', 'indices among all bodies of the run')
+      call serializer%field('/bodies/corners', corners, '1', 'numbers of vertices')
+   end subroutine serialize_list
+
+   !> Serialize the shapes of bodies. The rows are vertices.
+   subroutine serialize_shapes(serializer, bodies)
+      class(serializer_t), intent(inout) :: serializer
+      type(bodies_t), intent(inout) :: bodies
+
+      call serializer%field('/bodies/shape', bodies%shape, 'm', 'vertices in the body frame')
+   end subroutine serialize_shapes
+
+   !> Indices of the vertices of some bodies
+   pure function vertices_of(first, corners) result(vertices)
+      !> First vertex and number of vertices of each body
+      integer(ip), intent(in) :: first(:), corners(:)
+      integer(ip), allocatable :: vertices(:)
+      integer(ip) :: k, v, n
+
+      allocate (vertices(sum(corners)))
+      n = 0_ip
+      do k = 1_ip, size(corners, kind=ip)
+         do v = 0_ip, corners(k) - 1_ip
+            n = n + 1_ip
+            vertices(n) = first(k) + v
+         end do
+      end do
+   end function vertices_of
+
+   !> Read the list of packed bodies.
+   subroutine read_list(packed, global_index, corners)
+      type(packed_bodies_t), intent(inout) :: packed
+      !> Global index and number of vertices of each packed body
+      integer(ip), allocatable, intent(out) :: global_index(:), corners(:)
+      integer(ip) :: k, n
+
+      n = packed%list%n_rows()
+      allocate (global_index(n), corners(n))
+      call packed%list%restore_to([(k, k=1_ip, n)])
+      call serialize_list(packed%list, global_index, corners)
+   end subroutine read_list
 
    !> Exchange packed bodies between ranks, all-to-all. Collective.
    subroutine all_to_all_bodies(comm, counts, packed, counts_received)
@@ -56,22 +100,19 @@ contains
       type(packed_bodies_t), intent(inout) :: packed
       !> Number of bodies from each rank, (0:size - 1)
       integer(ip), allocatable, intent(out) :: counts_received(:)
-      integer(lp), allocatable :: corners(:, :)
-      real(wp), allocatable :: shape(:, :)
-      integer(ip), allocatable :: same(:)
+      integer(ip), allocatable :: global_index(:), corners(:), same(:)
       integer(ip) :: vertices(0:size(counts) - 1)
       integer(ip) :: k, r
 
+      call read_list(packed, global_index, corners)
       k = 0_ip
       do r = 0_ip, comm%size - 1_ip
-         vertices(r) = int(sum(packed%corners(1, k + 1_ip:k + counts(r))), ip)
+         vertices(r) = sum(corners(k + 1_ip:k + counts(r)))
          k = k + counts(r)
       end do
-      call packed%constants%move(comm, counts, counts_received)
-      call comm%all_to_all(packed%corners, counts, corners, same)
-      call comm%all_to_all(packed%shape, vertices, shape, same)
-      call move_alloc(corners, packed%corners)
-      call move_alloc(shape, packed%shape)
+      call packed%list%move(comm, counts, counts_received)
+      call packed%constants%move(comm, counts, same)
+      call packed%vertices%move(comm, vertices, same)
    end subroutine all_to_all_bodies
 
    !> Append packed bodies to others.
@@ -81,9 +122,9 @@ contains
       !> Second part
       type(packed_bodies_t), intent(in) :: other
 
+      call packed%list%append(other%list)
       call packed%constants%append(other%constants)
-      packed%corners = reshape([packed%corners, other%corners], [1, size(packed%corners) + size(other%corners)])
-      packed%shape = reshape([packed%shape, other%shape], [2, size(packed%shape, 2) + size(other%shape, 2)])
+      call packed%vertices%append(other%vertices)
    end subroutine join_packed
 
    !> Unpack bodies in ascending order of the global index. Their variable fields are zero. Free bodies belong to this
@@ -97,31 +138,25 @@ contains
       type(bodies_t), intent(out) :: bodies
       !> Slot of each packed body
       integer(ip), allocatable, intent(out) :: slots(:)
-      integer(ip), allocatable :: order(:), start(:)
-      integer(ip) :: k, n, s
+      integer(ip), allocatable :: global_index(:), corners(:), order(:)
+      integer(ip) :: n, s
 
-      n = size(packed%corners, kind=ip)
-      call allocate_bodies(bodies, n, size(packed%shape, 2, kind=ip))
+      call read_list(packed, global_index, corners)
+      n = size(corners, kind=ip)
+      call allocate_bodies(bodies, n, sum(corners))
       bodies%n_all = n_all
-      allocate (bodies%turned(2, size(packed%shape, 2)), source=0.0_wp)
-      ! In the order of the list first: the global indices then give the slots.
-      call packed%constants%restore_to([(k, k=1_ip, n)])
-      call serialize_constants(packed%constants, bodies)
-      order = ascending_order(int(bodies%global_index, lp))
-      allocate (slots(n), start(n + 1_ip))
+      allocate (bodies%turned(2, size(bodies%shape, 2)), source=0.0_wp)
+      order = ascending_order(int(global_index, lp))
+      allocate (slots(n))
       slots(order) = [(s, s=1_ip, n)]
+      do s = 1_ip, n
+         bodies%vertex_start(s + 1_ip) = bodies%vertex_start(s) + corners(order(s))
+      end do
       call packed%constants%restore_to(slots)
       call serialize_constants(packed%constants, bodies)
-      start(1) = 1_ip
-      do k = 1_ip, n
-         start(k + 1_ip) = start(k) + int(packed%corners(1, k), ip)
-      end do
-      do s = 1_ip, n
-         associate (first => start(order(s)), last => start(order(s) + 1_ip) - 1_ip, v => bodies%vertex_start)
-            v(s + 1_ip) = v(s) + last - first + 1_ip
-            bodies%shape(:, v(s):v(s + 1_ip) - 1_ip) = packed%shape(:, first:last)
-         end associate
-      end do
+      bodies%global_index = global_index(order)
+      call packed%vertices%restore_to(vertices_of(bodies%vertex_start(slots), corners))
+      call serialize_shapes(packed%vertices, bodies)
       bodies%free = pack([(s, s=1_ip, n)],.not. bodies%fixed)
       call measure_radii(bodies)
    end subroutine unpack_bodies

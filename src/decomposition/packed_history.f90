@@ -24,12 +24,12 @@ module polydem_packed_history
 
 contains
 
-   !> Append some pairs of another part of the same list.
+   !> Append some pairs of another part.
    subroutine append(self, other, chosen)
       class(packed_history_t), intent(inout) :: self
-      !> Pairs behind those of this list
+      !> The other part
       type(packed_history_t), intent(in) :: other
-      !> Indices of the pairs to append, ascending
+      !> Indices of the pairs to append
       integer(ip), intent(in) :: chosen(:)
       integer :: n
 
@@ -74,31 +74,35 @@ contains
    !> Send the history of each pair to the ranks that will move one of its bodies. Collective.
    !>
    !> Both ranks that move a body of the pair have its history. Each sends it to the next owner of its own body.
-   subroutine send_pairs(comm, id, owner, packed)
+   subroutine send_pairs(comm, slots, owner, packed)
       class(communicator_t), intent(inout) :: comm
-      !> Identifier of each body, ascending, (slot)
-      integer(ip), intent(in) :: id(:)
+      !> Slots of the bodies of each pair; 0 for bodies that this rank does not have, (2, pair)
+      integer(ip), intent(in) :: slots(:, :)
       !> Rank that will move each body; negative for bodies that this rank does not move, (slot)
       integer(ip), intent(in) :: owner(:)
       !> On entry the history of pairs with a body of this rank; on return that of pairs with a future body of it
       type(packed_history_t), intent(inout) :: packed
+      type(packed_history_t) :: other
       integer(lp), allocatable :: sent(:, :), received(:, :)
-      real(wp), allocatable :: value_received(:, :)
-      integer(ip), allocatable :: pair(:), to_rank(:), counts(:), counts_received(:), order(:)
-      integer(ip) :: p, k, m, n, slots(2), to(2)
+      integer(ip), allocatable :: pair(:), to_rank(:), counts(:), counts_received(:), order(:), kept(:)
+      integer(ip) :: p, k, m, n, n_kept, to(2)
 
       n = size(packed%key, kind=ip)
-      allocate (pair(2_ip*n), to_rank(2_ip*n))
+      allocate (pair(2_ip*n), to_rank(2_ip*n), kept(n))
       m = 0_ip
+      n_kept = 0_ip
       do p = 1_ip, n
-         slots = slots_of_pair(id, packed%key(p))
          to = -1_ip
          do k = 1_ip, 2_ip
-            if (slots(k) > 0_ip) to(k) = owner(slots(k))
+            if (slots(k, p) > 0_ip) to(k) = owner(slots(k, p))
          end do
+         if (any(to == comm%rank)) then
+            n_kept = n_kept + 1_ip
+            kept(n_kept) = p
+         end if
          if (to(1) == to(2)) to(2) = -1_ip
          do k = 1_ip, 2_ip
-            if (to(k) < 0_ip) cycle
+            if (to(k) < 0_ip .or. to(k) == comm%rank) cycle
             m = m + 1_ip
             pair(m) = p
             to_rank(m) = to(k)
@@ -110,8 +114,11 @@ contains
       sent(1, :) = packed%key(order)
       sent(2, :) = int(packed%memory(order), lp)
       call comm%all_to_all(sent, counts, received, counts_received)
-      call comm%all_to_all(packed%value(:, order), counts, value_received, counts_received)
-      call sort_pairs(received, value_received, packed)
+      call comm%all_to_all(packed%value(:, order), counts, other%value, counts_received)
+      other%key = received(1, :)
+      other%memory = int(received(2, :), ip)
+      call other%append(packed, kept(:n_kept))
+      call sort_pairs(other, packed)
    end subroutine send_pairs
 
    !> Slots of the bodies of a pair; 0 for bodies that the rank does not have
@@ -140,19 +147,18 @@ contains
       end if
    end function slot_of
 
-   !> Sort received pairs by their keys. A pair that two ranks sent is kept once.
-   subroutine sort_pairs(received, value_received, packed)
-      integer(lp), intent(in) :: received(:, :)
-      real(wp), intent(in) :: value_received(:, :)
+   !> Sort pairs by their keys. A pair that two ranks have is kept once.
+   subroutine sort_pairs(unsorted, packed)
+      type(packed_history_t), intent(in) :: unsorted
       type(packed_history_t), intent(out) :: packed
       integer(ip), allocatable :: order(:)
       integer(ip) :: k
 
-      order = ascending_order(received(1, :))
+      order = ascending_order(unsorted%key)
       order = pack(order, [(is_new(k), k=1_ip, size(order, kind=ip))])
-      packed%key = received(1, order)
-      packed%memory = int(received(2, order), ip)
-      packed%value = value_received(:, order)
+      packed%key = unsorted%key(order)
+      packed%memory = unsorted%memory(order)
+      packed%value = unsorted%value(:, order)
 
    contains
 
@@ -161,7 +167,7 @@ contains
          integer(ip), intent(in) :: at
 
          is_new = .true.
-         if (at > 1_ip) is_new = received(1, order(at)) /= received(1, order(at - 1_ip))
+         if (at > 1_ip) is_new = unsorted%key(order(at)) /= unsorted%key(order(at - 1_ip))
       end function is_new
 
    end subroutine sort_pairs

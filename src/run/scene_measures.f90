@@ -86,7 +86,7 @@ contains
          call measure_bodies(comm, s%bodies, measures)
          if (measures%free > 0_lp) measures%diameter(2) = s%maker%median_diameter
          if (measures%free > 0_lp) call measure_free_bodies(comm, s%bodies, s%settings%forces%stiffness, measures)
-         call greatest_displacement(s%guard, s%bodies, s%dt, measures%move, slot)
+         call greatest_displacement(s%bodies, s%guard%moving, s%dt, measures%move, slot)
          if (slot > 0_ip) measures%farthest = int(s%bodies%id(slot), lp)
          call keep_greatest(comm, measures%move, measures%farthest)
          do k = 1, size(s%motions)

@@ -4,7 +4,7 @@
 module polydem_body_passes
    use omp_lib, only: omp_get_max_threads
    use polydem_bodies, only: block_size
-   use polydem_box_maker, only: turn_and_bound_block
+   use polydem_box_maker, only: have_boxes_within, turn_and_bound_block
    use polydem_clock, only: wall_seconds
    use polydem_energy_balance, only: accumulate_bodies, accumulate_walls
    use polydem_errors, only: error_t
@@ -24,7 +24,8 @@ module polydem_body_passes
 contains
 
    !> Predict the free bodies at the end of the step, turn their vertices and update their boxes, in one pass over the
-   !> bodies. Move those with prescribed motion, and check all poses.
+   !> bodies. Move those with prescribed motion, and check all poses. In a run on several ranks, the bodies of the
+   !> border come first, and are sent to other ranks while the rest is computed.
    subroutine predict_bodies(self, boxes_share, error)
       !> The simulation at the start of a step
       type(simulation_t), intent(inout) :: self
@@ -32,60 +33,88 @@ contains
       real(dp), intent(out) :: boxes_share
       !> Names a body with an invalid pose
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip) :: n, low, high, k
-      integer :: n_parts, p
+      integer(ip) :: k
       real(dp) :: seconds(2)
       logical :: good
 
-      n = size(self%bodies%free, kind=ip)
-      n_parts = number_of_parts(n)
       good = .true.
       seconds = 0.0_dp
-      !$omp parallel do num_threads(n_parts) schedule(static, 1) default(none) shared(self, n, n_parts, seconds) &
-      !$omp    private(p, low, high) reduction(.and.:good)
-      do p = 1, n_parts
-         call part(n, n_parts, p, low, high)
-         call predict_part(self, low, high, p == 1, good, seconds)
-      end do
-      !$omp end parallel do
+      if (allocated(self%domain%halo%border)) then
+         call predict_list(self, self%domain%halo%border, good, seconds)
+         call self%domain%send_border(self%comm, self%bodies)
+         call predict_list(self, self%domain%halo%interior, good, seconds)
+      else
+         call predict_list(self, self%bodies%free, good, seconds)
+      end if
       boxes_share = 0.0_dp
       if (sum(seconds) > 0.0_dp) boxes_share = seconds(2)/sum(seconds)
       call move_walls(self, time_of(self))
-      do k = n + 1_ip, size(self%guard%moving, kind=ip)
+      do k = size(self%bodies%free, kind=ip) + 1_ip, size(self%guard%moving, kind=ip)
          good = good .and. have_valid_poses(self%bodies, self%guard%moving(k), self%guard%moving(k))
       end do
       if (.not. good) call check_poses(self%guard, self%bodies, self%step, error)
    end subroutine predict_bodies
 
-   !> Predict a part of the free bodies, turn their vertices and update their boxes, block by block.
-   subroutine predict_part(self, low, high, is_first, good, seconds)
+   !> Predict some free bodies, turn their vertices and update their boxes.
+   subroutine predict_list(self, list, good, seconds)
       type(simulation_t), intent(inout) :: self
-      !> Index of the first and of the last body in the list of free bodies
-      integer(ip), intent(in) :: low, high
+      !> Slots of the bodies, ascending
+      integer(ip), intent(in) :: list(:)
+      !> Becomes false if a body has an invalid pose
+      logical, intent(inout) :: good
+      !> Time of the prediction, and of vertices and boxes, in the timed blocks [s]
+      real(dp), intent(inout) :: seconds(2)
+      integer(ip) :: n, low, high
+      integer :: n_parts, p
+      logical :: has_left
+
+      n = size(list, kind=ip)
+      n_parts = number_of_parts(n)
+      has_left = .false.
+      !$omp parallel do num_threads(n_parts) schedule(static, 1) default(none) shared(self, list, n, n_parts, seconds) &
+      !$omp    private(p, low, high) reduction(.and.:good) reduction(.or.:has_left)
+      do p = 1, n_parts
+         call part(n, n_parts, p, low, high)
+         call predict_part(self, list(low:high), p == 1, good, has_left, seconds)
+      end do
+      !$omp end parallel do
+      self%domain%has_left = self%domain%has_left .or. has_left
+   end subroutine predict_list
+
+   !> Predict a part of a list of free bodies, turn their vertices and update their boxes, block by block.
+   subroutine predict_part(self, slots, is_first, good, has_left, seconds)
+      type(simulation_t), intent(inout) :: self
+      !> Slots of the bodies, ascending
+      integer(ip), intent(in) :: slots(:)
       !> Whether this is the part of the first thread, of which some blocks are timed
       logical, intent(in) :: is_first
       !> Becomes false if a body has an invalid pose
       logical, intent(inout) :: good
+      !> Becomes true if a box leaves its padded box of the last redistribution
+      logical, intent(inout) :: has_left
       !> Time of the prediction, and of vertices and boxes, in the timed blocks [s]
       real(dp), intent(inout) :: seconds(2)
       integer(ip) :: k, next, end_of_block, first, last
       real(dp) :: clock(3)
       logical :: valid, timed
 
-      do k = low, high, block_size
+      do k = 1_ip, size(slots, kind=ip), block_size
          timed = is_first .and. mod(k, timed_blocks*block_size) == 1_ip
          if (timed) clock(1) = wall_seconds()
-         end_of_block = min(k + block_size - 1_ip, high)
+         end_of_block = min(k + block_size - 1_ip, size(slots, kind=ip))
          next = k
          valid = .true.
          do while (next <= end_of_block)
-            call find_run(self%bodies%free, end_of_block, next, first, last)
+            call find_run(slots, end_of_block, next, first, last)
             call self%integrator%predict(self%dt, first, last, self%bodies)
             valid = valid .and. have_valid_poses(self%bodies, first, last)
          end do
          if (timed) clock(2) = wall_seconds()
-         if (valid) call turn_and_bound_block(self%maker, self%bodies%free(k:end_of_block), self%isa, self%bodies, &
-                                              self%boxes)
+         if (valid) then
+            call turn_and_bound_block(self%maker, slots(k:end_of_block), self%isa, self%bodies, self%boxes)
+            if (allocated(self%domain%reference)) has_left = has_left .or. .not. &
+               have_boxes_within(self%maker, slots(k:end_of_block), self%boxes, self%domain%reference)
+         end if
          good = good .and. valid
          if (.not. timed) cycle
          clock(3) = wall_seconds()

@@ -226,9 +226,10 @@ contains
    end function is_finite
 
    !> Greatest displacement per step of a point of any moving body, at the present velocities [m]
-   pure subroutine greatest_displacement(guard, bodies, dt, move, slot)
-      type(motion_guard_t), intent(in) :: guard
+   pure subroutine greatest_displacement(bodies, slots, dt, move, slot)
       type(bodies_t), intent(in) :: bodies
+      !> Slots of the bodies to compare
+      integer(ip), intent(in) :: slots(:)
       !> Time step [s]
       real(wp), intent(in) :: dt
       !> The displacement, 0 if no body moves [m]
@@ -239,9 +240,9 @@ contains
 
       move = 0.0_wp
       slot = 0_ip
-      do k = 1_ip, size(guard%moving, kind=ip)
-         if (.not. move_of(bodies, guard%moving(k), dt) > move) cycle
-         slot = guard%moving(k)
+      do k = 1_ip, size(slots, kind=ip)
+         if (.not. move_of(bodies, slots(k), dt) > move) cycle
+         slot = slots(k)
          move = move_of(bodies, slot, dt)
       end do
    end subroutine greatest_displacement

@@ -8,7 +8,7 @@ module polydem_local_bodies
    use polydem_finder_statistics, only: finder_statistics_t
    use polydem_force_law, only: force_law_t, new_force_law
    use polydem_force_sums, only: start_sums
-   use polydem_guards, only: motion_guard_t, new_motion_guard
+   use polydem_guards, only: new_motion_guard
    use polydem_kinds, only: ip, wp
    use polydem_neighbours, only: new_neighbours
    use polydem_passing, only: new_contact_guard
@@ -63,18 +63,14 @@ contains
       call reserve_contacts(contacts, 0_ip)
    end subroutine fit_table
 
-   !> Rebuild the guard for the present bodies. Limit and warnings of the run are preserved.
+   !> Rebuild the guard for the present bodies. After the start only the list of bodies changes.
    subroutine rebuild_guard(self)
       type(simulation_t), intent(inout) :: self
-      type(motion_guard_t) :: previous
       integer :: n
 
-      previous = self%guard
       n = size(self%moving) - count(self%bodies%in_halo)
-      call new_motion_guard(self%guard, self%settings%guards, self%bodies, self%moving(:n))
-      if (self%generation == 0_ip) return
-      self%guard%limit = previous%limit
-      self%guard%warning = previous%warning
+      if (self%generation == 0_ip) call new_motion_guard(self%guard, self%settings%guards, self%bodies, self%moving(:n))
+      self%guard%moving = self%moving(:n)
    end subroutine rebuild_guard
 
    !> Start with an empty pair list. The finder statistics are preserved.

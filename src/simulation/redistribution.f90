@@ -6,15 +6,17 @@
 !> restored. At the start of a run the bodies of a rank are anywhere; the first redistribution gives each rank its own.
 module polydem_redistribution
    use polydem_bodies, only: turn_bodies
+   use polydem_box_maker, only: have_boxes_within
    use polydem_body_fields, only: serialize_bodies
    use polydem_energy_balance, only: serialize_contributions
    use polydem_errors, only: error_t
+   use polydem_guards, only: greatest_displacement
    use polydem_halo, only: new_halo
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_local_bodies, only: fit_to_bodies
    use polydem_migration_buffer, only: migration_buffer_t
    use polydem_packed_bodies, only: packed_bodies_t, join_packed, pack_bodies, all_to_all_bodies, unpack_bodies
-   use polydem_packed_history, only: pack_pairs, receive_pairs, send_pairs
+   use polydem_packed_history, only: pack_pairs, receive_pairs, send_pairs, slots_of_pair
    use polydem_rank_order, only: sort_by_rank
    use polydem_redistribution_plan, only: divide, needs_repartition, list_needed, owners_of, padded_boxes, &
       work_of_bodies
@@ -24,12 +26,22 @@ module polydem_redistribution
    use polydem_timers, only: stage_boxes, stage_forces, stage_integrate, stage_neighbours, stage_overlap
    implicit none
    private
-   public :: redistribute, restore_history
+   public :: redistribute, compare_boxes, restore_history
 
    !> Stages whose time is proportional to the work for the bodies of a rank
    integer, parameter :: work_stages(*) = [stage_boxes, stage_neighbours, stage_overlap, stage_forces, stage_integrate]
 
 contains
+
+   !> Find out whether a box of a free body has left its padded box of the last redistribution. A step does this while
+   !> it updates the boxes; others call this before `redistribute`.
+   pure subroutine compare_boxes(self)
+      !> The simulation with updated boxes
+      type(simulation_t), intent(inout) :: self
+
+      if (.not. allocated(self%domain%reference)) return
+      self%domain%has_left = .not. have_boxes_within(self%maker, self%bodies%free, self%boxes, self%domain%reference)
+   end subroutine compare_boxes
 
    !> Exchange errors between ranks, and redistribute the bodies if any rank requests it. Collective.
    subroutine redistribute(self, error)
@@ -42,16 +54,31 @@ contains
       if (self%comm%size == 1_ip) return
       request = 0_lp
       if (.not. allocated(error)) then
-         associate (n => self%boxes%n)
-            if (self%domain%must_redistribute(self%boxes%bounds(:, :n), self%boxes%passive(:n))) request = 1_lp
-         end associate
+         if (self%domain%must_redistribute()) request = 1_lp
       end if
       call self%comm%all_reduce_error(error, request)
       if (allocated(error) .or. request(1) == 0_lp) return
-      call self%domain%adapt_margin(self%step)
+      if (self%domain%last_step < 0_lp) then
+         call choose_first_margin(self)
+      else
+         call self%domain%adapt_margin(self%step)
+      end if
       call balance_work(self)
       call migrate(self, error)
    end subroutine redistribute
+
+   !> Choose the margin of the first redistribution from the speeds of the free bodies. Collective.
+   subroutine choose_first_margin(self)
+      type(simulation_t), intent(inout) :: self
+      real(wp) :: move
+      real(dp) :: greatest(1)
+      integer(ip) :: slot
+
+      call greatest_displacement(self%bodies, self%bodies%free, self%dt, move, slot)
+      greatest = real(move, dp)
+      call self%comm%all_reduce_max(greatest)
+      call self%domain%choose_margin(real(greatest(1), wp))
+   end subroutine choose_first_margin
 
    !> Partition space again if the work of the ranks is uneven.
    subroutine balance_work(self)
@@ -94,7 +121,9 @@ contains
    subroutine migrate(self, error)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
-      integer(ip), allocatable :: owner(:)
+      type(packed_bodies_t) :: packed
+      type(migration_buffer_t) :: columns
+      integer(ip), allocatable :: owner(:), slots(:)
       integer(ip) :: j, k
 
       do k = 1_ip, size(self%motions, kind=ip)
@@ -102,8 +131,8 @@ contains
       end do
       owner = owners_of(self%domain, self%bodies)
       call send_history(self, owner)
-      call send_bodies(self, owner)
-      call receive_halo(self)
+      call send_bodies(self, owner, packed, columns, slots)
+      call receive_halo(self, packed, columns, slots)
       do k = 1_ip, size(self%motions, kind=ip)
          associate (slots => self%motions(k)%slots)
             slots = [(place_in(self%bodies%global_index, slots(j)), j=1_ip, size(slots, kind=ip))]
@@ -129,23 +158,36 @@ contains
    subroutine send_history(self, owner)
       type(simulation_t), intent(inout) :: self
       integer(ip), intent(in) :: owner(:)
+      integer(ip), allocatable :: slots(:, :)
+      integer(ip) :: p
 
       associate (pairs => self%neighbours%pairs, bodies => self%bodies)
-         if (.not. allocated(self%received_history)) then
-            allocate (self%received_history)
+         if (allocated(self%received_history)) then
+            allocate (slots(2, size(self%received_history%key)))
+            do p = 1_ip, size(slots, 2, kind=ip)
+               slots(:, p) = slots_of_pair(bodies%id, self%received_history%key(p))
+            end do
+         else
+            allocate (self%received_history, slots(2, pairs%n))
             call pack_pairs(pairs%n, pairs%first, pairs%second, bodies%id, self%history, self%received_history)
+            slots(1, :) = pairs%first(:pairs%n)
+            slots(2, :) = pairs%second(:pairs%n)
          end if
-         call send_pairs(self%comm, bodies%id, merge(-1_ip, owner, bodies%in_halo), self%received_history)
+         call send_pairs(self%comm, slots, merge(-1_ip, owner, bodies%in_halo), self%received_history)
       end associate
    end subroutine send_history
 
    !> Send the free bodies of this rank to their owners. Fixed bodies stay on all ranks.
-   subroutine send_bodies(self, owner)
+   subroutine send_bodies(self, owner, packed, columns, slots)
       type(simulation_t), intent(inout) :: self
       integer(ip), intent(in) :: owner(:)
-      type(packed_bodies_t) :: packed
-      type(migration_buffer_t) :: buffer
-      integer(ip), allocatable :: counts(:), counts_received(:), slots(:), order(:)
+      !> The bodies that this rank moves from now on, and its fixed bodies
+      type(packed_bodies_t), intent(out) :: packed
+      !> Their variable state
+      type(migration_buffer_t), intent(out) :: columns
+      !> Slot of each of them
+      integer(ip), allocatable, intent(out) :: slots(:)
+      integer(ip), allocatable :: counts(:), counts_received(:), order(:)
       integer(ip) :: s
 
       associate (bodies => self%bodies)
@@ -154,28 +196,30 @@ contains
          slots = slots(order)
          call pack_bodies(bodies, slots, packed)
       end associate
-      buffer%slots = slots
-      call serialize_columns(buffer, self)
-      call buffer%move(self%comm, counts, counts_received)
+      columns%slots = slots
+      call serialize_columns(columns, self)
+      call columns%move(self%comm, counts, counts_received)
       call all_to_all_bodies(self%comm, counts, packed, counts_received)
       self%domain%arrivals = self%domain%arrivals + &
          int(sum(counts_received) - counts_received(lbound(counts_received, 1) + self%comm%rank), lp)
-      call unpack_bodies(packed, (self%bodies%n_all), self%bodies, slots)
-      call buffer%restore_to(slots)
-      call self%integrator%start(self%bodies)
-      call serialize_columns(buffer, self)
+      call restore_bodies(self, packed, columns, slots)
       call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)], self%isa)
    end subroutine send_bodies
 
    !> Publish the bounds of the bodies of this rank, and receive the nearby bodies of other ranks as the halo.
-   subroutine receive_halo(self)
+   subroutine receive_halo(self, packed, columns, slots)
       type(simulation_t), intent(inout) :: self
-      type(packed_bodies_t) :: packed, packed_halo
-      type(migration_buffer_t) :: buffer
-      integer(ip), allocatable :: sent(:), counts(:), counts_received(:), slots(:)
+      !> The bodies that this rank moves, and its fixed bodies; afterwards with the halo
+      type(packed_bodies_t), intent(inout) :: packed
+      !> Variable state of the bodies without the halo
+      type(migration_buffer_t), intent(inout) :: columns
+      !> Slot of each packed body
+      integer(ip), allocatable, intent(inout) :: slots(:)
+      type(packed_bodies_t) :: packed_halo
+      integer(ip), allocatable :: sent(:), counts(:), counts_received(:), place(:)
       real(wp), allocatable :: boxes(:, :)
       integer(lp) :: n_halo(1)
-      integer(ip) :: s, n
+      integer(ip) :: k, s, n
 
       n = self%bodies%n
       boxes = padded_boxes(self%bodies, self%domain%margin + self%settings%boxes%margin)
@@ -183,22 +227,34 @@ contains
       call list_needed(self%domain, self%comm, self%bodies, boxes, sent, counts)
       call pack_bodies(self%bodies, sent, packed_halo)
       call all_to_all_bodies(self%comm, counts, packed_halo, counts_received)
-      buffer%slots = [(s, s=1_ip, n)]
-      call pack_bodies(self%bodies, buffer%slots, packed)
-      call serialize_columns(buffer, self)
       call join_packed(packed, packed_halo)
-      call unpack_bodies(packed, (self%bodies%n_all), self%bodies, slots)
+      allocate (place(n))
+      place(slots) = [(k, k=1_ip, n)]
+      sent = place(sent)
+      call restore_bodies(self, packed, columns, slots)
       self%bodies%in_halo(slots(n + 1_ip:)) = .true.
       self%bodies%free = pack([(s, s=1_ip, self%bodies%n)],.not. (self%bodies%fixed .or. self%bodies%in_halo))
-      call buffer%restore_to(slots(:n))
-      call self%integrator%start(self%bodies)
-      call serialize_columns(buffer, self)
-      call new_halo(self%domain%halo, counts, slots(sent), counts_received, slots(n + 1_ip:), &
-                      self%law%needs_accelerations)
+      call new_halo(self%domain%halo, self%bodies%free, counts, slots(sent), counts_received, slots(n + 1_ip:), &
+                    self%law%needs_accelerations)
       n_halo = int(self%bodies%n - n, lp)
       call self%comm%all_reduce_sum(n_halo)
       self%domain%halo_share = real(n_halo(1), wp)/real(self%bodies%n_all, wp)
    end subroutine receive_halo
+
+   !> Unpack bodies, and restore their variable state.
+   subroutine restore_bodies(self, packed, columns, slots)
+      type(simulation_t), intent(inout) :: self
+      type(packed_bodies_t), intent(inout) :: packed
+      !> Variable state of the first bodies of the list; that of the others becomes zero
+      type(migration_buffer_t), intent(inout) :: columns
+      !> Slot of each packed body
+      integer(ip), allocatable, intent(out) :: slots(:)
+
+      call unpack_bodies(packed, (self%bodies%n_all), self%bodies, slots)
+      call columns%restore_to(slots(:columns%n_rows()))
+      call self%integrator%start(self%bodies)
+      call serialize_columns(columns, self)
+   end subroutine restore_bodies
 
    !> Serialize the variable state of the bodies, including data of the current step.
    subroutine serialize_columns(serializer, self)

@@ -20,7 +20,7 @@ module polydem_relaxation
    use polydem_local_bodies, only: fit_to_bodies
    use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_origin, only: place_of
-   use polydem_redistribution, only: redistribute
+   use polydem_redistribution, only: compare_boxes, redistribute
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers
    use polydem_strings, only: to_text
@@ -133,6 +133,7 @@ contains
       call self%domain%halo%follow(self%comm, self%bodies)
       call turn_bodies(self%bodies, self%moving, self%isa)
       call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
+      call compare_boxes(self)
       call redistribute(self, error)
       if (allocated(error)) return
       ! The history of a redistribution is empty here.

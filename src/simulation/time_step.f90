@@ -45,7 +45,7 @@ contains
       call self%timers%lap(stage_integrate)
    end subroutine advance
 
-   !> Update the halo, and vertices and boxes of all but the free bodies. Redistribute the bodies if necessary.
+   !> Receive the halo, and update vertices and boxes of all but the free bodies. Redistribute the bodies if necessary.
    subroutine place_boxes(self, error)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
@@ -53,13 +53,7 @@ contains
 
       is_parallel = self%comm%size > 1_ip
       if (is_parallel) then
-         associate (domain => self%domain, comm => self%comm)
-            domain%step_messages = domain%step_messages - comm%messages
-            domain%step_bytes = domain%step_bytes - comm%bytes
-            call domain%halo%follow(comm, self%bodies)
-            domain%step_messages = domain%step_messages + comm%messages
-            domain%step_bytes = domain%step_bytes + comm%bytes
-         end associate
+         call self%domain%halo%receive_halo(self%comm, self%bodies)
          call self%timers%lap(stage_decomposition)
       end if
       if (.not. allocated(error)) then

@@ -28,7 +28,8 @@ contains
       call serializer%field('/bodies/torque', bodies%torque, 'N', 'sums of the torques about the centres of mass')
    end subroutine serialize_bodies
 
-   !> Serialize the constant fields of bodies, except their shapes, which have any number of vertices.
+   !> Serialize the constant fields of bodies, except their global indices, and their shapes, which have any number of
+   !> vertices.
    subroutine serialize_constants(serializer, bodies)
       !> Serializer, which reads or writes columns over /bodies
       class(serializer_t), intent(inout) :: serializer
@@ -36,7 +37,6 @@ contains
       integer(ip) :: fixed(bodies%n)
 
       fixed = merge(1_ip, 0_ip, bodies%fixed)
-      call serializer%field('/bodies/global_index', bodies%global_index, '1', 'indices among all bodies of the run')
       call serializer%field('/bodies/id', bodies%id, '1', 'identifiers')
       call serializer%field('/bodies/fixed', fixed, '1', '1: the body is fixed')
       call serializer%field('/bodies/mass', bodies%mass, 'kg/m', 'masses')

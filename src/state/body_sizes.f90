@@ -18,33 +18,52 @@ contains
       real(wp), intent(out) :: thickness
       !> Greatest distance of a vertex from the centre [m]
       real(wp), intent(out) :: radius
-      real(wp) :: edge(2)
-      integer(ip) :: v, w
+      integer(ip) :: v
 
-      thickness = huge(1.0_wp)
-      radius = 0.0_wp
-      w = bodies%vertex_start(s + 1_ip) - 1_ip
-      associate (shape => bodies%shape)
-         do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-            edge = shape(:, v) - shape(:, w)
-            thickness = min(thickness, &
-                            2.0_wp*abs(edge(1)*shape(2, w) - edge(2)*shape(1, w))/hypotenuse(edge(1), edge(2)))
-            radius = max(radius, hypotenuse(shape(1, v), shape(2, v)))
-            w = v
+      associate (vertex => bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))
+         thickness = thickness_of(vertex)
+         radius = 0.0_wp
+         do v = 1_ip, size(vertex, 2, kind=ip)
+            radius = max(radius, hypotenuse(vertex(1, v), vertex(2, v)))
          end do
       end associate
    end subroutine measure_body
+
+   !> Twice the least distance of an edge of a polygon from the origin [m]
+   pure real(wp) function thickness_of(vertex)
+      !> Vertices, anticlockwise, (2, n) [m]
+      real(wp), intent(in), contiguous :: vertex(:, :)
+      real(wp) :: numerator(size(vertex, 2)), edge(2, size(vertex, 2)), square(size(vertex, 2)), least
+      integer(ip) :: v, w
+      ! Edges whose squared distance is greater than the least by this factor are farther away, in spite of rounding.
+      real(wp), parameter :: share = 1.0_wp + 64.0_wp*epsilon(1.0_wp)
+
+      w = size(vertex, 2, kind=ip)
+      do v = 1_ip, size(vertex, 2, kind=ip)
+         edge(:, v) = vertex(:, v) - vertex(:, w)
+         numerator(v) = 2.0_wp*abs(edge(1, v)*vertex(2, w) - edge(2, v)*vertex(1, w))
+         square(v) = numerator(v)/(edge(1, v)**2 + edge(2, v)**2)*numerator(v)
+         w = v
+      end do
+      least = minval(square)
+      ! Where squares may underflow or overflow, the distances of all edges are measured.
+      if (least < tiny(least)/epsilon(least) .or. .not. maxval(square) < huge(least)) least = huge(least)
+      thickness_of = huge(1.0_wp)
+      do v = 1_ip, size(vertex, 2, kind=ip)
+         if (square(v) > share*least) cycle
+         thickness_of = min(thickness_of, numerator(v)/hypotenuse(edge(1, v), edge(2, v)))
+      end do
+   end function thickness_of
 
    !> Thickness of every body [m], (slot)
    pure function thickness_of_bodies(bodies) result(thickness)
       type(bodies_t), intent(in) :: bodies
       real(wp), allocatable :: thickness(:)
-      real(wp) :: radius
       integer(ip) :: s
 
       allocate (thickness(bodies%n))
       do s = 1_ip, bodies%n
-         call measure_body(bodies, s, thickness(s), radius)
+         thickness(s) = thickness_of(bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))
       end do
    end function thickness_of_bodies
 

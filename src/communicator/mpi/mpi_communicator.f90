@@ -1,12 +1,12 @@
 !> The ranks of an MPI run. In this room only this module and `world_communicator.f90` use MPI.
 !>
 !> Buffers are contiguous. Real rows are sent as bytes, so one code serves every working precision. Open MPI does not
-!> copy array sections and does not use the asynchronous attribute. Therefore every non-blocking call is completed in
-!> the procedure that starts it.
+!> copy array sections and does not use the asynchronous attribute. A compiler may therefore keep values of a buffer
+!> only until the next call that has the buffer as an argument. Both procedures of an exchange have them as arguments.
 module polydem_mpi_communicator
    use mpi_f08, only: mpi_allgather, mpi_allgatherv, mpi_allreduce, mpi_alltoall, mpi_bcast, mpi_byte, mpi_comm_world, &
       mpi_finalize, mpi_in_place, mpi_integer, mpi_integer8, mpi_irecv, mpi_isend, mpi_max, &
-      mpi_recv, mpi_request, mpi_send, mpi_statuses_ignore, mpi_status_ignore, mpi_sum, mpi_waitall
+      mpi_recv, mpi_request, mpi_request_null, mpi_send, mpi_statuses_ignore, mpi_status_ignore, mpi_sum, mpi_waitall
    use polydem_communicator, only: neighbour_ranks_t, communicator_t
    use polydem_kinds, only: ip, lp, wp
    implicit none
@@ -15,13 +15,16 @@ module polydem_mpi_communicator
 
    !> All ranks of MPI_COMM_WORLD
    type, extends(communicator_t) :: mpi_communicator_t
+      !> Unfinished messages of an exchange
+      type(mpi_request), allocatable, private :: requests(:)
    contains
       procedure :: all_reduce_sum
       procedure :: all_reduce_max_longs
       procedure :: broadcast_longs
       procedure :: gather_longs
       procedure :: all_to_all_longs
-      procedure :: exchange
+      procedure :: begin_exchange
+      procedure :: finish_exchange
       procedure :: receive_from_previous
       procedure :: send_to_next
       procedure :: finalize
@@ -110,34 +113,46 @@ contains
       call mpi_waitall(n, requests, mpi_statuses_ignore)
    end subroutine all_to_all_longs
 
-   !> Exchange rows with neighbour ranks.
-   subroutine exchange(self, route, sent, received)
+   !> Begin an exchange of rows with neighbour ranks.
+   subroutine begin_exchange(self, route, sent, received)
       class(mpi_communicator_t), intent(inout) :: self
       type(neighbour_ranks_t), intent(in) :: route
       real(wp), intent(in), contiguous, target :: sent(:, :)
       real(wp), intent(inout), contiguous, target :: received(:, :)
-      type(mpi_request) :: requests(2*size(route%rank))
       integer :: k, n, bytes, row_bytes
 
+      n = 2*size(route%rank)
+      if (allocated(self%requests)) then
+         if (size(self%requests) /= n) deallocate (self%requests)
+      end if
+      if (.not. allocated(self%requests)) allocate (self%requests(n))
+      self%requests = mpi_request_null
       row_bytes = size(sent, 1)*(storage_size(sent)/8)
-      n = 0
       do k = 1, size(route%rank)
          bytes = row_bytes*int(route%received(k + 1) - route%received(k))
-         if (bytes == 0) cycle
-         n = n + 1
-         call mpi_irecv(received(1, route%received(k)), bytes, mpi_byte, int(route%rank(k)), tag, mpi_comm_world, &
-                        requests(n))
+         if (bytes > 0) call mpi_irecv(received(1, route%received(k)), bytes, mpi_byte, int(route%rank(k)), tag, &
+                                       mpi_comm_world, self%requests(2*k - 1))
       end do
       do k = 1, size(route%rank)
          bytes = row_bytes*int(route%sent(k + 1) - route%sent(k))
          if (bytes == 0) cycle
-         n = n + 1
-         call mpi_isend(sent(1, route%sent(k)), bytes, mpi_byte, int(route%rank(k)), tag, mpi_comm_world, requests(n))
+         call mpi_isend(sent(1, route%sent(k)), bytes, mpi_byte, int(route%rank(k)), tag, mpi_comm_world, &
+                        self%requests(2*k))
          self%messages = self%messages + 1_lp
          self%bytes = self%bytes + int(bytes, lp)
       end do
-      call mpi_waitall(n, requests, mpi_statuses_ignore)
-   end subroutine exchange
+   end subroutine begin_exchange
+
+   !> Finish the exchange that was begun with the same buffers.
+   subroutine finish_exchange(self, sent, received)
+      class(mpi_communicator_t), intent(inout) :: self
+      real(wp), intent(in), contiguous, target :: sent(:, :)
+      real(wp), intent(inout), contiguous, target :: received(:, :)
+
+      associate (unused_rows => sent, unused_values => received)
+      end associate
+      call mpi_waitall(size(self%requests), self%requests, mpi_statuses_ignore)
+   end subroutine finish_exchange
 
    !> Receive numbers from rank - 1. Nothing happens on rank 0.
    subroutine receive_from_previous(self, values)
