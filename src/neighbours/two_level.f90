@@ -17,6 +17,7 @@ module polydem_two_level
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_nodes, count_passes, &
       count_rebuilds, count_searches, count_tests, count_visits, phase_filter, phase_search, phase_structure
+   use polydem_index_list, only: index_list_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_line_filter, only: class_cost
    use polydem_pair_changes, only: pair_changes_t
@@ -157,18 +158,20 @@ contains
    !> searches and intervals together cheaper per step.
    subroutine choose_length(self)
       type(two_level_t), intent(inout) :: self
+      type(index_list_t) :: strays
       real(dp) :: cost
 
       call self%filter%list_strays(self%list%fat)
       do while (self%filter%length > shortest)
          cost = self%list%cost_of_singles(self%filter%strays%n)
          if (cost <= self%filter%interval_cost(self%list%n)) exit
+         strays = self%filter%strays
          self%filter%length = self%filter%length/2_ip
-         call self%filter%list_strays(self%list%fat)
+         call self%filter%shorten_strays(self%list%fat)
          if (cost > self%filter%interval_cost(self%list%n) + &
              2.0_dp*self%list%cost_of_singles(self%filter%strays%n)) cycle
          self%filter%length = 2_ip*self%filter%length
-         call self%filter%list_strays(self%list%fat)
+         self%filter%strays = strays
          exit
       end do
    end subroutine choose_length

@@ -319,31 +319,27 @@ contains
       type(index_list_t), intent(inout) :: list
       !> Number of candidates that were classified
       integer(lp), intent(out) :: n_reviewed
-      integer(ip) :: asked(pair_block), box(2, pair_block), listed(pair_block + 1_ip), next, n, n_listed, kept, k, m
-      integer(bp) :: state(pair_block), kind(pair_block)
+      ! The loops have no branches, so that places in memory are read at the same time.
+      integer(ip) :: asked(pair_block + 1_ip), box(2, pair_block + 1_ip), listed(pair_block + 1_ip)
+      integer(bp) :: state(pair_block + 1_ip), kind(pair_block), off(pair_block + 1_ip)
+      integer(ip) :: next, n, n_listed, kept, k, m
 
       n_reviewed = 0_lp
       kept = 0_ip
-      next = 1_ip
-      do while (next <= list%n)
+      do next = 1_ip, list%n, pair_block
          n = 0_ip
-         do while (next <= list%n .and. n < pair_block)
-            k = list%at(next)
-            next = next + 1_ip
-            if (self%active%place(k) /= 0_ip) cycle
-            if (max(self%left(candidates%box(1, k)), self%left(candidates%box(2, k))) >= often) then
-               kept = kept + 1_ip
-               list%at(kept) = k
-               cycle
-            end if
-            n = n + 1_ip
-            asked(n) = k
-            box(1, n) = candidates%box(1, k)
-            box(2, n) = candidates%box(2, k)
-            state(n) = candidates%overlap(k)
+         do m = next, min(next + pair_block - 1_ip, list%n)
+            k = list%at(m)
+            asked(n + 1_ip) = k
+            box(1, n + 1_ip) = candidates%box(1, k)
+            box(2, n + 1_ip) = candidates%box(2, k)
+            state(n + 1_ip) = candidates%overlap(k)
+            off(n + 1_ip) = max(self%left(candidates%box(1, k)), self%left(candidates%box(2, k)))
+            n = n + merge(1_ip, 0_ip, self%active%place(k) == 0_ip)
          end do
-         n_reviewed = n_reviewed + int(n, lp)
          call self%classify_pairs(n, box, self%step, kind)
+         kind(1:n) = merge(active, kind(1:n), off(1:n) >= often)
+         n_reviewed = n_reviewed + count(off(1:n) < often, kind=lp)
          call list_differences(n, kind, state, n_listed, listed)
          do m = 1_ip, n_listed
             kept = kept + 1_ip

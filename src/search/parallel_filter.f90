@@ -17,6 +17,8 @@ module polydem_parallel_filter
    integer(ip), parameter :: worth_testing = 4096_ip
    !> Number of boxes above which the review of their candidates is parallel; a box takes about 100 ns
    integer(ip), parameter :: worth_reviewing = 128_ip
+   !> Inverse share of strays up to which it is cheaper to look at them alone than at all boxes again
+   integer(ip), parameter :: few_strays = 16_ip
 
    !> Results of one thread
    type :: worker_t
@@ -43,10 +45,12 @@ module polydem_parallel_filter
    contains
       procedure :: begin_step
       procedure :: follow_lines
+      procedure, private :: is_parallel
       procedure :: review_left
       procedure :: activate_candidates_of
       procedure :: draw_all_lines
       procedure :: list_strays
+      procedure :: shorten_strays
       procedure :: classify_all
       procedure :: find_active_states
       procedure :: compare_active
@@ -73,20 +77,44 @@ contains
       type(boxes_t), intent(in) :: boxes
       !> Bounds that each box must not leave while it is on its lines, (4, box) [m]
       real(wp), intent(in), contiguous :: limits(:, :)
-      integer(ip) :: low, high
       integer :: w
 
-      !$omp parallel do if (boxes%n > worth_testing) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes, limits) private(w, low, high)
-      do w = 1, size(self%worker)
-         call part(boxes%n, size(self%worker), w, low, high)
-         call self%find_off_lines(low, high, boxes%n, boxes%bounds, self%worker(w)%left)
-         call redraw_lines(self, boxes, limits, self%worker(w))
-      end do
-      !$omp end parallel do
+      if (self%is_parallel(boxes%n, worth_testing)) then
+         !$omp parallel do schedule(static, 1) default(none) shared(self, boxes, limits) private(w)
+         do w = 1, size(self%worker)
+            call follow_part(self, w, boxes, limits)
+         end do
+         !$omp end parallel do
+      else
+         do w = 1, size(self%worker)
+            call follow_part(self, w, boxes, limits)
+         end do
+      end if
       self%n_left = self%n_left + sum(int(self%worker%left%n, lp))
       call gather_strays(self)
    end subroutine follow_lines
+
+   !> Whether work is worth a parallel region. Even for one thread a region costs 0.2 us.
+   pure logical function is_parallel(self, n, worth)
+      class(parallel_filter_t), intent(in) :: self
+      !> Amount of work, and the amount above which it is worth a region
+      integer(ip), intent(in) :: n, worth
+
+      is_parallel = n > worth .and. size(self%worker) > 1
+   end function is_parallel
+
+   !> Find the boxes of a thread that left their lines, and draw new ones.
+   pure subroutine follow_part(self, w, boxes, limits)
+      class(parallel_filter_t), intent(inout) :: self
+      integer, intent(in) :: w
+      type(boxes_t), intent(in) :: boxes
+      real(wp), intent(in), contiguous :: limits(:, :)
+      integer(ip) :: low, high
+
+      call part(boxes%n, size(self%worker), w, low, high)
+      call self%find_off_lines(low, high, boxes%n, boxes%bounds, self%worker(w)%left)
+      call redraw_lines(self, boxes, limits, self%worker(w))
+   end subroutine follow_part
 
    !> Draw new lines through the boxes of a thread that left theirs, and list the strays among them. Boxes that were off
    !> before are removed from the list.
@@ -139,12 +167,17 @@ contains
 
       if (all(self%worker%left%n == 0_ip)) return
       call self%active%reserve_places(candidates%n)
-      !$omp parallel do if (sum(self%worker%left%n) > worth_reviewing) schedule(static, 1) default(none) &
-      !$omp    shared(self, candidates) private(w)
-      do w = 1, size(self%worker)
-         call review_part(self, candidates, self%worker(w))
-      end do
-      !$omp end parallel do
+      if (self%is_parallel(sum(self%worker%left%n), worth_reviewing)) then
+         !$omp parallel do schedule(static, 1) default(none) shared(self, candidates) private(w)
+         do w = 1, size(self%worker)
+            call review_part(self, candidates, self%worker(w))
+         end do
+         !$omp end parallel do
+      else
+         do w = 1, size(self%worker)
+            call review_part(self, candidates, self%worker(w))
+         end do
+      end if
       do w = 1, size(self%worker)
          call self%active%activate_all(self%worker(w)%asked, candidates)
          self%n_reviewed = self%n_reviewed + self%worker(w)%n_reviewed
@@ -219,6 +252,25 @@ contains
       call gather_strays(self)
    end subroutine list_strays
 
+   !> Remove those boxes from the strays that stay inside given bounds, after the interval became shorter.
+   subroutine shorten_strays(self, limits)
+      class(parallel_filter_t), intent(inout) :: self
+      !> Bounds of each box, (4, box) [m]
+      real(wp), intent(in), contiguous :: limits(:, :)
+      integer(ip) :: k, n, i
+
+      if (self%strays%n > size(limits, 2, ip)/few_strays) then
+         call self%list_strays(limits)
+         return
+      end if
+      n = self%strays%n
+      self%strays%n = 0_ip
+      do k = 1_ip, n
+         i = self%strays%at(k)
+         if (.not. self%stays_inside(i, limits(:, i))) call self%strays%push(i)
+      end do
+   end subroutine shorten_strays
+
    !> Classify all candidates.
    subroutine classify_all(self, boxes, candidates, known)
       class(parallel_filter_t), intent(inout) :: self
@@ -264,17 +316,31 @@ contains
       class(parallel_filter_t), intent(inout) :: self
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
-      integer(ip) :: low, high
       integer :: w
 
-      !$omp parallel do if (self%active%n > worth_testing) schedule(static, 1) default(none) &
-      !$omp    shared(self, boxes) private(w, low, high)
-      do w = 1, size(self%worker)
-         call part(self%active%n, size(self%worker), w, low, high)
-         call self%active%compare(low, high, boxes%bounds, boxes%body, self%changes%of(w))
-      end do
-      !$omp end parallel do
+      if (self%is_parallel(self%active%n, worth_testing)) then
+         !$omp parallel do schedule(static, 1) default(none) shared(self, boxes) private(w)
+         do w = 1, size(self%worker)
+            call compare_part(self, w, boxes)
+         end do
+         !$omp end parallel do
+      else
+         do w = 1, size(self%worker)
+            call compare_part(self, w, boxes)
+         end do
+      end if
       call self%count_step()
    end subroutine compare_active
+
+   !> Compare the boxes of the active candidates of a thread.
+   subroutine compare_part(self, w, boxes)
+      class(parallel_filter_t), intent(inout) :: self
+      integer, intent(in) :: w
+      type(boxes_t), intent(in) :: boxes
+      integer(ip) :: low, high
+
+      call part(self%active%n, size(self%worker), w, low, high)
+      call self%active%compare(low, high, boxes%bounds, boxes%body, self%changes%of(w))
+   end subroutine compare_part
 
 end module polydem_parallel_filter
