@@ -26,6 +26,9 @@ ENVIRONMENT = (("OMP_NUM_THREADS", "number of threads of a run without --threads
                ("GOMP_SPINCOUNT", "how long a waiting thread spins before it sleeps. If unset, for about 10 ms, which "
                 "slows runs on a machine that other programs use; with 10000 for less than 1 ms. The launcher of the "
                 "sources sets 10000"),
+               ("GLIBC_TUNABLES", "with glibc.malloc.hugetlb=1:glibc.malloc.mmap_max=0:"
+                "glibc.malloc.trim_threshold=4294967296 memory comes in large pages and freed memory is kept, which "
+                "makes steps of large scenes 4 to 6 % faster. The launcher of the sources sets this"),
                ("POLYDEM_ISA", "base or avx2: instruction set of the kernels; results have the same bits"),
                ("POLYDEM_PATIENCE", "seconds that a parallel write may hang before it ends the run (default: 600)"))
 

@@ -85,7 +85,7 @@ class Completion(unittest.TestCase):
         read = {name for text in sources for name in re.findall(r"'(POLYDEM_[A-Z]+)'", text)} - {"POLYDEM_CALL"}
         self.assertTrue(read)
         part = call(LAUNCHER, "completion", "man").partition(".SH ENVIRONMENT")[2]
-        for name in (*read, "GOMP_SPINCOUNT"):
+        for name in (*read, "GLIBC_TUNABLES", "GOMP_SPINCOUNT"):
             self.assertIn(f".B {name}\n", part)
 
     def test_shells_accept_the_texts(self):

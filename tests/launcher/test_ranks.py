@@ -49,6 +49,12 @@ class Ranks(Toy):
             noted = self.run_ranks("run", "x", "--ranks", "1", "--threads", "1", **chosen)[2]
             self.assertEqual(noted.get("GOMP_SPINCOUNT"), expected)
 
+    def test_memory_comes_in_large_pages_unless_the_user_has_chosen(self):
+        usual = "glibc.malloc.hugetlb=1:glibc.malloc.mmap_max=0:glibc.malloc.trim_threshold=4294967296"
+        for chosen, expected in (({}, usual), ({"GLIBC_TUNABLES": ""}, ""), ({"GLIBC_TUNABLES": "a.b=1"}, "a.b=1")):
+            noted = self.run_ranks("run", "x", "--ranks", "1", "--threads", "1", **chosen)[2]
+            self.assertEqual(noted["GLIBC_TUNABLES"], expected)
+
     def test_mpirun_that_went_after_the_build_is_installed_or_named(self):
         self.call("--version", POLYDEM_PRESET="mpi")
         machine = self.bare_machine()
