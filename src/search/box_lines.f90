@@ -145,7 +145,8 @@ contains
 
       self%origin = origin
       self%limit = -1.0_sp
-      if (self%tolerance >= least_tolerance) self%limit = reach + motion*real(self%side, sp)
+      if (self%tolerance >= least_tolerance) self%limit = reach + motion*real(self%side, sp) + &
+         real(min(maxval(abs(origin))*(epsilon(1.0_wp)/real(epsilon(1.0_sp), wp)), most_place), sp)
    end subroutine set_limit
 
    !> Largest velocity of a line [m per step]

@@ -15,6 +15,9 @@ module polydem_candidate_rows
    private
    public :: candidate_rows_t, lies_inside
 
+   !> Number of boxes whose rows are read at once
+   integer(ip), parameter :: at_once = 64_ip
+
    !> Candidates in rows, the box of the row first; more candidates can follow the rows
    type, extends(candidates_t) :: candidate_rows_t
       !> First candidate and number of candidates of the row of each box, (2, box)
@@ -33,6 +36,7 @@ module polydem_candidate_rows
       procedure :: append
       procedure :: list_by_second
       procedure :: append_candidates_of => append_row_candidates_of
+      procedure :: append_candidates_of_all => append_row_candidates_of_all
       procedure :: bytes => bytes_of_rows
    end type candidate_rows_t
 
@@ -238,6 +242,38 @@ contains
       end do
       list%n = list%n + n_second
    end subroutine append_row_candidates_of
+
+   !> Append the candidates of several boxes in the rows to a list. The rows of many boxes are read at the same time.
+   pure subroutine append_row_candidates_of_all(self, boxes, list)
+      class(candidate_rows_t), intent(in) :: self
+      !> The boxes
+      type(index_list_t), intent(in) :: boxes
+      !> Numbers of candidates
+      type(index_list_t), intent(inout) :: list
+      integer(ip) :: row(2, at_once), second(2, at_once), from, n, m, k, i
+
+      do from = 1_ip, boxes%n, at_once
+         n = min(boxes%n - from + 1_ip, at_once)
+         do m = 1_ip, n
+            i = boxes%at(from + m - 1_ip)
+            row(1, m) = self%row(1, i)
+            row(2, m) = self%row(2, i)
+            second(1, m) = self%first_of_second(i)
+            second(2, m) = self%first_of_second(i + 1_ip) - self%first_of_second(i)
+         end do
+         call list%reserve(list%n + sum(row(2, 1:n)) + sum(second(2, 1:n)))
+         do m = 1_ip, n
+            do k = 1_ip, row(2, m)
+               list%at(list%n + k) = row(1, m) + k - 1_ip
+            end do
+            list%n = list%n + row(2, m)
+            do k = 1_ip, second(2, m)
+               list%at(list%n + k) = self%of_second(second(1, m) + k - 1_ip)
+            end do
+            list%n = list%n + second(2, m)
+         end do
+      end do
+   end subroutine append_row_candidates_of_all
 
    !> Allocate memory for the candidates; their old values are lost.
    pure subroutine reserve(self)

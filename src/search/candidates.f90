@@ -56,6 +56,7 @@ module polydem_candidates
       procedure :: n_pairs
       procedure :: list_separated
       procedure :: append_candidates_of
+      procedure :: append_candidates_of_all
       procedure :: bytes
    end type candidates_t
 
@@ -75,10 +76,8 @@ contains
    !> Add a candidate.
    pure subroutine add(self, a, b, overlap, k)
       class(candidates_t), intent(inout) :: self
-      !> First box
-      integer(ip), intent(in) :: a
-      !> Second box
-      integer(ip), intent(in) :: b
+      !> First and second box
+      integer(ip), intent(in) :: a, b
       !> Whether they overlap
       logical, intent(in) :: overlap
       !> Its number
@@ -154,10 +153,8 @@ contains
    !> Compare the boxes of a range of candidates and record the pairs that begin or cease to overlap.
    subroutine compare(self, low, high, bounds, body, changes)
       class(candidates_t), intent(inout) :: self
-      !> First candidate
-      integer(ip), intent(in) :: low
-      !> Last candidate
-      integer(ip), intent(in) :: high
+      !> First and last candidate
+      integer(ip), intent(in) :: low, high
       !> Bounds of the boxes, (4, box) [m]
       real(wp), intent(in), contiguous :: bounds(:, :)
       !> Body of each box, (box)
@@ -260,6 +257,20 @@ contains
       end do
    end subroutine append_candidates_of
 
+   !> Append the candidates of several boxes to a list.
+   pure subroutine append_candidates_of_all(self, boxes, list)
+      class(candidates_t), intent(in) :: self
+      !> The boxes
+      type(index_list_t), intent(in) :: boxes
+      !> Numbers of candidates
+      type(index_list_t), intent(inout) :: list
+      integer(ip) :: k
+
+      do k = 1_ip, boxes%n
+         call self%append_candidates_of(boxes%at(k), list)
+      end do
+   end subroutine append_candidates_of_all
+
    !> Allocated memory [B]
    pure integer(lp) function bytes(self)
       class(candidates_t), intent(in) :: self
@@ -344,20 +355,16 @@ contains
 
    !> Whether two boxes share a point. The function has no branches because the result is hard to predict
    pure logical function overlapping(a, b)
-      !> Bounds xmin, ymin, xmax, ymax of the first box [m]
-      real(wp), intent(in) :: a(4)
-      !> Bounds of the second box [m]
-      real(wp), intent(in) :: b(4)
+      !> Bounds xmin, ymin, xmax, ymax of both boxes [m]
+      real(wp), intent(in) :: a(4), b(4)
 
       overlapping = min(min(b(3) - a(1), a(3) - b(1)), min(b(4) - a(2), a(4) - b(2))) >= 0.0_wp
    end function overlapping
 
    !> Whether two padded boxes share a point
    pure logical function meet(a, b)
-      !> Bounds xmin, ymin, xmax, ymax of the first box
-      real(dp), intent(in) :: a(4)
-      !> Bounds of the second box
-      real(dp), intent(in) :: b(4)
+      !> Bounds xmin, ymin, xmax, ymax of both boxes
+      real(dp), intent(in) :: a(4), b(4)
 
       meet = a(1) <= b(3) .and. b(1) <= a(3) .and. a(2) <= b(4) .and. b(2) <= a(4)
    end function meet

@@ -1,9 +1,12 @@
 !> Layout of one grid of cells: region, cell size and number of cells.
 !>
-!> Boxes are binned by their lower corner, and no box is larger than a cell. The lower corners of two overlapping boxes
-!> are then less than a cell apart on both axes, so their cells are the same or neighbours. This also holds with
-!> rounding: the cell index is a monotonic function of the position, its error is below 2^-12 cells (`most_columns`),
-!> and cells exceed the largest box by more than twice that error (`slack`).
+!> Boxes are binned by their lower corner. In a coarse grid no box is larger than a cell. The lower corners of two
+!> overlapping boxes are then less than a cell apart on both axes, so their cells are the same or neighbours. This also
+!> holds with rounding: the cell index is a monotonic function of the position, its error is below 2^-12 cells
+!> (`most_columns`), and cells exceed the largest box by more than twice that error (`slack`).
+!>
+!> In a fine grid cells have the mean size of the boxes. The cells of the lower corners of two overlapping boxes are
+!> then at most `reach` columns and rows apart. Fewer boxes are compared, in more ranges.
 !>
 !> The outermost cells extend to infinity: points outside the grid are moved to its border. The grid may therefore cover
 !> only a part of the boxes. This is the case if a few distant boxes would require more than `most_cells` cells per box.
@@ -34,8 +37,8 @@ module polydem_cell_grid
       integer(ip) :: n = 0_ip
       !> Smallest and largest coordinates of the lower corners [m]
       real(wp) :: low(2) = huge(1.0_wp), high(2) = -huge(1.0_wp)
-      !> Largest width and height of a box [m]
-      real(wp) :: side(2) = 0.0_wp
+      !> Largest and mean width and height of a box [m]
+      real(wp) :: side(2) = 0.0_wp, mean(2) = 0.0_wp
    end type extent_t
 
    !> One grid
@@ -48,6 +51,8 @@ module polydem_cell_grid
       integer(ip) :: columns = 1_ip, rows = 1_ip
       !> Number of cells of a row, including the empty cell behind it
       integer(ip) :: stride = 2_ip
+      !> Largest distance of the cells of two overlapping boxes, in columns and rows
+      integer(ip) :: reach(2) = 1_ip
       !> Number of the first cell minus one
       integer(ip) :: offset = 0_ip
       !> First and last index of the boxes of the grid in the order of cells
@@ -68,7 +73,7 @@ contains
       integer(ip), intent(in) :: level(n)
       !> Extent of the free boxes (1); only the number of the fixed boxes (2)
       type(extent_t), intent(out) :: extent(2)
-      real(wp) :: xlow, ylow, xhigh, yhigh, width, height
+      real(wp) :: xlow, ylow, xhigh, yhigh, width, height, widths, heights
       integer(ip) :: i, n_free
 
       n_free = 0_ip
@@ -78,6 +83,8 @@ contains
       yhigh = -huge(1.0_wp)
       width = 0.0_wp
       height = 0.0_wp
+      widths = 0.0_wp
+      heights = 0.0_wp
       do i = 1_ip, n
          if (level(i) /= 1_ip) cycle
          n_free = n_free + 1_ip
@@ -87,8 +94,11 @@ contains
          yhigh = max(yhigh, bounds(2, i))
          width = max(width, bounds(3, i) - bounds(1, i))
          height = max(height, bounds(4, i) - bounds(2, i))
+         widths = widths + (bounds(3, i) - bounds(1, i))
+         heights = heights + (bounds(4, i) - bounds(2, i))
       end do
-      extent(1) = extent_t(n_free, [xlow, ylow], [xhigh, yhigh], [width, height])
+      extent(1) = extent_t(n_free, [xlow, ylow], [xhigh, yhigh], [width, height], &
+                           [widths, heights]/real(max(n_free, 1_ip), wp))
       extent(2)%n = n - n_free
    end subroutine measure
 
@@ -110,15 +120,21 @@ contains
          extent(l)%low = min(extent(l)%low, bounds(1:2, i))
          extent(l)%high = max(extent(l)%high, bounds(1:2, i))
          extent(l)%side = max(extent(l)%side, bounds(3:4, i) - bounds(1:2, i))
+         extent(l)%mean = extent(l)%mean + (bounds(3:4, i) - bounds(1:2, i))
+      end do
+      do l = 1, size(extent, kind=ip)
+         extent(l)%mean = extent(l)%mean/real(max(extent(l)%n, 1_ip), wp)
       end do
    end subroutine measure_levels
 
    !> Lay out a grid.
-   pure subroutine new_grid(self, extent, corner, n, offset)
+   pure subroutine new_grid(self, extent, fine, corner, n, offset)
       !> Grid to make
       type(cell_grid_t), intent(out) :: self
       !> Extent of the boxes of the grid
       type(extent_t), intent(in) :: extent
+      !> Whether cells have the mean size of the boxes instead of the largest
+      logical, intent(in) :: fine
       !> Bounds of all boxes, (4, box) [m]
       real(wp), intent(in), contiguous :: corner(:, :)
       !> Number of all boxes
@@ -135,6 +151,7 @@ contains
       self%low = extent%low
       self%high = extent%high
       side = extent%side*(1.0_wp + slack)
+      if (fine) side = min(side, max(extent%mean, 0.0_wp)*(1.0_wp + slack))
       most = real(most_cells, dp)*real(extent%n, dp) + 16.0_dp
       cells = cells_that_fit(self, side)
       if (real(cells(1), dp)*real(cells(2), dp) > far_away*most) then
@@ -146,6 +163,7 @@ contains
          span = self%high(a) - self%low(a)
          if (cells(a) < 2.0_wp) cycle
          self%scale(a) = (cells(a) - 0.5_wp*slack)/span
+         if (fine) self%reach(a) = 1_ip + int(min(extent%side(a)*self%scale(a)*(1.0_wp + slack) + slack, cells(a)), ip)
       end do
       self%columns = int(cells(1), ip)
       self%rows = int(cells(2), ip)

@@ -7,26 +7,26 @@
 !> memory, and the search for the partners of a box runs over plain ranges:
 !>
 !>     in its own grid        the boxes behind it in its cell, the boxes of the next cell of the row, and those of three
-!>                            cells of the row above. Every pair of cells is visited from one side only.
-!>     in each coarser grid   the cells that the box covers, and one more cell to the left and below, because boxes are
-!>                            binned by their lower corner
+!>                            cells of the row above. Every pair of cells is visited from one side only. In a fine grid:
+!>                            the boxes behind it in the cells of its row that it covers, and the cells that it covers
+!>                            in the rows above, with `reach` more cells to the left.
+!>     in each coarser grid   the cells that the box covers, and `reach` more cells to the left and below, because boxes
+!>                            are binned by their lower corner
 !>
 !> Fixed boxes are few and often large (walls). They belong to no cell, so they do not enlarge the cells, and are stored
 !> behind all grids. The search for the partners of a fixed box covers all grids; other boxes do not search for fixed
-!> boxes. Searches in windows find guests of the cells (`polydem_cell_guests`) in addition.
+!> boxes.
 module polydem_cell_grids
    use omp_lib, only: omp_get_max_threads
    use polydem_box_pairs, only: found_pairs_t
    use polydem_boxes, only: boxes_t
    use polydem_cell_grid, only: cell_grid_t, extent_t, measure, measure_levels, new_grid
-   use polydem_cell_guests, only: cell_block_t, cell_guests_t
    use polydem_cell_order, only: cell_order_t
-   use polydem_index_list, only: index_list_t
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
    use polydem_thread_changes, only: part
    implicit none
    private
-   public :: cell_grids_t
+   public :: cell_grids_t, column, row
 
    !> Counts of one thread
    type :: tally_t
@@ -40,6 +40,8 @@ module polydem_cell_grids
 
    !> Grids with their boxes in the order of cells
    type :: cell_grids_t
+      !> Whether cells have the mean size of the boxes of their grid instead of the largest; set before `build`
+      logical :: fine = .false.
       !> Number of grids
       integer :: n_levels = 0
       !> Grid of each box, (box); n_levels + 1 if the box is fixed
@@ -49,15 +51,13 @@ module polydem_cell_grids
       !> Extents of the boxes from which the grids are laid out, (level)
       type(extent_t), allocatable :: extent(:)
       !> Index of the first box of each cell, (cell), for all grids one after the other
-      integer(ip), allocatable, private :: first(:)
+      integer(ip), allocatable :: first(:)
       !> Number of cells, including empty cells at borders
       integer(ip) :: n_cells = 0_ip
       !> Boxes in the order of cells
-      type(cell_order_t), private :: order
+      type(cell_order_t) :: order
       !> Cell of each box, (box)
       integer(ip), allocatable, private :: cell_of(:)
-      !> Boxes registered in cells after the sort
-      type(cell_guests_t) :: guests
       !> Pairs of each thread in the last search, (thread); those of a search for one box are adjacent, this box first
       type(found_pairs_t), allocatable :: found(:)
       !> Counts summed over all searches
@@ -66,10 +66,6 @@ module polydem_cell_grids
       procedure :: set_levels
       procedure :: build
       procedure :: search
-      procedure :: receive_fixed
-      procedure :: add_guest
-      procedure :: search_window
-      procedure :: search_guests
       procedure :: bytes
    end type cell_grids_t
 
@@ -111,7 +107,7 @@ contains
       place = 1_ip
       do l = 1, self%n_levels + 1
          if (l <= self%n_levels) then
-            call new_grid(self%grid(l), self%extent(l), bounds, n, self%n_cells)
+            call new_grid(self%grid(l), self%extent(l), self%fine, bounds, n, self%n_cells)
          else
             self%grid(l) = cell_grid_t(offset=self%n_cells)
          end if
@@ -128,6 +124,7 @@ contains
    !> Column of a point, from 0
    elemental integer(ip) function column(grid, x)
       type(cell_grid_t), intent(in) :: grid
+      !> Coordinate of the point [m]
       real(wp), intent(in) :: x
 
       column = int((min(max(x, grid%low(1)), grid%high(1)) - grid%low(1))*grid%scale(1), ip)
@@ -136,6 +133,7 @@ contains
    !> Row of a point, from 0
    elemental integer(ip) function row(grid, y)
       type(cell_grid_t), intent(in) :: grid
+      !> Coordinate of the point [m]
       real(wp), intent(in) :: y
 
       row = int((min(max(y, grid%low(2)), grid%high(2)) - grid%low(2))*grid%scale(2), ip)
@@ -202,7 +200,11 @@ contains
       do l = 1, self%n_levels + 1
          call part_of_level(self%grid(l), m, w, low, high)
          do k = low, high
-            if (l <= self%n_levels) call search_own_grid(self, self%grid(l), k, mine, my_tally)
+            if (l <= self%n_levels .and. self%fine) then
+               call search_fine_grid(self, self%grid(l), k, mine, my_tally)
+            else if (l <= self%n_levels) then
+               call search_own_grid(self, self%grid(l), k, mine, my_tally)
+            end if
             do other = merge(1, l + 1, l > self%n_levels), self%n_levels
                call search_other_grid(self, self%grid(other), k, mine, my_tally)
             end do
@@ -247,6 +249,33 @@ contains
       tally%searches = tally%searches + 1_lp
    end subroutine search_own_grid
 
+   !> Compare a box with later boxes of its own fine grid.
+   subroutine search_fine_grid(self, grid, k, found, tally)
+      type(cell_grids_t), intent(in) :: self
+      type(cell_grid_t), intent(in) :: grid
+      !> Index of the box in the order of cells
+      integer(ip), intent(in) :: k
+      type(found_pairs_t), intent(inout) :: found
+      type(tally_t), intent(inout) :: tally
+      integer(ip) :: before, left, right, low, r, from, to
+
+      low = row(grid, self%order%ymin(k))
+      before = grid%offset + low*grid%stride
+      left = max(self%order%cell(k) - before - grid%reach(1), 1_ip)
+      right = max(column(grid, self%order%xmax(k)) + 1_ip, self%order%cell(k) - before)
+      from = k + 1_ip
+      do r = low, row(grid, self%order%ymax(k))
+         to = self%first(before + right + 1_ip) - 1_ip
+         if (size(found%box, 2) < found%n + to - from + 2_ip) call found%reserve(to - from + 2_ip)
+         call self%order%compare(k, from, to, found%n, found%box)
+         tally%tests = tally%tests + int(max(to - from + 1_ip, 0_ip), lp)
+         tally%visits = tally%visits + int(right - left + 1_ip, lp)
+         before = before + grid%stride
+         from = self%first(before + left)
+      end do
+      tally%searches = tally%searches + 1_lp
+   end subroutine search_fine_grid
+
    !> Compare a box with the boxes of another grid.
    subroutine search_other_grid(self, grid, k, found, tally)
       type(cell_grids_t), intent(in) :: self
@@ -258,9 +287,9 @@ contains
       integer(ip) :: r, left, right, from, to
 
       if (grid%last_box < grid%first_box) return
-      left = max(column(grid, self%order%xmin(k)) - 1_ip, 0_ip)
+      left = max(column(grid, self%order%xmin(k)) - grid%reach(1), 0_ip)
       right = column(grid, self%order%xmax(k))
-      do r = max(row(grid, self%order%ymin(k)) - 1_ip, 0_ip), row(grid, self%order%ymax(k))
+      do r = max(row(grid, self%order%ymin(k)) - grid%reach(2), 0_ip), row(grid, self%order%ymax(k))
          from = self%first(grid%offset + r*grid%stride + left + 1_ip)
          to = self%first(grid%offset + r*grid%stride + right + 2_ip) - 1_ip
          tally%visits = tally%visits + int(right - left + 1_ip, lp)
@@ -271,90 +300,6 @@ contains
       end do
       tally%searches = tally%searches + 1_lp
    end subroutine search_other_grid
-
-   !> Remove all guests, and make all fixed boxes guests, after `build`.
-   pure subroutine receive_fixed(self, bounds)
-      class(cell_grids_t), intent(inout) :: self
-      !> Bounds of the boxes, (4, box) [m]
-      real(wp), intent(in), contiguous :: bounds(:, :)
-      integer(ip) :: k
-
-      call self%guests%clear(self%n_cells)
-      do k = self%grid(self%n_levels + 1)%first_box, self%grid(self%n_levels + 1)%last_box
-         call self%add_guest(self%order%box(k), bounds(:, self%order%box(k)))
-      end do
-   end subroutine receive_fixed
-
-   !> Register a box in the cells of its grid that it covers, a fixed box in the coarsest grid.
-   pure subroutine add_guest(self, i, bounds)
-      class(cell_grids_t), intent(inout) :: self
-      !> Box
-      integer(ip), intent(in) :: i
-      !> Its bounds xmin, ymin, xmax, ymax [m]
-      real(wp), intent(in) :: bounds(4)
-
-      call self%guests%add(i, cells_of(self%grid(min(self%level(i), int(self%n_levels, ip))), bounds))
-   end subroutine add_guest
-
-   !> Cells that a window covers; none if its bounds are not numbers
-   pure type(cell_block_t) function cells_of(grid, window)
-      type(cell_grid_t), intent(in) :: grid
-      real(wp), intent(in) :: window(4)
-      integer(ip) :: left, low
-
-      left = max(column(grid, window(1)), 0_ip)
-      low = max(row(grid, window(2)), 0_ip)
-      cells_of = cell_block_t(grid%offset + low*grid%stride + left + 1_ip, column(grid, window(3)) - left + 1_ip, &
-                              row(grid, window(4)) - low + 1_ip, grid%stride)
-   end function cells_of
-
-   !> List the guests that overlap a window.
-   pure subroutine search_guests(self, window, bounds, near)
-      class(cell_grids_t), intent(inout) :: self
-      !> Bounds xmin, ymin, xmax, ymax of the window [m]
-      real(wp), intent(in) :: window(4)
-      !> Present bounds of the boxes, (4, box) [m]
-      real(wp), intent(in), contiguous :: bounds(:, :)
-      !> List to which the boxes are appended; a box can be appended several times
-      type(index_list_t), intent(inout) :: near
-      integer :: l
-
-      do l = 1, self%n_levels
-         call self%guests%append_near(cells_of(self%grid(l), window), window, bounds, near, self%total%tests)
-      end do
-      call self%guests%append_wide(window, bounds, near, self%total%tests)
-   end subroutine search_guests
-
-   !> List the boxes that were not fixed and overlapped a window when they were binned.
-   subroutine search_window(self, window, near)
-      class(cell_grids_t), intent(inout) :: self
-      !> Bounds xmin, ymin, xmax, ymax of the window [m]
-      real(wp), intent(in) :: window(4)
-      !> List to which the boxes are appended
-      type(index_list_t), intent(inout) :: near
-      integer(ip) :: j, r, left, right, from, to
-      integer :: l
-
-      do l = 1, self%n_levels
-         associate (grid => self%grid(l))
-            if (grid%last_box < grid%first_box) cycle
-            left = max(column(grid, window(1)) - 1_ip, 0_ip)
-            right = column(grid, window(3))
-            do r = max(row(grid, window(2)) - 1_ip, 0_ip), row(grid, window(4))
-               from = self%first(grid%offset + r*grid%stride + left + 1_ip)
-               to = self%first(grid%offset + r*grid%stride + right + 2_ip) - 1_ip
-               self%total%visits = self%total%visits + int(right - left + 1_ip, lp)
-               self%total%tests = self%total%tests + int(to - from + 1_ip, lp)
-               do j = from, to
-                  if (min(min(self%order%xmax(j) - window(1), window(3) - self%order%xmin(j)), &
-                          min(self%order%ymax(j) - window(2), window(4) - self%order%ymin(j))) >= 0.0_wp) &
-                     call near%push(self%order%box(j))
-               end do
-            end do
-         end associate
-      end do
-      self%total%searches = self%total%searches + 1_lp
-   end subroutine search_window
 
    !> Allocate the arrays over boxes.
    subroutine reserve_boxes(self, n)
@@ -388,7 +333,7 @@ contains
 
       bytes = 0_lp
       if (.not. allocated(self%cell_of)) return
-      bytes = self%order%bytes() + self%guests%bytes() + &
+      bytes = self%order%bytes() + &
          int(storage_size(self%first)/8, lp)*(2_lp*size(self%cell_of, kind=lp) + size(self%first, kind=lp))
       do w = 1, size(self%found)
          if (allocated(self%found(w)%box)) bytes = bytes + int(storage_size(self%found(w)%box)/8, lp)* &

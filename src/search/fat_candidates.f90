@@ -15,7 +15,7 @@ module polydem_fat_candidates
    use polydem_boxes, only: boxes_t
    use polydem_candidate_rows, only: candidate_rows_t
    use polydem_candidates, only: overlapping
-   use polydem_cell_grids, only: cell_grids_t
+   use polydem_cell_windows, only: cell_windows_t
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: bp, dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
@@ -38,7 +38,7 @@ module polydem_fat_candidates
       !> Fat boxes, (4, box) [m]
       real(wp), allocatable :: fat(:, :)
       !> Grids of the fat boxes of the last search for all boxes
-      type(cell_grids_t) :: grids
+      type(cell_windows_t) :: grids
       !> Typical side of a box [m]
       real(wp) :: side = 0.0_wp
       !> Number of steps since the last search for all boxes, and between the last two
@@ -76,6 +76,7 @@ module polydem_fat_candidates
       procedure :: search_all
       procedure :: search_single
       procedure :: append_candidates_of
+      procedure :: append_candidates_of_all
       procedure :: bytes => bytes_of_all
    end type fat_candidates_t
 
@@ -94,6 +95,7 @@ contains
       self%margin = first_margin*self%side
       call choose_levels(boxes, 2.0_wp*self%margin, n_levels, level, largest)
       call self%grids%set_levels(n_levels, level, boxes%fixed(1:boxes%n))
+      self%grids%fine = .true.
       call self%start(boxes%n)
       allocate (self%fat(4, boxes%n))
       self%fat = spread([1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]*huge(1.0_wp), 2, boxes%n)
@@ -315,16 +317,40 @@ contains
       integer(ip), intent(in) :: i
       !> Numbers of candidates
       type(index_list_t), intent(inout) :: list
-      integer(ip) :: link, k
 
       call self%candidate_rows_t%append_candidates_of(i, list)
+      call append_linked(self, i, list)
+   end subroutine append_candidates_of
+
+   !> Append the candidates of several boxes to a list.
+   pure subroutine append_candidates_of_all(self, boxes, list)
+      class(fat_candidates_t), intent(in) :: self
+      !> The boxes
+      type(index_list_t), intent(in) :: boxes
+      !> Numbers of candidates
+      type(index_list_t), intent(inout) :: list
+      integer(ip) :: k
+
+      call self%candidate_rows_t%append_candidates_of_all(boxes, list)
+      do k = 1_ip, boxes%n
+         call append_linked(self, boxes%at(k), list)
+      end do
+   end subroutine append_candidates_of_all
+
+   !> Append the candidates of a box behind the rows to a list.
+   pure subroutine append_linked(self, i, list)
+      type(fat_candidates_t), intent(in) :: self
+      integer(ip), intent(in) :: i
+      type(index_list_t), intent(inout) :: list
+      integer(ip) :: link, k
+
       link = self%first_link(i)
       do while (link /= 0_ip)
          k = shiftr(link + 1_ip, 1)
          call list%push(self%n_listed + k)
          link = self%next_link(2_ip - iand(link, 1_ip), k)
       end do
-   end subroutine append_candidates_of
+   end subroutine append_linked
 
    !> Append a candidate, unless it is one already or no pair is possible.
    subroutine add_candidate(self, i, j, boxes, changes)

@@ -17,11 +17,13 @@
 !> Rounding. Lines and their gaps are numbers of single precision, with unit roundoff u; places count from an origin o.
 !> Let |p| + T|v| <= L for all lines of boxes that are not off, and let L be 100 d or more.
 !>
-!>  * The place x - o of a side, rounded to single precision, has an error below 2.1 u |x - o|.
-!>  * The line moved up by the tolerance, fl(p + fl(fl(v s) + d)), has an error below 1.01 u (3 L + 2 d).
-!>  * A side whose computed distance from it lies between -2 d and 0 is less than d (1 + 2.1 u) plus these errors from
-!>    p + v s. With |x - o| < 1.02 L the sum is less than d + 5.4 u L. So a gap of two boxes is less than 2 d + 10.8 u L
-!>    from g(s).
+!>  * A side at x is compared with its line after it is moved down by the tolerance, as x - b with b = fl(o + d). Its
+!>    distance from b, rounded to single precision, has an error below 2.1 u |x - b|; b has an error below u L, since L
+!>    includes |o| times the ratio of the roundoffs of coordinates and lines.
+!>  * The line fl(p + fl(v s)) has an error below 1.01 u (2 L).
+!>  * A side whose computed distance from it lies between -2 d and 0 is less than d plus these errors from p + v s. With
+!>    |x - b| < 1.02 L + d the sum is less than d + 5.4 u L. So a gap of two boxes is less than 2 d + 10.8 u L from
+!>    g(s).
 !>  * The gaps between lines at step s are computed as fl(fl(p_a - p_b) + fl(fl(v_a - v_b) s)), with an error of less
 !>    than 8.3 u L.
 !>
@@ -57,7 +59,7 @@ module polydem_line_filter
    !> Length of the first interval, which measures velocities [steps]
    integer(ip), parameter :: first_interval = 2_ip
    !> Number of times that a box may leave its lines in an interval before it is off
-   integer(bp), parameter :: often = 4_bp
+   integer(bp), parameter :: often = 6_bp
 
    !> Lines of all boxes, and active candidates
    type, extends(box_lines_t) :: line_filter_t

@@ -47,26 +47,26 @@ contains
       !> The list
       integer(ip), intent(out) :: off(range(2) - range(1) + 2_ip)
       real(wp) :: base(n_joined)
-      ! Bits of the distances of the sides of a block from their lines moved up
+      ! Bits of the distances of the sides of a block, moved down, from their lines
       integer(bits) :: below(n_sides), joined(n_joined), least
       integer(ip) :: from, to, sides, k, l
 
       n_off = 0_ip
       below = 0_bits
-      base = [origin, origin, origin, origin]
+      ! Each side is moved down by the tolerance and compared with its line. On its line it is between zero and two
+      ! tolerances below. The bits of such negative numbers, as integers, are below those of all others. Zero itself is
+      ! accepted when the boxes are looked at one by one.
+      base = [origin, origin, origin, origin] + real(tolerance, wp)
       least = transfer(-2.0_sp*tolerance, least)
       do from = range(1), range(2), box_block
          to = min(from + box_block - 1_ip, range(2))
          sides = 4_ip*(from - 1_ip)
          if (to - from == box_block - 1_ip) then
-            ! Each side is compared with its line moved up by the tolerance. On its line it is between zero and two
-            ! tolerances below. The bits of such negative numbers, as integers, are below those of all others. Zero
-            ! itself is accepted when the boxes are looked at one by one.
             joined = -huge(joined) - 1_bits
             do k = 0_ip, n_sides - n_joined, n_joined
                do l = 1_ip, n_joined
                   below(k + l) = transfer(real(bounds(sides + k + l) - base(l), sp) - &
-                                          (place(sides + k + l) + (speed(sides + k + l)*step + tolerance)), least)
+                                          (place(sides + k + l) + speed(sides + k + l)*step), least)
                   joined(l) = max(joined(l), below(k + l))
                end do
             end do
@@ -75,7 +75,7 @@ contains
             do k = 0_ip, 4_ip*(to - from), 4_ip
                do l = 1_ip, 4_ip
                   below(k + l) = transfer(real(bounds(sides + k + l) - base(l), sp) - &
-                                          (place(sides + k + l) + (speed(sides + k + l)*step + tolerance)), least)
+                                          (place(sides + k + l) + speed(sides + k + l)*step), least)
                end do
             end do
          end if
@@ -87,7 +87,7 @@ contains
    pure subroutine append_off(from, to, below, least, n_off, off)
       !> First and last box
       integer(ip), intent(in) :: from, to
-      !> Bits of the distances of all sides from their lines moved up by the tolerance, and of the least one on a line
+      !> Bits of the distances of all sides, moved down, from their lines, and of the least one on a line
       integer(bits), intent(in) :: below(n_sides), least
       !> Number of boxes in the list
       integer(ip), intent(inout) :: n_off

@@ -189,12 +189,9 @@ contains
       class(parallel_filter_t), intent(in) :: self
       class(candidates_t), intent(in) :: candidates
       type(worker_t), intent(inout) :: worker
-      integer(ip) :: k
 
       worker%asked%n = 0_ip
-      do k = 1_ip, worker%left%n
-         call candidates%append_candidates_of(worker%left%at(k), worker%asked)
-      end do
+      call candidates%append_candidates_of_all(worker%left, worker%asked)
       call self%review(candidates, worker%asked, worker%n_reviewed)
    end subroutine review_part
 
