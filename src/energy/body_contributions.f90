@@ -96,13 +96,15 @@ contains
       wall_channels(6) = wall_channels(6) + weight*abs(torque)
    end subroutine add_wall
 
-   !> Add the action of fixed bodies on free ones to the channels, and their share of the elastic energy.
-   pure subroutine add_walls(bodies, walls, weight, channels, wall_channels, energy)
+   !> Add the action of fixed bodies on some free ones to the channels, and their share of the elastic energy.
+   pure subroutine add_walls(bodies, walls, weight, first, last, channels, wall_channels, energy)
       type(bodies_t), intent(in) :: bodies
       !> Contacts with fixed bodies
       type(wall_terms_t), intent(in) :: walls
       !> Factor of all that is added to the channels
       real(wp), intent(in) :: weight
+      !> First and last slot of the free bodies
+      integer(ip), intent(in) :: first, last
       !> Channels of all bodies, (n_channels, slot)
       real(wp), intent(inout) :: channels(:, :)
       !> Wall channels of all bodies, (n_wall_channels, slot)
@@ -113,6 +115,7 @@ contains
 
       do c = 1_ip, walls%n
          associate (wall => walls%slots(1, c), body => walls%slots(2, c))
+            if (body < first .or. body > last) cycle
             call add_wall(bodies, wall, walls%term(:, c), weight, channels(:, body), wall_channels(:, body))
             if (present(energy)) energy(body) = energy(body) + walls%term(sum_energy, c)
          end associate

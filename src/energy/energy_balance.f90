@@ -32,13 +32,13 @@ module polydem_energy_balance
    implicit none
    private
    public :: energy_balance_t, balance_t, start_energy_balance, accumulate_bodies, &
-      accumulate_walls, evaluate_balance, serialize_balance, serialize_contributions
+      accumulate_walls, count_step, evaluate_balance, serialize_balance, serialize_contributions
 
    !> Running sums of the energy and momentum balance, and its values at the start
    type :: energy_balance_t
       !> Energy scale of the residual: largest kinetic energy or work of a channel so far [J/m]
       real(wp) :: energy_scale = 0.0_wp
-      !> Whether bodies and contacts are those of the last accumulated step. `accumulate_walls` sets it. The caller must
+      !> Whether bodies and contacts are those of the last accumulated step. `count_step` sets it. The caller must
       !> clear it when a step begins; the last rates then have full weight, as is right in the middle of a step
       logical :: is_current = .false.
       !> Sums over steps of the powers of forces on each body, (n_channels, slot); not allocated without a balance [W/m]
@@ -120,7 +120,7 @@ contains
 
       call allocate_channels(sums, bodies%n)
       call accumulate_bodies(sums, 0.5_wp, gravity, bodies, forces, 1_ip, bodies%n)
-      call add_walls(bodies, walls, 0.5_wp, sums%power_sum, sums%wall_sum)
+      call add_walls(bodies, walls, 0.5_wp, 1_ip, bodies%n, sums%power_sum, sums%wall_sum)
       sums%is_current = .true.
       total = totals(sums, comm, gravity, bodies, forces, walls)
       sums%energy_scale = total(1)
@@ -152,19 +152,29 @@ contains
       end do
    end subroutine accumulate_bodies
 
-   !> Accumulate the action of fixed bodies in one step, after the rates of all bodies of this step.
-   subroutine accumulate_walls(sums, bodies, walls)
-      !> Running sums
+   !> Accumulate the action of fixed bodies on some bodies in one step, after the rates of these bodies. Several threads
+   !> may call it for different bodies.
+   pure subroutine accumulate_walls(sums, bodies, walls, first, last)
+      !> Running sums; only those of these bodies change
       type(energy_balance_t), intent(inout) :: sums
       !> Bodies at the end of this step
       type(bodies_t), intent(in) :: bodies
       !> Contacts with fixed bodies
       type(wall_terms_t), intent(in) :: walls
+      !> First and last slot
+      integer(ip), intent(in) :: first, last
 
-      call add_walls(bodies, walls, 1.0_wp, sums%power_sum, sums%wall_sum)
+      call add_walls(bodies, walls, 1.0_wp, first, last, sums%power_sum, sums%wall_sum)
+   end subroutine accumulate_walls
+
+   !> Count a step of which the rates of all bodies and the action of fixed bodies are accumulated.
+   pure subroutine count_step(sums)
+      !> Running sums
+      type(energy_balance_t), intent(inout) :: sums
+
       sums%steps = sums%steps + 1_lp
       sums%is_current = .true.
-   end subroutine accumulate_walls
+   end subroutine count_step
 
    !> Evaluate all terms and residuals. Collective.
    subroutine evaluate_balance(sums, comm, dt, gravity, bodies, forces, walls, balance)
@@ -298,7 +308,7 @@ contains
       energy = forces%value(sum_energy, :)
       if (sums%is_current) then
          call accumulate_bodies(now, -0.5_wp, gravity, bodies, forces, 1_ip, bodies%n)
-         call add_walls(bodies, walls, -0.5_wp, now%power_sum, now%wall_sum, energy)
+         call add_walls(bodies, walls, -0.5_wp, 1_ip, bodies%n, now%power_sum, now%wall_sum, energy)
       end if
       if (.not. walls%energy_is_quadratic) energy = 0.0_wp
       n = size(bodies%free, kind=ip)

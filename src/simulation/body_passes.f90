@@ -6,7 +6,7 @@ module polydem_body_passes
    use polydem_bodies, only: block_size
    use polydem_box_maker, only: have_boxes_within, turn_and_bound_block
    use polydem_clock, only: wall_seconds
-   use polydem_energy_balance, only: accumulate_bodies, accumulate_walls
+   use polydem_energy_balance, only: accumulate_bodies, accumulate_walls, count_step
    use polydem_errors, only: error_t
    use polydem_force_sums, only: find_forces, total_forces
    use polydem_guards, only: check_motion, check_poses, have_valid_poses, move_within_limit
@@ -155,7 +155,7 @@ contains
       done = 0_ip
       if (n > 0_ip) done = self%bodies%free(n)
       call total_forces(self%settings%forces%gravity, self%force_sums, done + 1_ip, self%bodies%n, self%bodies)
-      if (self%settings%output%energy_balance) call accumulate_walls(self%energy_balance, self%bodies, self%walk%walls)
+      if (self%settings%output%energy_balance) call count_step(self%energy_balance)
       do k = n + 1_ip, size(self%guard%moving, kind=ip)
          good = good .and. move_within_limit(self%guard, self%bodies, self%guard%moving(k), self%guard%moving(k), &
                                              self%dt)
@@ -172,6 +172,7 @@ contains
       logical, intent(inout) :: good
       integer(ip) :: k, end_of_block, next, done, first, last
 
+      if (high < low) return
       do k = low, high, block_size
          end_of_block = min(k + block_size - 1_ip, high)
          done = 0_ip
@@ -185,6 +186,9 @@ contains
             done = last
          end do
       end do
+      if (.not. self%settings%output%energy_balance) return
+      call accumulate_walls(self%energy_balance, self%bodies, self%walk%walls, self%bodies%free(low), &
+                            self%bodies%free(high))
    end subroutine complete_part
 
    !> Compute final velocities of a run of free bodies, and accumulate their energy balance.

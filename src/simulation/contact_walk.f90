@@ -37,7 +37,7 @@ contains
       !> Share of the time spent in the search for overlaps, in a walk of which some blocks were timed
       real(dp), intent(out) :: overlap_share
       integer(ip) :: ends(0:most_ranges), last(0:most_ranges)
-      integer(ip) :: n, r, k, low, high
+      integer(ip) :: n, r, k
 
       associate (pairs => self%neighbours%pairs)
          n = min(int(omp_get_max_threads(), ip), most_ranges)
@@ -50,20 +50,18 @@ contains
          last(n) = self%bodies%n
       end associate
       call reserve_sums(self%bodies%n, self%force_sums)
-      !$omp parallel num_threads(n) default(none) shared(self, dt, ends, last, n) private(r, k, low, high)
+      !$omp parallel num_threads(n) default(none) shared(self, dt, ends, last, n) private(r, k)
       !$omp do schedule(static, 1)
       do r = 1_ip, n
          call walk_range(self, dt, r, ends(r - 1_ip:r), last(r - 1_ip:r))
       end do
       !$omp end do
-      ! Bodies beyond the first range share their late terms out evenly.
       !$omp do schedule(static, 1)
       do k = 1_ip, n
-         low = last(1) + share_of(self%bodies%n - last(1), k - 1_ip, n) + 1_ip
-         high = last(1) + share_of(self%bodies%n - last(1), k, n)
          do r = n - 1_ip, 1_ip, -1_ip
-            call add_late_terms(self%walk%ranges(r)%late, low, high, self%force_sums)
+            call add_late_terms(self%walk%ranges(r)%late, k, n, self%force_sums)
          end do
+         if (k == n) call join_walls(self%walk%walls_of(:n), self%walk%walls)
       end do
       !$omp end do nowait
       !$omp end parallel
@@ -75,13 +73,6 @@ contains
          if (sum(seconds) > 0.0_dp) overlap_share = seconds(1)/sum(seconds)
       end associate
    end subroutine walk_contacts
-
-   !> Number of n items before part k + 1 of n_parts
-   pure integer(ip) function share_of(n, k, n_parts)
-      integer(ip), intent(in) :: n, k, n_parts
-
-      share_of = int(int(n, lp)*int(k, lp)/int(n_parts, lp), ip)
-   end function share_of
 
    !> Make room for the results of n ranges.
    subroutine reserve_ranges(n, walk)
@@ -222,7 +213,6 @@ contains
          if (self%keeps_contacts) call gather_rows(walk%all_of(:n), self%contacts)
          ! Most tables are for a frame. Then the memory of the rows serves better elsewhere.
          if (self%keeps_contacts .and. .not. allocated(self%law%constraint)) call release_rows(walk%all_of)
-         call join_walls(walk%walls_of(:n), walk%walls)
          call gather_rows(walk%suspects_of(:n), walk%suspects)
       end associate
       associate (suspects => self%walk%suspects)

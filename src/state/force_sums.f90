@@ -26,6 +26,8 @@ module polydem_force_sums
    integer, parameter :: sum_x(3) = [1, 3, 5], sum_y(3) = [2, 4, 6], sum_torque(3) = [7, 8, 9], sum_energy = 10
    !> Number of rows
    integer, parameter :: n_terms = 10
+   !> Number of bodies in a group for late terms
+   integer(ip), parameter :: group = 16_ip
 
    !> Sums of all bodies
    type :: force_sums_t
@@ -259,19 +261,20 @@ contains
       list%term(:, list%n) = term
    end subroutine append_term
 
-   !> Add late terms to the sums of some bodies, in the order of the terms.
-   pure subroutine add_late_terms(late, low, high, sums)
+   !> Add late terms to the sums of a share of the bodies, in the order of the terms. Bodies with late terms lie close
+   !> together. Threads therefore take turns in groups of bodies, whose sums fill whole cache lines.
+   pure subroutine add_late_terms(late, k, n, sums)
       !> Late terms of one thread
       type(term_list_t), intent(in) :: late
-      !> First and last slot whose sums may change
-      integer(ip), intent(in) :: low, high
+      !> The share, from 1, and the number of shares
+      integer(ip), intent(in) :: k, n
       type(force_sums_t), intent(inout) :: sums
-      integer(ip) :: k
+      integer(ip) :: t
 
-      do k = 1_ip, late%n
-         associate (s => late%slots(1, k))
-            if (s < low .or. s > high) cycle
-            sums%value(:, s) = sums%value(:, s) + late%term(:, k)
+      do t = 1_ip, late%n
+         associate (s => late%slots(1, t))
+            if (mod(s/group, n) /= k - 1_ip) cycle
+            sums%value(:, s) = sums%value(:, s) + late%term(:, t)
             sums%has_terms(s) = .true.
          end associate
       end do
