@@ -23,8 +23,8 @@ module polydem_box_maker
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: box_maker_t, new_box_maker, turn_and_bound, turn_and_bound_block, update_boxes, have_boxes_within, &
-      diameters_of
+   public :: box_maker_t, new_box_maker, turn_and_bound, turn_and_bound_block, bound_body, update_boxes, &
+      have_boxes_within, diameters_of
 
    !> Allowance for rounding, in units of epsilon times the diameter of a body
    real(wp), parameter :: roundings = 64.0_wp

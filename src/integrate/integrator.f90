@@ -17,6 +17,9 @@ module polydem_integrator
    type, abstract :: integrator_t
       !> Whether the scheme starts from the forces at time 0; otherwise it starts from gravity alone
       logical :: starts_from_forces = .true.
+      !> Whether the prediction of a body without acceleration is final if no force acts on it: `correct` would change
+      !> no bit
+      logical :: coasts_exactly = .false.
    contains
       !> Prepare for bodies whose accelerations are known
       procedure(start), deferred :: start

@@ -27,6 +27,7 @@ contains
             allocate (compensated_verlet_t :: integrator)
          else
             allocate (velocity_verlet_t :: integrator)
+            integrator%coasts_exactly = .true.
          end if
       end select
    end subroutine new_integrator

@@ -72,7 +72,7 @@ contains
       allocate (self%finder, source=finder)
       self%n_boxes = boxes%n
       self%n_bodies = boxes%n_bodies
-      call self%pairs%start(boxes%one_to_one)
+      call self%pairs%start(boxes%one_to_one, boxes%n_bodies)
    end subroutine start_neighbours
 
    !> Update the list of pairs to the boxes of a step.
@@ -100,7 +100,7 @@ contains
          call self%finder%work%start()
          self%n_boxes = boxes%n
          self%n_bodies = boxes%n_bodies
-         call self%pairs%forget(boxes%one_to_one)
+         call self%pairs%forget(boxes%one_to_one, boxes%n_bodies)
       end if
       call self%changes%clear()
       call self%finder%find(boxes, self%changes)

@@ -29,6 +29,12 @@ module polydem_pair_list
       integer(ip) :: n_ended = 0_ip
       !> Their indices in the previous list, ascending
       integer(ip), allocatable :: ended(:)
+      !> Number of pairs of each body, (slot)
+      integer(ip), allocatable :: pairs_of(:)
+      !> Number of bodies without a pair, or whose pairs all ended in the last step, of which a pair began in that step
+      integer(ip) :: n_joined = 0_ip
+      !> Their slots, each once; may be longer than `n_joined`
+      integer(ip), allocatable :: joined(:)
       !> Number of changes so far that contradict the list; greater than 0 only if a finder broke its contract
       integer(lp) :: contradictions = 0_lp
       !> Number of overlapping pairs of boxes of each pair; all 1, and not stored, if every body has one box
@@ -55,13 +61,18 @@ module polydem_pair_list
 contains
 
    !> Start with an empty list.
-   pure subroutine start(self, one_to_one)
+   pure subroutine start(self, one_to_one, n_bodies)
       class(pair_list_t), intent(inout) :: self
       !> Whether every body has one box; then overlaps of boxes need not be counted
       logical, intent(in) :: one_to_one
+      !> Number of bodies
+      integer(ip), intent(in) :: n_bodies
 
+      if (allocated(self%pairs_of)) deallocate (self%pairs_of)
+      allocate (self%pairs_of(n_bodies), source=0_ip)
       self%n = 0_ip
       self%n_began = 0_ip
+      self%n_joined = 0_ip
       self%n_ended = 0_ip
       self%n_blocks = 0_ip
       self%n_forgotten = 0_ip
@@ -74,16 +85,18 @@ contains
    end subroutine start
 
    !> Empty the list, because the set of bodies has changed. The next `apply` reports all its pairs as ended.
-   pure subroutine forget(self, one_to_one)
+   pure subroutine forget(self, one_to_one, n_bodies)
       class(pair_list_t), intent(inout) :: self
       !> Whether every body has one box
       logical, intent(in) :: one_to_one
+      !> Number of bodies
+      integer(ip), intent(in) :: n_bodies
       integer(ip) :: n
       integer(lp) :: contradictions
 
       n = self%n
       contradictions = self%contradictions
-      call self%start(one_to_one)
+      call self%start(one_to_one, n_bodies)
       self%n_forgotten = n
       self%contradictions = contradictions
    end subroutine forget
@@ -98,6 +111,7 @@ contains
 
       self%n_began = 0_ip
       self%n_ended = 0_ip
+      self%n_joined = 0_ip
       self%n_blocks = 0_ip
       if (self%n_forgotten > 0_ip) call end_forgotten(self)
       if (changes%n == 0_ip) return
@@ -116,6 +130,8 @@ contains
          key = changes%key(self%cause(k))
          self%first(place) = int(shiftr(key, 32), ip)
          self%second(place) = int(iand(key, int(huge(1_ip), lp)), ip)
+         call join(self, self%first(place))
+         call join(self, self%second(place))
          if (self%counted) self%overlaps(place) = changes%step(self%cause(k))
       end do
    end subroutine apply
@@ -142,6 +158,8 @@ contains
             self%overlaps(place) = overlaps
          else if (listed) then
             call add_block(self, low, place - 1_ip, displacement)
+            self%pairs_of(self%first(place)) = self%pairs_of(self%first(place)) - 1_ip
+            self%pairs_of(self%second(place)) = self%pairs_of(self%second(place)) - 1_ip
             self%n_ended = self%n_ended + 1_ip
             self%ended(self%n_ended) = place
             low = place + 1_ip
@@ -158,6 +176,18 @@ contains
       call add_block(self, low, self%n, displacement)
       self%n = self%n + displacement
    end subroutine plan
+
+   !> Count a pair of a body that begins.
+   pure subroutine join(self, body)
+      type(pair_list_t), intent(inout) :: self
+      integer(ip), intent(in) :: body
+
+      if (self%pairs_of(body) == 0_ip) then
+         self%n_joined = self%n_joined + 1_ip
+         self%joined(self%n_joined) = body
+      end if
+      self%pairs_of(body) = self%pairs_of(body) + 1_ip
+   end subroutine join
 
    !> Least index, not below `from`, of a pair whose key is not below `key`
    pure integer(ip) function place_of(self, key, from)
@@ -304,6 +334,7 @@ contains
       call resize(self%began, n)
       call resize(self%ended, n)
       call resize(self%cause, n)
+      call resize(self%joined, 2_ip*n)
       if (allocated(self%block)) then
          if (size(self%block, 2) > n) return
          deallocate (self%block)

@@ -8,8 +8,9 @@ module polydem_body_passes
    use polydem_clock, only: wall_seconds
    use polydem_energy_balance, only: accumulate_bodies, accumulate_walls, count_step
    use polydem_errors, only: error_t
+   use polydem_extreme_corners, only: bound_block
    use polydem_force_sums, only: find_forces, total_forces
-   use polydem_guards, only: check_motion, check_poses, have_valid_poses, move_within_limit
+   use polydem_guards, only: check_motion, check_poses, find_coasting, have_valid_poses, move_within_limit
    use polydem_kinds, only: dp, ip, wp, min_parallel_size
    use polydem_prescribed_motion, only: move_bodies
    use polydem_simulation, only: simulation_t, time_of
@@ -59,7 +60,7 @@ contains
    subroutine predict_list(self, list, good, seconds)
       type(simulation_t), intent(inout) :: self
       !> Slots of the bodies, ascending
-      integer(ip), intent(in) :: list(:)
+      integer(ip), intent(in), contiguous :: list(:)
       !> Becomes false if a body has an invalid pose
       logical, intent(inout) :: good
       !> Time of the prediction, and of vertices and boxes, in the timed blocks [s]
@@ -85,7 +86,7 @@ contains
    subroutine predict_part(self, slots, is_first, good, has_left, seconds)
       type(simulation_t), intent(inout) :: self
       !> Slots of the bodies, ascending
-      integer(ip), intent(in) :: slots(:)
+      integer(ip), intent(in), contiguous :: slots(:)
       !> Whether this is the part of the first thread, of which some blocks are timed
       logical, intent(in) :: is_first
       !> Becomes false if a body has an invalid pose
@@ -108,10 +109,16 @@ contains
             call find_run(slots, end_of_block, next, first, last)
             call self%integrator%predict(self%dt, first, last, self%bodies)
             valid = valid .and. have_valid_poses(self%bodies, first, last)
+            if (self%skips_coasting) call find_coasting(self%guard, self%bodies, first, last, self%dt, self%coasts)
          end do
          if (timed) clock(2) = wall_seconds()
          if (valid) then
-            call turn_and_bound_block(self%maker, slots(k:end_of_block), self%isa, self%bodies, self%boxes)
+            if (self%is_weightless) then
+               call bound_block(self%extreme_corners, self%maker, slots(k:end_of_block), &
+                                self%neighbours%pairs%pairs_of, self%isa, self%bodies, self%boxes)
+            else
+               call turn_and_bound_block(self%maker, slots(k:end_of_block), self%isa, self%bodies, self%boxes)
+            end if
             if (allocated(self%domain%reference)) has_left = has_left .or. .not. &
                have_boxes_within(self%maker, slots(k:end_of_block), self%boxes, self%domain%reference)
          end if
@@ -170,7 +177,7 @@ contains
       integer(ip), intent(in) :: low, high
       !> Becomes false if a body moves too far
       logical, intent(inout) :: good
-      integer(ip) :: k, end_of_block, next, done, first, last
+      integer(ip) :: k, end_of_block, next, done, first, last, n_chosen, chosen(block_size)
 
       if (high < low) return
       do k = low, high, block_size
@@ -181,9 +188,16 @@ contains
          do while (next <= end_of_block)
             call find_run(self%bodies%free, end_of_block, next, first, last)
             call total_forces(self%settings%forces%gravity, self%force_sums, done + 1_ip, first - 1_ip, self%bodies)
-            call complete_run(self, first, last)
-            good = good .and. move_within_limit(self%guard, self%bodies, first, last, self%dt)
             done = last
+            if (.not. self%skips_coasting) call complete_run(self, first, last, good)
+         end do
+         if (.not. self%skips_coasting) cycle
+         call choose_accelerated(end_of_block - k + 1_ip, self%bodies%free(k:end_of_block), self%coasts, &
+                                 self%force_sums%has_terms, n_chosen, chosen)
+         next = 1_ip
+         do while (next <= n_chosen)
+            call find_run(chosen, n_chosen, next, first, last)
+            call complete_run(self, first, last, good)
          end do
       end do
       if (.not. self%settings%output%energy_balance) return
@@ -191,11 +205,34 @@ contains
                             self%bodies%free(high))
    end subroutine complete_part
 
-   !> Compute final velocities of a run of free bodies, and accumulate their energy balance.
-   subroutine complete_run(self, first, last)
+   !> List the bodies that do not coast.
+   pure subroutine choose_accelerated(n, slots, coasts, has_terms, n_chosen, chosen)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> Their slots
+      integer(ip), intent(in) :: slots(n)
+      !> Whether a body coasts unless a force acts on it, and whether one does, (slot)
+      logical, intent(in), contiguous :: coasts(:), has_terms(:)
+      !> Number and slots of the bodies that do not coast
+      integer(ip), intent(out) :: n_chosen
+      integer(ip), intent(inout) :: chosen(block_size)
+      integer(ip) :: k
+
+      n_chosen = 0_ip
+      do k = 1_ip, n
+         if (coasts(slots(k)) .and. .not. has_terms(slots(k))) cycle
+         n_chosen = n_chosen + 1_ip
+         chosen(n_chosen) = slots(k)
+      end do
+   end subroutine choose_accelerated
+
+   !> Compute final velocities of a run of free bodies, accumulate their energy balance, and check their motion.
+   subroutine complete_run(self, first, last, good)
       type(simulation_t), intent(inout) :: self
       !> First and last slot, at most `block_size` bodies
       integer(ip), intent(in) :: first, last
+      !> Becomes false if a body moves too far
+      logical, intent(inout) :: good
       real(wp) :: force(3, block_size)
 
       associate (bodies => self%bodies, gravity => self%settings%forces%gravity, sums => self%force_sums)
@@ -204,6 +241,7 @@ contains
          if (self%settings%output%energy_balance) &
             call accumulate_bodies(self%energy_balance, 1.0_wp, gravity, bodies, sums, first, last)
       end associate
+      good = good .and. move_within_limit(self%guard, self%bodies, first, last, self%dt)
    end subroutine complete_run
 
    !> Set the total forces on all bodies at the end of a step, if only those on fixed bodies are known.

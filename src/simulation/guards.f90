@@ -11,8 +11,8 @@ module polydem_guards
    use polydem_warning, only: warning_t
    implicit none
    private
-   public :: motion_guard_t, new_motion_guard, have_valid_poses, check_poses, move_within_limit, check_motion, &
-      check_step, check_contacts, place_of, greatest_displacement
+   public :: motion_guard_t, new_motion_guard, have_valid_poses, check_poses, move_within_limit, find_coasting, &
+      check_motion, check_step, check_contacts, place_of, greatest_displacement
 
    !> Guard of the displacement of bodies per step
    type :: motion_guard_t
@@ -119,6 +119,26 @@ contains
       end do
       move_within_limit = n_beyond == 0_ip
    end function move_within_limit
+
+   !> Find which bodies of a run coast unless a force acts on them: they have no acceleration, and do not move too far.
+   !> Several threads may call it for different runs.
+   pure subroutine find_coasting(guard, bodies, first, last, dt, coasts)
+      type(motion_guard_t), intent(in) :: guard
+      !> Bodies in the middle of a step
+      type(bodies_t), intent(in) :: bodies
+      !> First and last slot
+      integer(ip), intent(in) :: first, last
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Whether a body coasts, (slot); those of the run are set
+      logical, intent(inout), contiguous :: coasts(:)
+      integer(ip) :: s
+
+      do s = first, last
+         coasts(s) = max(abs(bodies%acceleration(1, s)), abs(bodies%acceleration(2, s)), &
+                         abs(bodies%angular_acceleration(s))) <= 0.0_wp .and. move_of(bodies, s, dt) <= guard%limit
+      end do
+   end subroutine find_coasting
 
    !> Stop if the state of a body is not finite. Stop or warn if a body moves too far in a step.
    subroutine check_motion(guard, bodies, step, dt, error)

@@ -5,6 +5,7 @@ module polydem_local_bodies
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_errors, only: error_t
+   use polydem_extreme_corners, only: forget_corners
    use polydem_finder_statistics, only: finder_statistics_t
    use polydem_force_law, only: force_law_t, new_force_law
    use polydem_force_sums, only: start_sums
@@ -36,6 +37,10 @@ contains
       self%n_contacts = 0_ip
       self%walk%passing_pair = 0_ip
       call start_sums(self%bodies%n, self%force_sums)
+      self%is_weightless = .not. any(abs(self%settings%forces%gravity) > 0.0_wp)
+      if (self%is_weightless) call forget_corners(self%extreme_corners, self%bodies%n)
+      self%skips_coasting = self%is_weightless .and. self%integrator%coasts_exactly
+      self%coasts = spread(.false., 1, self%bodies%n)
       self%walk%incidence = incidence_t()
       call list_moving(self)
       call rebuild_guard(self)

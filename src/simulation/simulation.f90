@@ -8,6 +8,7 @@ module polydem_simulation
    use polydem_contacts, only: contacts_t
    use polydem_domain, only: domain_t
    use polydem_energy_balance, only: energy_balance_t, evaluate_balance, balance_t
+   use polydem_extreme_corners, only: extreme_corners_t
    use polydem_force_law, only: force_law_t
    use polydem_force_sums, only: force_sums_t
    use polydem_guards, only: motion_guard_t
@@ -98,6 +99,15 @@ module polydem_simulation
       type(motion_guard_t) :: guard
       !> Summary of the relaxation before time 0
       type(relaxation_t) :: relaxation
+      !> Whether there is no gravity. Then bodies often fly alone, and need neither turned vertices nor a correction
+      logical :: is_weightless = .false.
+      !> Extreme corners of the bodies, if `is_weightless`
+      type(extreme_corners_t) :: extreme_corners
+      !> Whether bodies that coast are not corrected: there is no gravity, and they coast exactly
+      logical :: skips_coasting = .false.
+      !> Whether a body coasts in this step unless a force acts on it, (slot); if bodies have been exchanged since the
+      !> prediction, false
+      logical, allocatable :: coasts(:)
       !> Slots that may move: free bodies, then bodies with prescribed motion, then halo bodies
       integer(ip), allocatable :: moving(:)
       !> Sums over all steps, (`sum_contacts` to `sum_degenerate`)

@@ -120,6 +120,11 @@ contains
                     'program error; use finder all_pairs instead')
          return
       end if
+      associate (pairs => self%neighbours%pairs)
+         ! Other bodies with pairs are turned already.
+         if (self%is_weightless .and. pairs%n_joined > 0_ip) &
+            call turn_bodies(self%bodies, pairs%joined(:pairs%n_joined), self%isa)
+      end associate
       call carry_history(self)
       call restore_history(self)
       call self%timers%lap(stage_neighbours)

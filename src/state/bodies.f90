@@ -19,7 +19,8 @@ module polydem_bodies
    use polydem_polygon, only: greatest_radius
    implicit none
    private
-   public :: bodies_t, allocate_bodies, turn_bodies, turn_block, block_size, measure_radii, state_hash, state_words
+   public :: bodies_t, allocate_bodies, turn_bodies, turn_block, find_directions, block_size, measure_radii, &
+      state_hash, state_words
 
    !> Greatest number of bodies of a block for `turn_block`
    integer(ip), parameter :: block_size = 64_ip
@@ -141,6 +142,26 @@ contains
       real(wp), intent(out) :: extent(4, block_size)
       !> Cosine and sine of the angle of each body, (2, body)
       real(wp), intent(out) :: direction(2, block_size)
+      integer(ip) :: k
+
+      call find_directions(bodies, slots, isa, direction)
+      do k = 1_ip, size(slots, kind=ip)
+         associate (first => bodies%vertex_start(slots(k)), last => bodies%vertex_start(slots(k) + 1_ip) - 1_ip)
+            call turn_vertices(last - first + 1_ip, bodies%shape(:, first:last), direction(1, k), direction(2, k), &
+                               bodies%turned(:, first:last), extent(:, k))
+         end associate
+      end do
+   end subroutine turn_block
+
+   !> Find cosine and sine of the angles of up to `block_size` bodies.
+   subroutine find_directions(bodies, slots, isa, direction)
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Instruction set of the kernels
+      integer, intent(in) :: isa
+      !> Cosine and sine of the angle of each body, (2, body)
+      real(wp), intent(out) :: direction(2, block_size)
       real(wp) :: angle(block_size), cosine(block_size), sine(block_size)
       integer(ip) :: k, n
 
@@ -151,12 +172,8 @@ contains
       call sines_and_cosines(isa, angle(1:n), sine(1:n), cosine(1:n))
       do k = 1_ip, n
          direction(:, k) = [cosine(k), sine(k)]
-         associate (first => bodies%vertex_start(slots(k)), last => bodies%vertex_start(slots(k) + 1_ip) - 1_ip)
-            call turn_vertices(last - first + 1_ip, bodies%shape(:, first:last), cosine(k), sine(k), &
-                               bodies%turned(:, first:last), extent(:, k))
-         end associate
       end do
-   end subroutine turn_block
+   end subroutine find_directions
 
    !> Turn vertices, and find their extent.
    pure subroutine turn_vertices(n, vertex, cosine, sine, turned, extent)
