@@ -112,7 +112,7 @@ contains
          known = maker%pieces%n
          fits = .true.
          ! A body of small radius is small enough for certain.
-         if (2.0_wp*bodies%radius(s)*(1.0_wp + roundings*epsilon(1.0_wp)) > largest_ratio*maker%median_diameter) &
+         if (2.0_wp*bodies%radius(s)*(1.0_wp + roundings*epsilon(1.0_wp))/maker%median_diameter > largest_ratio) &
             call cut_body(body_shape(bodies, s), maker%median_diameter, largest_ratio, room, maker%pieces, fits)
          n_pieces = maker%pieces%n - known
          if (.not. fits) then

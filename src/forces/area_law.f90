@@ -95,6 +95,7 @@ contains
    !>
    !> The length l = 4 r1 r2/(r1 + r2) contains the distances of the two centres from the centroid of the overlap, which
    !> is d/2 inside either body. l depends weakly on the depth d, so a few fixed-point iterations converge to rounding.
+   !> A block that is too heavy for this sinks deeper than its height.
    real(wp) function static_depth(self, block) result(depth)
       class(area_law_t), intent(in) :: self
       type(resting_block_t), intent(in) :: block
@@ -106,6 +107,7 @@ contains
          r1 = 0.5_wp*(block%height - depth)
          r2 = hypotenuse(0.5_wp*(block%support_height - depth), block%offset)
          depth = block%load/(self%stiffness*block%width)*4.0_wp*r1*r2/(r1 + r2)
+         if (.not. depth < block%height) return
       end do
    end function static_depth
 

@@ -64,8 +64,8 @@ contains
       call file%open(path, error)
       if (allocated(error)) return
       if (present(most_steps)) trace%n_steps = most_steps
-      if (.not. file%has('/aabb')) call file%reject('the file is not a trace: it has no data set /aabb with the boxes '// &
-         'of each step. A run with trace_steps in &output writes one, trace.h5', error)
+      if (.not. file%has('/aabb')) call file%reject('the file is not a trace: it has no data set /aabb with the '// &
+         'boxes of each step. A run with trace_steps in &output writes one, trace.h5', error)
       if (.not. allocated(error)) call read_boxes(file, trace, error)
       if (.not. allocated(error)) call read_bodies(file, trace, error)
       if (.not. allocated(error)) call read_numbers(file, trace, error)

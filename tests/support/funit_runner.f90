@@ -1,6 +1,7 @@
 !> Runs tests and reports them in pFUnit's words; unlike pFUnit, failures give a non-zero exit code, and
 !> so do unknown options and a filter that matches nothing.
 module funit_runner
+   use, intrinsic :: ieee_arithmetic, only: ieee_all, ieee_get_halting_mode, ieee_set_halting_mode
    use, intrinsic :: iso_fortran_env, only: output_unit
    use funit_exceptions, only: anyExceptions, clear, pending
    implicit none
@@ -159,12 +160,15 @@ contains
       stop misuse
    end subroutine abort_all
 
-   !> Before, test and after; after also if the test failed, neither if before did.
+   !> Before, test and after; after also if the test failed, neither if before did. A test may switch off that invalid
+   !> operations end the program.
    subroutine run_test(test, unit, verbose, quiet)
       type(test_t), intent(inout) :: test
       integer, intent(in) :: unit
       logical, intent(in) :: verbose, quiet
+      logical :: halting(size(ieee_all))
 
+      call ieee_get_halting_mode(ieee_all, halting)
       call clear()
       if (verbose .and. .not. quiet) then
          write (unit, '(a)') 'Start: <'//full_name(test)//'>'
@@ -175,6 +179,7 @@ contains
          call test%run()
          if (associated(test%after)) call test%after()
       end if
+      call ieee_set_halting_mode(ieee_all, halting)
       test%failures = pending()
       if (quiet) return
       if (verbose) then
