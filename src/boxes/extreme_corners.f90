@@ -17,9 +17,6 @@ module polydem_extreme_corners
    !> Allowance for rounding, in units of epsilon times the radius of a body
    real(wp), parameter :: roundings = 64.0_wp
 
-   !> If more than one of so many bodies of a block have pairs, all are turned: memory is read fastest in sequence
-   integer(ip), parameter :: dilution = 4_ip
-
    !> Extreme corners of a body; none are known at first
    type :: known_corners_t
       !> Least and greatest angle at which they are known [rad]
@@ -70,10 +67,6 @@ contains
 
       n = size(slots, kind=ip)
       call divide_by_pairs(n, slots, pairs_of, single, n_single, others, n_others)
-      if (dilution*n_others > n) then
-         call turn_and_bound_block(maker, slots, isa, bodies, boxes)
-         return
-      end if
       call find_directions(bodies, single(:n_single), isa, direction)
       do k = 1_ip, n_single
          associate (s => single(k))

@@ -31,6 +31,8 @@ module polydem_pair_list
       integer(ip), allocatable :: ended(:)
       !> Number of pairs of each body, (slot)
       integer(ip), allocatable :: pairs_of(:)
+      !> Number of bodies with pairs
+      integer(ip) :: n_paired = 0_ip
       !> Number of bodies without a pair, or whose pairs all ended in the last step, of which a pair began in that step
       integer(ip) :: n_joined = 0_ip
       !> Their slots, each once; may be longer than `n_joined`
@@ -72,6 +74,7 @@ contains
       allocate (self%pairs_of(n_bodies), source=0_ip)
       self%n = 0_ip
       self%n_began = 0_ip
+      self%n_paired = 0_ip
       self%n_joined = 0_ip
       self%n_ended = 0_ip
       self%n_blocks = 0_ip
@@ -158,8 +161,8 @@ contains
             self%overlaps(place) = overlaps
          else if (listed) then
             call add_block(self, low, place - 1_ip, displacement)
-            self%pairs_of(self%first(place)) = self%pairs_of(self%first(place)) - 1_ip
-            self%pairs_of(self%second(place)) = self%pairs_of(self%second(place)) - 1_ip
+            call leave(self, self%first(place))
+            call leave(self, self%second(place))
             self%n_ended = self%n_ended + 1_ip
             self%ended(self%n_ended) = place
             low = place + 1_ip
@@ -183,11 +186,21 @@ contains
       integer(ip), intent(in) :: body
 
       if (self%pairs_of(body) == 0_ip) then
+         self%n_paired = self%n_paired + 1_ip
          self%n_joined = self%n_joined + 1_ip
          self%joined(self%n_joined) = body
       end if
       self%pairs_of(body) = self%pairs_of(body) + 1_ip
    end subroutine join
+
+   !> Count a pair of a body that ends.
+   pure subroutine leave(self, body)
+      type(pair_list_t), intent(inout) :: self
+      integer(ip), intent(in) :: body
+
+      self%pairs_of(body) = self%pairs_of(body) - 1_ip
+      if (self%pairs_of(body) == 0_ip) self%n_paired = self%n_paired - 1_ip
+   end subroutine leave
 
    !> Least index, not below `from`, of a pair whose key is not below `key`
    pure integer(ip) function place_of(self, key, from)

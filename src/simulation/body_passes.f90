@@ -21,6 +21,8 @@ module polydem_body_passes
 
    !> One of so many blocks of the first thread is timed
    integer(ip), parameter :: timed_blocks = 8_ip
+   !> A scene is dilute if at most one of so many bodies has pairs. Otherwise reading all vertices in sequence is faster
+   integer(ip), parameter :: dilution = 4_ip
 
 contains
 
@@ -40,6 +42,7 @@ contains
 
       good = .true.
       seconds = 0.0_dp
+      self%is_dilute = self%is_weightless .and. self%neighbours%pairs%n_paired <= self%bodies%n/dilution
       if (allocated(self%domain%halo%border)) then
          call predict_list(self, self%domain%halo%border, good, seconds)
          call self%domain%send_border(self%comm, self%bodies)
@@ -113,7 +116,7 @@ contains
          end do
          if (timed) clock(2) = wall_seconds()
          if (valid) then
-            if (self%is_weightless) then
+            if (self%is_dilute) then
                call bound_block(self%extreme_corners, self%maker, slots(k:end_of_block), &
                                 self%neighbours%pairs%pairs_of, self%isa, self%bodies, self%boxes)
             else

@@ -101,6 +101,8 @@ module polydem_simulation
       type(relaxation_t) :: relaxation
       !> Whether there is no gravity. Then bodies often fly alone, and need neither turned vertices nor a correction
       logical :: is_weightless = .false.
+      !> Whether vertices of bodies without pairs are not turned in this step: there is no gravity, and few have pairs
+      logical :: is_dilute = .false.
       !> Extreme corners of the bodies, if `is_weightless`
       type(extreme_corners_t) :: extreme_corners
       !> Whether bodies that coast are not corrected: there is no gravity, and they coast exactly

@@ -122,7 +122,7 @@ contains
       end if
       associate (pairs => self%neighbours%pairs)
          ! Other bodies with pairs are turned already.
-         if (self%is_weightless .and. pairs%n_joined > 0_ip) &
+         if (self%is_dilute .and. pairs%n_joined > 0_ip) &
             call turn_bodies(self%bodies, pairs%joined(:pairs%n_joined), self%isa)
       end associate
       call carry_history(self)
