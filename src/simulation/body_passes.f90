@@ -203,7 +203,7 @@ contains
             call complete_run(self, first, last, good)
          end do
       end do
-      if (.not. self%settings%output%energy_balance) return
+      if (low > high .or. .not. self%settings%output%energy_balance) return
       call accumulate_walls(self%energy_balance, self%bodies, self%walk%walls, self%bodies%free(low), &
                             self%bodies%free(high))
    end subroutine complete_part
