@@ -4,7 +4,7 @@ module polydem_gather_corners
    use polydem_overlap_batch, only: column_length
    implicit none
    private
-   public :: gather_corners
+   public :: gather_corners, less, next
 
 contains
 
@@ -37,5 +37,21 @@ contains
          end do
       end do
    end subroutine gather_corners
+
+   !> -1 if the first number is less than the second one, otherwise 0; their difference must not overflow
+   elemental integer(ip) function less(a, b)
+      !> The numbers
+      integer(ip), intent(in) :: a, b
+
+      less = shifta(a - b, 31)
+   end function less
+
+   !> Corner behind another of n, counted from 0
+   elemental integer(ip) function next(corner, n)
+      !> The corner, and their number
+      integer(ip), intent(in) :: corner, n
+
+      next = iand(corner + 1_ip, less(corner + 1_ip, n))
+   end function next
 
 end module polydem_gather_corners

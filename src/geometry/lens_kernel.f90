@@ -24,7 +24,7 @@
 !> Loops over all lanes have no branches, so that the compiler handles several lanes at a time. A division by a
 !> difference that is zero or tiny only without a certificate has a least divisor, which changes no certified bit.
 module polydem_lens_kernel
-   use polydem_gather_corners, only: gather_corners
+   use polydem_gather_corners, only: gather_corners, less, next
    use polydem_kinds, only: ip, wp
    use polydem_lens_area, only: integrate_area
    use polydem_lens_effective_area, only: integrate_effective_area
@@ -110,20 +110,6 @@ contains
          lens%vertex(i, 8) = batch%start(i, 2) + next(edge(4), batch%corners(i, 2))
       end do
    end subroutine unpack_lenses
-
-   !> -1 if the first number is less than the second one, otherwise 0; their difference must not overflow
-   elemental integer(ip) function less(a, b)
-      integer(ip), intent(in) :: a, b
-
-      less = shifta(a - b, 31)
-   end function less
-
-   !> Corner behind another of n, counted from 0
-   elemental integer(ip) function next(corner, n)
-      integer(ip), intent(in) :: corner, n
-
-      next = iand(corner + 1_ip, less(corner + 1_ip, n))
-   end function next
 
    !> Prepare the numbers that the tests need.
    pure subroutine prepare(n, batch, lens)

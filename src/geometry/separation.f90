@@ -1,11 +1,13 @@
 !> Test of a remembered separating edge.
 module polydem_separation
+   use polydem_edge_kernel_avx2, only: find_separated_with_avx2 => find_separated
+   use polydem_edge_kernel_base, only: find_separated, lead
    use polydem_exact_cross, only: exact_cross
-   use polydem_gather_corners, only: gather_corners
+   use polydem_instruction_set, only: isa_avx2
    use polydem_kinds, only: ip, wp
    use polydem_overlap_batch, only: column_length, lanes, overlap_batch_t
    use polydem_overlap_tolerances, only: far, surely_apart
-   use polydem_pair_memory, only: edge_bits, packed_edge, unpack_edge
+   use polydem_pair_memory, only: packed_edge, unpack_edge
    implicit none
    private
    public :: test_separation, test_edges, remembered_edge
@@ -31,7 +33,7 @@ contains
    !> Find which remembered edges of a batch still separate the polygons.
    !>
    !> Nearly always the remembered corner decides. That is tested without branches; `test_separation` tests the rest.
-   pure subroutine test_edges(batch, n, n_vertices, turned, apart)
+   pure subroutine test_edges(batch, n, n_vertices, turned, isa, apart)
       !> The batch: an edge is remembered in each lane; its corner is brought up to date
       type(overlap_batch_t), intent(inout) :: batch
       !> Number of lanes
@@ -40,15 +42,19 @@ contains
       integer(ip), intent(in) :: n_vertices
       !> Vertices of all polygons, anticlockwise, each relative to its own centre [m]
       real(wp), intent(in) :: turned(2, n_vertices)
+      !> Instruction set of the kernels
+      integer, intent(in) :: isa
       !> Whether the polygons of a lane are apart
       logical, intent(out) :: apart(lanes)
-      real(wp) :: sure(column_length), vertex(column_length, 2, 5)
-      integer(ip) :: place(column_length, 5), i
+      real(wp) :: sure(column_length)
+      integer(ip) :: i
 
       if (n == 0_ip) return
-      call unpack_edges(batch, n, place, sure)
-      call gather_corners(n, 5_ip, place, n_vertices, turned, vertex)
-      call test_corners(batch, n, vertex, sure)
+      if (isa == isa_avx2) then
+         call find_separated_with_avx2(batch, n, n_vertices, turned, sure)
+      else
+         call find_separated(batch, n, n_vertices, turned, sure)
+      end if
       do i = 1_ip, n
          apart(i) = sure(i) > 0.0_wp
          if (apart(i)) cycle
@@ -58,64 +64,6 @@ contains
          end associate
       end do
    end subroutine test_edges
-
-   !> Find the vertices of the remembered edges and corners.
-   pure subroutine unpack_edges(batch, n, vertex, sure)
-      type(overlap_batch_t), intent(in) :: batch
-      integer(ip), intent(in) :: n
-      !> Places of start and end of the edge, of the remembered corner, the one before, and the one behind
-      integer(ip), intent(inout) :: vertex(column_length, 5)
-      !> Positive if they exist; otherwise the vertices are others
-      real(wp), intent(inout) :: sure(column_length)
-      integer(ip) :: i, edge, corner, start(2), last(2), of_q, exchange
-
-      do i = 1_ip, n
-         ! As in `unpack_edge`; all bits of `of_q` are set if the edge is one of Q. Then P and Q change places.
-         of_q = -iand(not(batch%memory(i)), 1_ip)
-         edge = ibits(not(batch%memory(i)), 1, edge_bits)
-         corner = ibits(not(batch%memory(i)), 1 + edge_bits, edge_bits)
-         exchange = iand(of_q, ieor(batch%start(i, 1), batch%start(i, 2)))
-         start = ieor(batch%start(i, :), exchange)
-         exchange = iand(of_q, ieor(batch%corners(i, 1), batch%corners(i, 2)))
-         last = ieor(batch%corners(i, :), exchange) - 1_ip
-         sure(i) = merge(1.0_wp, -1.0_wp, edge <= last(1) .and. corner <= last(2))
-         edge = min(edge, last(1))
-         corner = min(corner, last(2))
-         vertex(i, 1) = start(1) + edge
-         vertex(i, 2) = start(1) + merge(0_ip, edge + 1_ip, edge == last(1))
-         vertex(i, 3) = start(2) + corner
-         vertex(i, 4) = start(2) + merge(last(2), corner - 1_ip, corner == 0_ip)
-         vertex(i, 5) = start(2) + merge(0_ip, corner + 1_ip, corner == last(2))
-      end do
-   end subroutine unpack_edges
-
-   !> Test the remembered corners: `sure` stays positive if the corner is near, outside of the edge, and nearer to its
-   !> line than both its neighbours.
-   pure subroutine test_corners(batch, n, vertex, sure)
-      type(overlap_batch_t), intent(in) :: batch
-      integer(ip), intent(in) :: n
-      !> Vertices as in `unpack_edges`, (lane, x or y, vertex)
-      real(wp), intent(in) :: vertex(column_length, 2, 5)
-      real(wp), intent(inout) :: sure(column_length)
-      real(wp) :: edge(2), from(2), to(2), of_p, of_q, nearer
-      integer(ip) :: i
-
-      do i = 1_ip, n
-         of_q = real(iand(not(batch%memory(i)), 1_ip), wp)
-         of_p = 1.0_wp - of_q
-         edge(1) = vertex(i, 1, 2) - vertex(i, 1, 1)
-         edge(2) = vertex(i, 2, 2) - vertex(i, 2, 1)
-         from(1) = vertex(i, 1, 1) + of_q*batch%offset(i, 1)
-         from(2) = vertex(i, 2, 1) + of_q*batch%offset(i, 2)
-         to(1) = vertex(i, 1, 3) + of_p*batch%offset(i, 1)
-         to(2) = vertex(i, 2, 3) + of_p*batch%offset(i, 2)
-         nearer = min(lead(edge, vertex(i, :, 3), vertex(i, :, 4)), lead(edge, vertex(i, :, 3), vertex(i, :, 5)))
-         sure(i) = min(min(sure(i), nearer), &
-                       min(far*batch%radius(i, 1) - max(max(abs(from(1)), abs(from(2))), max(abs(to(1)), abs(to(2)))), &
-                           -surely_apart*batch%radius(i, 1)*(abs(edge(1)) + abs(edge(2))) &
-                           - (edge(1)*(to(2) - from(2)) - edge(2)*(to(1) - from(1)))))
-      end do
-   end subroutine test_corners
 
    !> Find whether a remembered edge still separates the polygons.
    !>
@@ -188,15 +136,13 @@ contains
       end if
    end function depth_of
 
-   !> How much deeper one point is than another beyond rounding errors, which are 4 u of each product at most
-   pure real(wp) function lead(edge, point, other)
-      real(wp), intent(in) :: edge(2), point(2), other(2)
-      real(wp) :: plus, minus
+   !> Whether a point of B is surely deeper below a line than another
+   pure logical function leads(line, point, other)
+      type(line_t), intent(in) :: line
+      real(wp), intent(in) :: point(2), other(2)
 
-      plus = edge(1)*(point(2) - other(2))
-      minus = edge(2)*(point(1) - other(1))
-      lead = plus - minus - 4.0_wp*epsilon(1.0_wp)*(abs(plus) + abs(minus))
-   end function lead
+      leads = lead(line%edge(1), line%edge(2), point(1) - other(1), point(2) - other(2)) > 0.0_wp
+   end function leads
 
    !> Find whether all corners of polygon B are outside of a line.
    pure subroutine test_line(line, b, corner, apart)
@@ -212,8 +158,8 @@ contains
       v = corner + 1_ip
       apart = depth_of(line, b(:, v)) < line%level
       if (.not. apart) return
-      if (lead(line%edge, b(:, v), b(:, merge(n, v - 1_ip, v == 1_ip))) > 0.0_wp) then
-         if (lead(line%edge, b(:, v), b(:, merge(1_ip, v + 1_ip, v == n))) > 0.0_wp) return
+      if (leads(line, b(:, v), b(:, merge(n, v - 1_ip, v == 1_ip)))) then
+         if (leads(line, b(:, v), b(:, merge(1_ip, v + 1_ip, v == n)))) return
       end if
       highest = -huge(1.0_wp)
       do v = 1_ip, n

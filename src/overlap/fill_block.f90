@@ -53,7 +53,7 @@ contains
       type(overlap_batch_t) :: batch
       logical :: all_certified
 
-      call select_pairs(bodies, first, second, low, next, tested, history, block, batch)
+      call select_pairs(bodies, first, second, isa, low, next, tested, history, block, batch)
       call describe_pairs(block%n, block%pair, first, second, bodies%radius, bodies%vertex_start, bodies%position, &
                           block%first, block%second, batch)
       call evaluate_batch(batch, block%n, bodies%turned, effective, isa, block%overlap_columns_t)
@@ -66,9 +66,10 @@ contains
    end subroutine fill_block
 
    !> Select the next pairs that may be contacts: those that no remembered edge separates.
-   subroutine select_pairs(bodies, first, second, low, next, tested, history, block, batch)
+   subroutine select_pairs(bodies, first, second, isa, low, next, tested, history, block, batch)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in), contiguous :: first(:), second(:)
+      integer, intent(in) :: isa
       integer(ip), intent(in) :: low
       integer(ip), intent(inout) :: next, tested
       type(contact_history_t), intent(inout) :: history
@@ -80,7 +81,8 @@ contains
       do while (next >= low .and. block%n < block_size)
          if (next < tested) then
             tested = max(low, next - ahead + 1_ip)
-            if (allocated(history%memory)) call forget_edges(bodies, tested, next, first, second, history%memory)
+            if (allocated(history%memory)) call forget_edges(bodies, tested, next, first, second, isa, &
+                                                                    history%memory)
          end if
          if (allocated(history%memory)) then
             call select_in_range(tested, next, history%memory(tested:next), block, batch)
@@ -92,11 +94,12 @@ contains
    end subroutine select_pairs
 
    !> Forget the remembered edges that do not separate the polygons any more.
-   subroutine forget_edges(bodies, from, to, first, second, memory)
+   subroutine forget_edges(bodies, from, to, first, second, isa, memory)
       type(bodies_t), intent(in) :: bodies
       !> First and last pair, at most `ahead` pairs
       integer(ip), intent(in) :: from, to
       integer(ip), intent(in), contiguous :: first(:), second(:)
+      integer, intent(in) :: isa
       integer(ip), intent(inout), contiguous :: memory(:)
       type(overlap_batch_t) :: batch
       integer(ip) :: found(ahead), i(block_size), j(block_size), k, n, n_found, p, done
@@ -114,7 +117,7 @@ contains
          do k = 1_ip, n
             batch%memory(k) = memory(found(done + k))
          end do
-         call test_edges(batch, n, size(bodies%turned, 2, kind=ip), bodies%turned, apart)
+         call test_edges(batch, n, size(bodies%turned, 2, kind=ip), bodies%turned, isa, apart)
          do k = 1_ip, n
             memory(found(done + k)) = merge(batch%memory(k), 0_ip, apart(k))
          end do

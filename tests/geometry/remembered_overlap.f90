@@ -2,6 +2,7 @@
 module remembered_overlap
    use overlap_cases, only: median_diameter, rectangle, regular, turned, two_pi
    use polydem_convex_overlap, only: find_overlap, overlap_t
+   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
    use polydem_lens_kernel_base, only: evaluate_batch
    use polydem_overlap_batch, only: add_lane, lanes, overlap_batch_t, overlap_columns_t
@@ -65,7 +66,7 @@ contains
       n = size(pair%p, 2, kind=ip)
       m = size(pair%q, 2, kind=ip)
       call add_lane(batch, 1_ip, memory, [1_ip, n, n + 1_ip, n + m], pair%offset, radius_of(pair%p), radius_of(pair%q))
-      call test_edges(batch, 1_ip, n + m, vertices_of(pair), lane_apart)
+      call test_edges(batch, 1_ip, n + m, vertices_of(pair), isa_base, lane_apart)
       apart = lane_apart(1)
       memory = batch%memory(1)
    end subroutine separated_by
