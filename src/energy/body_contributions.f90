@@ -36,19 +36,39 @@ contains
       integer(ip), intent(in) :: first, last
       !> Channels of all bodies, (n_channels, slot) [W/m]
       real(wp), intent(inout), contiguous :: channels(:, :)
-      integer(ip) :: s
 
-      do s = first, last
-         if (.not. forces%has_terms(s) .or. bodies%fixed(s) .or. bodies%in_halo(s)) cycle
-         call add_term(bodies, s, forces%value(:, s), weight, channels(:, s))
-      end do
+      if (last < first) return
+      call add_powers_of(last - first + 1_ip, forces%has_terms(first), bodies%fixed(first), bodies%in_halo(first), &
+                         bodies%velocity(1, first), bodies%angular_velocity(first), forces%value(1, first), weight, &
+                         channels(:, first:last))
    end subroutine add_powers
 
+   !> Add the powers of the sums of some bodies to their channels.
+   pure subroutine add_powers_of(n, has_terms, fixed, in_halo, velocity, spin, value, weight, channels)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> Whether they have terms, are fixed, and are in the halo
+      logical, intent(in) :: has_terms(n), fixed(n), in_halo(n)
+      !> Their velocities [m/s] and angular velocities [rad/s]
+      real(wp), intent(in) :: velocity(2, n), spin(n)
+      !> Sums of their terms
+      real(wp), intent(in) :: value(n_terms, n)
+      !> Factor of what is added
+      real(wp), intent(in) :: weight
+      !> Their channels [W/m]
+      real(wp), intent(inout) :: channels(n_channels, n)
+      integer(ip) :: s
+
+      do s = 1_ip, n
+         if (.not. has_terms(s) .or. fixed(s) .or. in_halo(s)) cycle
+         call add_term(velocity(:, s), spin(s), value(:, s), weight, channels(:, s))
+      end do
+   end subroutine add_powers_of
+
    !> Add the powers of the elastic, damping and tangential rows of a term on a body, times a weight.
-   pure subroutine add_term(bodies, s, term, weight, channels)
-      type(bodies_t), intent(in) :: bodies
-      !> Slot of the body on which the term acts
-      integer(ip), intent(in) :: s
+   pure subroutine add_term(velocity, spin, term, weight, channels)
+      !> Velocity [m/s] and angular velocity [rad/s] of the body
+      real(wp), intent(in) :: velocity(2), spin
       real(wp), intent(in) :: term(n_terms)
       !> Factor of what is added
       real(wp), intent(in) :: weight
@@ -58,7 +78,7 @@ contains
       integer, parameter :: ex = sum_x(e), ey = sum_y(e), et = sum_torque(e), nx = sum_x(n), ny = sum_y(n), &
          nt = sum_torque(n), fx = sum_x(f), fy = sum_y(f), ft = sum_torque(f)
 
-      associate (x => bodies%velocity(1, s), y => bodies%velocity(2, s), w => bodies%angular_velocity(s))
+      associate (x => velocity(1), y => velocity(2), w => spin)
          channels(1) = channels(1) + weight*((term(ex)*x + term(ey)*y) + term(et)*w)
          channels(2) = channels(2) + weight*(((term(nx) - term(ex))*x + (term(ny) - term(ey))*y) &
                                              + (term(nt) - term(et))*w)
@@ -81,7 +101,7 @@ contains
       real(wp), intent(inout) :: wall_channels(n_wall_channels)
       real(wp) :: fx, fy, twist, torque
 
-      call add_term(bodies, wall, term, weight, channels)
+      call add_term(bodies%velocity(:, wall), bodies%angular_velocity(wall), term, weight, channels)
       fx = term(sum_x(of_normal)) + term(sum_x(of_tangential))
       fy = term(sum_y(of_normal)) + term(sum_y(of_tangential))
       twist = term(sum_torque(of_normal)) + term(sum_torque(of_tangential))

@@ -142,15 +142,34 @@ contains
       type(force_sums_t), intent(in) :: forces
       !> First and last slot; only the free bodies of this rank count
       integer(ip), intent(in) :: first, last
-      integer(ip) :: s
 
       call add_powers(bodies, forces, weight, first, last, sums%power_sum)
-      if (.not. any(abs(gravity) > 0.0_wp)) return
-      do s = first, last
-         if (bodies%fixed(s) .or. bodies%in_halo(s)) cycle
-         sums%torque(s) = sums%torque(s) + weight*torque_of(gravity, bodies, s)
-      end do
+      if (last < first .or. .not. any(abs(gravity) > 0.0_wp)) return
+      call add_torques(last - first + 1_ip, weight, gravity, bodies%fixed(first), bodies%in_halo(first), &
+                       bodies%mass(first), bodies%position(1, first), sums%torque(first))
    end subroutine accumulate_bodies
+
+   !> Add the torques of gravity on some bodies about the origin, times a weight.
+   pure subroutine add_torques(n, weight, gravity, fixed, in_halo, mass, position, torque)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> Factor of what is added
+      real(wp), intent(in) :: weight
+      !> Acceleration of gravity [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Whether the bodies are fixed, and in the halo; those are left out
+      logical, intent(in) :: fixed(n), in_halo(n)
+      !> Masses [kg/m] and positions [m]
+      real(wp), intent(in) :: mass(n), position(2, n)
+      !> Sums of the torques about the origin [N]
+      real(wp), intent(inout) :: torque(n)
+      integer(ip) :: s
+
+      do s = 1_ip, n
+         if (fixed(s) .or. in_halo(s)) cycle
+         torque(s) = torque(s) + weight*(mass(s)*(position(1, s)*gravity(2) - position(2, s)*gravity(1)))
+      end do
+   end subroutine add_torques
 
    !> Accumulate the action of fixed bodies on some bodies in one step, after the rates of these bodies. Several threads
    !> may call it for different bodies.
@@ -370,14 +389,5 @@ contains
          end do
       end do
    end subroutine add_block
-
-   !> Torque of gravity on a free body about the origin [N]
-   pure real(wp) function torque_of(gravity, bodies, s)
-      real(wp), intent(in) :: gravity(2)
-      type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: s
-
-      torque_of = bodies%mass(s)*(bodies%position(1, s)*gravity(2) - bodies%position(2, s)*gravity(1))
-   end function torque_of
 
 end module polydem_energy_balance

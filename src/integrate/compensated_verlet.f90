@@ -60,7 +60,7 @@ contains
                    self%lost_place(1, s), self%lost_speed(1, s))
          call move(dt, bodies%acceleration(2, s), bodies%position(2, s), bodies%velocity(2, s), self%half(2, s), &
                    self%lost_place(2, s), self%lost_speed(2, s))
-         call move(dt, bodies%angular_acceleration(s), bodies%angle(s), bodies%angular_velocity(s), self%half(3, s), &
+         call move(dt, bodies%angular_acceleration(s), bodies%angle(s), bodies%angular_velocity(s), self%half_spin(s), &
                    self%lost_place(3, s), self%lost_speed(3, s))
       end do
    end subroutine predict
@@ -82,8 +82,8 @@ contains
          bodies%acceleration(1, s) = force(1, s)*bodies%inverse_mass(s)
          bodies%acceleration(2, s) = force(2, s)*bodies%inverse_mass(s)
          bodies%angular_acceleration(s) = force(3, s)*bodies%inverse_inertia(s)
-         bodies%velocity(:, s) = self%half(1:2, s)
-         bodies%angular_velocity(s) = self%half(3, s)
+         bodies%velocity(:, s) = self%half(:, s)
+         bodies%angular_velocity(s) = self%half_spin(s)
          call add(h*bodies%acceleration(1, s), bodies%velocity(1, s), self%lost_speed(1, s))
          call add(h*bodies%acceleration(2, s), bodies%velocity(2, s), self%lost_speed(2, s))
          call add(h*bodies%angular_acceleration(s), bodies%angular_velocity(s), self%lost_speed(3, s))

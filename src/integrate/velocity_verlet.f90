@@ -14,8 +14,10 @@ module polydem_velocity_verlet
 
    !> Velocity Verlet
    type, extends(integrator_t) :: velocity_verlet_t
-      !> Velocity and angular velocity in the middle of the step, (3, slot) [m/s, m/s, rad/s]
+      !> Velocity in the middle of the step, (2, slot) [m/s]
       real(wp), allocatable :: half(:, :)
+      !> Angular velocity in the middle of the step [rad/s]
+      real(wp), allocatable :: half_spin(:)
    contains
       procedure :: start
       procedure :: predict
@@ -31,8 +33,8 @@ contains
       class(velocity_verlet_t), intent(inout) :: self
       type(bodies_t), intent(in) :: bodies
 
-      if (allocated(self%half)) deallocate (self%half)
-      allocate (self%half(3, bodies%n))
+      if (allocated(self%half)) deallocate (self%half, self%half_spin)
+      allocate (self%half(2, bodies%n), self%half_spin(bodies%n))
    end subroutine start
 
    !> Move the bodies to the end of the step and predict the velocities there.
@@ -42,30 +44,38 @@ contains
       integer(ip), intent(in) :: first, last
       !> Bodies; position, angle and velocities of these change
       type(bodies_t), intent(inout) :: bodies
-      integer(ip) :: s
-      real(wp) :: h, half(3), gain(3), rate(3)
+      integer(ip) :: n
 
-      h = 0.5_wp*dt
-      do s = first, last
-         rate(1) = cleared(bodies%acceleration(1, s))
-         rate(2) = cleared(bodies%acceleration(2, s))
-         rate(3) = cleared(bodies%angular_acceleration(s))
-         gain = h*rate
-         half(1) = cleared(bodies%velocity(1, s)) + gain(1)
-         half(2) = cleared(bodies%velocity(2, s)) + gain(2)
-         half(3) = cleared(bodies%angular_velocity(s)) + gain(3)
-         bodies%position(1, s) = bodies%position(1, s) + dt*half(1)
-         bodies%position(2, s) = bodies%position(2, s) + dt*half(2)
-         bodies%angle(s) = bodies%angle(s) + dt*half(3)
-         bodies%velocity(1, s) = half(1) + gain(1)
-         bodies%velocity(2, s) = half(2) + gain(2)
-         bodies%angular_velocity(s) = half(3) + gain(3)
-         bodies%acceleration(1, s) = rate(1)
-         bodies%acceleration(2, s) = rate(2)
-         bodies%angular_acceleration(s) = rate(3)
-         self%half(:, s) = half
-      end do
+      n = last - first + 1_ip
+      call move(dt, 2_ip*n, bodies%acceleration(1, first), bodies%velocity(1, first), self%half(1, first), &
+                bodies%position(1, first))
+      call move(dt, n, bodies%angular_acceleration(first), bodies%angular_velocity(first), self%half_spin(first), &
+                bodies%angle(first))
    end subroutine predict
+
+   !> Move some coordinates to the end of the step. What is too small to move a body becomes zero.
+   pure subroutine move(dt, n, acceleration, velocity, half, place)
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Number of coordinates
+      integer(ip), intent(in) :: n
+      !> Their accelerations, and their velocities, which become those predicted at the end of the step
+      real(wp), intent(inout) :: acceleration(n), velocity(n)
+      !> Their velocities in the middle of the step
+      real(wp), intent(inout) :: half(n)
+      !> The coordinates
+      real(wp), intent(inout) :: place(n)
+      real(wp) :: gain
+      integer(ip) :: k
+
+      do k = 1_ip, n
+         acceleration(k) = cleared(acceleration(k))
+         gain = 0.5_wp*dt*acceleration(k)
+         half(k) = cleared(velocity(k)) + gain
+         place(k) = place(k) + dt*half(k)
+         velocity(k) = half(k) + gain
+      end do
+   end subroutine move
 
    !> A velocity or an acceleration, or zero if it is too small to move a body, as in `clear_negligible_motion`
    elemental real(wp) function cleared(value)
@@ -83,19 +93,50 @@ contains
       real(wp), intent(in) :: force(3, first:last)
       !> Bodies; velocities and accelerations of these change
       type(bodies_t), intent(inout) :: bodies
-      integer(ip) :: s
-      real(wp) :: h
+      integer(ip) :: n
 
-      h = 0.5_wp*dt
-      do s = first, last
-         bodies%acceleration(1, s) = force(1, s)*bodies%inverse_mass(s)
-         bodies%acceleration(2, s) = force(2, s)*bodies%inverse_mass(s)
-         bodies%angular_acceleration(s) = force(3, s)*bodies%inverse_inertia(s)
-         bodies%velocity(1, s) = self%half(1, s) + h*bodies%acceleration(1, s)
-         bodies%velocity(2, s) = self%half(2, s) + h*bodies%acceleration(2, s)
-         bodies%angular_velocity(s) = self%half(3, s) + h*bodies%angular_acceleration(s)
-      end do
+      n = last - first + 1_ip
+      call accelerate(n, force, bodies%inverse_mass(first), bodies%inverse_inertia(first), &
+                      bodies%acceleration(1, first), bodies%angular_acceleration(first))
+      call add_second_half(dt, 2_ip*n, bodies%acceleration(1, first), self%half(1, first), bodies%velocity(1, first))
+      call add_second_half(dt, n, bodies%angular_acceleration(first), self%half_spin(first), &
+                           bodies%angular_velocity(first))
    end subroutine correct
+
+   !> Compute the accelerations of some bodies.
+   pure subroutine accelerate(n, force, inverse_mass, inverse_inertia, acceleration, angular_acceleration)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> Forces [N/m] and torques [N]
+      real(wp), intent(in) :: force(3, n)
+      !> Inverse masses [m/kg] and moments of inertia [1/(kg m)]
+      real(wp), intent(in) :: inverse_mass(n), inverse_inertia(n)
+      !> Accelerations [m/s2] and angular accelerations [rad/s2]
+      real(wp), intent(inout) :: acceleration(2, n), angular_acceleration(n)
+      integer(ip) :: s
+
+      do s = 1_ip, n
+         acceleration(1, s) = force(1, s)*inverse_mass(s)
+         acceleration(2, s) = force(2, s)*inverse_mass(s)
+         angular_acceleration(s) = force(3, s)*inverse_inertia(s)
+      end do
+   end subroutine accelerate
+
+   !> Compute velocities at the end of the step from those in its middle.
+   pure subroutine add_second_half(dt, n, acceleration, half, velocity)
+      real(wp), intent(in) :: dt
+      !> Number of coordinates
+      integer(ip), intent(in) :: n
+      !> Their accelerations at the end of the step, and their velocities in the middle
+      real(wp), intent(in) :: acceleration(n), half(n)
+      !> Their velocities at the end
+      real(wp), intent(inout) :: velocity(n)
+      integer(ip) :: k
+
+      do k = 1_ip, n
+         velocity(k) = half(k) + 0.5_wp*dt*acceleration(k)
+      end do
+   end subroutine add_second_half
 
    !> Serialize the velocities in the middle of the step.
    subroutine serialize_step(self, serializer)
@@ -103,7 +144,8 @@ contains
       class(serializer_t), intent(inout) :: serializer
 
       call self%serialize(serializer)
-      call serializer%field('/bodies/half_velocity', self%half, 'm/s, rad/s', 'velocities in the middle of the step')
+      call serializer%field('/bodies/half_velocity', self%half, 'm/s', 'velocities in the middle of the step')
+      call serializer%field('/bodies/half_spin', self%half_spin, 'rad/s', 'angular velocities in the middle of the step')
    end subroutine serialize_step
 
    !> Stability limits for x'' + 2 z w x' + w^2 x = 0 with the force at the predicted velocity: beyond them the spectral
