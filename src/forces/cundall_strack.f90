@@ -71,14 +71,14 @@ contains
       call find_slip(block, slip)
       associate (stored => history%column(self%first_column)%value)
          if (self%midstep) then
-            call find_midstep_slip(bodies, dt, block, slip, mean)
+            call find_midstep_slip(bodies%n, bodies%acceleration, bodies%angular_acceleration, dt, block, slip, mean)
             call stretch(self, dt, block, mean, stored, spring)
          else
             call stretch(self, dt, block, slip, stored, spring)
          end if
       end associate
       if (self%damping > 0.0_wp) then
-         call find_dashpots(self, bodies, block, root)
+         call find_dashpots(self, bodies%n, bodies%inverse_inertia, block, root)
          do c = 1_ip, block%n
             limit = self%coefficient*max(0.0_wp, block%normal_force(c))
             spring(c) = max(-limit, min(limit, spring(c) - root(c)*slip(c)))
@@ -144,41 +144,53 @@ contains
 
    !> Find the slip velocity in the middle of the step: half of its change in a step is subtracted. The centripetal
    !> acceleration of the arms does not extend the spring and is left out.
-   pure subroutine find_midstep_slip(bodies, dt, block, slip, mean)
-      !> Bodies, for their accelerations
-      type(bodies_t), intent(in) :: bodies
+   pure subroutine find_midstep_slip(n, acceleration, angular_acceleration, dt, block, slip, mean)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> Their accelerations [m/s2] and angular accelerations [rad/s2]
+      real(wp), intent(in) :: acceleration(2, n), angular_acceleration(n)
       real(wp), intent(in) :: dt
       type(contact_block_t), intent(in) :: block
       real(wp), intent(in) :: slip(block_size)
       real(wp), intent(inout) :: mean(block_size)
-      real(wp) :: x, y
+      real(wp) :: a(block_size, 2), b(block_size, 2), spin_a(block_size), spin_b(block_size), x, y
       integer(ip) :: c
 
       do c = 1_ip, block%n
-         associate (i => block%first(c), j => block%second(c), a => bodies%acceleration, &
-                    b => bodies%angular_acceleration)
-            x = (a(1, i) - b(i)*block%arm_first(c, 2)) - (a(1, j) - b(j)*block%arm_second(c, 2))
-            y = (a(2, i) + b(i)*block%arm_first(c, 1)) - (a(2, j) + b(j)*block%arm_second(c, 1))
-         end associate
+         a(c, 1) = acceleration(1, block%first(c))
+         a(c, 2) = acceleration(2, block%first(c))
+         spin_a(c) = angular_acceleration(block%first(c))
+         b(c, 1) = acceleration(1, block%second(c))
+         b(c, 2) = acceleration(2, block%second(c))
+         spin_b(c) = angular_acceleration(block%second(c))
+      end do
+      do c = 1_ip, block%n
+         x = (a(c, 1) - spin_a(c)*block%arm_first(c, 2)) - (b(c, 1) - spin_b(c)*block%arm_second(c, 2))
+         y = (a(c, 2) + spin_a(c)*block%arm_first(c, 1)) - (b(c, 2) + spin_b(c)*block%arm_second(c, 1))
          mean(c) = slip(c) - 0.5_wp*dt*(block%direction(c, 1)*y - block%direction(c, 2)*x)
       end do
    end subroutine find_midstep_slip
 
    !> Dashpots d sqrt(k_t m_t) of all contacts [N s/m2]
-   pure subroutine find_dashpots(self, bodies, block, dashpot)
+   pure subroutine find_dashpots(self, n, inverse_inertia, block, dashpot)
       class(cundall_strack_t), intent(in) :: self
-      !> Bodies, for their moments of inertia
-      type(bodies_t), intent(in) :: bodies
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> Their inverse moments of inertia [1/(kg m)]
+      real(wp), intent(in) :: inverse_inertia(n)
       type(contact_block_t), intent(in) :: block
       real(wp), intent(inout) :: dashpot(block_size)
-      real(wp) :: square_first, square_second, mobility
+      real(wp) :: inverse(block_size, 2), square_first, square_second, mobility
       integer(ip) :: c
 
       do c = 1_ip, block%n
+         inverse(c, 1) = inverse_inertia(block%first(c))
+         inverse(c, 2) = inverse_inertia(block%second(c))
+      end do
+      do c = 1_ip, block%n
          square_first = block%arm_first(c, 1)**2 + block%arm_first(c, 2)**2
          square_second = block%arm_second(c, 1)**2 + block%arm_second(c, 2)**2
-         mobility = block%mobility(c) + (square_first*bodies%inverse_inertia(block%first(c)) &
-                                         + square_second*bodies%inverse_inertia(block%second(c)))
+         mobility = block%mobility(c) + (square_first*inverse(c, 1) + square_second*inverse(c, 2))
          dashpot(c) = self%damping*sqrt(self%stiffness/mobility)
       end do
    end subroutine find_dashpots
