@@ -13,18 +13,19 @@
 module polydem_box_maker
    use polydem_bodies, only: block_size, bodies_t, turn_block
    use polydem_body_pieces, only: cut_body
+   use polydem_body_sizes, only: diameter_of, median_of_diameters
+   use polydem_box_placement, only: extent_of, place_box, place_whole, turn
    use polydem_boxes, only: boxes_t
    use polydem_elementary, only: sine_and_cosine
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_polygon, only: diameter
    use polydem_polygon_list, only: polygon_list_t
-   use polydem_sort_reals, only: sort_reals
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: box_maker_t, new_box_maker, turn_and_bound, turn_and_bound_block, bound_body, update_boxes, &
-      have_boxes_within, diameters_of
+   public :: box_maker_t, new_box_maker, turn_and_bound, turn_and_bound_block, place_boxes, update_boxes, &
+      have_boxes_within
 
    !> Allowance for rounding, in units of epsilon times the diameter of a body
    real(wp), parameter :: roundings = 64.0_wp
@@ -113,10 +114,11 @@ contains
          fits = .true.
          ! A body of small radius is small enough for certain.
          if (2.0_wp*bodies%radius(s)*(1.0_wp + roundings*epsilon(1.0_wp))/maker%median_diameter > largest_ratio) &
-            call cut_body(body_shape(bodies, s), maker%median_diameter, largest_ratio, room, maker%pieces, fits)
+            call cut_body(bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip), &
+                          maker%median_diameter, largest_ratio, room, maker%pieces, fits)
          n_pieces = maker%pieces%n - known
          if (.not. fits) then
-            call refuse(bodies%id(s), diameter(body_shape(bodies, s))/maker%median_diameter, error)
+            call refuse(bodies%id(s), diameter_of(bodies, s)/maker%median_diameter, error)
             return
          end if
          if (n_pieces == 0_ip) then
@@ -132,7 +134,7 @@ contains
             call move_alloc(longer, maker%cut)
          end if
          maker%cut(n_cut) = cut_body_t(first_box=n_boxes + 1_ip, first_piece=known + 1_ip, n=n_pieces, &
-                                       padding=maker%margin + roundings*epsilon(1.0_wp)*diameter(body_shape(bodies, s)))
+                                       padding=maker%margin + roundings*epsilon(1.0_wp)*diameter_of(bodies, s))
          maker%box(s) = -n_cut
          n_boxes = n_boxes + n_pieces
       end do
@@ -161,7 +163,7 @@ contains
 
       b = maker%box(s)
       if (b > 0_ip) then
-         call describe_box(bodies, s, diameter(body_shape(bodies, s)), maker%margin, b, boxes)
+         call describe_box(bodies, s, diameter_of(bodies, s), maker%margin, b, boxes)
          return
       end if
       associate (cut => maker%cut(-b), pieces => maker%pieces)
@@ -217,7 +219,7 @@ contains
       !> From `new_box_maker`
       type(box_maker_t), intent(in) :: maker
       !> Slots of the bodies that may have moved since the last call
-      integer(ip), intent(in) :: moving(:)
+      integer(ip), intent(in), contiguous :: moving(:)
       !> Instruction set of the kernels
       integer, intent(in) :: isa
       !> Bodies; only `turned` changes
@@ -241,7 +243,7 @@ contains
       !> From `new_box_maker`
       type(box_maker_t), intent(in) :: maker
       !> Slots of the bodies
-      integer(ip), intent(in) :: slots(:)
+      integer(ip), intent(in), contiguous :: slots(:)
       !> Instruction set of the kernels
       integer, intent(in) :: isa
       !> Bodies; only `turned` changes
@@ -249,13 +251,34 @@ contains
       !> Boxes; only `bounds` changes
       type(boxes_t), intent(inout) :: boxes
       real(wp) :: extent(4, block_size), direction(2, block_size)
-      integer(ip) :: k
 
       call turn_block(bodies, slots, isa, extent, direction)
-      do k = 1_ip, size(slots, kind=ip)
+      call place_boxes(maker, slots, extent, direction, bodies, boxes)
+   end subroutine turn_and_bound_block
+
+   !> Update the boxes of up to `block_size` bodies from the extents of their turned vertices.
+   pure subroutine place_boxes(maker, slots, extent, direction, bodies, boxes)
+      !> From `new_box_maker`
+      type(box_maker_t), intent(in) :: maker
+      !> Slots of the bodies
+      integer(ip), intent(in), contiguous :: slots(:)
+      !> Least x and y and greatest x and y of the turned vertices of each, (4, body) [m]
+      real(wp), intent(in) :: extent(4, block_size)
+      !> Cosine and sine of the angle of each, (2, body)
+      real(wp), intent(in) :: direction(2, block_size)
+      type(bodies_t), intent(in) :: bodies
+      !> Boxes; only `bounds` changes
+      type(boxes_t), intent(inout) :: boxes
+      integer(ip) :: k, n, n_cut
+
+      n = size(slots, kind=ip)
+      call place_whole(n, slots, bodies%n, maker%box, maker%margin, extent, bodies%position, boxes%n, boxes%bounds, n_cut)
+      if (n_cut == 0_ip) return
+      do k = 1_ip, n
+         if (maker%box(slots(k)) > 0_ip) cycle
          call bound_body(maker, bodies%position(:, slots(k)), slots(k), extent(:, k), direction(:, k), boxes)
       end do
-   end subroutine turn_and_bound_block
+   end subroutine place_boxes
 
    !> Update the boxes of the given bodies to their positions. The boxes of other bodies do not change.
    subroutine update_boxes(maker, bodies, moving, boxes)
@@ -319,81 +342,5 @@ contains
          end do
       end associate
    end subroutine bound_body
-
-   !> Box of vertices with an extent. The padding is applied before the position is added: rounding then remains
-   !> monotonic.
-   pure subroutine place_box(extent, padding, position, box)
-      real(wp), intent(in) :: extent(4), padding, position(2)
-      real(wp), intent(out) :: box(4)
-
-      box(1:2) = position + (extent(1:2) - padding)
-      box(3:4) = position + (extent(3:4) + padding)
-   end subroutine place_box
-
-   !> Least x and y and greatest x and y of vertices [m]
-   pure function extent_of(vertices) result(extent)
-      real(wp), intent(in) :: vertices(:, :)
-      real(wp) :: extent(4)
-      integer(ip) :: v
-
-      extent(1:2) = vertices(:, 1)
-      extent(3:4) = vertices(:, 1)
-      do v = 2_ip, size(vertices, 2, kind=ip)
-         extent(1:2) = min(extent(1:2), vertices(:, v))
-         extent(3:4) = max(extent(3:4), vertices(:, v))
-      end do
-   end function extent_of
-
-   !> Vertices turned by an angle
-   pure function turn(vertices, direction) result(turned)
-      real(wp), intent(in) :: vertices(:, :)
-      !> Cosine and sine of the angle
-      real(wp), intent(in) :: direction(2)
-      real(wp) :: turned(2, size(vertices, 2))
-      integer(ip) :: v
-
-      do v = 1_ip, size(vertices, 2, kind=ip)
-         turned(1, v) = direction(1)*vertices(1, v) - direction(2)*vertices(2, v)
-         turned(2, v) = direction(2)*vertices(1, v) + direction(1)*vertices(2, v)
-      end do
-   end function turn
-
-   !> Vertices of a body in the body frame
-   pure function body_shape(bodies, s) result(vertices)
-      type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: s
-      real(wp) :: vertices(2, bodies%vertex_start(s + 1_ip) - bodies%vertex_start(s))
-
-      vertices = bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip)
-   end function body_shape
-
-   !> Median diameter of the free bodies; huge if there are none, and no body is cut [m]
-   pure real(wp) function median_of_diameters(bodies)
-      type(bodies_t), intent(in) :: bodies
-      real(wp), allocatable :: length(:)
-      integer(ip), allocatable :: ranked(:)
-      integer(ip) :: n
-
-      n = size(bodies%free, kind=ip)
-      median_of_diameters = huge(1.0_wp)
-      if (n == 0_ip) return
-      allocate (ranked(n))
-      length = diameters_of(bodies)
-      call sort_reals(length, ranked)
-      median_of_diameters = length(ranked((n + 1_ip)/2_ip))
-   end function median_of_diameters
-
-   !> Diameters of the free bodies, (body) [m]
-   pure function diameters_of(bodies) result(length)
-      !> Bodies
-      type(bodies_t), intent(in) :: bodies
-      real(wp), allocatable :: length(:)
-      integer(ip) :: k
-
-      allocate (length(size(bodies%free)))
-      do k = 1_ip, size(bodies%free, kind=ip)
-         length(k) = diameter(body_shape(bodies, bodies%free(k)))
-      end do
-   end function diameters_of
 
 end module polydem_box_maker

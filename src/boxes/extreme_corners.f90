@@ -7,7 +7,7 @@
 !> its neighbours than 1e-9 of the size, which is far above all rounding errors here.
 module polydem_extreme_corners
    use polydem_bodies, only: block_size, bodies_t, find_directions
-   use polydem_box_maker, only: bound_body, box_maker_t, turn_and_bound_block
+   use polydem_box_maker, only: box_maker_t, place_boxes, turn_and_bound_block
    use polydem_boxes, only: boxes_t
    use polydem_kinds, only: ip, wp
    implicit none
@@ -62,25 +62,29 @@ contains
       type(bodies_t), intent(inout) :: bodies
       !> Boxes; only `bounds` changes
       type(boxes_t), intent(inout) :: boxes
-      integer(ip) :: single(block_size), others(block_size), k, n, n_single, n_others
-      real(wp) :: direction(2, block_size)
+      integer(ip) :: single(block_size), others(block_size), k, n, n_single, n_others, n_known
+      real(wp) :: direction(2, block_size), extent(4, block_size)
 
       n = size(slots, kind=ip)
       call divide_by_pairs(n, slots, pairs_of, single, n_single, others, n_others)
       call find_directions(bodies, single(:n_single), isa, direction)
+      n_known = 0_ip
       do k = 1_ip, n_single
          associate (s => single(k))
             if (.not. is_known(self%known(s), bodies%angle(s))) &
                call update_corners(bodies, s, direction(:, k), self%place(:, s), self%known(s))
-            if (is_known(self%known(s), bodies%angle(s))) then
-               call bound_body(maker, bodies%position(:, s), s, extent_of(self%known(s)%corner, direction(:, k)), &
-                               direction(:, k), boxes)
-            else
+            if (.not. is_known(self%known(s), bodies%angle(s))) then
                n_others = n_others + 1_ip
                others(n_others) = s
+               cycle
             end if
          end associate
+         n_known = n_known + 1_ip
+         single(n_known) = single(k)
+         direction(:, n_known) = direction(:, k)
+         extent(:, n_known) = extent_of(self%known(single(k))%corner, direction(:, k))
       end do
+      call place_boxes(maker, single(:n_known), extent, direction, bodies, boxes)
       if (n_others > 0_ip) call turn_and_bound_block(maker, others(:n_others), isa, bodies, boxes)
    end subroutine bound_block
 

@@ -1,7 +1,8 @@
 !> Start of a simulation: time step, forces and accelerations at time 0. All ranks start alike, one or many.
 module polydem_start_simulation
    use polydem_body_passes, only: move_walls
-   use polydem_box_maker, only: diameters_of, update_boxes
+   use polydem_body_sizes, only: diameters_of
+   use polydem_box_maker, only: update_boxes
    use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_choose_step, only: choose_step
    use polydem_communicator, only: communicator_t

@@ -1,11 +1,13 @@
-!> Thickness and radius of bodies, measured from their centres of mass.
+!> Thickness and radius of bodies, measured from their centres of mass, and diameters.
 module polydem_body_sizes
    use polydem_bodies, only: bodies_t
    use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
+   use polydem_polygon, only: diameter
+   use polydem_sort_reals, only: sort_reals
    implicit none
    private
-   public :: measure_body, thickness_of_bodies
+   public :: measure_body, thickness_of_bodies, diameter_of, diameters_of, median_of_diameters
 
 contains
 
@@ -66,5 +68,42 @@ contains
          thickness(s) = thickness_of(bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))
       end do
    end function thickness_of_bodies
+
+   !> Diameter of one body [m]
+   pure real(wp) function diameter_of(bodies, s)
+      type(bodies_t), intent(in) :: bodies
+      !> Slot
+      integer(ip), intent(in) :: s
+
+      diameter_of = diameter(bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))
+   end function diameter_of
+
+   !> Diameters of the free bodies, (body) [m]
+   pure function diameters_of(bodies) result(length)
+      type(bodies_t), intent(in) :: bodies
+      real(wp), allocatable :: length(:)
+      integer(ip) :: k
+
+      allocate (length(size(bodies%free)))
+      do k = 1_ip, size(bodies%free, kind=ip)
+         length(k) = diameter_of(bodies, bodies%free(k))
+      end do
+   end function diameters_of
+
+   !> Median diameter of the free bodies; huge if there are none [m]
+   pure real(wp) function median_of_diameters(bodies)
+      type(bodies_t), intent(in) :: bodies
+      real(wp), allocatable :: length(:)
+      integer(ip), allocatable :: ranked(:)
+      integer(ip) :: n
+
+      n = size(bodies%free, kind=ip)
+      median_of_diameters = huge(1.0_wp)
+      if (n == 0_ip) return
+      allocate (ranked(n))
+      length = diameters_of(bodies)
+      call sort_reals(length, ranked)
+      median_of_diameters = length(ranked((n + 1_ip)/2_ip))
+   end function median_of_diameters
 
 end module polydem_body_sizes
