@@ -5,7 +5,6 @@ module polydem_filtered_candidates
    use polydem_boxes, only: boxes_t
    use polydem_candidates, only: candidates_t
    use polydem_kinds, only: ip, wp
-   use polydem_pair_changes, only: pair_changes_t
    use polydem_parallel_filter, only: parallel_filter_t
    implicit none
    private
@@ -23,7 +22,11 @@ module polydem_filtered_candidates
       procedure :: add
       procedure :: drop
       procedure :: start_filter
-      procedure :: compare_active
+      procedure :: is_due
+      procedure :: follow_part
+      procedure :: gather_left
+      procedure :: review_and_compare
+      procedure :: begin_interval
    end type filtered_candidates_t
 
 contains
@@ -68,37 +71,67 @@ contains
       call self%candidates_t%drop(k)
    end subroutine drop
 
-   !> Compare the active candidates of a step; before that, begin an interval or review the boxes off their lines.
-   subroutine compare_active(self, boxes, changes)
+   !> Whether an interval must begin before the active candidates of this step are compared
+   pure logical function is_due(self)
+      class(filtered_candidates_t), intent(in) :: self
+
+      is_due = self%filter%is_due(self%n)
+   end function is_due
+
+   !> Draw new lines through the boxes of a part that left theirs. After all parts call `gather_left`.
+   pure subroutine follow_part(self, w, boxes)
+      class(filtered_candidates_t), intent(inout) :: self
+      !> Number of the part
+      integer, intent(in) :: w
+      !> Boxes of this step
+      type(boxes_t), intent(in) :: boxes
+
+      call self%filter%follow_part(w, boxes, self%everywhere)
+   end subroutine follow_part
+
+   !> Make the candidates of the boxes that left their lines often active, unless an interval is due. Then call
+   !> `review_and_compare`.
+   pure subroutine gather_left(self)
+      class(filtered_candidates_t), intent(inout) :: self
+
+      call self%filter%gather_left()
+      if (.not. self%is_due()) call activate_strays(self)
+   end subroutine gather_left
+
+   !> Review the candidates of the boxes that left their lines, and compare the active candidates, by the calling thread
+   !> alone.
+   subroutine review_and_compare(self, boxes)
       class(filtered_candidates_t), intent(inout) :: self
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
-      !> List of changes; the new changes are appended
-      type(pair_changes_t), intent(inout) :: changes
+
+      call self%filter%review_left(self)
+      call self%filter%compare_alone(boxes)
+   end subroutine review_and_compare
+
+   !> Begin an interval, and compare the candidates that are active in it.
+   subroutine begin_interval(self, boxes)
+      class(filtered_candidates_t), intent(inout) :: self
+      !> Boxes of this step
+      type(boxes_t), intent(in) :: boxes
+
+      call self%filter%begin_interval(self)
+      call self%tidy()
+      call self%filter%draw_all_lines(boxes)
+      call self%filter%list_strays(self%everywhere)
+      call self%filter%classify_all(boxes, self, known=.true.)
+      call activate_strays(self)
+      call self%filter%compare_active(boxes)
+   end subroutine begin_interval
+
+   !> Make all candidates of the strays active.
+   pure subroutine activate_strays(self)
+      type(filtered_candidates_t), intent(inout) :: self
       integer(ip) :: k
 
-      call self%filter%begin_step()
-      if (.not. self%filter%is_due(self%n)) then
-         call self%filter%follow_lines(boxes, self%everywhere)
-         if (.not. self%filter%is_due(self%n)) then
-            do k = 1_ip, self%filter%strays%n
-               call self%filter%activate_candidates_of(self%filter%strays%at(k), self)
-            end do
-            call self%filter%review_left(self)
-         end if
-      end if
-      if (self%filter%is_due(self%n)) then
-         call self%filter%begin_interval(self)
-         call self%tidy()
-         call self%filter%draw_all_lines(boxes)
-         call self%filter%list_strays(self%everywhere)
-         call self%filter%classify_all(boxes, self, known=.true.)
-         do k = 1_ip, self%filter%strays%n
-            call self%filter%activate_candidates_of(self%filter%strays%at(k), self)
-         end do
-      end if
-      call self%filter%compare_active(boxes)
-      call self%filter%changes%join(changes)
-   end subroutine compare_active
+      do k = 1_ip, self%filter%strays%n
+         call self%filter%activate_candidates_of(self%filter%strays%at(k), self)
+      end do
+   end subroutine activate_strays
 
 end module polydem_filtered_candidates

@@ -1,13 +1,17 @@
-!> Search of the tree for the new candidates of a box.
+!> Search for the changes of candidates after the tree has changed.
+!>
+!> A pair becomes a candidate only if the padded cell of one of its boxes has grown somewhere, and ceases to be one only
+!> if one has shrunk somewhere. So the tree is searched for boxes whose padded cell has grown, and the candidates of the
+!> others are only compared.
 module polydem_quadtree_search
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: meet
+   use polydem_candidates, only: candidates_t, meet
    use polydem_index_list, only: index_list_t
-   use polydem_kinds, only: bp, dp, ip, lp
+   use polydem_kinds, only: bp, dp, ip, lp, wp
    use polydem_quadtree_nodes, only: tree_t
    implicit none
    private
-   public :: padded_cells_t, search
+   public :: padded_cells_t, worker_t, find_outside, search_changed
 
    !> Size of the stack of cells to be searched: at most three cells per level and one more are on the stack
    integer, parameter :: stack_size = 96
@@ -18,19 +22,149 @@ module polydem_quadtree_search
       real(dp), allocatable :: now(:, :)
       !> Bounds of the padded cells before this step, (4, box) [finest cells]
       real(dp), allocatable :: before(:, :)
+      !> 1 if the padded cell of a box has grown in this step, else 0, (box)
+      integer(bp), allocatable :: has_grown(:)
+   contains
+      procedure :: start
+      procedure :: update
+      procedure :: settle
    end type padded_cells_t
+
+   !> Results of one thread, or of one part of the work
+   type :: worker_t
+      !> Boxes whose centre left its leaf or whose half side exceeds their reach
+      type(index_list_t) :: outside
+      !> Boxes of new candidates, two entries for each candidate
+      type(index_list_t) :: found
+      !> Candidates to remove
+      type(index_list_t) :: separated
+      !> Number of searches, and of nodes visited in them
+      integer(lp) :: searches = 0_lp, visits = 0_lp
+   contains
+      procedure :: clear
+   end type worker_t
 
 contains
 
-   !> Find the new candidates of one box.
-   subroutine search(tree, padded, boxes, i, found, visits)
+   !> Start with empty cells.
+   pure subroutine start(self, n_boxes)
+      class(padded_cells_t), intent(inout) :: self
+      !> Number of boxes
+      integer(ip), intent(in) :: n_boxes
+
+      allocate (self%before(4, n_boxes))
+      allocate (self%has_grown(n_boxes), source=0_bp)
+      self%before = spread([1.0_dp, 1.0_dp, -1.0_dp, -1.0_dp]*huge(1.0_dp), 2, n_boxes)
+      self%now = self%before
+   end subroutine start
+
+   !> Compute the padded cells of the boxes whose leaf changed. The previous ones are those of `before`.
+   pure subroutine update(self, tree)
+      class(padded_cells_t), intent(inout) :: self
+      !> Tree of the boxes
+      type(tree_t), intent(in) :: tree
+      integer(ip) :: k, i
+      real(dp) :: reach
+
+      do k = 1_ip, tree%n_changed
+         i = tree%changed(k)
+         reach = tree%reach(i)
+         self%now(1:2, i) = tree%cell(1:2, i) - reach
+         self%now(3:4, i) = tree%cell(3:4, i) + reach
+         self%has_grown(i) = merge(0_bp, 1_bp, lies_in(self%now(:, i), self%before(:, i)))
+      end do
+   end subroutine update
+
+   !> Whether a cell lies in another one
+   pure logical function lies_in(cell, other)
+      real(dp), intent(in) :: cell(4), other(4)
+
+      lies_in = all(cell(1:2) >= other(1:2)) .and. all(cell(3:4) <= other(3:4))
+   end function lies_in
+
+   !> End a step: the padded cells before the next step are those of now.
+   pure subroutine settle(self, tree)
+      class(padded_cells_t), intent(inout) :: self
+      !> Tree of the boxes
+      type(tree_t), intent(in) :: tree
+      integer(ip) :: k, i
+
+      do k = 1_ip, tree%n_changed
+         i = tree%changed(k)
+         self%before(:, i) = self%now(:, i)
+         self%has_grown(i) = 0_bp
+      end do
+   end subroutine settle
+
+   !> Delete all results.
+   pure subroutine clear(self)
+      class(worker_t), intent(inout) :: self
+
+      self%outside%n = 0_ip
+      self%found%n = 0_ip
+      self%separated%n = 0_ip
+      self%searches = 0_lp
+      self%visits = 0_lp
+   end subroutine clear
+
+   !> List the boxes low..high whose centre is not in its leaf or whose side exceeds `greatest_side`.
+   subroutine find_outside(tree, low, high, bounds, greatest_side, outside)
+      !> Tree of the boxes
+      type(tree_t), intent(in) :: tree
+      !> First and last box
+      integer(ip), intent(in) :: low, high
+      !> Bounds of the boxes, (4, box) [m]
+      real(wp), intent(in), contiguous :: bounds(:, :)
+      !> Largest side of each box for which its reach is sufficient, (box) [m]
+      real(wp), intent(in), contiguous :: greatest_side(:)
+      !> List of the boxes; appended
+      type(index_list_t), intent(inout) :: outside
+      real(dp) :: x, y
+      integer(ip) :: i
+
+      do i = low, high
+         x = (real(bounds(1, i), dp) + real(bounds(3, i), dp))*tree%half_scale + tree%shift(1)
+         y = (real(bounds(2, i), dp) + real(bounds(4, i), dp))*tree%half_scale + tree%shift(2)
+         if (x >= tree%cell(1, i) .and. x < tree%cell(3, i) .and. &
+             y >= tree%cell(2, i) .and. y < tree%cell(4, i) .and. &
+             max(bounds(3, i) - bounds(1, i), bounds(4, i) - bounds(2, i)) <= greatest_side(i)) cycle
+         call outside%push(i)
+      end do
+   end subroutine find_outside
+
+   !> Find the new candidates of boxes whose leaf changed, and those that are candidates no longer.
+   subroutine search_changed(tree, padded, candidates, low, high, boxes, worker)
       !> Tree of the boxes
       type(tree_t), intent(in) :: tree
       !> Padded cells in this step and before
       type(padded_cells_t), intent(in) :: padded
+      !> Candidates before this step
+      class(candidates_t), intent(in) :: candidates
+      !> First and last box in the list of those whose leaf changed
+      integer(ip), intent(in) :: low, high
       !> Boxes; only their bodies, and whether the bodies are passive, are used
       type(boxes_t), intent(in) :: boxes
-      !> Box whose padded cell changed
+      !> Results; increased
+      type(worker_t), intent(inout) :: worker
+      integer(ip) :: k, i
+
+      do k = low, high
+         i = tree%changed(k)
+         if (padded%has_grown(i) /= 0_bp) then
+            worker%searches = worker%searches + 1_lp
+            call search(tree, padded, boxes, i, worker%found, worker%visits)
+         end if
+         if (.not. lies_in(padded%before(:, i), padded%now(:, i))) &
+            call candidates%list_separated(i, padded%now, worker%separated)
+      end do
+   end subroutine search_changed
+
+   !> Find the new candidates of one box.
+   subroutine search(tree, padded, boxes, i, found, visits)
+      type(tree_t), intent(in) :: tree
+      type(padded_cells_t), intent(in) :: padded
+      type(boxes_t), intent(in) :: boxes
+      !> Box whose padded cell has grown
       integer(ip), intent(in) :: i
       !> List of the boxes of new candidates; two entries are appended for each candidate
       type(index_list_t), intent(inout) :: found
@@ -50,7 +184,7 @@ contains
          visits = visits + 1_lp
          j = tree%node(node)%first
          do while (j /= 0_ip)
-            if (is_new(tree, padded, boxes, i, j)) then
+            if (is_new(padded, boxes, i, j)) then
                call found%push(i)
                call found%push(j)
             end if
@@ -91,17 +225,16 @@ contains
       end do
    end function ancestor_around
 
-   !> Whether two boxes have become candidates and this search reports the pair. If the leaves of both boxes changed,
+   !> Whether two boxes have become candidates and this search reports the pair. If the padded cells of both have grown,
    !> only the search for the box with the lower number reports it.
-   pure logical function is_new(tree, padded, boxes, i, j)
-      type(tree_t), intent(in) :: tree
+   pure logical function is_new(padded, boxes, i, j)
       type(padded_cells_t), intent(in) :: padded
       type(boxes_t), intent(in) :: boxes
       integer(ip), intent(in) :: i, j
 
       is_new = .false.
       if (j <= i) then
-         if (j == i .or. tree%is_changed(j) /= 0_bp) return
+         if (j == i .or. padded%has_grown(j) /= 0_bp) return
       end if
       if (.not. meet(padded%now(:, i), padded%now(:, j))) return
       if (meet(padded%before(:, i), padded%before(:, j))) return

@@ -60,6 +60,7 @@ module polydem_box_lines
       integer(ip), allocatable :: drawn(:)
    contains
       procedure :: gap_margin
+      procedure :: tube
       procedure :: draw_lines
       procedure :: set_limit
       procedure :: redraw
@@ -202,7 +203,7 @@ contains
       real(wp), intent(in) :: bounds(4)
       real(wp) :: from(4), to(4), room(4), widths(2)
 
-      widths = tube(self)
+      widths = self%tube()
       from = real(self%place(:, i), wp) + real(self%speed(:, i), wp)*real(self%drawn(i), wp)
       to = real(self%place(:, i), wp) + real(self%speed(:, i), wp)*real(self%length, wp)
       room(1:2) = min(from(1:2), to(1:2)) - (bounds(1:2) - self%origin + widths(1))
@@ -213,7 +214,7 @@ contains
 
    !> Half width of the tubes around the lines in which the boxes on their lines are, and limit of places [m]
    pure function tube(self)
-      type(box_lines_t), intent(in) :: self
+      class(box_lines_t), intent(in) :: self
       real(wp) :: tube(2)
 
       tube = real([self%tolerance + rounding*self%limit, self%limit], wp)
@@ -234,10 +235,10 @@ contains
       strays%n = 0_ip
       call strays%reserve(high - low + 2_ip)
       if (self%isa == isa_avx2) then
-         call list_strays_avx2([low, high], [0.0_sp, real(self%length, sp)], tube(self), self%origin, n_boxes, bounds, &
-                               self%place, self%speed, strays%n, strays%at)
+         call list_strays_avx2([low, high], [0.0_sp, real(self%length, sp)], self%tube(), self%origin, n_boxes, &
+                               bounds, self%place, self%speed, strays%n, strays%at)
       else
-         call list_strays([low, high], [0.0_sp, real(self%length, sp)], tube(self), self%origin, n_boxes, bounds, &
+         call list_strays([low, high], [0.0_sp, real(self%length, sp)], self%tube(), self%origin, n_boxes, bounds, &
                           self%place, self%speed, strays%n, strays%at)
       end if
    end subroutine find_strays

@@ -1,6 +1,7 @@
 !> List of integers that grows.
 module polydem_index_list
-   use polydem_kinds, only: ip
+   use polydem_kinds, only: ip, lp
+   use polydem_sort, only: sort_keys
    implicit none
    private
    public :: index_list_t
@@ -14,6 +15,7 @@ module polydem_index_list
    contains
       procedure :: push
       procedure :: reserve
+      procedure :: sort
    end type index_list_t
 
 contains
@@ -49,5 +51,21 @@ contains
       self%n = self%n + 1_ip
       self%at(self%n) = entry
    end subroutine push
+
+   !> Sort the entries in ascending order.
+   pure subroutine sort(self)
+      class(index_list_t), intent(inout) :: self
+      integer(lp), allocatable :: keys(:), spare_keys(:)
+      integer(ip), allocatable :: spare(:)
+      integer(ip) :: k
+
+      do k = 2_ip, self%n
+         if (self%at(k - 1_ip) > self%at(k)) exit
+      end do
+      if (k > self%n) return
+      allocate (keys(self%n), spare_keys(self%n), spare(self%n))
+      keys = int(self%at(1:self%n), lp)
+      call sort_keys(self%n, keys, self%at, spare_keys, spare)
+   end subroutine sort
 
 end module polydem_index_list

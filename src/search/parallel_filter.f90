@@ -1,4 +1,4 @@
-!> Filter of candidates (`polydem_line_filter`) by several threads. Each thread works on a part of the boxes, of the
+!> Filter of candidates (`polydem_line_filter`) by several threads. Each thread works on parts of the boxes, of the
 !> candidates or of the active candidates. The results do not depend on the number of threads.
 module polydem_parallel_filter
    use polydem_active_pairs, only: active_pairs_t
@@ -20,7 +20,7 @@ module polydem_parallel_filter
    !> Inverse share of strays up to which it is cheaper to look at them alone than at all boxes again
    integer(ip), parameter :: few_strays = 16_ip
 
-   !> Results of one thread
+   !> Results of one part of the work
    type :: worker_t
       !> Boxes that left their lines in this step
       type(index_list_t) :: left
@@ -36,9 +36,9 @@ module polydem_parallel_filter
 
    !> Filter with the results of its threads
    type, extends(line_filter_t) :: parallel_filter_t
-      !> Changes that each thread recorded
+      !> Changes that were recorded in each part
       type(thread_changes_t) :: changes
-      !> Results of each thread, (thread)
+      !> Results of each part, (part)
       type(worker_t), allocatable, private :: worker(:)
       !> Boxes that left their lines often or leave their bounds
       type(index_list_t) :: strays
@@ -53,12 +53,16 @@ module polydem_parallel_filter
       procedure :: shorten_strays
       procedure :: classify_all
       procedure :: find_active_states
+      procedure :: append_left
+      procedure :: follow_part
+      procedure :: gather_left
       procedure :: compare_active
+      procedure :: compare_alone
    end type parallel_filter_t
 
 contains
 
-   !> Begin a step: the results of all threads are empty.
+   !> Begin a step: the results of all parts are empty.
    subroutine begin_step(self)
       class(parallel_filter_t), intent(inout) :: self
 
@@ -90,9 +94,30 @@ contains
             call follow_part(self, w, boxes, limits)
          end do
       end if
+      call self%gather_left()
+   end subroutine follow_lines
+
+   !> Count the boxes that left their lines in any part, and join the strays among them.
+   pure subroutine gather_left(self)
+      class(parallel_filter_t), intent(inout) :: self
+
       self%n_left = self%n_left + sum(int(self%worker%left%n, lp))
       call gather_strays(self)
-   end subroutine follow_lines
+   end subroutine gather_left
+
+   !> Append the boxes of a part that left their lines in this step to a list.
+   pure subroutine append_left(self, w, list)
+      class(parallel_filter_t), intent(in) :: self
+      !> Number of the part
+      integer, intent(in) :: w
+      !> List of boxes
+      type(index_list_t), intent(inout) :: list
+      integer(ip) :: k
+
+      do k = 1_ip, self%worker(w)%left%n
+         call list%push(self%worker(w)%left%at(k))
+      end do
+   end subroutine append_left
 
    !> Whether work is worth a parallel region. Even for one thread a region costs 0.2 us.
    pure logical function is_parallel(self, n, worth)
@@ -103,11 +128,14 @@ contains
       is_parallel = n > worth .and. size(self%worker) > 1
    end function is_parallel
 
-   !> Find the boxes of a thread that left their lines, and draw new ones.
+   !> Find the boxes of a part that left their lines, and draw new ones. After all parts call `gather_left`.
    pure subroutine follow_part(self, w, boxes, limits)
       class(parallel_filter_t), intent(inout) :: self
+      !> Number of the part
       integer, intent(in) :: w
+      !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
+      !> Bounds that each box must not leave while it is on its lines, (4, box) [m]
       real(wp), intent(in), contiguous :: limits(:, :)
       integer(ip) :: low, high
 
@@ -116,7 +144,7 @@ contains
       call redraw_lines(self, boxes, limits, self%worker(w))
    end subroutine follow_part
 
-   !> Draw new lines through the boxes of a thread that left theirs, and list the strays among them. Boxes that were off
+   !> Draw new lines through the boxes of a part that left theirs, and list the strays among them. Boxes that were off
    !> before are removed from the list.
    pure subroutine redraw_lines(self, boxes, limits, worker)
       class(parallel_filter_t), intent(inout) :: self
@@ -144,7 +172,7 @@ contains
       worker%left%n = kept
    end subroutine redraw_lines
 
-   !> Join the strays of all threads.
+   !> Join the strays of all parts.
    pure subroutine gather_strays(self)
       class(parallel_filter_t), intent(inout) :: self
       integer(ip) :: k
@@ -184,7 +212,7 @@ contains
       end do
    end subroutine review_left
 
-   !> Review the candidates of the boxes of a thread.
+   !> Review the candidates of the boxes of a part.
    pure subroutine review_part(self, candidates, worker)
       class(parallel_filter_t), intent(in) :: self
       class(candidates_t), intent(in) :: candidates
@@ -329,7 +357,7 @@ contains
       call self%count_step()
    end subroutine compare_active
 
-   !> Compare the boxes of the active candidates of a thread.
+   !> Compare the boxes of the active candidates of a part.
    subroutine compare_part(self, w, boxes)
       class(parallel_filter_t), intent(inout) :: self
       integer, intent(in) :: w
@@ -339,5 +367,15 @@ contains
       call part(self%active%n, size(self%worker), w, low, high)
       call self%active%compare(low, high, boxes%bounds, boxes%body, self%changes%of(w))
    end subroutine compare_part
+
+   !> Compare the boxes of the active candidates by the calling thread alone.
+   subroutine compare_alone(self, boxes)
+      class(parallel_filter_t), intent(inout) :: self
+      !> Boxes of this step
+      type(boxes_t), intent(in) :: boxes
+
+      call self%active%compare(1_ip, self%active%n, boxes%bounds, boxes%body, self%changes%of(1))
+      call self%count_step()
+   end subroutine compare_alone
 
 end module polydem_parallel_filter
