@@ -42,6 +42,8 @@ module polydem_parallel_filter
       type(worker_t), allocatable, private :: worker(:)
       !> Boxes that left their lines often or leave their bounds
       type(index_list_t) :: strays
+      !> Number of active candidates that were compared in this step
+      integer(ip), private :: n_compared = 0_ip
    contains
       procedure :: begin_step
       procedure :: follow_lines
@@ -67,6 +69,7 @@ contains
       class(parallel_filter_t), intent(inout) :: self
 
       if (self%length > 0_ip) self%step = self%step + 1_ip
+      self%n_compared = 0_ip
       call self%changes%clear()
       if (allocated(self%worker)) then
          if (size(self%worker) /= self%changes%n_threads()) deallocate (self%worker)
@@ -74,7 +77,8 @@ contains
       if (.not. allocated(self%worker)) allocate (self%worker(self%changes%n_threads()))
    end subroutine begin_step
 
-   !> Draw new lines through the boxes that left theirs. Then handle the `strays`, and call `review_left`.
+   !> Draw new lines through the boxes that left theirs. Several threads also compare the active candidates, so that this
+   !> needs no region of its own. Then handle the `strays`, and call `review_left`.
    subroutine follow_lines(self, boxes, limits)
       class(parallel_filter_t), intent(inout) :: self
       !> Boxes of this step
@@ -87,8 +91,10 @@ contains
          !$omp parallel do schedule(static, 1) default(none) shared(self, boxes, limits) private(w)
          do w = 1, size(self%worker)
             call follow_part(self, w, boxes, limits)
+            call compare_part(self, w, boxes)
          end do
          !$omp end parallel do
+         self%n_compared = self%active%n
       else
          do w = 1, size(self%worker)
             call follow_part(self, w, boxes, limits)
@@ -316,6 +322,7 @@ contains
       end do
       !$omp end parallel do
       call self%collect(candidates%n, self%worker%active)
+      self%n_compared = 0_ip
    end subroutine classify_all
 
    !> Find the states of all active candidates, without changes.
@@ -336,14 +343,14 @@ contains
       !$omp end parallel do
    end subroutine find_active_states
 
-   !> Compare the boxes of the active candidates.
+   !> Compare the boxes of the active candidates that were not compared in this step.
    subroutine compare_active(self, boxes)
       class(parallel_filter_t), intent(inout) :: self
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
       integer :: w
 
-      if (self%is_parallel(self%active%n, worth_testing)) then
+      if (self%is_parallel(self%active%n - self%n_compared, worth_testing)) then
          !$omp parallel do schedule(static, 1) default(none) shared(self, boxes) private(w)
          do w = 1, size(self%worker)
             call compare_part(self, w, boxes)
@@ -357,15 +364,16 @@ contains
       call self%count_step()
    end subroutine compare_active
 
-   !> Compare the boxes of the active candidates of a part.
+   !> Compare the boxes of a part of these candidates.
    subroutine compare_part(self, w, boxes)
       class(parallel_filter_t), intent(inout) :: self
       integer, intent(in) :: w
       type(boxes_t), intent(in) :: boxes
       integer(ip) :: low, high
 
-      call part(self%active%n, size(self%worker), w, low, high)
-      call self%active%compare(low, high, boxes%bounds, boxes%body, self%changes%of(w))
+      call part(self%active%n - self%n_compared, size(self%worker), w, low, high)
+      call self%active%compare(self%n_compared + low, self%n_compared + high, boxes%bounds, boxes%body, &
+                               self%changes%of(w))
    end subroutine compare_part
 
    !> Compare the boxes of the active candidates by the calling thread alone.
