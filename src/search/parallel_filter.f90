@@ -77,8 +77,8 @@ contains
       if (.not. allocated(self%worker)) allocate (self%worker(self%changes%n_threads()))
    end subroutine begin_step
 
-   !> Draw new lines through the boxes that left theirs. Several threads also compare the active candidates, so that this
-   !> needs no region of its own. Then handle the `strays`, and call `review_left`.
+   !> Draw new lines through the boxes that left theirs. Several threads also compare the active candidates, so that
+   !> this needs no region of its own. Then handle the `strays`, and call `review_left`.
    subroutine follow_lines(self, boxes, limits)
       class(parallel_filter_t), intent(inout) :: self
       !> Boxes of this step
