@@ -98,15 +98,20 @@ contains
       if (.not. self%is_due()) call activate_strays(self)
    end subroutine gather_left
 
-   !> Review the candidates of the boxes that left their lines, and compare the active candidates, by the calling thread
-   !> alone.
-   subroutine review_and_compare(self, boxes)
+   !> Review the candidates of the boxes that left their lines, and compare the active candidates.
+   subroutine review_and_compare(self, boxes, alone)
       class(filtered_candidates_t), intent(inout) :: self
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
+      !> Whether the calling thread does all, because the others have other work
+      logical, intent(in) :: alone
 
       call self%filter%review_left(self)
-      call self%filter%compare_alone(boxes)
+      if (alone) then
+         call self%filter%compare_alone(boxes)
+      else
+         call self%filter%compare_active(boxes)
+      end if
    end subroutine review_and_compare
 
    !> Begin an interval, and compare the candidates that are active in it.

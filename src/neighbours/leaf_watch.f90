@@ -3,7 +3,12 @@
 !> A box on its lines (`polydem_line_filter`) is inside straight tubes. If they keep its centre in its leaf, and its
 !> sides below the largest one for which its reach is sufficient, until the end of the interval, the box need not be
 !> tested as long as it is on its lines. All others are *watched*: a step tests only these. A box is judged when an
-!> interval begins, when it gets new lines, and when its leaf changes.
+!> interval begins, when it gets new lines or is marked as off, and when its leaf changes. Boxes that are off are always
+!> watched.
+!>
+!> A tube bounds each side within its half width, so it bounds the sum of two opposite sides, twice the centre, and their
+!> difference, the length of a side, within twice the half width. The path is straight: its ends bound it. The slack of
+!> the tree covers the rounding errors of coordinates in finest cells.
 module polydem_leaf_watch
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: dp, ip, lp, wp
@@ -149,7 +154,7 @@ contains
             x = (real(bounds(1, i), dp) + real(bounds(3, i), dp))*tree%half_scale + tree%shift(1)
             y = (real(bounds(2, i), dp) + real(bounds(4, i), dp))*tree%half_scale + tree%shift(2)
             outside%at(n + 1_ip) = i
-            ! Differences of numbers have the sign of their comparison
+            ! Differences of numbers have the sign of their comparison. There is no NaN: poses are tested before.
             inside = min(x - watched%leaf(1, k), y - watched%leaf(2, k))
             below = min(watched%leaf(3, k) - x, watched%leaf(4, k) - y)
             side = real(max(bounds(3, i) - bounds(1, i), bounds(4, i) - bounds(2, i)), dp)

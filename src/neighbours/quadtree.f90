@@ -26,7 +26,6 @@
 !> tree along the longer axis for nearly one-dimensional scenes.
 module polydem_quadtree
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: overlapping
    use polydem_filtered_candidates, only: filtered_candidates_t
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_leaf_changes, &
@@ -37,7 +36,8 @@ module polydem_quadtree
    use polydem_pair_changes, only: pair_changes_t
    use polydem_quadtree_measures, only: finest_cell, half_side, measure_reaches, shorter_axis
    use polydem_quadtree_nodes, only: tree_t
-   use polydem_quadtree_search, only: find_outside, padded_cells_t, search_changed, worker_t
+   use polydem_quadtree_search, only: find_outside, padded_cells_t, replace_candidates, &
+      search_changed, worker_t
    use polydem_thread_changes, only: part, thread_changes_t
    implicit none
    private
@@ -102,7 +102,7 @@ contains
          call self%changes%join(changes)
       end if
       call count_work(self)
-      call replace_candidates(self, boxes, changes)
+      call replace_candidates(self%worker, boxes, self%candidates, changes)
       call self%padded%settle(self%tree)
       call self%tree%settle()
       call self%work%lap(phase_search)
@@ -215,9 +215,10 @@ contains
       call self%work%add(count_leaf_changes, int(self%tree%n_changed, lp))
    end subroutine count_work
 
-   !> The same with a filter. The first thread repairs the tree and searches, while the last one reviews the candidates
-   !> of the boxes that left their lines and compares the active ones. So each finds most of what it reads in its own
-   !> cache. If many leaves changed, or there are more threads, all search afterwards.
+   !> The same with a filter. Of two threads, the first one repairs the tree and searches, while the other one reviews the
+   !> candidates of the boxes that left their lines and compares the active ones. So each finds most of what it reads in
+   !> its own cache. More threads compare together before the first one repairs the tree. If many leaves changed, or there
+   !> are more than two threads, all search afterwards.
    subroutine filter_and_search(self, boxes)
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
@@ -227,15 +228,19 @@ contains
 
       call follow_boxes(self, boxes, compares)
       if (.not. compares) call self%work%add(count_passes, 1_lp)
-      call self%work%lap(phase_filter)
       n_threads = size(self%worker)
+      if (compares .and. n_threads /= 2) then
+         call self%candidates%review_and_compare(boxes, alone=.false.)
+         compares = .false.
+      end if
+      call self%work%lap(phase_filter)
       one_searches = .false.
       !$omp parallel if (boxes%n > min_parallel_size) default(none) private(w, low, high) &
       !$omp    shared(self, boxes, compares, n_threads, one_searches)
       !$omp do schedule(static, 1)
       do w = 1, n_threads
          if (w == 1) call repair_and_search(self, boxes, one_searches)
-         if (w == n_threads .and. compares) call self%candidates%review_and_compare(boxes)
+         if (w == n_threads .and. compares) call self%candidates%review_and_compare(boxes, alone=.true.)
       end do
       !$omp end do
       !$omp do schedule(static, 1)
@@ -256,6 +261,7 @@ contains
       !> Whether the active candidates are still to be compared: no interval began
       logical, intent(out) :: compares
       logical :: all_judged
+      integer(ip) :: k
 
       call self%candidates%filter%begin_step()
       call self%watch%set_parts(size(self%worker), boxes%n, all_judged)
@@ -265,9 +271,17 @@ contains
       if (.not. compares) return
       call self%candidates%gather_left()
       compares = .not. self%candidates%is_due()
-      if (compares) return
-      call self%candidates%begin_interval(boxes)
-      call test_boxes(self, boxes, follows=.false., judges=.true.)
+      if (.not. compares) then
+         call self%candidates%begin_interval(boxes)
+         call test_boxes(self, boxes, follows=.false., judges=.true.)
+         return
+      end if
+      ! These were on their lines when they were judged, and are off now.
+      associate (strays => self%candidates%filter%strays)
+         do k = 1_ip, strays%n
+            call self%watch%judge(strays%at(k), self%candidates%filter, self%tree, self%greatest_side)
+         end do
+      end associate
    end subroutine follow_boxes
 
    !> Find the boxes that left their leaf. Each thread works on the boxes of which it has just tested the lines.
@@ -358,31 +372,6 @@ contains
          end do
       end do
    end subroutine move_boxes
-
-   !> Replace the candidates of the boxes whose leaf changed.
-   subroutine replace_candidates(self, boxes, changes)
-      type(quadtree_t), intent(inout) :: self
-      type(boxes_t), intent(in) :: boxes
-      type(pair_changes_t), intent(inout) :: changes
-      integer(ip) :: k, i, j, number
-      integer :: w
-      logical :: overlap
-
-      do w = 1, size(self%worker)
-         do k = 1_ip, self%worker(w)%separated%n
-            call self%candidates%drop(self%worker(w)%separated%at(k))
-         end do
-      end do
-      do w = 1, size(self%worker)
-         do k = 1_ip, self%worker(w)%found%n, 2_ip
-            i = self%worker(w)%found%at(k)
-            j = self%worker(w)%found%at(k + 1_ip)
-            overlap = overlapping(boxes%bounds(:, i), boxes%bounds(:, j))
-            call self%candidates%add(i, j, overlap, number)
-            if (overlap) call changes%record(boxes%body(i), boxes%body(j), 1_ip)
-         end do
-      end do
-   end subroutine replace_candidates
 
    !> Set the counters: candidates, nodes, levels, and memory [B].
    subroutine survey(self)

@@ -5,13 +5,14 @@
 !> others are only compared.
 module polydem_quadtree_search
    use polydem_boxes, only: boxes_t
-   use polydem_candidates, only: candidates_t, meet
+   use polydem_candidates, only: candidates_t, meet, overlapping
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: bp, dp, ip, lp, wp
+   use polydem_pair_changes, only: pair_changes_t
    use polydem_quadtree_nodes, only: tree_t
    implicit none
    private
-   public :: padded_cells_t, worker_t, find_outside, search_changed
+   public :: padded_cells_t, worker_t, find_outside, search_changed, replace_candidates
 
    !> Size of the stack of cells to be searched: at most three cells per level and one more are on the stack
    integer, parameter :: stack_size = 96
@@ -158,6 +159,34 @@ contains
             call candidates%list_separated(i, padded%now, worker%separated)
       end do
    end subroutine search_changed
+
+   !> Replace the candidates of the boxes whose leaf changed, after all were searched.
+   subroutine replace_candidates(worker, boxes, candidates, changes)
+      !> Results of all workers, (worker)
+      type(worker_t), intent(in) :: worker(:)
+      type(boxes_t), intent(in) :: boxes
+      class(candidates_t), intent(inout) :: candidates
+      !> List of changes; new overlapping pairs are appended
+      type(pair_changes_t), intent(inout) :: changes
+      integer(ip) :: k, number
+      integer :: w
+      logical :: overlap
+
+      do w = 1, size(worker)
+         do k = 1_ip, worker(w)%separated%n
+            call candidates%drop(worker(w)%separated%at(k))
+         end do
+      end do
+      do w = 1, size(worker)
+         do k = 1_ip, worker(w)%found%n, 2_ip
+            associate (i => worker(w)%found%at(k), j => worker(w)%found%at(k + 1_ip))
+               overlap = overlapping(boxes%bounds(:, i), boxes%bounds(:, j))
+               call candidates%add(i, j, overlap, number)
+               if (overlap) call changes%record(boxes%body(i), boxes%body(j), 1_ip)
+            end associate
+         end do
+      end do
+   end subroutine replace_candidates
 
    !> Find the new candidates of one box.
    subroutine search(tree, padded, boxes, i, found, visits)
