@@ -272,7 +272,8 @@ contains
       integer(ip) :: k, n, n_cut
 
       n = size(slots, kind=ip)
-      call place_whole(n, slots, bodies%n, maker%box, maker%margin, extent, bodies%position, boxes%n, boxes%bounds, n_cut)
+      call place_whole(n, slots, bodies%n, maker%box, maker%margin, extent, bodies%position, boxes%n, boxes%bounds, &
+                       n_cut)
       if (n_cut == 0_ip) return
       do k = 1_ip, n
          if (maker%box(slots(k)) > 0_ip) cycle

@@ -39,8 +39,8 @@ contains
       call test_corners(batch, n, vertex, of_q, sure)
    end subroutine find_separated
 
-   !> Find the vertices of the remembered edges and corners. These are whole numbers, and -1 is true, so that the compiler
-   !> handles several lanes at a time.
+   !> Find the vertices of the remembered edges and corners. These are whole numbers, and -1 is true, so that the
+   !> compiler handles several lanes at a time.
    pure subroutine unpack_edges(batch, n, vertex, of_q, sure)
       type(overlap_batch_t), intent(in) :: batch
       integer(ip), intent(in) :: n

@@ -145,7 +145,8 @@ contains
 
       call self%serialize(serializer)
       call serializer%field('/bodies/half_velocity', self%half, 'm/s', 'velocities in the middle of the step')
-      call serializer%field('/bodies/half_spin', self%half_spin, 'rad/s', 'angular velocities in the middle of the step')
+      call serializer%field('/bodies/half_spin', self%half_spin, 'rad/s', &
+                            'angular velocities in the middle of the step')
    end subroutine serialize_step
 
    !> Stability limits for x'' + 2 z w x' + w^2 x = 0 with the force at the predicted velocity: beyond them the spectral

@@ -6,9 +6,9 @@
 !> interval begins, when it gets new lines or is marked as off, and when its leaf changes. Boxes that are off are always
 !> watched.
 !>
-!> A tube bounds each side within its half width, so it bounds the sum of two opposite sides, twice the centre, and their
-!> difference, the length of a side, within twice the half width. The path is straight: its ends bound it. The slack of
-!> the tree covers the rounding errors of coordinates in finest cells.
+!> A tube bounds each side within its half width, so it bounds the sum of two opposite sides, twice the centre, and
+!> their difference, the length of a side, within twice the half width. The path is straight: its ends bound it. The
+!> slack of the tree covers the rounding errors of coordinates in finest cells.
 module polydem_leaf_watch
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: dp, ip, lp, wp
