@@ -215,10 +215,10 @@ contains
       call self%work%add(count_leaf_changes, int(self%tree%n_changed, lp))
    end subroutine count_work
 
-   !> The same with a filter. Of two threads, the first one repairs the tree and searches, while the other one reviews
-   !> the candidates of the boxes that left their lines and compares the active ones. So each finds most of what it
-   !> reads in its own cache. More threads compare together before the first one repairs the tree. If many leaves
-   !> changed, or there are more than two threads, all search afterwards.
+   !> The work of `work_on_parts` with a filter. Of two threads, the first one repairs the tree and searches, while the
+   !> other one reviews the candidates of the boxes that left their lines and compares the active ones. So each finds
+   !> most of what it reads in its own cache. More threads compare together before the first one repairs the tree. If
+   !> many leaves changed, or there are more than two threads, all search afterwards.
    subroutine filter_and_search(self, boxes)
       type(quadtree_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
