@@ -1,7 +1,7 @@
 !> Halo: copies of nearby bodies that other ranks move. The halo exchange updates them in every step.
 !>
-!> `follow` is the whole exchange. `send_border` and `receive_halo` are its two parts: a step computes the bodies of the
-!> interior between them.
+!> `follow` is the whole exchange. `send_border` and `receive_halo` are its two parts: between them a step predicts all
+!> other bodies, and updates the boxes.
 module polydem_halo
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: neighbour_ranks_t, communicator_t
@@ -14,9 +14,11 @@ module polydem_halo
    type :: halo_t
       !> Neighbouring ranks, with the rows to send and to receive
       type(neighbour_ranks_t), private :: route
-      !> Slots of the free bodies that are in the halo of another rank, and of all other free bodies; ascending. Not
-      !> allocated before the first redistribution
-      integer(ip), allocatable :: border(:), interior(:)
+      !> Slots of the free bodies that are in the halo of another rank, the border, ascending. Not allocated before the
+      !> first redistribution
+      integer(ip), allocatable :: border(:)
+      !> Whether a body is in the border, (slot), up to the last free body
+      logical, allocatable :: in_border(:)
       !> Slots of the bodies to send, in the order of the route
       integer(ip), allocatable, private :: sent(:)
       !> Slots of the halo bodies, in the order of the route
@@ -49,13 +51,11 @@ contains
       integer(ip), intent(in) :: received(:)
       !> Whether forces depend on accelerations
       logical, intent(in) :: with_acceleration
-      logical :: in_border(maxval([0_ip, free]))
       integer(ip) :: k, r, width
 
-      in_border = .false.
-      in_border(sent) = .true.
-      halo%border = pack(free, in_border(free))
-      halo%interior = pack(free,.not. in_border(free))
+      halo%in_border = spread(.false., 1, maxval([0_ip, free]))
+      halo%in_border(sent) = .true.
+      halo%border = pack(free, halo%in_border(free))
       associate (route => halo%route)
          route%rank = pack([(r, r=0_ip, size(counts_sent, kind=ip) - 1_ip)], &
                            counts_sent > 0_ip .or. counts_received > 0_ip)

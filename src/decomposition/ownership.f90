@@ -10,7 +10,7 @@ module polydem_ownership
    use polydem_kinds, only: ip, lp
    implicit none
    private
-   public :: owns_body, owns_pair, order_bodies, order_parts, order_pairs
+   public :: owns_body, owns_pair, find_owned_pairs, order_bodies, order_parts, order_pairs
 
 contains
 
@@ -32,6 +32,23 @@ contains
 
       owns_pair = .not. bodies%in_halo(merge(second, first, bodies%fixed(first)))
    end function owns_pair
+
+   !> Find out which of some pairs this rank owns, as `owns_pair` does, in a loop over plain arrays.
+   pure subroutine find_owned_pairs(n, one, other, in_halo, fixed, owned)
+      !> Number of pairs, and slots of their bodies, in any order
+      integer(ip), intent(in) :: n, one(n), other(n)
+      !> Whether each body is in the halo, and whether it is fixed, (slot)
+      logical, intent(in), contiguous :: in_halo(:), fixed(:)
+      !> Whether the pair is owned
+      logical, intent(inout) :: owned(n)
+      integer(ip) :: low, high, k
+
+      do k = 1_ip, n
+         low = min(one(k), other(k))
+         high = max(one(k), other(k))
+         owned(k) = .not. in_halo(merge(high, low, fixed(low)))
+      end do
+   end subroutine find_owned_pairs
 
    !> Find the global order of columns over the bodies. Collective.
    subroutine order_bodies(comm, bodies, blocks)

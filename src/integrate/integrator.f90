@@ -11,14 +11,14 @@ module polydem_integrator
    use polydem_stability_limit, only: stability_table_t
    implicit none
    private
-   public :: integrator_t, clear_negligible, clear_negligible_motion, negligible
+   public :: integrator_t, drift, clear_negligible, clear_negligible_motion, negligible
 
    !> An integration scheme and its state
    type, abstract :: integrator_t
       !> Whether the scheme starts from the forces at time 0; otherwise it starts from gravity alone
       logical :: starts_from_forces = .true.
-      !> Whether the prediction of a body without acceleration is final if no force acts on it: `correct` would change
-      !> no bit
+      !> Whether a body without acceleration coasts until a force acts on it: its prediction is final, `correct` would
+      !> change no bit, and the next prediction changes nothing but its place, as `drift` does
       logical :: coasts_exactly = .false.
    contains
       !> Prepare for bodies whose accelerations are known
@@ -82,6 +82,28 @@ module polydem_integrator
    real(wp), parameter :: negligible = sqrt(tiny(1.0_wp))
 
 contains
+
+   !> Move those bodies of a run that have coasted since the last prediction. The scheme coasts exactly. Velocities stay;
+   !> accelerations and the state of the scheme are not read.
+   pure subroutine drift(dt, n, coasts, velocity, spin, position, angle)
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> Which bodies coast; the others are left alone
+      logical, intent(in) :: coasts(n)
+      !> Velocities [m/s] and angular velocities [rad/s]
+      real(wp), intent(in) :: velocity(2, n), spin(n)
+      !> Positions [m] and angles [rad]
+      real(wp), intent(inout) :: position(2, n), angle(n)
+      integer(ip) :: s
+
+      do s = 1_ip, n
+         position(1, s) = merge(position(1, s) + dt*velocity(1, s), position(1, s), coasts(s))
+         position(2, s) = merge(position(2, s) + dt*velocity(2, s), position(2, s), coasts(s))
+         angle(s) = merge(angle(s) + dt*spin(s), angle(s), coasts(s))
+      end do
+   end subroutine drift
 
    !> Set velocities and accelerations of a run of bodies to zero that are too small to move them. Schemes begin their
    !> prediction with it.

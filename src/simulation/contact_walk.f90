@@ -12,7 +12,7 @@ module polydem_contact_walk
    use polydem_fill_block, only: fill_block
    use polydem_force_sums, only: add_late_terms, add_terms, clear_sums, contact_terms_t, reserve_sums, terms_of_block
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_ownership, only: owns_pair
+   use polydem_ownership, only: find_owned_pairs
    use polydem_pair_ranges, only: balance_ranges, divide_pairs, most_ranges
    use polydem_passing, only: test_block
    use polydem_range_results, only: range_results_t
@@ -178,20 +178,17 @@ contains
       type(simulation_t), intent(in) :: self
       type(contact_block_t), intent(in) :: block
       type(range_results_t), intent(inout) :: results
-      integer(ip) :: c, i, j
+      logical :: owned(block_size)
 
       if (self%comm%size == 1_ip) then
          results%n_contacts = results%n_contacts + block%n
          results%n_degenerate = results%n_degenerate + count(block%degenerate(:block%n) > 0.0_wp, kind=ip)
          return
       end if
-      do c = 1_ip, block%n
-         i = min(block%first(c), block%second(c))
-         j = max(block%first(c), block%second(c))
-         if (.not. owns_pair(self%bodies, i, j)) cycle
-         results%n_contacts = results%n_contacts + 1_ip
-         if (block%degenerate(c) > 0.0_wp) results%n_degenerate = results%n_degenerate + 1_ip
-      end do
+      call find_owned_pairs(block%n, block%first, block%second, self%bodies%in_halo, self%bodies%fixed, owned)
+      results%n_contacts = results%n_contacts + count(owned(:block%n), kind=ip)
+      results%n_degenerate = results%n_degenerate &
+                             + count(owned(:block%n) .and. block%degenerate(:block%n) > 0.0_wp, kind=ip)
    end subroutine count_block
 
    !> Join the results of n ranges.

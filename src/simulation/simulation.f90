@@ -105,10 +105,10 @@ module polydem_simulation
       logical :: is_dilute = .false.
       !> Extreme corners of the bodies, if `is_weightless`
       type(extreme_corners_t) :: extreme_corners
-      !> Whether bodies that coast are not corrected: there is no gravity, and they coast exactly
+      !> Whether bodies that coast only drift: there is no gravity, and they coast exactly
       logical :: skips_coasting = .false.
-      !> Whether a body coasts in this step unless a force acts on it, (slot); if bodies have been exchanged since the
-      !> prediction, false
+      !> Whether a body coasts in this step unless a force acts on it, and, between steps, whether it has coasted in the
+      !> last one, (slot); false after bodies have been exchanged
       logical, allocatable :: coasts(:)
       !> Slots that may move: free bodies, then bodies with prescribed motion, then halo bodies
       integer(ip), allocatable :: moving(:)
