@@ -191,28 +191,70 @@ contains
       boxes%reach(b) = (0.5_wp*length + padding)*(1.0_wp + roundings*epsilon(1.0_wp))
    end subroutine describe_box
 
-   !> Whether every box of some bodies lies within a limit of its own. It may touch the limit.
-   pure logical function have_boxes_within(maker, slots, boxes, limit)
+   !> Whether every box of some bodies lies within a zone, or within a limit of its own. It may touch them.
+   pure logical function have_boxes_within(maker, slots, boxes, zone, limit)
       type(box_maker_t), intent(in) :: maker
       !> Slots of the bodies
-      integer(ip), intent(in) :: slots(:)
+      integer(ip), intent(in), contiguous :: slots(:)
       type(boxes_t), intent(in) :: boxes
+      !> xmin, ymin, xmax, ymax of the zone [m]
+      real(wp), intent(in) :: zone(4)
       !> xmin, ymin, xmax, ymax of the limit of each box, (4, box) [m]
       real(wp), intent(in) :: limit(:, :)
-      integer(ip) :: k, first, last
+      integer(ip) :: others(block_size + 1_ip), low, b, k, n, first, last
 
       have_boxes_within = .true.
-      do k = 1_ip, size(slots, kind=ip)
-         first = maker%box(slots(k))
-         last = first
-         if (first < 0_ip) then
-            last = maker%cut(-first)%first_box + maker%cut(-first)%n - 1_ip
-            first = maker%cut(-first)%first_box
-         end if
-         have_boxes_within = have_boxes_within .and. all(boxes%bounds(1:2, first:last) >= limit(1:2, first:last)) &
-            .and. all(boxes%bounds(3:4, first:last) <= limit(3:4, first:last))
+      do low = 1_ip, size(slots, kind=ip), block_size
+         call list_outside(slots(low:min(low + block_size - 1_ip, size(slots, kind=ip))), maker%box, boxes%bounds, zone, &
+                           n, others)
+         do k = 1_ip, n
+            first = maker%box(others(k))
+            last = first
+            if (first < 0_ip) then
+               last = maker%cut(-first)%first_box + maker%cut(-first)%n - 1_ip
+               first = maker%cut(-first)%first_box
+            end if
+            do b = first, last
+               have_boxes_within = have_boxes_within .and. &
+                  (is_within(boxes%bounds(:, b), zone) .or. is_within(boxes%bounds(:, b), limit(:, b)))
+            end do
+         end do
       end do
    end function have_boxes_within
+
+   !> List the bodies that are cut, and those whose box is not within a zone. There is no branch.
+   pure subroutine list_outside(slots, box, bounds, zone, n, outside)
+      !> Slots of the bodies, at most `block_size`
+      integer(ip), intent(in), contiguous :: slots(:)
+      !> Box of each body, (slot); negative if it is cut
+      integer(ip), intent(in), contiguous :: box(:)
+      !> Bounds of all boxes, and xmin, ymin, xmax, ymax of the zone [m]
+      real(wp), intent(in), contiguous :: bounds(:, :)
+      real(wp), intent(in) :: zone(4)
+      !> Number and slots of the listed bodies
+      integer(ip), intent(out) :: n
+      integer(ip), intent(inout) :: outside(block_size + 1_ip)
+      real(wp) :: room
+      integer(ip) :: b, k
+
+      n = 0_ip
+      do k = 1_ip, size(slots, kind=ip)
+         outside(n + 1_ip) = slots(k)
+         b = max(box(slots(k)), 1_ip)
+         room = min(min(bounds(1, b) - zone(1), bounds(2, b) - zone(2)), &
+                    min(zone(3) - bounds(3, b), zone(4) - bounds(4, b)))
+         n = n + ior(merge(0_ip, 1_ip, room >= 0.0_wp), shiftr(box(slots(k)), bit_size(n) - 1))
+      end do
+   end subroutine list_outside
+
+   !> Whether a box lies within a rectangle
+   pure logical function is_within(box, rectangle)
+      !> xmin, ymin, xmax, ymax [m]
+      real(wp), intent(in) :: box(4), rectangle(4)
+
+      is_within = box(1) >= rectangle(1) .and. box(2) >= rectangle(2) .and. box(3) <= rectangle(3) &
+                  .and. box(4) <= rectangle(4)
+   end function is_within
 
    !> Turn bodies to their angles and update their boxes in one pass: the same as `turn_bodies` and then `update_boxes`.
    subroutine turn_and_bound(maker, moving, isa, bodies, boxes)

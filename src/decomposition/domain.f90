@@ -2,8 +2,9 @@
 !>
 !> A partition of space assigns each body to a rank. The halo of a rank contains the bodies of other ranks whose padded
 !> boxes overlap the padded boxes of its own bodies; the padding is a margin. The halo is sufficient until the box of a
-!> body leaves the padded box recorded at the last redistribution. The next redistribution then takes place in the
-!> middle of the step, after the prediction and before the search for pairs: no pair can be missed.
+!> body leaves the padded box recorded at the last redistribution, and is not in the zone of its rank either, which no
+!> body of another rank can enter. The next redistribution then takes place in the middle of the step, after the
+!> prediction and before the search for pairs: no pair can be missed.
 module polydem_domain
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
@@ -36,7 +37,7 @@ module polydem_domain
       real(wp) :: halo_share = 0.0_wp
       !> Padded boxes recorded at the last redistribution, (4, box) [m]
       real(wp), allocatable :: reference(:, :)
-      !> Whether a box has left it in this step
+      !> Whether a box has left it and the zone of the rank in this step
       logical :: has_left = .false.
       !> Step of the last redistribution; -1 before the first
       integer(lp) :: last_step = -1_lp
@@ -88,8 +89,8 @@ contains
       if (comm%size > 1_ip) call new_partition(domain%partition, settings%partition, error)
    end subroutine new_domain
 
-   !> Whether a redistribution is necessary: a box of a body of this rank has left its padded box recorded at the last
-   !> one, or there was none yet.
+   !> Whether a redistribution is necessary: a box of a body of this rank has left the zone and its padded box recorded
+   !> at the last one, or there was none yet.
    pure logical function must_redistribute(self)
       class(domain_t), intent(in) :: self
 

@@ -83,8 +83,8 @@ module polydem_integrator
 
 contains
 
-   !> Move those bodies of a run that have coasted since the last prediction. The scheme coasts exactly. Velocities stay;
-   !> accelerations and the state of the scheme are not read.
+   !> Move those bodies of a run that have coasted since the last prediction. The scheme coasts exactly. Velocities
+   !> stay; accelerations and the state of the scheme are not read.
    pure subroutine drift(dt, n, coasts, velocity, spin, position, angle)
       !> Time step [s]
       real(wp), intent(in) :: dt

@@ -28,6 +28,10 @@ module polydem_rank_bounds
       integer(ip) :: n_published = 0_ip
       !> Bounding rectangle of all boxes of this rank [m]
       real(wp) :: own(4) = 0.0_wp
+      !> A part of `own` without a point in common with the bounding rectangle of all boxes of any other rank; empty if
+      !> xmin > xmax. The zones of two ranks are disjoint, and so are the zone of a rank and the boxes of another. A
+      !> body of this rank may therefore move anywhere in the zone before the next call of `publish` [m]
+      real(wp), public :: zone(4) = [1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]
       !> Map of `own`: whether a rectangle of another rank overlaps each cell
       logical :: shared(n_cells, n_cells) = .false.
    contains
@@ -70,7 +74,34 @@ contains
       end do
       self%own = bounds_of(boxes)
       call build_map(self)
+      self%zone = zone_of(self)
    end subroutine publish
+
+   !> Cut the bounding rectangle of this rank at those of the other ranks, each time such that most of its area remains.
+   pure function zone_of(self) result(zone)
+      type(rank_bounds_t), intent(in) :: self
+      real(wp) :: zone(4), parts(4, 4), other(4)
+      integer(ip) :: first, last
+
+      zone = self%own
+      first = 1_ip
+      do while (first <= size(self%owner, kind=ip))
+         last = first
+         do while (last < size(self%owner, kind=ip))
+            if (self%owner(last + 1_ip) /= self%owner(first)) exit
+            last = last + 1_ip
+         end do
+         other = bounds_of(self%rectangle(:, first:last))
+         first = last + 1_ip
+         if (.not. boxes_overlap(zone, other)) cycle
+         parts = spread(zone, 2, 4)
+         parts(3, 1) = nearest(other(1), -1.0_wp)
+         parts(4, 2) = nearest(other(2), -1.0_wp)
+         parts(1, 3) = nearest(other(3), 1.0_wp)
+         parts(2, 4) = nearest(other(4), 1.0_wp)
+         zone = parts(:, maxloc(max(0.0_wp, parts(3, :) - parts(1, :))*max(0.0_wp, parts(4, :) - parts(2, :)), 1))
+      end do
+   end function zone_of
 
    !> Number of rectangles of all ranks in the last call of `publish`
    pure integer(ip) function n_rectangles(self)

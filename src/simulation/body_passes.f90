@@ -108,7 +108,7 @@ contains
       logical, intent(in) :: is_first
       !> Becomes false if a body has an invalid pose
       logical, intent(inout) :: good
-      !> Becomes true if a box leaves its padded box of the last redistribution
+      !> Becomes true if a box leaves the zone of this rank and its padded box of the last redistribution
       logical, intent(inout) :: has_left
       !> Time of the prediction, and of vertices and boxes, in the timed blocks [s]
       real(dp), intent(inout) :: seconds(2)
@@ -201,7 +201,7 @@ contains
       type(simulation_t), intent(inout) :: self
       !> Slots of the bodies, ascending
       integer(ip), intent(in), contiguous :: slots(:)
-      !> Becomes true if a box leaves its padded box of the last redistribution
+      !> Becomes true if a box leaves the zone of this rank and its padded box of the last redistribution
       logical, intent(inout) :: has_left
 
       if (self%is_dilute) then
@@ -211,7 +211,8 @@ contains
          call turn_and_bound_block(self%maker, slots, self%isa, self%bodies, self%boxes)
       end if
       if (.not. allocated(self%domain%reference)) return
-      has_left = has_left .or. .not. have_boxes_within(self%maker, slots, self%boxes, self%domain%reference)
+      has_left = has_left .or. .not. have_boxes_within(self%maker, slots, self%boxes, self%domain%rank_bounds%zone, &
+                                                       self%domain%reference)
    end subroutine bound
 
    !> List those of some slots that are not excluded.

@@ -33,14 +33,15 @@ module polydem_redistribution
 
 contains
 
-   !> Find out whether a box of a free body has left its padded box of the last redistribution. A step does this while
-   !> it updates the boxes; others call this before `redistribute`.
+   !> Find out whether a box of a free body has left both the zone of this rank and its padded box of the last
+   !> redistribution. A step does this while it updates the boxes; others call this before `redistribute`.
    pure subroutine compare_boxes(self)
       !> The simulation with updated boxes
       type(simulation_t), intent(inout) :: self
 
       if (.not. allocated(self%domain%reference)) return
-      self%domain%has_left = .not. have_boxes_within(self%maker, self%bodies%free, self%boxes, self%domain%reference)
+      self%domain%has_left = .not. have_boxes_within(self%maker, self%bodies%free, self%boxes, &
+                                                     self%domain%rank_bounds%zone, self%domain%reference)
    end subroutine compare_boxes
 
    !> Exchange errors between ranks, and redistribute the bodies if any rank requests it. Collective.
