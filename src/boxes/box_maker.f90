@@ -201,12 +201,12 @@ contains
       real(wp), intent(in) :: zone(4)
       !> xmin, ymin, xmax, ymax of the limit of each box, (4, box) [m]
       real(wp), intent(in) :: limit(:, :)
-      integer(ip) :: others(block_size + 1_ip), low, b, k, n, first, last
+      integer(ip) :: others(block_size + 1_ip), low, high, b, k, n, first, last
 
       have_boxes_within = .true.
       do low = 1_ip, size(slots, kind=ip), block_size
-         call list_outside(slots(low:min(low + block_size - 1_ip, size(slots, kind=ip))), maker%box, boxes%bounds, zone, &
-                           n, others)
+         high = min(low + block_size - 1_ip, size(slots, kind=ip))
+         call list_outside(slots(low:high), maker%box, boxes%bounds, zone, n, others)
          do k = 1_ip, n
             first = maker%box(others(k))
             last = first
