@@ -12,7 +12,7 @@ module polydem_body_contributions
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: n_channels, n_wall_channels, n_motions, add_powers, add_walls, motion_of
+   public :: n_channels, n_wall_channels, n_motions, add_powers, add_torques, add_walls, motion_of
 
    !> Number of channels of a body: powers of the elastic normal forces with cohesion, of the other normal forces with
    !> the damping of tilts, and of the tangential forces [W/m]
@@ -32,23 +32,22 @@ contains
       type(force_sums_t), intent(in) :: forces
       !> Factor of what is added
       real(wp), intent(in) :: weight
-      !> First and last slot; only the free bodies of this rank count
+      !> First and last slot, of free bodies of this rank
       integer(ip), intent(in) :: first, last
       !> Channels of all bodies, (n_channels, slot) [W/m]
       real(wp), intent(inout), contiguous :: channels(:, :)
 
       if (last < first) return
-      call add_powers_of(last - first + 1_ip, forces%has_terms(first), bodies%fixed(first), bodies%in_halo(first), &
-                         bodies%velocity(1, first), bodies%angular_velocity(first), forces%value(1, first), weight, &
-                         channels(:, first:last))
+      call add_powers_of(last - first + 1_ip, forces%has_terms(first), bodies%velocity(1, first), &
+                         bodies%angular_velocity(first), forces%value(1, first), weight, channels(:, first:last))
    end subroutine add_powers
 
    !> Add the powers of the sums of some bodies to their channels.
-   pure subroutine add_powers_of(n, has_terms, fixed, in_halo, velocity, spin, value, weight, channels)
+   pure subroutine add_powers_of(n, has_terms, velocity, spin, value, weight, channels)
       !> Number of bodies
       integer(ip), intent(in) :: n
-      !> Whether they have terms, are fixed, and are in the halo
-      logical, intent(in) :: has_terms(n), fixed(n), in_halo(n)
+      !> Whether they have terms
+      logical, intent(in) :: has_terms(n)
       !> Their velocities [m/s] and angular velocities [rad/s]
       real(wp), intent(in) :: velocity(2, n), spin(n)
       !> Sums of their terms
@@ -60,7 +59,7 @@ contains
       integer(ip) :: s
 
       do s = 1_ip, n
-         if (.not. has_terms(s) .or. fixed(s) .or. in_halo(s)) cycle
+         if (.not. has_terms(s)) cycle
          call add_term(velocity(:, s), spin(s), value(:, s), weight, channels(:, s))
       end do
    end subroutine add_powers_of
@@ -85,6 +84,25 @@ contains
          channels(3) = channels(3) + weight*((term(fx)*x + term(fy)*y) + term(ft)*w)
       end associate
    end subroutine add_term
+
+   !> Add the torques of gravity on some bodies about the origin, times a weight.
+   pure subroutine add_torques(n, weight, gravity, mass, position, torque)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      !> Factor of what is added
+      real(wp), intent(in) :: weight
+      !> Acceleration of gravity [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Masses [kg/m] and positions [m]
+      real(wp), intent(in) :: mass(n), position(2, n)
+      !> Sums of the torques about the origin [N]
+      real(wp), intent(inout) :: torque(n)
+      integer(ip) :: s
+
+      do s = 1_ip, n
+         torque(s) = torque(s) + weight*(mass(s)*(position(1, s)*gravity(2) - position(2, s)*gravity(1)))
+      end do
+   end subroutine add_torques
 
    !> Add the action of a fixed body on a free one: its terms of the powers, and the wall channels.
    pure subroutine add_wall(bodies, wall, term, weight, channels, wall_channels)

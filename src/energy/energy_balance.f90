@@ -21,7 +21,8 @@
 !> bodies, and over bodies for gravity. Forces that cancel within a fixed body therefore add to the scale.
 module polydem_energy_balance
    use polydem_bodies, only: bodies_t
-   use polydem_body_contributions, only: add_powers, add_walls, motion_of, n_channels, n_motions, n_wall_channels
+   use polydem_body_contributions, only: add_powers, add_torques, add_walls, motion_of, n_channels, n_motions, &
+      n_wall_channels
    use polydem_communicator, only: communicator_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
@@ -32,7 +33,7 @@ module polydem_energy_balance
    implicit none
    private
    public :: energy_balance_t, balance_t, start_energy_balance, accumulate_bodies, &
-      accumulate_walls, count_step, evaluate_balance, serialize_balance, serialize_contributions
+      accumulate_all, accumulate_walls, count_step, evaluate_balance, serialize_balance, serialize_contributions
 
    !> Running sums of the energy and momentum balance, and its values at the start
    type :: energy_balance_t
@@ -119,7 +120,7 @@ contains
       real(wp) :: total(n_totals)
 
       call allocate_channels(sums, bodies%n)
-      call accumulate_bodies(sums, 0.5_wp, gravity, bodies, forces, 1_ip, bodies%n)
+      call accumulate_all(sums, 0.5_wp, gravity, bodies, forces)
       call add_walls(bodies, walls, 0.5_wp, 1_ip, bodies%n, sums%power_sum, sums%wall_sum)
       sums%is_current = .true.
       total = totals(sums, comm, gravity, bodies, forces, walls)
@@ -128,7 +129,27 @@ contains
       sums%elastic_start = total(at_energy)
    end subroutine start_energy_balance
 
-   !> Accumulate the rates of some bodies, times a weight. Several threads may call it for different bodies.
+   !> Accumulate the rates of all free bodies of this rank, times a weight.
+   pure subroutine accumulate_all(sums, weight, gravity, bodies, forces)
+      !> Running sums; only those of these bodies change
+      type(energy_balance_t), intent(inout) :: sums
+      !> Factor of the rates: 1 for a step
+      real(wp), intent(in) :: weight
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Bodies at the end of this step
+      type(bodies_t), intent(in) :: bodies
+      !> Sums of the contact forces on each body
+      type(force_sums_t), intent(in) :: forces
+      integer(ip) :: k
+
+      do k = 1_ip, size(bodies%free, kind=ip)
+         call accumulate_bodies(sums, weight, gravity, bodies, forces, bodies%free(k), bodies%free(k))
+      end do
+   end subroutine accumulate_all
+
+   !> Accumulate the rates of a run of free bodies of this rank, times a weight. Several threads may call it for
+   !> different bodies.
    pure subroutine accumulate_bodies(sums, weight, gravity, bodies, forces, first, last)
       !> Running sums; only those of these bodies change
       type(energy_balance_t), intent(inout) :: sums
@@ -140,36 +161,14 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Sums of the contact forces on each body
       type(force_sums_t), intent(in) :: forces
-      !> First and last slot; only the free bodies of this rank count
+      !> First and last slot
       integer(ip), intent(in) :: first, last
 
       call add_powers(bodies, forces, weight, first, last, sums%power_sum)
       if (last < first .or. .not. any(abs(gravity) > 0.0_wp)) return
-      call add_torques(last - first + 1_ip, weight, gravity, bodies%fixed(first), bodies%in_halo(first), &
-                       bodies%mass(first), bodies%position(1, first), sums%torque(first))
+      call add_torques(last - first + 1_ip, weight, gravity, bodies%mass(first), bodies%position(1, first), &
+                       sums%torque(first))
    end subroutine accumulate_bodies
-
-   !> Add the torques of gravity on some bodies about the origin, times a weight.
-   pure subroutine add_torques(n, weight, gravity, fixed, in_halo, mass, position, torque)
-      !> Number of bodies
-      integer(ip), intent(in) :: n
-      !> Factor of what is added
-      real(wp), intent(in) :: weight
-      !> Acceleration of gravity [m/s2]
-      real(wp), intent(in) :: gravity(2)
-      !> Whether the bodies are fixed, and in the halo; those are left out
-      logical, intent(in) :: fixed(n), in_halo(n)
-      !> Masses [kg/m] and positions [m]
-      real(wp), intent(in) :: mass(n), position(2, n)
-      !> Sums of the torques about the origin [N]
-      real(wp), intent(inout) :: torque(n)
-      integer(ip) :: s
-
-      do s = 1_ip, n
-         if (fixed(s) .or. in_halo(s)) cycle
-         torque(s) = torque(s) + weight*(mass(s)*(position(1, s)*gravity(2) - position(2, s)*gravity(1)))
-      end do
-   end subroutine add_torques
 
    !> Accumulate the action of fixed bodies on some bodies in one step, after the rates of these bodies. Several threads
    !> may call it for different bodies.
@@ -326,7 +325,7 @@ contains
       now = sums
       energy = forces%value(sum_energy, :)
       if (sums%is_current) then
-         call accumulate_bodies(now, -0.5_wp, gravity, bodies, forces, 1_ip, bodies%n)
+         call accumulate_all(now, -0.5_wp, gravity, bodies, forces)
          call add_walls(bodies, walls, -0.5_wp, 1_ip, bodies%n, now%power_sum, now%wall_sum, energy)
       end if
       if (.not. walls%energy_is_quadratic) energy = 0.0_wp

@@ -6,7 +6,7 @@
 module polydem_checkpoint_fields
    use polydem_bodies, only: bodies_t, state_hash, turn_bodies
    use polydem_body_fields, only: serialize_bodies
-   use polydem_body_passes, only: keep_forces
+   use polydem_completion, only: keep_forces
    use polydem_contact_history, only: contact_history_t
    use polydem_energy_balance, only: serialize_contributions, serialize_balance
    use polydem_errors, only: error_t, input_error, raise

@@ -1,6 +1,5 @@
 !> Start of a simulation: time step, forces and accelerations at time 0. All ranks start alike, one or many.
 module polydem_start_simulation
-   use polydem_body_passes, only: move_walls
    use polydem_body_sizes, only: diameters_of
    use polydem_box_maker, only: update_boxes
    use polydem_choose_instruction_set, only: choose_instruction_set
@@ -13,6 +12,7 @@ module polydem_start_simulation
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, wp
    use polydem_local_bodies, only: fit_to_bodies
+   use polydem_prediction, only: move_walls
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
    use polydem_settings, only: settings_t

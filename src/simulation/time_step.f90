@@ -1,14 +1,15 @@
 !> The time step of a simulation.
 module polydem_time_step
    use polydem_bodies, only: turn_bodies
-   use polydem_body_passes, only: complete_step, predict_bodies
    use polydem_box_maker, only: turn_and_bound
+   use polydem_completion, only: complete_step
    use polydem_contact_incidence, only: index_contacts
    use polydem_contact_walk, only: walk_contacts
    use polydem_errors, only: error_t, raise, run_error
    use polydem_force_sums, only: assemble_forces, total_forces
    use polydem_guards, only: check_contacts
    use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_prediction, only: predict_bodies
    use polydem_redistribution, only: restore_history, redistribute
    use polydem_simulation, only: simulation_t, sum_began, sum_ended
    use polydem_strings, only: to_text

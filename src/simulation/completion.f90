@@ -1,0 +1,130 @@
+!> The second pass of a step over the bodies: completion after the forces are computed.
+!>
+!> The pass does all that it can do for a block of bodies while the block is in the cache.
+module polydem_completion
+   use polydem_bodies, only: block_size, bodies_t
+   use polydem_body_runs, only: find_run, list_accelerated, number_of_parts
+   use polydem_energy_balance, only: accumulate_bodies, accumulate_walls, count_step
+   use polydem_errors, only: error_t
+   use polydem_force_sums, only: find_forces, force_sums_t, set_force, total_forces
+   use polydem_guards, only: check_motion, move_within_limit
+   use polydem_kinds, only: ip, wp
+   use polydem_simulation, only: simulation_t
+   use polydem_thread_changes, only: part
+   implicit none
+   private
+   public :: complete_step, keep_forces
+
+contains
+
+   !> Complete the step from the sums of the contact forces: total forces, final velocities, energy balance, and the
+   !> guard of the motion, in one pass over the bodies. Of the total forces, only those on fixed bodies are kept.
+   subroutine complete_step(self, error)
+      !> The simulation with the sums of the contact forces
+      type(simulation_t), intent(inout) :: self
+      !> Names a body that moves too far
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: n, low, high, k, done
+      integer :: n_parts, p
+      logical :: good
+
+      n = size(self%bodies%free, kind=ip)
+      n_parts = number_of_parts(n)
+      good = .true.
+      !$omp parallel do num_threads(n_parts) schedule(static, 1) default(none) shared(self, n, n_parts) &
+      !$omp    private(p, low, high) reduction(.and.:good)
+      do p = 1, n_parts
+         call part(n, n_parts, p, low, high)
+         call complete_part(self, low, high, good)
+      end do
+      !$omp end parallel do
+      done = 0_ip
+      if (n > 0_ip) done = self%bodies%free(n)
+      call keep_fixed(done + 1_ip, self%bodies%n, self%force_sums, self%bodies)
+      if (self%settings%output%energy_balance) call count_step(self%energy_balance)
+      do k = n + 1_ip, size(self%guard%moving, kind=ip)
+         good = good .and. move_within_limit(self%guard, self%bodies, self%guard%moving(k), self%guard%moving(k), &
+                                             self%dt)
+      end do
+      if (.not. good) call check_motion(self%guard, self%bodies, self%step, self%dt, error)
+   end subroutine complete_step
+
+   !> Complete the step of a part of the free bodies, block by block, and keep the forces on fixed bodies between them.
+   subroutine complete_part(self, low, high, good)
+      type(simulation_t), intent(inout) :: self
+      !> Index of the first and of the last body in the list of free bodies
+      integer(ip), intent(in) :: low, high
+      !> Becomes false if a body moves too far
+      logical, intent(inout) :: good
+      integer(ip) :: k, end_of_block, next, done, first, last, n_chosen, chosen(block_size)
+
+      if (high < low) return
+      do k = low, high, block_size
+         end_of_block = min(k + block_size - 1_ip, high)
+         done = 0_ip
+         if (k > 1_ip) done = self%bodies%free(k - 1_ip)
+         next = k
+         do while (next <= end_of_block)
+            call find_run(self%bodies%free, end_of_block, next, first, last)
+            call keep_fixed(done + 1_ip, first - 1_ip, self%force_sums, self%bodies)
+            done = last
+            if (.not. self%skips_coasting) call complete_run(self, first, last, good)
+         end do
+         if (.not. self%skips_coasting) cycle
+         call list_accelerated(end_of_block - k + 1_ip, self%bodies%free(k:end_of_block), self%coasts, &
+                                 self%force_sums%has_terms, n_chosen, chosen)
+         next = 1_ip
+         do while (next <= n_chosen)
+            call find_run(chosen, n_chosen, next, first, last)
+            call complete_run(self, first, last, good)
+            self%coasts(first:last) = .false.
+         end do
+      end do
+      if (low > high .or. .not. self%settings%output%energy_balance) return
+      call accumulate_walls(self%energy_balance, self%bodies, self%walk%walls, self%bodies%free(low), &
+                            self%bodies%free(high))
+   end subroutine complete_part
+
+   !> Set the total forces on those bodies of a run that are fixed. The run has no free bodies of this rank.
+   pure subroutine keep_fixed(first, last, sums, bodies)
+      !> First and last slot
+      integer(ip), intent(in) :: first, last
+      !> Sums of the contact forces
+      type(force_sums_t), intent(in) :: sums
+      !> Bodies; `force` and `torque` of the fixed ones are set
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: s
+
+      do s = first, last
+         if (bodies%fixed(s)) call set_force(sums%value(:, s), s, bodies)
+      end do
+   end subroutine keep_fixed
+
+   !> Compute final velocities of a run of free bodies, accumulate their energy balance, and check their motion.
+   subroutine complete_run(self, first, last, good)
+      type(simulation_t), intent(inout) :: self
+      !> First and last slot, at most `block_size` bodies
+      integer(ip), intent(in) :: first, last
+      !> Becomes false if a body moves too far
+      logical, intent(inout) :: good
+      real(wp) :: force(3, block_size)
+
+      associate (bodies => self%bodies, gravity => self%settings%forces%gravity, sums => self%force_sums)
+         call find_forces(gravity, first, last, bodies%mass, sums%value, sums%has_terms, force)
+         call self%integrator%correct(self%dt, first, last, force, bodies)
+         if (self%settings%output%energy_balance) &
+            call accumulate_bodies(self%energy_balance, 1.0_wp, gravity, bodies, sums, first, last)
+      end associate
+      good = good .and. move_within_limit(self%guard, self%bodies, first, last, self%dt)
+   end subroutine complete_run
+
+   !> Set the total forces on all bodies at the end of a step, if only those on fixed bodies are known.
+   subroutine keep_forces(self)
+      type(simulation_t), intent(inout) :: self
+
+      if (.not. self%has_forces) call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, &
+                                                   self%bodies%n, self%bodies)
+      self%has_forces = .true.
+   end subroutine keep_forces
+
+end module polydem_completion
