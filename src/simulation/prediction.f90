@@ -57,8 +57,8 @@ contains
       if (.not. good) call check_poses(self%guard, self%bodies, self%step, error)
    end subroutine predict_bodies
 
-   !> Predict the bodies of the border. They lie scattered: what they need not for the message, they get together with
-   !> the bodies around them.
+   !> Predict the bodies of the border. The message does not need their vertices and boxes. These are updated later
+   !> together with those of the bodies around them, since bodies of the border lie scattered in memory.
    subroutine predict_border(self)
       type(simulation_t), intent(inout) :: self
       integer(ip) :: low, n
