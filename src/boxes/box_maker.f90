@@ -191,7 +191,7 @@ contains
       boxes%reach(b) = (0.5_wp*length + padding)*(1.0_wp + roundings*epsilon(1.0_wp))
    end subroutine describe_box
 
-   !> Whether every box of some bodies lies within a zone, or within a limit of its own. It may touch them.
+   !> Whether every box of some bodies lies within a zone, or within a limit of its own. Touching counts as within.
    pure logical function have_boxes_within(maker, slots, boxes, zone, limit)
       type(box_maker_t), intent(in) :: maker
       !> Slots of the bodies
@@ -222,7 +222,8 @@ contains
       end do
    end function have_boxes_within
 
-   !> List the bodies that are cut, and those whose box is not within a zone. There is no branch.
+   !> List the bodies that are cut, and those whose box is not within a zone. There is no branch, since a processor
+   !> cannot predict which bodies these are.
    pure subroutine list_outside(slots, box, bounds, zone, n, outside)
       !> Slots of the bodies, at most `block_size`
       integer(ip), intent(in), contiguous :: slots(:)
@@ -231,7 +232,7 @@ contains
       !> Bounds of all boxes, and xmin, ymin, xmax, ymax of the zone [m]
       real(wp), intent(in), contiguous :: bounds(:, :)
       real(wp), intent(in) :: zone(4)
-      !> Number and slots of the listed bodies
+      !> Number and slots of the listed bodies. A slot is written before it is known to count, so there is a spare one
       integer(ip), intent(out) :: n
       integer(ip), intent(inout) :: outside(block_size + 1_ip)
       real(wp) :: room

@@ -1,10 +1,12 @@
 !> Domain: the part of space of one rank, and the criterion for the next redistribution of bodies.
 !>
 !> A partition of space assigns each body to a rank. The halo of a rank contains the bodies of other ranks whose padded
-!> boxes overlap the padded boxes of its own bodies; the padding is a margin. The halo is sufficient until the box of a
-!> body leaves the padded box recorded at the last redistribution, and is not in the zone of its rank either, which no
-!> body of another rank can enter. The next redistribution then takes place in the middle of the step, after the
-!> prediction and before the search for pairs: no pair can be missed.
+!> boxes overlap the padded boxes of its own bodies; the padding is a margin. The halo is sufficient as long as each box
+!> is within its padded box recorded at the last redistribution, or within the zone of its rank. The zone is an area
+!> that no body of another rank can enter. If a box is in neither, the next redistribution takes place in the middle of
+!> the step, after the prediction and before the search for pairs: no pair can be missed.
+!>
+!> A redistribution also takes place after a thousand steps without one, since the work of the ranks is compared then.
 module polydem_domain
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
@@ -37,7 +39,7 @@ module polydem_domain
       real(wp) :: halo_share = 0.0_wp
       !> Padded boxes recorded at the last redistribution, (4, box) [m]
       real(wp), allocatable :: reference(:, :)
-      !> Whether a box has left it and the zone of the rank in this step
+      !> Whether a box is outside both its padded box and the zone of the rank in this step
       logical :: has_left = .false.
       !> Step of the last redistribution; -1 before the first
       integer(lp) :: last_step = -1_lp
@@ -67,6 +69,8 @@ module polydem_domain
    real(wp), parameter :: first_interval = 100.0_wp
    !> Cost of a redistribution in steps, and of a halo body in bodies (measured; see postproc/verdicts/scale)
    real(wp), parameter :: redistribution_cost = 4.0_wp, halo_body_cost = 0.5_wp
+   !> Greatest number of steps between redistributions, unless the work is not balanced
+   integer(lp), parameter :: longest_interval = 1000_lp
    !> Greatest factor by which the margin changes in a redistribution
    real(wp), parameter :: greatest_change = 3.0_wp
 
@@ -89,13 +93,17 @@ contains
       if (comm%size > 1_ip) call new_partition(domain%partition, settings%partition, error)
    end subroutine new_domain
 
-   !> Whether a redistribution is necessary: a box of a body of this rank has left the zone and its padded box recorded
-   !> at the last one, or there was none yet.
-   pure logical function must_redistribute(self)
+   !> Whether a redistribution is necessary: a box of a body of this rank is outside both the zone and its padded box
+   !> recorded at the last one, the last one was long ago, or there was none yet.
+   pure logical function must_redistribute(self, step)
       class(domain_t), intent(in) :: self
+      !> The present step
+      integer(lp), intent(in) :: step
 
       must_redistribute = allocated(self%partition)
-      if (allocated(self%reference)) must_redistribute = self%has_left
+      if (.not. allocated(self%reference)) return
+      must_redistribute = self%has_left .or. &
+         (self%settings%balance /= 'off' .and. step - self%last_step >= longest_interval)
    end function must_redistribute
 
    !> Choose the margin of the first redistribution, unless the settings give one.

@@ -30,7 +30,8 @@ module polydem_rank_bounds
       real(wp) :: own(4) = 0.0_wp
       !> A part of `own` without a point in common with the bounding rectangle of all boxes of any other rank; empty if
       !> xmin > xmax. The zones of two ranks are disjoint, and so are the zone of a rank and the boxes of another. A
-      !> body of this rank may therefore move anywhere in the zone before the next call of `publish` [m]
+      !> body of this rank may therefore move anywhere before the next call of `publish` while its box is in the zone
+      !> [m]
       real(wp), public :: zone(4) = [1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp]
       !> Map of `own`: whether a rectangle of another rank overlaps each cell
       logical :: shared(n_cells, n_cells) = .false.
@@ -77,7 +78,8 @@ contains
       self%zone = zone_of(self)
    end subroutine publish
 
-   !> Cut the bounding rectangle of this rank at those of the other ranks, each time such that most of its area remains.
+   !> Cut the bounding rectangle of this rank at those of the other ranks. Each of the four parts at a rectangle would
+   !> do; the largest one is kept.
    pure function zone_of(self) result(zone)
       type(rank_bounds_t), intent(in) :: self
       real(wp) :: zone(4), parts(4, 4), other(4)

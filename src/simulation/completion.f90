@@ -85,7 +85,8 @@ contains
                             self%bodies%free(high))
    end subroutine complete_part
 
-   !> Set the total forces on those bodies of a run that are fixed. The run has no free bodies of this rank.
+   !> Set the total forces on those bodies of a run that are fixed. The run has no free bodies of this rank. Its halo
+   !> bodies keep former forces, which nothing reads, until `keep_forces`.
    pure subroutine keep_fixed(first, last, sums, bodies)
       !> First and last slot
       integer(ip), intent(in) :: first, last

@@ -33,7 +33,7 @@ module polydem_redistribution
 
 contains
 
-   !> Find out whether a box of a free body has left both the zone of this rank and its padded box of the last
+   !> Find out whether a box of a free body is outside both the zone of this rank and its padded box of the last
    !> redistribution. A step does this while it updates the boxes; others call this before `redistribute`.
    pure subroutine compare_boxes(self)
       !> The simulation with updated boxes
@@ -55,7 +55,7 @@ contains
       if (self%comm%size == 1_ip) return
       request = 0_lp
       if (.not. allocated(error)) then
-         if (self%domain%must_redistribute()) request = 1_lp
+         if (self%domain%must_redistribute(self%step)) request = 1_lp
       end if
       call self%comm%all_reduce_error(error, request)
       if (allocated(error) .or. request(1) == 0_lp) return

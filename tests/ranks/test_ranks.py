@@ -49,6 +49,27 @@ def test_the_result_has_the_same_bits(combination, expected, outcomes, tmp_path)
         outcome.migrations.append(count(output, "migrations"))
 
 
+#: Fast grains that fly through the areas of all ranks; those of the Morton curve are no rectangles
+MORTON = """\
+&scene name = 'gas' bodies = 60 fraction = 0.2 speed = 1.75 spin = 175 seed = 641 /
+&forces gravity = 0, 0 stiffness = 1.25e6 /
+&integrate fraction = 0.2 duration = 0.043 /
+&decomposition partition = 'morton' balance = 'off' /
+&guards displacement = 'off' step = 'off' /
+"""
+
+
+@pytest.mark.parametrize("ranks", [3, 7])
+def test_no_contact_is_missed_where_the_areas_of_ranks_are_odd(ranks, tmp_path):
+    (tmp_path / "scene.nml").write_text(MORTON, encoding="utf-8")
+    one, _ = run(tmp_path / "scene.nml", tmp_path / "one")
+    for margin in ("1e-3", "4e-3"):
+        override = ("--set", f"decomposition.margin={margin}")
+        several, _ = run(tmp_path / "scene.nml", tmp_path / margin, ranks, 1, override)
+        assert state_hash(several) == state_hash(one)
+        assert count(several, "contacts") == count(one, "contacts")
+
+
 @pytest.mark.parametrize("scene, midstep, row_bytes", [("drum", ".false.", 48), ("hopper", ".true.", 72)])
 def test_what_ranks_tell_each_other_is_counted(scene, midstep, row_bytes, tmp_path):
     ranks = 3
