@@ -108,7 +108,7 @@ module polydem_simulation
       !> Whether bodies that coast only drift: there is no gravity, and they coast exactly
       logical :: skips_coasting = .false.
       !> Whether a body coasts in this step unless a force acts on it, and, between steps, whether it has coasted in the
-      !> last one, (slot); false after bodies have been exchanged
+      !> last one, (slot); false after bodies have been exchanged. Who changes velocities between steps must clear it
       logical, allocatable :: coasts(:)
       !> Slots that may move: free bodies, then bodies with prescribed motion, then halo bodies
       integer(ip), allocatable :: moving(:)

@@ -49,6 +49,8 @@ contains
          turned = maxval(abs(simulation%bodies%velocity - start%velocity))
          simulation%bodies%velocity = -simulation%bodies%velocity
          simulation%bodies%angular_velocity = -simulation%bodies%angular_velocity
+         ! The velocities in mid-step are not reversed: no body has coasted with the new velocities.
+         simulation%coasts = .false.
          call steps(simulation, n, error)
       end if
       call table%note_error(error)
