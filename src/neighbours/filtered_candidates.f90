@@ -12,7 +12,7 @@ module polydem_filtered_candidates
 
    !> Candidates, and the filter of their comparisons
    type, extends(candidates_t) :: filtered_candidates_t
-      !> Whether to use the filter; set before the first step
+      !> Whether there is a filter
       logical :: filtered = .false.
       !> Lines, intervals and active candidates
       type(parallel_filter_t) :: filter
@@ -25,8 +25,7 @@ module polydem_filtered_candidates
       procedure :: is_due
       procedure :: follow_part
       procedure :: gather_left
-      procedure :: review_and_compare
-      procedure :: begin_interval
+      procedure :: classify_all
    end type filtered_candidates_t
 
 contains
@@ -39,6 +38,8 @@ contains
       !> Typical side of a box [m]
       real(wp), intent(in) :: side
 
+      self%filtered = .true.
+      self%filter%isa = self%isa
       call self%filter%start(n_boxes, side)
       allocate (self%everywhere(4, n_boxes))
       self%everywhere(1:2, :) = -0.5_wp*huge(1.0_wp)
@@ -89,8 +90,7 @@ contains
       call self%filter%follow_part(w, boxes, self%everywhere)
    end subroutine follow_part
 
-   !> Make the candidates of the boxes that left their lines often active, unless an interval is due. Then call
-   !> `review_and_compare`.
+   !> Make the candidates of the boxes that left their lines often active, unless an interval is due.
    pure subroutine gather_left(self)
       class(filtered_candidates_t), intent(inout) :: self
 
@@ -98,36 +98,19 @@ contains
       if (.not. self%is_due()) call activate_strays(self)
    end subroutine gather_left
 
-   !> Review the candidates of the boxes that left their lines, and compare the active candidates.
-   subroutine review_and_compare(self, boxes, alone)
-      class(filtered_candidates_t), intent(inout) :: self
-      !> Boxes of this step
-      type(boxes_t), intent(in) :: boxes
-      !> Whether the calling thread does all, because the others have other work
-      logical, intent(in) :: alone
-
-      call self%filter%review_left(self)
-      if (alone) then
-         call self%filter%compare_alone(boxes)
-      else
-         call self%filter%compare_active(boxes)
-      end if
-   end subroutine review_and_compare
-
-   !> Begin an interval, and compare the candidates that are active in it.
-   subroutine begin_interval(self, boxes)
+   !> Draw all lines at the start of an interval, classify all candidates, and compare the active ones.
+   subroutine classify_all(self, boxes)
       class(filtered_candidates_t), intent(inout) :: self
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
 
-      call self%filter%begin_interval(self)
       call self%tidy()
       call self%filter%draw_all_lines(boxes)
       call self%filter%list_strays(self%everywhere)
       call self%filter%classify_all(boxes, self, known=.true.)
       call activate_strays(self)
       call self%filter%compare_active(boxes)
-   end subroutine begin_interval
+   end subroutine classify_all
 
    !> Make all candidates of the strays active.
    pure subroutine activate_strays(self)

@@ -5,6 +5,7 @@ module polydem_finder_factory
    use polydem_all_pairs, only: all_pairs_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_finder, only: finder_t
+   use polydem_filtered_quadtree_inlined, only: filtered_quadtree_t
    use polydem_hierarchical_grid, only: hierarchical_grid_t
    use polydem_kinds, only: wp
    use polydem_linked_cells, only: linked_cells_t
@@ -44,13 +45,13 @@ contains
       case ('partitioned_sweep')
          allocate (partitioned_sweep_t :: finder)
       case ('quadtree')
-         call new_tree(finder, equal_leaves=.false., one_axis=.false., filtered=.false.)
+         call new_tree(finder, equal_leaves=.false., one_axis=.false.)
       case ('pruned_quadtree')
-         call new_tree(finder, equal_leaves=.true., one_axis=.false., filtered=.false.)
+         call new_tree(finder, equal_leaves=.true., one_axis=.false.)
       case ('binary_tree')
-         call new_tree(finder, equal_leaves=.false., one_axis=.true., filtered=.false.)
+         call new_tree(finder, equal_leaves=.false., one_axis=.true.)
       case ('filtered_quadtree')
-         call new_tree(finder, equal_leaves=.false., one_axis=.false., filtered=.true.)
+         allocate (filtered_quadtree_t :: finder)
       case ('linked_cells')
          allocate (linked_cells_t :: finder)
       case ('verlet')
@@ -67,15 +68,14 @@ contains
    end subroutine new_finder
 
    !> Make one of the tree finders, which differ only in their options.
-   subroutine new_tree(finder, equal_leaves, one_axis, filtered)
+   subroutine new_tree(finder, equal_leaves, one_axis)
       class(finder_t), allocatable, intent(out) :: finder
-      logical, intent(in) :: equal_leaves, one_axis, filtered
+      logical, intent(in) :: equal_leaves, one_axis
       type(quadtree_t), allocatable :: tree
 
       allocate (tree)
       tree%equal_leaves = equal_leaves
       tree%one_axis = one_axis
-      tree%filtered = filtered
       call move_alloc(tree, finder)
    end subroutine new_tree
 

@@ -2,7 +2,7 @@
 !>
 !> A pair becomes a candidate only if the padded cell of one of its boxes has grown somewhere, and ceases to be one only
 !> if one has shrunk somewhere. So the tree is searched for boxes whose padded cell has grown, and the candidates of the
-!> others are only compared.
+!> others are only compared. The candidates can be replaced later, before the next comparison.
 module polydem_quadtree_search
    use polydem_boxes, only: boxes_t
    use polydem_candidates, only: candidates_t, meet, overlapping
@@ -12,7 +12,7 @@ module polydem_quadtree_search
    use polydem_quadtree_nodes, only: tree_t
    implicit none
    private
-   public :: padded_cells_t, worker_t, find_outside, search_changed, replace_candidates
+   public :: padded_cells_t, replacement_t, worker_t, find_outside, search_changed
 
    !> Size of the stack of cells to be searched: at most three cells per level and one more are on the stack
    integer, parameter :: stack_size = 96
@@ -35,15 +35,29 @@ module polydem_quadtree_search
    type :: worker_t
       !> Boxes whose centre left its leaf or whose half side exceeds their reach
       type(index_list_t) :: outside
-      !> Boxes of new candidates, two entries for each candidate
+      !> Both boxes of each new candidate, and 1 if they overlap, else 0
       type(index_list_t) :: found
-      !> Candidates to remove
-      type(index_list_t) :: separated
+      !> Boxes whose padded cell has shrunk somewhere
+      type(index_list_t) :: shrunk
       !> Number of searches, and of nodes visited in them
       integer(lp) :: searches = 0_lp, visits = 0_lp
    contains
       procedure :: clear
    end type worker_t
+
+   !> Candidates to add and to remove after a search; it can wait until the next step compares them
+   type :: replacement_t
+      private
+      !> Both boxes of each new candidate, and 1 if they overlap, else 0
+      type(index_list_t) :: found
+      !> Boxes whose padded cell has shrunk somewhere
+      type(index_list_t) :: shrunk
+      !> Candidates to remove
+      type(index_list_t) :: separated
+   contains
+      procedure :: collect
+      procedure :: apply
+   end type replacement_t
 
 contains
 
@@ -103,7 +117,7 @@ contains
 
       self%outside%n = 0_ip
       self%found%n = 0_ip
-      self%separated%n = 0_ip
+      self%shrunk%n = 0_ip
       self%searches = 0_lp
       self%visits = 0_lp
    end subroutine clear
@@ -133,72 +147,79 @@ contains
       end do
    end subroutine find_outside
 
-   !> Find the new candidates of boxes whose leaf changed, and those that are candidates no longer.
-   subroutine search_changed(tree, padded, candidates, low, high, boxes, worker)
+   !> Find the new candidates of boxes whose leaf changed, and the boxes that may have lost some.
+   subroutine search_changed(tree, padded, low, high, boxes, worker, changes)
       !> Tree of the boxes
       type(tree_t), intent(in) :: tree
       !> Padded cells in this step and before
       type(padded_cells_t), intent(in) :: padded
-      !> Candidates before this step
-      class(candidates_t), intent(in) :: candidates
       !> First and last box in the list of those whose leaf changed
       integer(ip), intent(in) :: low, high
-      !> Boxes; only their bodies, and whether the bodies are passive, are used
       type(boxes_t), intent(in) :: boxes
       !> Results; increased
       type(worker_t), intent(inout) :: worker
+      !> List of changes; new overlapping pairs are appended
+      type(pair_changes_t), intent(inout) :: changes
       integer(ip) :: k, i
 
       do k = low, high
          i = tree%changed(k)
          if (padded%has_grown(i) /= 0_bp) then
             worker%searches = worker%searches + 1_lp
-            call search(tree, padded, boxes, i, worker%found, worker%visits)
+            call search(tree, padded, boxes, i, worker%found, worker%visits, changes)
          end if
-         if (.not. lies_in(padded%before(:, i), padded%now(:, i))) &
-            call candidates%list_separated(i, padded%now, worker%separated)
+         if (.not. lies_in(padded%before(:, i), padded%now(:, i))) call worker%shrunk%push(i)
       end do
    end subroutine search_changed
 
-   !> Replace the candidates of the boxes whose leaf changed, after all were searched.
-   subroutine replace_candidates(worker, boxes, candidates, changes)
+   !> Collect the results of a search.
+   pure subroutine collect(self, worker)
+      class(replacement_t), intent(inout) :: self
       !> Results of all workers, (worker)
       type(worker_t), intent(in) :: worker(:)
-      type(boxes_t), intent(in) :: boxes
-      class(candidates_t), intent(inout) :: candidates
-      !> List of changes; new overlapping pairs are appended
-      type(pair_changes_t), intent(inout) :: changes
-      integer(ip) :: k, number
       integer :: w
-      logical :: overlap
 
       do w = 1, size(worker)
-         do k = 1_ip, worker(w)%separated%n
-            call candidates%drop(worker(w)%separated%at(k))
-         end do
+         call self%found%append(worker(w)%found)
+         call self%shrunk%append(worker(w)%shrunk)
       end do
-      do w = 1, size(worker)
-         do k = 1_ip, worker(w)%found%n, 2_ip
-            associate (i => worker(w)%found%at(k), j => worker(w)%found%at(k + 1_ip))
-               overlap = overlapping(boxes%bounds(:, i), boxes%bounds(:, j))
-               call candidates%add(i, j, overlap, number)
-               if (overlap) call changes%record(boxes%body(i), boxes%body(j), 1_ip)
-            end associate
-         end do
+   end subroutine collect
+
+   !> Remove and add candidates after `settle`, when `before` has the padded cells of the search. Forget its results.
+   pure subroutine apply(self, padded, candidates)
+      class(replacement_t), intent(inout) :: self
+      !> Padded cells. Those of `now` are not used, and may change meanwhile
+      type(padded_cells_t), intent(in) :: padded
+      class(candidates_t), intent(inout) :: candidates
+      integer(ip) :: k, number
+
+      self%separated%n = 0_ip
+      do k = 1_ip, self%shrunk%n
+         call candidates%list_separated(self%shrunk%at(k), padded%before, self%separated)
       end do
-   end subroutine replace_candidates
+      do k = 1_ip, self%separated%n
+         call candidates%drop(self%separated%at(k))
+      end do
+      do k = 1_ip, self%found%n, 3_ip
+         call candidates%add(self%found%at(k), self%found%at(k + 1_ip), self%found%at(k + 2_ip) /= 0_ip, number)
+      end do
+      self%found%n = 0_ip
+      self%shrunk%n = 0_ip
+   end subroutine apply
 
    !> Find the new candidates of one box.
-   subroutine search(tree, padded, boxes, i, found, visits)
+   subroutine search(tree, padded, boxes, i, found, visits, changes)
       type(tree_t), intent(in) :: tree
       type(padded_cells_t), intent(in) :: padded
       type(boxes_t), intent(in) :: boxes
       !> Box whose padded cell has grown
       integer(ip), intent(in) :: i
-      !> List of the boxes of new candidates; two entries are appended for each candidate
+      !> Both boxes of each new candidate, and 1 if they overlap, else 0; appended
       type(index_list_t), intent(inout) :: found
       !> Number of visited nodes, upwards and downwards; increased by this search
       integer(lp), intent(inout) :: visits
+      !> List of changes; new overlapping pairs are appended
+      type(pair_changes_t), intent(inout) :: changes
       integer(ip) :: stack(stack_size), node, child, j
       integer :: waiting, q
       real(dp) :: window(4)
@@ -216,6 +237,12 @@ contains
             if (is_new(padded, boxes, i, j)) then
                call found%push(i)
                call found%push(j)
+               if (overlapping(boxes%bounds(:, i), boxes%bounds(:, j))) then
+                  call found%push(1_ip)
+                  call changes%record(boxes%body(i), boxes%body(j), 1_ip)
+               else
+                  call found%push(0_ip)
+               end if
             end if
             j = tree%next(j)
          end do

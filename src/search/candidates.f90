@@ -114,7 +114,7 @@ contains
       end do
    end subroutine link_boxes
 
-   !> Sort the candidates by their lower box, without holes, if many of them are not in their region.
+   !> Sort the candidates by their lower box, without holes, if many are not in their region.
    pure subroutine tidy(self)
       class(candidates_t), intent(inout) :: self
       integer(ip), allocatable :: box(:, :), end_of_row(:)
@@ -123,8 +123,9 @@ contains
 
       if (self%n_elsewhere <= shiftr(self%n, most_elsewhere)) return
       n = self%n
-      box = self%box(:, 1:n)
-      overlap = self%overlap(1:n)
+      call move_alloc(self%box, box)
+      call move_alloc(self%overlap, overlap)
+      allocate (self%box(2, size(overlap)), self%overlap(size(overlap)))
       allocate (end_of_row(0:size(self%first)), source=0_ip)
       do k = 1_ip, n
          i = min(box(1, k), box(2, k))
@@ -137,7 +138,8 @@ contains
       do k = 1_ip, n
          if (box(1, k) == box(2, k)) cycle
          i = min(box(1, k), box(2, k))
-         self%box(:, end_of_row(i)) = box(:, k)
+         self%box(1, end_of_row(i)) = box(1, k)
+         self%box(2, end_of_row(i)) = box(2, k)
          self%overlap(end_of_row(i)) = overlap(k)
          end_of_row(i) = end_of_row(i) - 1_ip
       end do
@@ -287,12 +289,10 @@ contains
       class(candidates_t), intent(inout) :: self
       !> Number of the candidate
       integer(ip), intent(in) :: k
-      integer(ip) :: s
 
       if (self%box(1, k) == self%box(2, k)) return
-      do s = 1_ip, 2_ip
-         call unlink(self, self%box(s, k), self%previous(s, k), self%next(s, k))
-      end do
+      call unlink(self, self%box(1, k), self%previous(1, k), self%next(1, k))
+      call unlink(self, self%box(2, k), self%previous(2, k), self%next(2, k))
       self%box(2, k) = self%box(1, k)
       self%overlap(k) = 1_bp
       self%next(1, k) = self%first_hole(region(k))

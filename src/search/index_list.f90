@@ -14,6 +14,7 @@ module polydem_index_list
       integer(ip), allocatable :: at(:)
    contains
       procedure :: push
+      procedure :: append
       procedure :: reserve
       procedure :: sort
    end type index_list_t
@@ -51,6 +52,18 @@ contains
       self%n = self%n + 1_ip
       self%at(self%n) = entry
    end subroutine push
+
+   !> Append the entries of another list.
+   pure subroutine append(self, other)
+      class(index_list_t), intent(inout) :: self
+      !> Entries to append
+      type(index_list_t), intent(in) :: other
+
+      if (other%n == 0_ip) return
+      call self%reserve(self%n + other%n)
+      self%at(self%n + 1_ip:self%n + other%n) = other%at(1:other%n)
+      self%n = self%n + other%n
+   end subroutine append
 
    !> Sort the entries in ascending order.
    pure subroutine sort(self)

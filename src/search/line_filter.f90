@@ -257,7 +257,9 @@ contains
       do w = 1, size(found)
          do k = 1_ip, found(w)%n
             n = n + 1_ip
-            self%active%box(:, n) = found(w)%box(:, k)
+            ! Not box(:, n): for a column the compiler calls memmove.
+            self%active%box(1, n) = found(w)%box(1, k)
+            self%active%box(2, n) = found(w)%box(2, k)
             self%active%overlap(n) = found(w)%overlap(k)
             self%active%owner(n) = found(w)%owner(k)
             self%active%place(found(w)%owner(k)) = n

@@ -59,7 +59,7 @@ module polydem_parallel_filter
       procedure :: follow_part
       procedure :: gather_left
       procedure :: compare_active
-      procedure :: compare_alone
+      procedure :: compare_part
    end type parallel_filter_t
 
 contains
@@ -118,11 +118,8 @@ contains
       integer, intent(in) :: w
       !> List of boxes
       type(index_list_t), intent(inout) :: list
-      integer(ip) :: k
 
-      do k = 1_ip, self%worker(w)%left%n
-         call list%push(self%worker(w)%left%at(k))
-      end do
+      call list%append(self%worker(w)%left)
    end subroutine append_left
 
    !> Whether work is worth a parallel region. Even for one thread a region costs 0.2 us.
@@ -181,14 +178,11 @@ contains
    !> Join the strays of all parts.
    pure subroutine gather_strays(self)
       class(parallel_filter_t), intent(inout) :: self
-      integer(ip) :: k
       integer :: w
 
       self%strays%n = 0_ip
       do w = 1, size(self%worker)
-         do k = 1_ip, self%worker(w)%strays%n
-            call self%strays%push(self%worker(w)%strays%at(k))
-         end do
+         call self%strays%append(self%worker(w)%strays)
       end do
    end subroutine gather_strays
 
@@ -364,10 +358,12 @@ contains
       call self%count_step()
    end subroutine compare_active
 
-   !> Compare the boxes of a part of these candidates.
+   !> Compare the boxes of a part of these candidates. After all parts call `count_step`.
    subroutine compare_part(self, w, boxes)
       class(parallel_filter_t), intent(inout) :: self
+      !> Number of the part
       integer, intent(in) :: w
+      !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
       integer(ip) :: low, high
 
@@ -375,15 +371,5 @@ contains
       call self%active%compare(self%n_compared + low, self%n_compared + high, boxes%bounds, boxes%body, &
                                self%changes%of(w))
    end subroutine compare_part
-
-   !> Compare the boxes of the active candidates by the calling thread alone.
-   subroutine compare_alone(self, boxes)
-      class(parallel_filter_t), intent(inout) :: self
-      !> Boxes of this step
-      type(boxes_t), intent(in) :: boxes
-
-      call self%active%compare(1_ip, self%active%n, boxes%bounds, boxes%body, self%changes%of(1))
-      call self%count_step()
-   end subroutine compare_alone
 
 end module polydem_parallel_filter

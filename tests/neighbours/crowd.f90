@@ -1,5 +1,6 @@
 !> Moving boxes for tests of neighbour finders, and the pairs that a direct search finds.
 module crowd
+   use omp_lib, only: omp_set_num_threads
    use polydem_boxes, only: boxes_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
@@ -102,10 +103,12 @@ contains
    end function wrong_steps
 
    !> Number of steps of one finder in which the list of pairs or values carried with the pairs are wrong.
-   integer(ip) function count_wrong(finder, boxes, frames)
+   integer(ip) function count_wrong(finder, boxes, frames, threads)
       character(len=*), intent(in) :: finder
       type(boxes_t), intent(in) :: boxes
       real(wp), intent(in) :: frames(:, :, :)
+      !> Numbers of threads of successive steps, in turn
+      integer, intent(in), optional :: threads(:)
       type(boxes_t) :: now
       type(neighbours_t) :: neighbours
       type(error_t), allocatable :: error
@@ -118,6 +121,7 @@ contains
       count_wrong = merge(1_ip, 0_ip, allocated(error))
       do s = 1_ip, size(frames, 3, kind=ip)
          now%bounds = frames(:, :, s)
+         if (present(threads)) call omp_set_num_threads(threads(1 + modulo(int(s), size(threads))))
          call neighbours%update(now)
          call direct_pairs(now, expected)
          if (.not. as_expected(neighbours, now%n_bodies, expected, before, rider)) &
