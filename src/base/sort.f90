@@ -65,13 +65,14 @@ contains
       end do
       width = run
       do while (width < n)
-         do low = 1_ip, n, 2_ip*width
-            middle = min(low + width, n + 1_ip)
+         do low = 1_ip, n - width, 2_ip*width
+            middle = low + width
             high = min(low + 2_ip*width, n + 1_ip)
+            if (keys(middle - 1_ip) <= keys(middle)) cycle
             call merge_runs(keys, carried, low, middle, high, spare_keys, spare_carried)
+            keys(low:high - 1_ip) = spare_keys(low:high - 1_ip)
+            carried(low:high - 1_ip) = spare_carried(low:high - 1_ip)
          end do
-         keys(1:n) = spare_keys(1:n)
-         carried(1:n) = spare_carried(1:n)
          width = 2_ip*width
       end do
    end subroutine sort_keys

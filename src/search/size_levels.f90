@@ -104,7 +104,7 @@ contains
       real(wp), intent(in) :: margin
       type(spectrum_t), intent(out) :: spectrum
       integer, intent(out) :: class(:)
-      real(dp) :: largest, least, side, low(2), high(2), squares
+      real(dp) :: largest, least, side, low(2), high(2), squares, octave
       integer(ip) :: i
 
       largest = 0.0_dp
@@ -126,10 +126,11 @@ contains
       if (.not. squares > 0.0_dp) return
       spectrum%area = min((high(1) - low(1))*(high(2) - low(2)), squares/least_cover)
       least = max(least, largest*2.0_dp**(-octaves))
+      octave = logarithm(2.0_dp)
       do i = 1_ip, boxes%n
          if (boxes%fixed(i)) cycle
          side = max(side_of(boxes, i) + real(margin, dp), least)
-         class(i) = 1 + int(real(classes_per_octave, dp)*logarithm(side/least)/logarithm(2.0_dp))
+         class(i) = 1 + int(real(classes_per_octave, dp)*logarithm(side/least)/octave)
          class(i) = min(class(i), most_classes)
          spectrum%n = max(spectrum%n, class(i))
          spectrum%boxes(class(i)) = spectrum%boxes(class(i)) + 1.0_dp
