@@ -13,7 +13,7 @@
 module polydem_box_maker
    use polydem_bodies, only: block_size, bodies_t, turn_block
    use polydem_body_pieces, only: cut_body
-   use polydem_body_sizes, only: diameter_of, median_of_diameters
+   use polydem_body_sizes, only: median_of_diameters
    use polydem_box_placement, only: extent_of, place_box, place_whole, turn
    use polydem_boxes, only: boxes_t
    use polydem_elementary, only: sine_and_cosine
@@ -118,7 +118,7 @@ contains
                           maker%median_diameter, largest_ratio, room, maker%pieces, fits)
          n_pieces = maker%pieces%n - known
          if (.not. fits) then
-            call refuse(bodies%id(s), diameter_of(bodies, s)/maker%median_diameter, error)
+            call refuse(bodies%id(s), bodies%diameter(s)/maker%median_diameter, error)
             return
          end if
          if (n_pieces == 0_ip) then
@@ -134,7 +134,7 @@ contains
             call move_alloc(longer, maker%cut)
          end if
          maker%cut(n_cut) = cut_body_t(first_box=n_boxes + 1_ip, first_piece=known + 1_ip, n=n_pieces, &
-                                       padding=maker%margin + roundings*epsilon(1.0_wp)*diameter_of(bodies, s))
+                                       padding=maker%margin + roundings*epsilon(1.0_wp)*bodies%diameter(s))
          maker%box(s) = -n_cut
          n_boxes = n_boxes + n_pieces
       end do
@@ -163,7 +163,7 @@ contains
 
       b = maker%box(s)
       if (b > 0_ip) then
-         call describe_box(bodies, s, diameter_of(bodies, s), maker%margin, b, boxes)
+         call describe_box(bodies, s, bodies%diameter(s), maker%margin, b, boxes)
          return
       end if
       associate (cut => maker%cut(-b), pieces => maker%pieces)

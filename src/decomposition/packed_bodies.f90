@@ -1,6 +1,6 @@
 !> Packed bodies: transfer of the constant fields and the shapes of bodies between ranks.
 module polydem_packed_bodies
-   use polydem_bodies, only: allocate_bodies, bodies_t, measure_radii
+   use polydem_bodies, only: allocate_bodies, bodies_t
    use polydem_body_fields, only: serialize_constants
    use polydem_communicator, only: communicator_t
    use polydem_kinds, only: ip, lp, wp
@@ -158,7 +158,6 @@ contains
       call packed%vertices%restore_to(vertices_of(bodies%vertex_start(slots), corners))
       call serialize_shapes(packed%vertices, bodies)
       bodies%free = pack([(s, s=1_ip, n)],.not. bodies%fixed)
-      call measure_radii(bodies)
    end subroutine unpack_bodies
 
 end module polydem_packed_bodies

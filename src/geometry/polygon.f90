@@ -9,7 +9,7 @@ module polydem_polygon
    use polydem_strings, only: counted, to_text
    implicit none
    private
-   public :: clean_polygon, mass_properties, diameter, greatest_radius, clip_half_plane, cross
+   public :: clean_polygon, mass_properties, diameter, greatest_radius, thickness, clip_half_plane, cross
 
    !> A vertex is dropped if it is closer to its neighbour, or to the line of its neighbours, than this fraction of
    !> the size: far above the rounding errors of a text file, far below any effect on a result.
@@ -223,6 +223,32 @@ contains
       end do
       greatest_radius = sqrt(greatest_radius)
    end function greatest_radius
+
+   !> Twice the least distance of an edge of a polygon from the origin [m]
+   pure real(wp) function thickness(vertex)
+      !> Vertices, anticlockwise, (2, n) [m]
+      real(wp), intent(in), contiguous :: vertex(:, :)
+      real(wp) :: numerator(size(vertex, 2)), edge(2, size(vertex, 2)), square(size(vertex, 2)), least
+      integer(ip) :: v, w
+      ! Edges whose squared distance is greater than the least by this factor are farther away, in spite of rounding.
+      real(wp), parameter :: share = 1.0_wp + 64.0_wp*epsilon(1.0_wp)
+
+      w = size(vertex, 2, kind=ip)
+      do v = 1_ip, size(vertex, 2, kind=ip)
+         edge(:, v) = vertex(:, v) - vertex(:, w)
+         numerator(v) = 2.0_wp*abs(edge(1, v)*vertex(2, w) - edge(2, v)*vertex(1, w))
+         square(v) = numerator(v)/(edge(1, v)**2 + edge(2, v)**2)*numerator(v)
+         w = v
+      end do
+      least = minval(square)
+      ! Where squares may underflow or overflow, the distances of all edges are measured.
+      if (least < tiny(least)/epsilon(least) .or. .not. maxval(square) < huge(least)) least = huge(least)
+      thickness = huge(1.0_wp)
+      do v = 1_ip, size(vertex, 2, kind=ip)
+         if (square(v) > share*least) cycle
+         thickness = min(thickness, numerator(v)/hypotenuse(edge(1, v), edge(2, v)))
+      end do
+   end function thickness
 
    !> The part of a convex polygon on one side of a line: (r - point) . normal <= 0.
    !>

@@ -1,6 +1,5 @@
 !> Description of a run: its scene, models and time step, for `check` and for the head of the log.
 module polydem_description
-   use polydem_body_sizes, only: thickness_of_bodies
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
@@ -112,7 +111,7 @@ contains
          if (folder == '') then
             call log%write_line('           (a run lists them in overlaps.csv)')
          else
-            call write_overlap_table(folder//'/'//overlaps_name, s%bodies, s%contacts, thickness_of_bodies(s%bodies), &
+            call write_overlap_table(folder//'/'//overlaps_name, s%bodies, s%contacts, s%bodies%thickness, &
                                      limit, error, s%comm)
             call log%write_line('           full list: '//folder//'/'//overlaps_name)
          end if

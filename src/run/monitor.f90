@@ -223,7 +223,7 @@ contains
 
       share = 0.0_dp
       associate (s => simulation, settings => simulation%settings%guards, &
-                 thickness => simulation%walk%contact_guard%thickness)
+                 thickness => simulation%bodies%thickness)
          if (any_deeper(s%walk%suspects, thickness, settings%overlap_limit)) then
             worst = deepest_contact(s%walk%suspects, thickness)
             text = depth_text(s%bodies, s%walk%suspects, thickness, worst)

@@ -2,7 +2,6 @@
 !> those of the bodies of all ranks.
 module polydem_scene_measures
    use polydem_bodies, only: bodies_t
-   use polydem_body_sizes, only: measure_body, thickness_of_bodies
    use polydem_communicator, only: communicator_t
    use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
    use polydem_elementary, only: hypotenuse
@@ -10,7 +9,6 @@ module polydem_scene_measures
    use polydem_guards, only: greatest_displacement, place_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_body, owns_pair
-   use polydem_polygon, only: diameter
    use polydem_prescribed_motion, only: motion_t
    use polydem_simulation, only: simulation_t
    use polydem_stability_check, only: find_stable_step
@@ -120,7 +118,6 @@ contains
       type(simulation_t), intent(inout) :: simulation
       type(scene_measures_t), intent(inout) :: measures
       integer(lp) :: counts(5)
-      real(wp), allocatable :: thickness(:)
       integer(ip) :: c, k
 
       counts = 0_lp
@@ -134,11 +131,10 @@ contains
                counts(2) = counts(2) + int(bodies%vertex_start(k + 1_ip) - bodies%vertex_start(k), lp)
          end do
          counts(3) = count(.not. boxes%passive(:boxes%n), kind=lp)
-         thickness = thickness_of_bodies(bodies)
          do c = 1_ip, contacts%n
             if (.not. owns_pair(bodies, contacts%first(c), contacts%second(c))) cycle
             counts(4) = counts(4) + 1_lp
-            if (depth_share(contacts, thickness, c) > limit) counts(5) = counts(5) + 1_lp
+            if (depth_share(contacts, bodies%thickness, c) > limit) counts(5) = counts(5) + 1_lp
          end do
       end associate
       call simulation%comm%all_reduce_sum(counts)
@@ -153,7 +149,6 @@ contains
    subroutine measure_contacts(simulation, measures)
       type(simulation_t), intent(inout) :: simulation
       type(scene_measures_t), intent(inout) :: measures
-      real(wp), allocatable :: thickness(:)
       real(wp) :: depth, greatest
       integer(lp) :: place, longest
       integer(ip) :: c, worst
@@ -162,11 +157,10 @@ contains
       longest = 0_lp
       greatest = -1.0_wp
       associate (bodies => simulation%bodies, contacts => simulation%contacts)
-         thickness = thickness_of_bodies(bodies)
-         worst = deepest_contact(contacts, thickness)
+         worst = deepest_contact(contacts, bodies%thickness)
          if (worst > 0_ip) then
-            measures%depth_share = depth_share(contacts, thickness, worst)
-            measures%deepest = depth_text(bodies, contacts, thickness, worst)
+            measures%depth_share = depth_share(contacts, bodies%thickness, worst)
+            measures%deepest = depth_text(bodies, contacts, bodies%thickness, worst)
             place = place_of(bodies, contacts%first(worst), contacts%second(worst))
          end if
          do c = 1_ip, contacts%n
@@ -190,7 +184,6 @@ contains
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
       type(scene_measures_t), intent(inout) :: measures
-      real(wp) :: thickness, radius
       integer(ip) :: s
 
       measures%thickness = huge(1.0_wp)
@@ -199,9 +192,8 @@ contains
       do s = 1_ip, bodies%n
          call extend_extent(measures%extent, bodies, s)
          if (.not. bodies%fixed(s)) call extend_extent(measures%free_extent, bodies, s)
-         call measure_body(bodies, s, thickness, radius)
-         if (thickness >= measures%thickness) cycle
-         measures%thickness = thickness
+         if (bodies%thickness(s) >= measures%thickness) cycle
+         measures%thickness = bodies%thickness(s)
          measures%thinnest = int(bodies%id(s), lp)
       end do
       call reduce_to_least(comm, measures%extent(:, 1))
@@ -236,7 +228,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: stiffness
       type(scene_measures_t), intent(inout) :: measures
-      real(wp) :: length, density, speed, impact, least(3), greatest(4)
+      real(wp) :: density, speed, impact, least(3), greatest(4)
       real(wp), allocatable :: kinetic(:)
       integer(ip) :: k, s
 
@@ -247,11 +239,11 @@ contains
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
          associate (shape => bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))
-            length = diameter(shape)
             density = bodies%mass(s)/area_of(shape)
          end associate
          speed = hypotenuse(bodies%velocity(1, s), bodies%velocity(2, s))
-         measures%diameter([1, 3]) = [min(measures%diameter(1), length), max(measures%diameter(3), length)]
+         measures%diameter([1, 3]) = [min(measures%diameter(1), bodies%diameter(s)), &
+                                       max(measures%diameter(3), bodies%diameter(s))]
          measures%mass(:2) = [min(measures%mass(1), bodies%mass(s)), max(measures%mass(2), bodies%mass(s))]
          measures%density = [min(measures%density(1), density), max(measures%density(2), density)]
          measures%speed = max(measures%speed, speed)

@@ -2,7 +2,6 @@
 !> for displacements that are too large per step, for an unstable time step and for contacts without direction.
 module polydem_guards
    use polydem_bodies, only: bodies_t
-   use polydem_body_sizes, only: measure_body
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: far, dp, ip, lp, wp
@@ -39,17 +38,12 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> Slots of the bodies that may move
       integer(ip), intent(in) :: moving(:)
-      real(wp) :: thickness, radius
-      integer(ip) :: s
 
       guard%choice = settings%displacement
       guard%moving = moving
       guard%limit = huge(1.0_wp)
-      if (guard%choice == 'off') return
-      do s = 1_ip, bodies%n
-         call measure_body(bodies, s, thickness, radius)
-         guard%limit = min(guard%limit, settings%displacement_limit*thickness)
-      end do
+      if (guard%choice == 'off' .or. bodies%n == 0_ip) return
+      guard%limit = settings%displacement_limit*minval(bodies%thickness)
    end subroutine new_motion_guard
 
    !> Whether all bodies of a run have valid poses

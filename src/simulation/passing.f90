@@ -12,7 +12,6 @@
 !> reverses, but this is harmless.
 module polydem_passing
    use polydem_bodies, only: bodies_t
-   use polydem_body_sizes, only: thickness_of_bodies
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
@@ -29,8 +28,6 @@ module polydem_passing
 
    !> Guard of the contacts
    type :: contact_guard_t
-      !> Thickness of each body, (slot) [m]; not allocated if the guards are off
-      real(wp), allocatable :: thickness(:)
       !> Contacts deeper than this fraction of the thickness of the thinner body are suspects; huge: only degenerate
       !> ones
       real(wp) :: least_depth = huge(1.0_wp)
@@ -55,8 +52,7 @@ contains
       if (settings%overlap /= 'off') guard%least_depth = settings%overlap_limit
       if (settings%passing /= 'off') guard%least_depth = min(guard%least_depth, least_depth)
       if (guard%least_depth < huge(1.0_wp)) then
-         guard%thickness = thickness_of_bodies(bodies)
-         guard%shallow = min(guard%shallow, 0.999_wp*guard%least_depth*minval(guard%thickness))
+         guard%shallow = min(guard%shallow, 0.999_wp*guard%least_depth*minval(bodies%thickness))
       end if
    end subroutine new_contact_guard
 
@@ -83,7 +79,7 @@ contains
          deepest = max(deepest, max(block%degenerate(c), block%area(c) - guard%shallow*block%length(c)))
       end do
       any_suspect = deepest > 0.0_wp
-      if (any_suspect) call find_suspects(guard, block, suspect)
+      if (any_suspect) call find_suspects(guard, bodies, block, suspect)
       if (guard%column == 0) return
       do c = 1_ip, block%n
          now(c) = packed_direction(block%direction(c, 1), block%direction(c, 2))
@@ -97,28 +93,28 @@ contains
       if (.not. any_suspect) return
       do c = 1_ip, block%n
          if (.not. suspect(c)) cycle
-         if (passes(guard, bodies, block, c, is_reversed(before(c), now(c)))) passing_pair = block%pair(c)
+         if (passes(bodies, block, c, is_reversed(before(c), now(c)))) passing_pair = block%pair(c)
       end do
    end subroutine test_block
 
    !> Find the contacts that are deep or degenerate.
-   pure subroutine find_suspects(guard, block, suspect)
+   pure subroutine find_suspects(guard, bodies, block, suspect)
       type(contact_guard_t), intent(in) :: guard
+      type(bodies_t), intent(in) :: bodies
       type(contact_block_t), intent(in) :: block
       logical, intent(inout) :: suspect(block_size)
       integer(ip) :: c
 
       do c = 1_ip, block%n
          suspect(c) = block%degenerate(c) > 0.0_wp
-         if (suspect(c) .or. .not. allocated(guard%thickness)) cycle
+         if (suspect(c) .or. guard%least_depth >= huge(1.0_wp)) cycle
          suspect(c) = block%area(c) > guard%least_depth*block%length(c) &
-            *min(guard%thickness(block%first(c)), guard%thickness(block%second(c)))
+            *min(bodies%thickness(block%first(c)), bodies%thickness(block%second(c)))
       end do
    end subroutine find_suspects
 
    !> Whether the bodies of a contact pass through each other
-   pure logical function passes(guard, bodies, block, c, reversed)
-      type(contact_guard_t), intent(in) :: guard
+   pure logical function passes(bodies, block, c, reversed)
       type(bodies_t), intent(in) :: bodies
       type(contact_block_t), intent(in) :: block
       integer(ip), intent(in) :: c
@@ -126,7 +122,7 @@ contains
       logical, intent(in) :: reversed
 
       associate (i => block%first(c), j => block%second(c))
-         passes = block%area(c) > least_depth*block%length(c)*min(guard%thickness(i), guard%thickness(j))
+         passes = block%area(c) > least_depth*block%length(c)*min(bodies%thickness(i), bodies%thickness(j))
          if (.not. passes .or. reversed) return
          passes = centre_inside(bodies, bodies%radius, i, j)
          if (.not. passes) passes = centre_inside(bodies, bodies%radius, j, i)

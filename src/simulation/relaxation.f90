@@ -8,7 +8,6 @@
 !> of threads and ranks.
 module polydem_relaxation
    use polydem_bodies, only: bodies_t, turn_bodies
-   use polydem_body_sizes, only: thickness_of_bodies
    use polydem_box_maker, only: update_boxes
    use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
    use polydem_contact_history, only: contact_history_t
@@ -46,7 +45,6 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(neighbours_t) :: neighbours
       type(contacts_t) :: contacts
-      real(wp), allocatable :: thickness(:)
       real(wp) :: greatest(1), least, before(2)
       integer(ip) :: worst, generation
       logical :: is_idle
@@ -60,10 +58,9 @@ contains
          call find_overlaps(self, neighbours, generation, contacts, error)
          call self%comm%all_reduce_error(error)
          if (allocated(error)) return
-         thickness = thickness_of_bodies(self%bodies)
-         worst = deepest_contact(contacts, thickness)
+         worst = deepest_contact(contacts, self%bodies%thickness)
          greatest = 0.0_wp
-         if (worst > 0_ip) greatest = depth_share(contacts, thickness, worst)
+         if (worst > 0_ip) greatest = depth_share(contacts, self%bodies%thickness, worst)
          call reduce_to_greatest(self%comm, greatest)
          associate (relaxation => self%relaxation)
             relaxation%after = greatest(1)
@@ -72,7 +69,7 @@ contains
             least = min(least, relaxation%after)
             call check_progress(self, least, before, is_idle)
             if (is_idle .or. relaxation%sweeps == most_sweeps) then
-               if (worst > 0_ip) call report_depth(self, contacts, thickness, worst, is_idle, error)
+               if (worst > 0_ip) call report_depth(self, contacts, worst, is_idle, error)
                call self%comm%all_reduce_error(error)
                return
             end if
@@ -150,22 +147,21 @@ contains
    end subroutine find_overlaps
 
    !> Report the deepest contact of all ranks. Two ranks may have it.
-   subroutine report_depth(self, contacts, thickness, worst, is_idle, error)
+   subroutine report_depth(self, contacts, worst, is_idle, error)
       type(simulation_t), intent(in) :: self
       type(contacts_t), intent(in) :: contacts
-      real(wp), intent(in) :: thickness(:)
       integer(ip), intent(in) :: worst
       !> Whether the last sweeps brought no progress
       logical, intent(in) :: is_idle
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: idle
 
-      if (depth_share(contacts, thickness, worst) < self%relaxation%after) return
+      if (depth_share(contacts, self%bodies%thickness, worst) < self%relaxation%after) return
       idle = ''
       if (is_idle) idle = ', the last '//to_text(most_idle_sweeps)//' without progress,'
       call raise(error, input_error, place_of(self%settings, 'guards', 'relaxed_depth')//': after '// &
                  to_text(self%relaxation%sweeps)//' sweeps'//idle//' '// &
-                 depth_text(self%bodies, contacts, thickness, worst)// &
+                 depth_text(self%bodies, contacts, self%bodies%thickness, worst)// &
                  '. Provide more space for the bodies, or increase relaxed_depth in &guards')
    end subroutine report_depth
 

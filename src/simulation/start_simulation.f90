@@ -1,6 +1,5 @@
 !> Start of a simulation: time step, forces and accelerations at time 0. All ranks start alike, one or many.
 module polydem_start_simulation
-   use polydem_body_sizes, only: diameters_of
    use polydem_box_maker, only: update_boxes
    use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_choose_step, only: choose_step
@@ -46,7 +45,7 @@ contains
       call new_integrator(settings%integrate, self%integrator)
       call choose_step(self, error)
       if (allocated(error)) return
-      call find_median(self%comm, diameters_of(self%bodies), median_diameter)
+      call find_median(self%comm, self%bodies%diameter(self%bodies%free), median_diameter)
       call new_domain(self%domain, settings%decomposition, median_diameter, self%comm, error)
       if (.not. allocated(error)) call fit_to_bodies(self, error, median_diameter)
       call self%comm%all_reduce_error(error)

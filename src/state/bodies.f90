@@ -16,10 +16,10 @@ module polydem_bodies
    use polydem_elementary, only: sines_and_cosines
    use polydem_hash, only: mix_word
    use polydem_kinds, only: ip, lp, wp, dp, min_parallel_size
-   use polydem_polygon, only: greatest_radius
+   use polydem_polygon, only: diameter, greatest_radius, thickness
    implicit none
    private
-   public :: bodies_t, allocate_bodies, turn_bodies, turn_block, find_directions, block_size, measure_radii, &
+   public :: bodies_t, allocate_bodies, turn_bodies, turn_block, find_directions, block_size, measure_sizes, &
       state_hash, state_words
 
    !> Greatest number of bodies of a block for `turn_block`
@@ -71,6 +71,10 @@ module polydem_bodies
       real(wp), allocatable :: shape(:, :)
       !> Greatest distance of a vertex from the centre of mass [m]
       real(wp), allocatable :: radius(:)
+      !> Greatest distance between two vertices [m]
+      real(wp), allocatable :: diameter(:)
+      !> Twice the least distance of an edge from the centre of mass [m]
+      real(wp), allocatable :: thickness(:)
       !> Vertices turned by the angle, relative to the centre of mass, (2, vertex) [m]
       real(wp), allocatable :: turned(:, :)
    end type bodies_t
@@ -89,7 +93,8 @@ contains
       allocate (bodies%id(n), bodies%global_index(n), source=0_ip)
       allocate (bodies%vertex_start(n + 1_ip), source=1_ip)
       allocate (bodies%fixed(n), bodies%in_halo(n), source=.false.)
-      allocate (bodies%mass(n), bodies%inertia(n), bodies%inverse_mass(n), bodies%inverse_inertia(n), bodies%angle(n), &
+      allocate (bodies%mass(n), bodies%inertia(n), bodies%inverse_mass(n), bodies%inverse_inertia(n), &
+                bodies%radius(n), bodies%diameter(n), bodies%thickness(n), bodies%angle(n), &
                 bodies%angular_velocity(n), bodies%angular_acceleration(n), bodies%torque(n), source=0.0_wp)
       allocate (bodies%position(2, n), bodies%velocity(2, n), bodies%acceleration(2, n), bodies%force(2, n), &
                 source=0.0_wp)
@@ -115,20 +120,24 @@ contains
       !$omp end parallel do
    end subroutine turn_bodies
 
-   !> Compute the radii of all bodies from their shapes.
-   subroutine measure_radii(bodies)
-      !> Bodies; only `radius` changes
+   !> Compute the sizes of all bodies from their shapes.
+   subroutine measure_sizes(bodies)
+      !> Bodies; only `radius`, `diameter` and `thickness` change
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: s
 
-      if (allocated(bodies%radius)) deallocate (bodies%radius)
-      allocate (bodies%radius(bodies%n))
+      if (.not. allocated(bodies%radius)) &
+         allocate (bodies%radius(bodies%n), bodies%diameter(bodies%n), bodies%thickness(bodies%n))
+      !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) shared(bodies) private(s)
       do s = 1_ip, bodies%n
-         associate (first => bodies%vertex_start(s), last => bodies%vertex_start(s + 1_ip) - 1_ip)
-            bodies%radius(s) = greatest_radius(bodies%shape(:, first:last))
+         associate (shape => bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))
+            bodies%radius(s) = greatest_radius(shape)
+            bodies%diameter(s) = diameter(shape)
+            bodies%thickness(s) = thickness(shape)
          end associate
       end do
-   end subroutine measure_radii
+      !$omp end parallel do
+   end subroutine measure_sizes
 
    !> Update `turned` of up to `block_size` bodies to their angles.
    subroutine turn_block(bodies, slots, isa, extent, direction)

@@ -44,6 +44,9 @@ contains
       call serializer%field('/bodies/inverse_mass', bodies%inverse_mass, 'm/kg', 'inverse masses')
       call serializer%field('/bodies/inverse_inertia', bodies%inverse_inertia, '1/(kg m)', &
                             'inverse moments of inertia')
+      call serializer%field('/bodies/radius', bodies%radius, 'm', 'greatest distances of a vertex from the centre')
+      call serializer%field('/bodies/diameter', bodies%diameter, 'm', 'greatest distances between two vertices')
+      call serializer%field('/bodies/thickness', bodies%thickness, 'm', 'twice the least distances of an edge')
       bodies%fixed = fixed == 1_ip
    end subroutine serialize_constants
 

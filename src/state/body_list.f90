@@ -1,6 +1,6 @@
 !> A list to which generators and readers append bodies one by one, and its conversion to the arrays of `bodies_t`.
 module polydem_body_list
-   use polydem_bodies, only: allocate_bodies, bodies_t, measure_radii, turn_bodies
+   use polydem_bodies, only: allocate_bodies, bodies_t, measure_sizes, turn_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
@@ -263,7 +263,7 @@ contains
       allocate (shape(2, n_vertices), bodies%turned(2, n_vertices))
       shape(:, :) = bodies%shape(:, :n_vertices)
       call move_alloc(shape, bodies%shape)
-      call measure_radii(bodies)
+      call measure_sizes(bodies)
       where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass
       where (bodies%inertia > 0.0_wp) bodies%inverse_inertia = 1.0_wp/bodies%inertia
       bodies%free = pack([(s, s=1_ip, bodies%n)],.not. bodies%fixed)

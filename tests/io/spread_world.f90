@@ -2,7 +2,7 @@
 !>
 !> It is only written to files. Its numbers are arbitrary and use all bits.
 module spread_world
-   use polydem_bodies, only: bodies_t, measure_radii, turn_bodies
+   use polydem_bodies, only: bodies_t, measure_sizes, turn_bodies
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_force_sums, only: assemble_forces, force_sums_t
    use polydem_hash, only: mix_word
@@ -123,7 +123,7 @@ contains
                                              [7_ip, 8_ip]*(v - bodies%vertex_start(s) + 1_ip))
          end do
       end do
-      call measure_radii(bodies)
+      call measure_sizes(bodies)
       call turn_bodies(bodies, [(s, s=1_ip, bodies%n)], isa_base)
    end subroutine make_bodies
 
