@@ -1,9 +1,9 @@
 !> Migration buffer: transfers fields of bodies between ranks.
 !>
 !> The buffer is a serializer and is used in three steps. First it stores the rows of some slots of all columns over
-!> /bodies. Then `move` sends them to their new ranks, all-to-all, if necessary; rows that stay on this rank are not
-!> sent. Finally, after `restore_to` and called with the same columns in the same order, it restores the rows to other
-!> slots. Values of the whole run are ignored.
+!> /bodies. Then `move` sends them to their new ranks, all-to-all, and `append` joins those of several buffers, if
+!> necessary. Finally, after `restore_to` and called with the same columns in the same order, it restores the rows to
+!> other slots. Values of the whole run are ignored.
 module polydem_migration_buffer
    use polydem_communicator, only: communicator_t
    use polydem_kinds, only: dp, ip, lp
@@ -22,6 +22,10 @@ module polydem_migration_buffer
    type, extends(serializer_t) :: migration_buffer_t
       !> Slots of the rows to store, in the order of the destination ranks; later the slots to which they are restored
       integer(ip), allocatable :: slots(:)
+      !> Number of rows of each column for which there is room beside those to store
+      integer(ip) :: room = 0_ip
+      !> Number of rows of each column
+      integer(ip) :: n_rows = 0_ip
       !> The columns, and room for more
       type(column_t), allocatable, private :: columns(:)
       !> Number of columns
@@ -30,8 +34,8 @@ module polydem_migration_buffer
       integer, private :: last = 0
    contains
       procedure :: move
+      procedure :: copy_rows
       procedure :: append
-      procedure :: n_rows
       procedure :: restore_to
       procedure :: transfer_reals
       procedure :: transfer_longs
@@ -50,67 +54,61 @@ contains
       integer(ip), intent(in) :: counts(0:)
       !> Number of rows from each rank, (0:size - 1); the rows are in the order of these ranks
       integer(ip), allocatable, intent(out) :: counts_received(:)
-      integer(lp), allocatable :: sent(:, :), received(:, :), word(:, :)
-      integer(ip) :: counts_sent(0:size(counts) - 1), before, own, n, n_lower
-      integer :: k, first, width(self%n_columns)
+      integer(lp), allocatable :: sent(:, :), received(:, :)
+      integer :: k, first(self%n_columns + 1)
 
+      first(1) = 1
       do k = 1, self%n_columns
-         width(k) = size(self%columns(k)%word, 1)
+         first(k + 1) = first(k) + size(self%columns(k)%word, 1)
       end do
-      own = counts(comm%rank)
-      before = sum(counts(:comm%rank - 1_ip))
-      counts_sent = counts
-      counts_sent(comm%rank) = 0_ip
-      allocate (sent(sum(width), sum(counts_sent)))
-      first = 1
+      allocate (sent(first(self%n_columns + 1) - 1, self%n_rows))
       do k = 1, self%n_columns
-         associate (rows => sent(first:first + width(k) - 1, :), stored => self%columns(k)%word)
-            rows(:, :before) = stored(:, :before)
-            rows(:, before + 1_ip:) = stored(:, before + own + 1_ip:)
-         end associate
-         first = first + width(k)
+         sent(first(k):first(k + 1) - 1, :) = self%columns(k)%word(:, :self%n_rows)
       end do
-      call comm%all_to_all(sent, counts_sent, received, counts_received)
-      n_lower = sum(counts_received(:comm%rank - 1_ip))
-      counts_received(comm%rank) = own
-      n = sum(counts_received)
-      first = 1
+      call comm%all_to_all(sent, counts, received, counts_received)
+      self%n_rows = sum(counts_received)
       do k = 1, self%n_columns
-         allocate (word(width(k), n))
-         associate (rows => received(first:first + width(k) - 1, :))
-            word(:, :n_lower) = rows(:, :n_lower)
-            word(:, n_lower + 1_ip:n_lower + own) = self%columns(k)%word(:, before + 1_ip:before + own)
-            word(:, n_lower + own + 1_ip:) = rows(:, n_lower + 1_ip:)
-         end associate
-         call move_alloc(word, self%columns(k)%word)
-         first = first + width(k)
+         self%columns(k)%word = received(first(k):first(k + 1) - 1, :)
       end do
    end subroutine move
+
+   !> Copy some rows to another buffer.
+   subroutine copy_rows(self, rows, other)
+      class(migration_buffer_t), intent(in) :: self
+      !> Indices of the rows
+      integer(ip), intent(in) :: rows(:)
+      !> The other buffer; it has these rows in their order
+      type(migration_buffer_t), intent(out) :: other
+      integer :: k
+
+      other%n_rows = size(rows, kind=ip)
+      other%n_columns = self%n_columns
+      allocate (other%columns(other%n_columns))
+      do k = 1, self%n_columns
+         other%columns(k)%word = self%columns(k)%word(:, rows)
+      end do
+   end subroutine copy_rows
 
    !> Append the rows of another buffer with the same columns.
    subroutine append(self, other)
       class(migration_buffer_t), intent(inout) :: self
       !> The other buffer
       type(migration_buffer_t), intent(in) :: other
-      integer(lp), allocatable :: word(:, :)
-      integer :: k, n
+      integer(lp), allocatable :: longer(:, :)
+      integer(ip) :: n
+      integer :: k
 
+      n = self%n_rows + other%n_rows
       do k = 1, self%n_columns
-         n = size(self%columns(k)%word, 2)
-         allocate (word(size(self%columns(k)%word, 1), n + size(other%columns(k)%word, 2)))
-         word(:, :n) = self%columns(k)%word
-         word(:, n + 1:) = other%columns(k)%word
-         call move_alloc(word, self%columns(k)%word)
+         if (size(self%columns(k)%word, 2) < n) then
+            allocate (longer(size(self%columns(k)%word, 1), n))
+            longer(:, :self%n_rows) = self%columns(k)%word(:, :self%n_rows)
+            call move_alloc(longer, self%columns(k)%word)
+         end if
+         self%columns(k)%word(:, self%n_rows + 1_ip:n) = other%columns(k)%word(:, :other%n_rows)
       end do
+      self%n_rows = n
    end subroutine append
-
-   !> Number of rows of each column; 0 if there is no column
-   pure integer(ip) function n_rows(self)
-      class(migration_buffer_t), intent(in) :: self
-
-      n_rows = 0_ip
-      if (self%n_columns > 0) n_rows = size(self%columns(1)%word, 2, kind=ip)
-   end function n_rows
 
    !> Switch to restoring, from the first column on.
    subroutine restore_to(self, slots)
@@ -139,13 +137,15 @@ contains
       associate (word => self%columns(self%last)%word)
          do k = 1_ip, size(self%slots, kind=ip)
             first = (self%slots(k) - 1_ip)*int(width, ip)
-            do j = 1_ip, int(width, ip)
-               if (self%is_reading) then
+            if (self%is_reading) then
+               do j = 1_ip, int(width, ip)
                   values(first + j) = transfer(word(j, k), 1.0_dp)
-               else
+               end do
+            else
+               do j = 1_ip, int(width, ip)
                   word(j, k) = transfer(values(first + j), 1_lp)
-               end if
-            end do
+               end do
+            end if
          end do
       end associate
    end subroutine transfer_reals
@@ -166,13 +166,15 @@ contains
       associate (word => self%columns(self%last)%word)
          do k = 1_ip, size(self%slots, kind=ip)
             first = (self%slots(k) - 1_ip)*int(width, ip)
-            do j = 1_ip, int(width, ip)
-               if (self%is_reading) then
+            if (self%is_reading) then
+               do j = 1_ip, int(width, ip)
                   values(first + j) = word(j, k)
-               else
+               end do
+            else
+               do j = 1_ip, int(width, ip)
                   word(j, k) = values(first + j)
-               end if
-            end do
+               end do
+            end if
          end do
       end associate
    end subroutine transfer_longs
@@ -196,7 +198,8 @@ contains
          call move_alloc(longer, self%columns)
       end if
       self%n_columns = self%last
-      allocate (self%columns(self%last)%word(width, size(self%slots)))
+      self%n_rows = size(self%slots, kind=ip)
+      allocate (self%columns(self%last)%word(width, self%n_rows + self%room))
    end subroutine next_column
 
 end module polydem_migration_buffer

@@ -9,7 +9,7 @@ module polydem_packed_bodies
    use polydem_sort, only: ascending_order
    implicit none
    private
-   public :: packed_bodies_t, pack_bodies, all_to_all_bodies, join_packed, unpack_bodies
+   public :: packed_bodies_t, pack_bodies, all_to_all_bodies, copy_packed, join_packed, unpack_bodies
 
    !> Constant fields and shapes of a list of bodies
    type :: packed_bodies_t
@@ -25,15 +25,22 @@ module polydem_packed_bodies
 contains
 
    !> Pack bodies.
-   subroutine pack_bodies(bodies, slots, packed)
+   subroutine pack_bodies(bodies, slots, packed, room)
       !> Bodies; unchanged on return
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies to pack
       integer(ip), intent(in) :: slots(:)
       !> The packed bodies, in the order of the slots
       type(packed_bodies_t), intent(out) :: packed
+      !> Number of bodies to join later, for which memory is reserved
+      integer(ip), intent(in), optional :: room
       integer(ip), allocatable :: corners(:)
 
+      if (present(room)) then
+         packed%list%room = room
+         packed%constants%room = room
+         packed%vertices%room = room*(size(bodies%shape, 2, kind=ip)/max(1_ip, bodies%n) + 1_ip)
+      end if
       corners = bodies%vertex_start(2:) - bodies%vertex_start(:bodies%n)
       packed%list%slots = slots
       call serialize_list(packed%list, bodies%global_index, corners)
@@ -85,7 +92,7 @@ contains
       integer(ip), allocatable, intent(out) :: global_index(:), corners(:)
       integer(ip) :: k, n
 
-      n = packed%list%n_rows()
+      n = packed%list%n_rows
       allocate (global_index(n), corners(n))
       call packed%list%restore_to([(k, k=1_ip, n)])
       call serialize_list(packed%list, global_index, corners)
@@ -114,6 +121,28 @@ contains
       call packed%constants%move(comm, counts, same)
       call packed%vertices%move(comm, vertices, same)
    end subroutine all_to_all_bodies
+
+   !> Copy some of the packed bodies.
+   subroutine copy_packed(packed, rows, copied)
+      !> Packed bodies; the order is kept
+      type(packed_bodies_t), intent(inout) :: packed
+      !> Indices of the bodies to copy
+      integer(ip), intent(in) :: rows(:)
+      !> These bodies, in this order
+      type(packed_bodies_t), intent(out) :: copied
+      integer(ip), allocatable :: global_index(:), corners(:), first(:)
+      integer(ip) :: k
+
+      call read_list(packed, global_index, corners)
+      allocate (first(size(corners)))
+      if (size(first) > 0) first(1) = 1_ip
+      do k = 2_ip, size(first, kind=ip)
+         first(k) = first(k - 1_ip) + corners(k - 1_ip)
+      end do
+      call packed%list%copy_rows(rows, copied%list)
+      call packed%constants%copy_rows(rows, copied%constants)
+      call packed%vertices%copy_rows(vertices_of(first(rows), corners(rows)), copied%vertices)
+   end subroutine copy_packed
 
    !> Append packed bodies to others.
    subroutine join_packed(packed, other)

@@ -102,18 +102,21 @@ contains
       end do
    end function owners_of
 
-   !> Boxes of the free bodies, padded by a margin and an allowance for rounding: xmin, ymin, xmax, ymax, (4, body) [m]
-   pure function padded_boxes(bodies, margin) result(boxes)
+   !> Boxes of bodies, padded by a margin and an allowance for rounding: xmin, ymin, xmax, ymax, (4, body) [m]
+   pure function padded_boxes(bodies, slots, margin) result(boxes)
+      !> Bodies; `turned` of these is up to date
       type(bodies_t), intent(in) :: bodies
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
       !> Distance that bodies may move before the next redistribution, and the margin of boxes [m]
       real(wp), intent(in) :: margin
       real(wp), allocatable :: boxes(:, :)
       real(wp) :: low(2), high(2), room
       integer(ip) :: k, s, v
 
-      allocate (boxes(4, size(bodies%free)))
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
+      allocate (boxes(4, size(slots)))
+      do k = 1_ip, size(slots, kind=ip)
+         s = slots(k)
          low = bodies%turned(:, bodies%vertex_start(s))
          high = low
          do v = bodies%vertex_start(s) + 1_ip, bodies%vertex_start(s + 1_ip) - 1_ip
@@ -127,35 +130,34 @@ contains
    end function padded_boxes
 
    !> List the bodies that other ranks need, in the order of these ranks.
-   subroutine list_needed(domain, comm, bodies, boxes, slots, counts)
+   subroutine list_needed(domain, comm, boxes, needed, counts)
       type(domain_t), intent(in) :: domain
       class(communicator_t), intent(in) :: comm
-      type(bodies_t), intent(in) :: bodies
-      !> Padded boxes of the free bodies, (4, body) [m]
+      !> Padded boxes of the bodies of this rank, (4, body) [m]
       real(wp), intent(in) :: boxes(:, :)
-      !> Slots of the bodies to send
-      integer(ip), allocatable, intent(out) :: slots(:)
+      !> Indices of the bodies to send
+      integer(ip), allocatable, intent(out) :: needed(:)
       !> Number of bodies for each rank
       integer(ip), allocatable, intent(out) :: counts(:)
       integer(ip), allocatable :: to_rank(:), longer(:), order(:)
       integer(ip) :: needing(comm%size), k, m, n
 
-      allocate (slots(64), to_rank(64))
+      allocate (needed(64), to_rank(64))
       n = 0_ip
       do k = 1_ip, size(boxes, 2, kind=ip)
          call domain%rank_bounds%needed_by(boxes(:, k), needing, m)
-         if (n + m > size(slots)) then
-            longer = [slots, spread(0_ip, 1, n + m)]
-            call move_alloc(longer, slots)
+         if (n + m > size(needed)) then
+            longer = [needed, spread(0_ip, 1, n + m)]
+            call move_alloc(longer, needed)
             longer = [to_rank, spread(0_ip, 1, n + m)]
             call move_alloc(longer, to_rank)
          end if
-         slots(n + 1_ip:n + m) = bodies%free(k)
+         needed(n + 1_ip:n + m) = k
          to_rank(n + 1_ip:n + m) = needing(:m)
          n = n + m
       end do
       call sort_by_rank(to_rank(:n), comm%size, counts, order)
-      slots = slots(order)
+      needed = needed(order)
    end subroutine list_needed
 
 end module polydem_redistribution_plan

@@ -15,7 +15,8 @@ module polydem_redistribution
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_local_bodies, only: fit_to_bodies
    use polydem_migration_buffer, only: migration_buffer_t
-   use polydem_packed_bodies, only: packed_bodies_t, join_packed, pack_bodies, all_to_all_bodies, unpack_bodies
+   use polydem_packed_bodies, only: packed_bodies_t, all_to_all_bodies, copy_packed, join_packed, pack_bodies, &
+      unpack_bodies
    use polydem_packed_history, only: pack_pairs, receive_pairs, send_pairs, slots_of_pair
    use polydem_rank_order, only: sort_by_rank
    use polydem_redistribution_plan, only: divide, needs_repartition, list_needed, owners_of, padded_boxes, &
@@ -27,6 +28,18 @@ module polydem_redistribution
    implicit none
    private
    public :: redistribute, compare_boxes, restore_history
+
+   !> Packed bodies with their state
+   type :: packed_state_t
+      !> Constant fields and shapes
+      type(packed_bodies_t) :: bodies
+      !> Variable fields
+      type(migration_buffer_t) :: columns
+      !> Indices of the free bodies
+      integer(ip), allocatable :: free(:)
+      !> Their padded boxes: xmin, ymin, xmax, ymax, (4, free body) [m]
+      real(wp), allocatable :: boxes(:, :)
+   end type packed_state_t
 
    !> Stages whose time is proportional to the work for the bodies of a rank
    integer, parameter :: work_stages(*) = [stage_boxes, stage_neighbours, stage_overlap, stage_forces, stage_integrate]
@@ -122,9 +135,8 @@ contains
    subroutine migrate(self, error)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
-      type(packed_bodies_t) :: packed
-      type(migration_buffer_t) :: columns
-      integer(ip), allocatable :: owner(:), slots(:)
+      type(packed_state_t) :: own
+      integer(ip), allocatable :: owner(:)
       integer(ip) :: j, k
 
       do k = 1_ip, size(self%motions, kind=ip)
@@ -132,8 +144,8 @@ contains
       end do
       owner = owners_of(self%domain, self%bodies)
       call send_history(self, owner)
-      call send_bodies(self, owner, packed, columns, slots)
-      call receive_halo(self, packed, columns, slots)
+      call send_bodies(self, owner, own)
+      call receive_halo(self, own)
       do k = 1_ip, size(self%motions, kind=ip)
          associate (slots => self%motions(k)%slots)
             slots = [(place_in(self%bodies%global_index, slots(j)), j=1_ip, size(slots, kind=ip))]
@@ -178,61 +190,81 @@ contains
       end associate
    end subroutine send_history
 
-   !> Send the free bodies of this rank to their owners. Fixed bodies stay on all ranks.
-   subroutine send_bodies(self, owner, packed, columns, slots)
+   !> Pack the bodies that stay on this rank, send the others to their owners, and join those that arrive. Fixed bodies
+   !> stay on all ranks.
+   subroutine send_bodies(self, owner, own)
       type(simulation_t), intent(inout) :: self
+      !> Rank that owns each body from now on, negative for fixed bodies, (slot)
       integer(ip), intent(in) :: owner(:)
-      !> The bodies that this rank moves from now on, and its fixed bodies
-      type(packed_bodies_t), intent(out) :: packed
-      !> Their variable state
-      type(migration_buffer_t), intent(out) :: columns
-      !> Slot of each of them
-      integer(ip), allocatable, intent(out) :: slots(:)
-      integer(ip), allocatable :: counts(:), counts_received(:), order(:)
-      integer(ip) :: s
+      !> The bodies that this rank owns from now on, and its fixed bodies
+      type(packed_state_t), intent(out) :: own
+      type(packed_state_t) :: other
+      real(wp), allocatable :: boxes(:, :)
+      integer(ip), allocatable :: slots(:), counts(:), counts_received(:), order(:)
+      integer(ip) :: s, k
 
-      associate (bodies => self%bodies)
-         slots = pack([(s, s=1_ip, bodies%n)],.not. bodies%in_halo)
-         call sort_by_rank(merge(owner(slots), self%comm%rank, owner(slots) >= 0_ip), self%comm%size, counts, order)
-         slots = slots(order)
-         call pack_bodies(bodies, slots, packed)
+      associate (bodies => self%bodies, comm => self%comm)
+         call turn_bodies(bodies, bodies%free, self%isa)
+         slots = pack(bodies%free, owner(bodies%free) /= comm%rank)
+         call sort_by_rank(owner(slots), comm%size, counts, order)
+         call pack_state(self, slots(order), 0_ip, other)
+         call all_to_all_bodies(comm, counts, other%bodies, counts_received)
+         call other%columns%move(comm, counts, counts_received)
+         boxes = other%boxes
+         call comm%all_to_all(boxes, counts, other%boxes, counts_received)
+         other%free = [(k, k=1_ip, sum(counts_received))]
+         self%domain%arrivals = self%domain%arrivals + int(sum(counts_received), lp)
+
+         slots = pack([(s, s=1_ip, bodies%n)], bodies%fixed .or. (owner == comm%rank .and. .not. bodies%in_halo))
+         call pack_state(self, slots, sum(counts_received) + 2_ip*count(bodies%in_halo, kind=ip), own)
       end associate
-      columns%slots = slots
-      call serialize_columns(columns, self)
-      call columns%move(self%comm, counts, counts_received)
-      call all_to_all_bodies(self%comm, counts, packed, counts_received)
-      self%domain%arrivals = self%domain%arrivals + &
-         int(sum(counts_received) - counts_received(lbound(counts_received, 1) + self%comm%rank), lp)
-      call restore_bodies(self, packed, columns, slots)
-      call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)], self%isa)
+      own%free = [own%free, own%columns%n_rows + other%free]
+      own%boxes = reshape([own%boxes, other%boxes], [4, size(own%free)])
+      call join_packed(own%bodies, other%bodies)
+      call own%columns%append(other%columns)
    end subroutine send_bodies
 
-   !> Publish the bounds of the bodies of this rank, and receive the nearby bodies of other ranks as the halo.
-   subroutine receive_halo(self, packed, columns, slots)
+   !> Pack bodies of this rank with their state.
+   subroutine pack_state(self, slots, room, packed)
       type(simulation_t), intent(inout) :: self
-      !> The bodies that this rank moves, and its fixed bodies; afterwards with the halo
-      type(packed_bodies_t), intent(inout) :: packed
-      !> Variable state of the bodies without the halo
-      type(migration_buffer_t), intent(inout) :: columns
-      !> Slot of each packed body
-      integer(ip), allocatable, intent(inout) :: slots(:)
-      type(packed_bodies_t) :: packed_halo
-      integer(ip), allocatable :: sent(:), counts(:), counts_received(:), place(:)
-      real(wp), allocatable :: boxes(:, :)
-      integer(lp) :: n_halo(1)
-      integer(ip) :: k, s, n
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Number of bodies to join later, for which memory is reserved
+      integer(ip), intent(in) :: room
+      !> The packed bodies, in the order of the slots
+      type(packed_state_t), intent(out) :: packed
+      integer(ip) :: k
 
-      n = self%bodies%n
-      boxes = padded_boxes(self%bodies, self%domain%margin + self%settings%boxes%margin)
-      call self%domain%rank_bounds%publish(self%comm, boxes)
-      call list_needed(self%domain, self%comm, self%bodies, boxes, sent, counts)
-      call pack_bodies(self%bodies, sent, packed_halo)
-      call all_to_all_bodies(self%comm, counts, packed_halo, counts_received)
-      call join_packed(packed, packed_halo)
-      allocate (place(n))
-      place(slots) = [(k, k=1_ip, n)]
-      sent = place(sent)
-      call restore_bodies(self, packed, columns, slots)
+      call pack_bodies(self%bodies, slots, packed%bodies, room)
+      packed%columns%slots = slots
+      packed%columns%room = room
+      call serialize_columns(packed%columns, self)
+      packed%free = pack([(k, k=1_ip, size(slots, kind=ip))],.not. self%bodies%fixed(slots))
+      packed%boxes = padded_boxes(self%bodies, slots(packed%free), self%domain%margin + self%settings%boxes%margin)
+   end subroutine pack_state
+
+   !> Publish the bounds of the bodies of this rank, receive the nearby bodies of other ranks as the halo, and unpack
+   !> all of them.
+   subroutine receive_halo(self, own)
+      type(simulation_t), intent(inout) :: self
+      !> The bodies that this rank owns, and its fixed bodies; afterwards with the halo
+      type(packed_state_t), intent(inout) :: own
+      type(packed_bodies_t) :: halo
+      integer(ip), allocatable :: sent(:), counts(:), counts_received(:), slots(:)
+      integer(lp) :: n_halo(1)
+      integer(ip) :: s, n
+
+      call self%domain%rank_bounds%publish(self%comm, own%boxes)
+      call list_needed(self%domain, self%comm, own%boxes, sent, counts)
+      sent = own%free(sent)
+      call copy_packed(own%bodies, sent, halo)
+      call all_to_all_bodies(self%comm, counts, halo, counts_received)
+      call join_packed(own%bodies, halo)
+      call unpack_bodies(own%bodies, (self%bodies%n_all), self%bodies, slots)
+      n = own%columns%n_rows
+      call own%columns%restore_to(slots(:n))
+      call self%integrator%start(self%bodies)
+      call serialize_columns(own%columns, self)
       self%bodies%in_halo(slots(n + 1_ip:)) = .true.
       self%bodies%free = pack([(s, s=1_ip, self%bodies%n)],.not. (self%bodies%fixed .or. self%bodies%in_halo))
       call new_halo(self%domain%halo, self%bodies%free, counts, slots(sent), counts_received, slots(n + 1_ip:), &
@@ -241,21 +273,6 @@ contains
       call self%comm%all_reduce_sum(n_halo)
       self%domain%halo_share = real(n_halo(1), wp)/real(self%bodies%n_all, wp)
    end subroutine receive_halo
-
-   !> Unpack bodies, and restore their variable state.
-   subroutine restore_bodies(self, packed, columns, slots)
-      type(simulation_t), intent(inout) :: self
-      type(packed_bodies_t), intent(inout) :: packed
-      !> Variable state of the first bodies of the list; that of the others becomes zero
-      type(migration_buffer_t), intent(inout) :: columns
-      !> Slot of each packed body
-      integer(ip), allocatable, intent(out) :: slots(:)
-
-      call unpack_bodies(packed, (self%bodies%n_all), self%bodies, slots)
-      call columns%restore_to(slots(:columns%n_rows()))
-      call self%integrator%start(self%bodies)
-      call serialize_columns(columns, self)
-   end subroutine restore_bodies
 
    !> Serialize the variable state of the bodies, including data of the current step.
    subroutine serialize_columns(serializer, self)
