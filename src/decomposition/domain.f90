@@ -63,12 +63,13 @@ module polydem_domain
       procedure :: send_border
    end type domain_t
 
-   !> Least margin at the start, and bounds of later margins, in median diameters
-   real(wp), parameter :: first_margin = 0.15_wp, least_margin = 0.02_wp, greatest_margin = 2.0_wp
+   !> Bounds of the margin at the start, and of later margins, in median diameters
+   real(wp), parameter :: first_margin = 0.15_wp, greatest_first = 2.0_wp
+   real(wp), parameter :: least_margin = 0.02_wp, greatest_margin = 8.0_wp
    !> Steps until the fastest body leaves the margin at the start
    real(wp), parameter :: first_interval = 100.0_wp
-   !> Cost of a redistribution in steps, and of a halo body in bodies (measured; see postproc/verdicts/scale)
-   real(wp), parameter :: redistribution_cost = 4.0_wp, halo_body_cost = 0.5_wp
+   !> Cost of a redistribution with its new pair list in steps, and of a halo body in bodies (measured)
+   real(wp), parameter :: redistribution_cost = 6.0_wp, halo_body_cost = 0.5_wp
    !> Greatest number of steps between redistributions, unless the work is not balanced
    integer(lp), parameter :: longest_interval = 1000_lp
    !> Greatest factor by which the margin changes in a redistribution
@@ -114,7 +115,7 @@ contains
 
       if (self%settings%margin > 0.0_wp) return
       self%margin = min(max(first_interval*move, first_margin*self%median_diameter), &
-                        greatest_margin*self%median_diameter)
+                        greatest_first*self%median_diameter)
    end subroutine choose_margin
 
    !> Record the padded boxes of a redistribution.
@@ -134,20 +135,21 @@ contains
    end subroutine set_reference
 
    !> Choose the margin, unless the settings give one. With a wide margin redistributions are rare, but the halo is
-   !> large: both the interval between redistributions and the number of halo bodies grow with the margin. At the chosen
-   !> margin redistributions cost as much as the halo.
+   !> large. The interval between redistributions is proportional to the margin. The halo is about a median diameter
+   !> and two margins wide. The sum of both costs is least where redistributions cost as much as that part of the halo
+   !> which is due to the margin.
    subroutine adapt_margin(self, step)
       class(domain_t), intent(inout) :: self
       !> Step of the redistribution that begins. It and `halo_share` are equal on all ranks, and so is the margin
       integer(lp), intent(in) :: step
-      real(wp) :: cost_of_redistributions, cost_of_halo, factor
+      real(wp) :: cost_of_redistributions, cost_of_margin, factor
 
       if (self%settings%margin > 0.0_wp .or. self%last_step < 0_lp) return
       cost_of_redistributions = redistribution_cost/real(max(1_lp, step - self%last_step), wp)
-      cost_of_halo = halo_body_cost*self%halo_share
+      cost_of_margin = halo_body_cost*self%halo_share*2.0_wp*self%margin/(self%median_diameter + 2.0_wp*self%margin)
       factor = greatest_change
-      if (cost_of_halo*greatest_change**2 > cost_of_redistributions) &
-         factor = max(1.0_wp/greatest_change, sqrt(cost_of_redistributions/cost_of_halo))
+      if (cost_of_margin*greatest_change**2 > cost_of_redistributions) &
+         factor = max(1.0_wp/greatest_change, sqrt(cost_of_redistributions/cost_of_margin))
       self%margin = max(least_margin*self%median_diameter, min(factor*self%margin, &
          greatest_margin*self%median_diameter))
    end subroutine adapt_margin
