@@ -1,9 +1,14 @@
-!> Sorting of 64-bit keys: a stable bottom-up merge sort without recursion, O(n log n) in the worst case.
+!> Sorting of 64-bit keys: a stable radix sort, by insertion if there are few keys.
 module polydem_sort
    use polydem_kinds, only: ip, lp
    implicit none
    private
    public :: ascending_order, place_in, sort_keys
+
+   !> Number of keys up to which insertion is faster
+   integer(ip), parameter :: few = 64_ip
+   !> Number of bytes of a key
+   integer, parameter :: n_bytes = 8
 
 contains
 
@@ -45,7 +50,8 @@ contains
       call sort_keys(n, sorted, order, spare_keys, spare)
    end function ascending_order
 
-   !> Sort keys in ascending order, and permute one integer per key in the same way.
+   !> Sort keys in ascending order, and permute one integer per key in the same way. The sort is stable. It takes the
+   !> keys byte by byte, from the lowest byte on, without those bytes that are equal in all keys.
    pure subroutine sort_keys(n, keys, carried, spare_keys, spare_carried)
       !> Number of entries
       integer(ip), intent(in) :: n
@@ -57,38 +63,80 @@ contains
       integer(lp), intent(inout) :: spare_keys(:)
       !> Workspace, (n) or longer
       integer(ip), intent(inout) :: spare_carried(:)
-      integer(ip) :: width, low, middle, high
-      integer(ip), parameter :: run = 16_ip
+      integer(lp) :: varying
+      integer(ip) :: k
+      integer :: byte
+      logical :: in_spare
 
-      do low = 1_ip, n, run
-         call insertion_sort(keys, carried, low, min(low + run - 1_ip, n))
+      if (n <= few) then
+         call insertion_sort(keys, carried, n)
+         return
+      end if
+      varying = 0_lp
+      do k = 2_ip, n
+         varying = ior(varying, ieor(keys(k), keys(1)))
       end do
-      width = run
-      do while (width < n)
-         do low = 1_ip, n - width, 2_ip*width
-            middle = low + width
-            high = min(low + 2_ip*width, n + 1_ip)
-            if (keys(middle - 1_ip) <= keys(middle)) cycle
-            call merge_runs(keys, carried, low, middle, high, spare_keys, spare_carried)
-            keys(low:high - 1_ip) = spare_keys(low:high - 1_ip)
-            carried(low:high - 1_ip) = spare_carried(low:high - 1_ip)
-         end do
-         width = 2_ip*width
+      in_spare = .false.
+      do byte = 0, n_bytes - 1
+         if (ibits(varying, 8*byte, 8) == 0_lp) cycle
+         if (in_spare) then
+            call sort_by_byte(n, byte, spare_keys, spare_carried, keys, carried)
+         else
+            call sort_by_byte(n, byte, keys, carried, spare_keys, spare_carried)
+         end if
+         in_spare = .not. in_spare
       end do
+      if (.not. in_spare) return
+      keys(:n) = spare_keys(:n)
+      carried(:n) = spare_carried(:n)
    end subroutine sort_keys
 
-   pure subroutine insertion_sort(keys, carried, low, high)
+   !> Sort keys by one of their bytes.
+   pure subroutine sort_by_byte(n, byte, keys, carried, sorted_keys, sorted_carried)
+      !> Number of entries
+      integer(ip), intent(in) :: n
+      !> The byte; 0 is the lowest one
+      integer, intent(in) :: byte
+      !> Keys, and the integers that go with them
+      integer(lp), intent(in) :: keys(n)
+      integer(ip), intent(in) :: carried(n)
+      !> The same, sorted
+      integer(lp), intent(inout) :: sorted_keys(n)
+      integer(ip), intent(inout) :: sorted_carried(n)
+      integer(ip) :: next(0:256), k, v
+      integer(lp) :: sign_bit
+
+      ! The highest bit of the highest byte is the sign. Negative keys come first.
+      sign_bit = merge(128_lp, 0_lp, byte == n_bytes - 1)
+      next = 0_ip
+      do k = 1_ip, n
+         v = int(ieor(ibits(keys(k), 8*byte, 8), sign_bit), ip)
+         next(v + 1_ip) = next(v + 1_ip) + 1_ip
+      end do
+      do v = 1_ip, 255_ip
+         next(v + 1_ip) = next(v) + next(v + 1_ip)
+      end do
+      do k = 1_ip, n
+         v = int(ieor(ibits(keys(k), 8*byte, 8), sign_bit), ip)
+         next(v) = next(v) + 1_ip
+         sorted_keys(next(v)) = keys(k)
+         sorted_carried(next(v)) = carried(k)
+      end do
+   end subroutine sort_by_byte
+
+   !> Sort few keys.
+   pure subroutine insertion_sort(keys, carried, n)
       integer(lp), intent(inout) :: keys(:)
       integer(ip), intent(inout) :: carried(:)
-      integer(ip), intent(in) :: low, high
+      integer(ip), intent(in) :: n
       integer(lp) :: key
       integer(ip) :: k, place, item
 
-      do k = low + 1_ip, high
+      do k = 2_ip, n
          key = keys(k)
          item = carried(k)
          place = k
-         do while (place > low)
+         do while (place > 1_ip)
             if (keys(place - 1_ip) <= key) exit
             keys(place) = keys(place - 1_ip)
             carried(place) = carried(place - 1_ip)
@@ -98,32 +146,5 @@ contains
          carried(place) = item
       end do
    end subroutine insertion_sort
-
-   !> Merge the sorted ranges [low, middle) and [middle, high) into the spare arrays.
-   pure subroutine merge_runs(keys, carried, low, middle, high, spare_keys, spare_carried)
-      integer(lp), intent(in) :: keys(:)
-      integer(ip), intent(in) :: carried(:)
-      integer(ip), intent(in) :: low, middle, high
-      integer(lp), intent(inout) :: spare_keys(:)
-      integer(ip), intent(inout) :: spare_carried(:)
-      integer(ip) :: a, b, k
-      logical :: take_left
-
-      a = low
-      b = middle
-      do k = low, high - 1_ip
-         take_left = a < middle
-         if (take_left .and. b < high) take_left = keys(a) <= keys(b)
-         if (take_left) then
-            spare_keys(k) = keys(a)
-            spare_carried(k) = carried(a)
-            a = a + 1_ip
-         else
-            spare_keys(k) = keys(b)
-            spare_carried(k) = carried(b)
-            b = b + 1_ip
-         end if
-      end do
-   end subroutine merge_runs
 
 end module polydem_sort

@@ -136,11 +136,13 @@ contains
          j = found%box(2, m)
          if (max(self%outside(i), self%outside(j)) == 0_bp) cycle
          if (.not. overlapping(boxes%bounds(:, i), boxes%bounds(:, j))) cycle
-         known%n = 0_ip
-         call self%append_candidates_of(i, known)
-         call self%append_candidates_of(j, known)
-         if (any(sum(self%box(:, known%at(1:known%n)), 1) == i + j .and. &
-                 abs(self%box(1, known%at(1:known%n)) - self%box(2, known%at(1:known%n))) == abs(i - j))) cycle
+         if (self%n > 0_ip) then
+            known%n = 0_ip
+            call self%append_candidates_of(i, known)
+            call self%append_candidates_of(j, known)
+            if (any(sum(self%box(:, known%at(1:known%n)), 1) == i + j .and. &
+                    abs(self%box(1, known%at(1:known%n)) - self%box(2, known%at(1:known%n))) == abs(i - j))) cycle
+         end if
          call changes%record(boxes%body(i), boxes%body(j), 1_ip)
       end do
    end subroutine record_begun
