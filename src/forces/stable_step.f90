@@ -14,7 +14,7 @@ module polydem_stable_step
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
    use polydem_force_law, only: force_law_t
-   use polydem_kinds, only: ip, wp
+   use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_stability_limit, only: stability_table_t, limit_at
    implicit none
    private
@@ -39,18 +39,24 @@ contains
       real(wp), intent(out) :: step
       !> Index of the contact that limits the step, 0 if there are no contacts
       integer(ip), intent(out) :: critical
-      real(wp) :: this
+      real(wp), allocatable :: steps(:)
       integer(ip) :: c
 
-      step = huge(step)
-      critical = 0_ip
+      allocate (steps(contacts%n))
+      !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
+      !$omp    shared(law, table, bodies, numbers, contacts, steps) private(c)
       do c = 1_ip, contacts%n
-         this = step_of_contact(law, table, bodies, numbers, contacts, c)
-         if (this < step) then
-            step = this
-            critical = c
-         end if
+         steps(c) = step_of_contact(law, table, bodies, numbers, contacts, c)
       end do
+      !$omp end parallel do
+      step = huge(step)
+      critical = minloc(steps, 1, kind=ip)
+      if (critical == 0_ip) return
+      if (steps(critical) < step) then
+         step = steps(critical)
+      else
+         critical = 0_ip
+      end if
    end subroutine stable_step_of_contacts
 
    !> Find the stable step expected from the shapes of the free bodies, and the body that limits it. Each body is

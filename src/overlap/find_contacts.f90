@@ -41,7 +41,7 @@ contains
       !$omp parallel do schedule(static, 1) num_threads(n_ranges) default(none) private(r) &
       !$omp    shared(bodies, first, second, history, contacts, rows, ends, n_ranges)
       do r = 1_ip, n_ranges
-         call start_rows(contacts, rows(r))
+         call start_rows(contacts, 0_ip, rows(r))
          call find_in_range(bodies, first, second, contacts%area_is_effective, ends(r - 1_ip:r), history, rows(r))
       end do
       !$omp end parallel do

@@ -103,7 +103,7 @@ contains
       logical :: timed
 
       began = wall_seconds()
-      call start_results(self%contacts, r, self%walk)
+      call start_results(self%contacts, self%keeps_contacts, r, self%walk)
       next = ends(2)
       tested = next + 1_ip
       n_blocks = 0_ip
@@ -136,14 +136,16 @@ contains
    end subroutine walk_range
 
    !> Empty the results of a range.
-   subroutine start_results(contacts, r, walk)
+   subroutine start_results(contacts, keeps_contacts, r, walk)
       type(contacts_t), intent(in) :: contacts
+      !> Whether the range will keep all its contacts. About as many as in the last step are expected
+      logical, intent(in) :: keeps_contacts
       !> Index of the range
       integer(ip), intent(in) :: r
       type(walk_results_t), intent(inout) :: walk
 
-      call start_rows(contacts, walk%all_of(r))
-      call start_rows(contacts, walk%suspects_of(r))
+      call start_rows(contacts, merge(walk%ranges(r)%n_contacts, 0_ip, keeps_contacts), walk%all_of(r))
+      call start_rows(contacts, 0_ip, walk%suspects_of(r))
       walk%walls_of(r)%n = 0_ip
       associate (results => walk%ranges(r))
          results%late%n = 0_ip

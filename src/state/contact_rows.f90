@@ -19,13 +19,16 @@ module polydem_contact_rows
 contains
 
    !> Empty the rows. They get the same columns as a table.
-   pure subroutine start_rows(contacts, rows)
+   subroutine start_rows(contacts, expected, rows)
       type(contacts_t), intent(in) :: contacts
+      !> Number of contacts to make room for; more may follow
+      integer(ip), intent(in) :: expected
       type(contact_rows_t), intent(inout) :: rows
 
       rows%contacts%n = 0_ip
       rows%contacts%has_cohesion = contacts%has_cohesion
       rows%contacts%has_twist = contacts%has_twist
+      if (expected > 0_ip) call reserve_contacts(rows%contacts, expected)
    end subroutine start_rows
 
    !> Append contacts of a block.

@@ -63,6 +63,11 @@ module polydem_contacts
       real(wp), allocatable :: twist(:)
    end type contacts_t
 
+   !> Lengthen a column
+   interface lengthen
+      procedure lengthen_integers, lengthen_reals, lengthen_vectors
+   end interface lengthen
+
 contains
 
    !> Whether a contact is degenerate: its `normal` vanishes, and its `length` is the square root of the area.
@@ -79,25 +84,11 @@ contains
       type(contacts_t), intent(inout) :: contacts
       !> Number of contacts to make room for
       integer(ip), intent(in) :: capacity
-      integer(ip) :: m
 
       if (allocated(contacts%pair)) then
          if (size(contacts%pair) >= capacity) return
-         deallocate (contacts%pair, contacts%first, contacts%second, contacts%area, contacts%rate, &
-                     contacts%normal, contacts%moment, contacts%arm_first, contacts%arm_second, &
-                     contacts%direction, contacts%length, contacts%inverse_length, contacts%lever, &
-                     contacts%elastic, contacts%normal_force, contacts%tangential_force)
-         if (allocated(contacts%cohesion)) deallocate (contacts%cohesion)
-         if (allocated(contacts%twist)) deallocate (contacts%twist)
       end if
-      m = capacity + capacity/4_ip + 16_ip
-      allocate (contacts%pair(m), contacts%first(m), contacts%second(m), source=0_ip)
-      allocate (contacts%area(m), contacts%rate(m), contacts%length(m), contacts%inverse_length(m), contacts%lever(m), &
-                contacts%elastic(m), contacts%normal_force(m), contacts%tangential_force(m), source=0.0_wp)
-      allocate (contacts%normal(2, m), contacts%moment(2, m), contacts%arm_first(2, m), contacts%arm_second(2, m), &
-                contacts%direction(2, m), source=0.0_wp)
-      if (contacts%has_cohesion) allocate (contacts%cohesion(m), source=0.0_wp)
-      if (contacts%has_twist) allocate (contacts%twist(m), source=0.0_wp)
+      call lengthen_columns(contacts, 0_ip, capacity + capacity/4_ip + 16_ip)
    end subroutine reserve_contacts
 
    !> Make room for at least `capacity` contacts without losing contacts 1..n.
@@ -105,18 +96,78 @@ contains
       type(contacts_t), intent(inout) :: contacts
       !> Number of contacts to make room for
       integer(ip), intent(in) :: capacity
-      type(contacts_t) :: smaller
-      integer(ip) :: c
 
       if (allocated(contacts%pair)) then
          if (size(contacts%pair) >= capacity) return
       end if
-      smaller = contacts
-      call reserve_contacts(contacts, capacity + capacity/2_ip)
-      do c = 1_ip, smaller%n
-         call copy_contact(smaller, c, contacts, c)
-      end do
+      call lengthen_columns(contacts, contacts%n, 2_ip*capacity + 16_ip)
    end subroutine grow_contacts
+
+   !> Lengthen all columns, one after the other, and keep their first values. The others become zero.
+   subroutine lengthen_columns(contacts, kept, m)
+      type(contacts_t), intent(inout) :: contacts
+      !> Number of contacts to keep, and new length
+      integer(ip), intent(in) :: kept, m
+
+      call lengthen(contacts%pair, kept, m)
+      call lengthen(contacts%first, kept, m)
+      call lengthen(contacts%second, kept, m)
+      call lengthen(contacts%area, kept, m)
+      call lengthen(contacts%rate, kept, m)
+      call lengthen(contacts%normal, kept, m)
+      call lengthen(contacts%moment, kept, m)
+      call lengthen(contacts%arm_first, kept, m)
+      call lengthen(contacts%arm_second, kept, m)
+      call lengthen(contacts%direction, kept, m)
+      call lengthen(contacts%length, kept, m)
+      call lengthen(contacts%inverse_length, kept, m)
+      call lengthen(contacts%lever, kept, m)
+      call lengthen(contacts%elastic, kept, m)
+      if (contacts%has_cohesion) call lengthen(contacts%cohesion, kept, m)
+      call lengthen(contacts%normal_force, kept, m)
+      call lengthen(contacts%tangential_force, kept, m)
+      if (contacts%has_twist) call lengthen(contacts%twist, kept, m)
+   end subroutine lengthen_columns
+
+   !> Lengthen a column of integers.
+   pure subroutine lengthen_integers(column, kept, m)
+      integer(ip), allocatable, intent(inout) :: column(:)
+      !> Number of values to keep, and new length
+      integer(ip), intent(in) :: kept, m
+      integer(ip), allocatable :: longer(:)
+
+      if (kept == 0_ip .and. allocated(column)) deallocate (column)
+      allocate (longer(m))
+      if (kept > 0_ip) longer(:kept) = column(:kept)
+      longer(kept + 1_ip:) = 0_ip
+      call move_alloc(longer, column)
+   end subroutine lengthen_integers
+
+   !> Lengthen a column of real numbers.
+   pure subroutine lengthen_reals(column, kept, m)
+      real(wp), allocatable, intent(inout) :: column(:)
+      integer(ip), intent(in) :: kept, m
+      real(wp), allocatable :: longer(:)
+
+      if (kept == 0_ip .and. allocated(column)) deallocate (column)
+      allocate (longer(m))
+      if (kept > 0_ip) longer(:kept) = column(:kept)
+      longer(kept + 1_ip:) = 0.0_wp
+      call move_alloc(longer, column)
+   end subroutine lengthen_reals
+
+   !> Lengthen a column of vectors.
+   pure subroutine lengthen_vectors(column, kept, m)
+      real(wp), allocatable, intent(inout) :: column(:, :)
+      integer(ip), intent(in) :: kept, m
+      real(wp), allocatable :: longer(:, :)
+
+      if (kept == 0_ip .and. allocated(column)) deallocate (column)
+      allocate (longer(2, m))
+      if (kept > 0_ip) longer(:, :kept) = column(:, :kept)
+      longer(:, kept + 1_ip:) = 0.0_wp
+      call move_alloc(longer, column)
+   end subroutine lengthen_vectors
 
    !> Copy a contact from one table to another.
    pure subroutine copy_contact(from, c, to, d)
