@@ -210,8 +210,8 @@ contains
          call pack_state(self, slots(order), 0_ip, other)
          call all_to_all_bodies(comm, counts, other%bodies, counts_received)
          call other%columns%move(comm, counts, counts_received)
-         boxes = other%boxes
-         call comm%all_to_all(boxes, counts, other%boxes, counts_received)
+         call comm%all_to_all(other%boxes, counts, boxes, counts_received)
+         call move_alloc(boxes, other%boxes)
          other%free = [(k, k=1_ip, sum(counts_received))]
          self%domain%arrivals = self%domain%arrivals + int(sum(counts_received), lp)
 
