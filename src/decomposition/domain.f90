@@ -68,7 +68,8 @@ module polydem_domain
    real(wp), parameter :: least_margin = 0.02_wp, greatest_margin = 8.0_wp
    !> Steps until the fastest body leaves the margin at the start
    real(wp), parameter :: first_interval = 100.0_wp
-   !> Cost of a redistribution with its new pair list in steps, and of a halo body in bodies (measured)
+   !> Cost of a redistribution with its new pair list in steps, and of a halo body in bodies (measured: 5 to
+   !> 8, and about a half)
    real(wp), parameter :: redistribution_cost = 6.0_wp, halo_body_cost = 0.5_wp
    !> Greatest number of steps between redistributions, unless the work is not balanced
    integer(lp), parameter :: longest_interval = 1000_lp

@@ -39,7 +39,9 @@ contains
       if (present(room)) then
          packed%list%room = room
          packed%constants%room = room
-         packed%vertices%room = room*(size(bodies%shape, 2, kind=ip)/max(1_ip, bodies%n) + 1_ip)
+         ! As many vertices as other bodies have, and at most as many as there are. More can be joined.
+         packed%vertices%room = int(min(int(room, lp)*int(size(bodies%shape, 2)/max(1_ip, bodies%n) + 1, lp), &
+                                        size(bodies%shape, 2, kind=lp)), ip)
       end if
       corners = bodies%vertex_start(2:) - bodies%vertex_start(:bodies%n)
       packed%list%slots = slots

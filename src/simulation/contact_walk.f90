@@ -138,7 +138,7 @@ contains
    !> Empty the results of a range.
    subroutine start_results(contacts, keeps_contacts, r, walk)
       type(contacts_t), intent(in) :: contacts
-      !> Whether the range will keep all its contacts. About as many as in the last step are expected
+      !> Whether the range will keep all its contacts. About as many are expected as this rank owned in the last step
       logical, intent(in) :: keeps_contacts
       !> Index of the range
       integer(ip), intent(in) :: r

@@ -126,8 +126,6 @@ contains
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: s
 
-      if (.not. allocated(bodies%radius)) &
-         allocate (bodies%radius(bodies%n), bodies%diameter(bodies%n), bodies%thickness(bodies%n))
       !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) shared(bodies) private(s)
       do s = 1_ip, bodies%n
          associate (shape => bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))

@@ -19,7 +19,7 @@ module polydem_contact_rows
 contains
 
    !> Empty the rows. They get the same columns as a table.
-   subroutine start_rows(contacts, expected, rows)
+   pure subroutine start_rows(contacts, expected, rows)
       type(contacts_t), intent(in) :: contacts
       !> Number of contacts to make room for; more may follow
       integer(ip), intent(in) :: expected

@@ -80,7 +80,7 @@ contains
    end function is_degenerate
 
    !> Make room for at least `capacity` contacts. If the arrays grow, their contents are lost, and all values are zero.
-   subroutine reserve_contacts(contacts, capacity)
+   pure subroutine reserve_contacts(contacts, capacity)
       type(contacts_t), intent(inout) :: contacts
       !> Number of contacts to make room for
       integer(ip), intent(in) :: capacity
@@ -92,7 +92,7 @@ contains
    end subroutine reserve_contacts
 
    !> Make room for at least `capacity` contacts without losing contacts 1..n.
-   subroutine grow_contacts(contacts, capacity)
+   pure subroutine grow_contacts(contacts, capacity)
       type(contacts_t), intent(inout) :: contacts
       !> Number of contacts to make room for
       integer(ip), intent(in) :: capacity
@@ -104,7 +104,7 @@ contains
    end subroutine grow_contacts
 
    !> Lengthen all columns, one after the other, and keep their first values. The others become zero.
-   subroutine lengthen_columns(contacts, kept, m)
+   pure subroutine lengthen_columns(contacts, kept, m)
       type(contacts_t), intent(inout) :: contacts
       !> Number of contacts to keep, and new length
       integer(ip), intent(in) :: kept, m

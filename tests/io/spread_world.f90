@@ -108,7 +108,8 @@ contains
       bodies%angle = some_number(step, bodies%global_index, 1_ip)
       bodies%angular_velocity = some_number(step, bodies%global_index, 2_ip)
       allocate (bodies%position(2, bodies%n), bodies%velocity(2, bodies%n), bodies%force(2, bodies%n), &
-                bodies%torque(bodies%n), bodies%vertex_start(bodies%n + 1))
+                bodies%torque(bodies%n), bodies%vertex_start(bodies%n + 1), bodies%radius(bodies%n), &
+                bodies%diameter(bodies%n), bodies%thickness(bodies%n))
       bodies%vertex_start(1) = 1_ip
       do s = 1_ip, bodies%n
          bodies%position(:, s) = some_number(step, bodies%global_index(s), [3_ip, 4_ip])
