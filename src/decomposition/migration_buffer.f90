@@ -2,8 +2,8 @@
 !>
 !> The buffer is a serializer and is used in three steps. First it stores the rows of some slots of all columns over
 !> /bodies. Then `move` sends them to their new ranks, all-to-all, `copy_rows` takes some of them, and `append` joins
-!> those of several buffers, if necessary. Finally, after `restore_to` and called with the same columns in the same order, it restores the rows to
-!> other slots. Values of the whole run are ignored.
+!> those of several buffers, if necessary. Finally, after `restore_to` and called with the same columns in the same
+!> order, it restores the rows to other slots. Values of the whole run are ignored.
 module polydem_migration_buffer
    use polydem_communicator, only: communicator_t
    use polydem_kinds, only: dp, ip, lp
