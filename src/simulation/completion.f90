@@ -31,7 +31,7 @@ contains
       n = size(self%bodies%free, kind=ip)
       n_parts = number_of_parts(n)
       good = .true.
-      !$omp parallel do num_threads(n_parts) schedule(static, 1) default(none) shared(self, n, n_parts) &
+      !$omp parallel do if (n_parts > 1) schedule(static, 1) default(none) shared(self, n, n_parts) &
       !$omp    private(p, low, high) reduction(.and.:good)
       do p = 1, n_parts
          call part(n, n_parts, p, low, high)

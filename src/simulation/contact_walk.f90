@@ -50,7 +50,7 @@ contains
          last(n) = self%bodies%n
       end associate
       call reserve_sums(self%bodies%n, self%force_sums)
-      !$omp parallel num_threads(n) default(none) shared(self, dt, ends, last, n) private(r, k)
+      !$omp parallel if (n > 1_ip) default(none) shared(self, dt, ends, last, n) private(r, k)
       !$omp do schedule(static, 1)
       do r = 1_ip, n
          call walk_range(self, dt, r, ends(r - 1_ip:r), last(r - 1_ip:r))

@@ -64,7 +64,7 @@ contains
       integer(ip) :: low, n
 
       n = size(self%domain%halo%border, kind=ip)
-      !$omp parallel do num_threads(number_of_parts(n)) schedule(static) default(none) shared(self, n) private(low)
+      !$omp parallel do if (number_of_parts(n) > 1) schedule(static) default(none) shared(self, n) private(low)
       do low = 1_ip, n, block_size
          call predict_list(self, self%domain%halo%border(low:min(low + block_size - 1_ip, n)))
       end do
@@ -87,7 +87,7 @@ contains
       good = .true.
       has_left = .false.
       seconds = 0.0_dp
-      !$omp parallel do num_threads(n_parts) schedule(static, 1) default(none) shared(self, n, n_parts, seconds) &
+      !$omp parallel do if (n_parts > 1) schedule(static, 1) default(none) shared(self, n, n_parts, seconds) &
       !$omp    private(p, low, high) reduction(.and.:good) reduction(.or.:has_left)
       do p = 1, n_parts
          call part(n, n_parts, p, low, high)

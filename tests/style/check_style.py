@@ -120,6 +120,8 @@ def of_directive(statement):
         yield "a sum by reduction depends on the number of threads"
     if re.match(r"!\$omp (atomic|critical|ordered)\b", code):
         yield f"{code.split()[1]}: write disjointly and sum in a fixed order"
+    if code.startswith("!$omp parallel") and re.search(r"\bnum_threads\b", code):
+        yield "num_threads: a smaller team ends threads, and the next team starts them again; use if"
 
 
 # --- rules of one file -------------------------------------------------------------------------------------------

@@ -121,6 +121,7 @@ BAD = [
     ("half(k)/2.0_wp", "half(k)**(1.0_wp/3.0_wp)", 47, "a power with a real exponent"),
     ("default(none) ", "", 44, "without default(none)"),
     ("schedule(static)", "reduction(+:total)", 44, "a sum by reduction"),
+    ("schedule(static)", "num_threads(2) schedule(static)", 44, "num_threads: a smaller team"),
     ("half(k)/2.0_wp", "half(k)\n      !$omp atomic", 48, "atomic: write disjointly"),
     ("half(k)/2.0_wp", "half(k)\n      !$omp critical", 48, "critical: write disjointly"),
     ("   !> Twice a number\n", "\n", 53, "no comment !> above double_real"),
