@@ -9,15 +9,17 @@ module polydem_overlap_table
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_line_writer, only: line_writer_t
    use polydem_ownership, only: order_pairs
-   use polydem_strings, only: to_text
+   use polydem_strings, only: text_t, to_text
    implicit none
    private
    public :: write_overlap_table
 
    !> Binary exponents below this one have decimal exponents of two digits
    integer, parameter :: greatest_exponent = 328
-   !> Rows that are gathered and written at a time
-   integer(ip), parameter :: piece = 10000_ip
+   !> Rows that are gathered at a time
+   integer(ip), parameter :: piece = 32000_ip
+   !> Rows that a thread writes to a text at a time
+   integer, parameter :: slice = 500
    !> Bytes that no row exceeds
    integer, parameter :: longest_row = 128
 
@@ -107,23 +109,42 @@ contains
       call comm%gather(values, of_rank, counts)
    end subroutine gather_rows
 
-   !> Write some rows.
+   !> Write some rows. Their numbers take most of the time, so the threads share them.
    subroutine put_rows(file, n, block)
       type(line_writer_t), intent(inout) :: file
       !> Number of rows
       integer, intent(in) :: n
       !> Identifiers, position, area, depth, and depth over thickness, (7, row)
       real(dp), intent(in) :: block(7, n)
+      type(text_t) :: rows((n + slice - 1)/slice)
+      integer :: k
+
+      !$omp parallel do if (n > slice) schedule(static) default(none) shared(n, block, rows) private(k)
+      do k = 1, size(rows)
+         call write_rows(block(:, (k - 1)*slice + 1:min(k*slice, n)), rows(k)%text)
+      end do
+      !$omp end parallel do
+      do k = 1, size(rows)
+         call file%put(rows(k)%text)
+      end do
+   end subroutine put_rows
+
+   !> Write some rows to a text.
+   subroutine write_rows(block, rows)
+      !> Values of each row, as above, (7, row)
+      real(dp), intent(in) :: block(:, :)
+      !> The text
+      character(len=:), allocatable, intent(out) :: rows
       character(len=:), allocatable :: text
       integer :: k, length
 
-      allocate (character(len=n*longest_row) :: text)
+      allocate (character(len=size(block, 2)*longest_row) :: text)
       length = 0
-      do k = 1, n
+      do k = 1, size(block, 2)
          call append_row(nint(block(:2, k), ip), real(block(3:, k), wp), text, length)
       end do
-      call file%put(text(:length))
-   end subroutine put_rows
+      rows = text(:length)
+   end subroutine write_rows
 
    !> Append a row to a text, with its numbers as `to_text` writes them. Usual numbers are written together: a table may
    !> have millions of rows.
