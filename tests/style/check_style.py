@@ -82,6 +82,8 @@ def of_any(statement, room):
         yield "MPI is used in src/communicator and src/hdf5 only"
     if re.match(r"(if\s*\(.*\)\s*)?(error\s+)?stop\b(?!\s*[=%(])", code) and room != "app":
         yield "only the program in src/app stops"
+    if re.search(r"\bcall\s+omp_set_num_threads\b", code) and room not in ("app", "bench"):
+        yield "the number of threads is set in src/app and src/bench only"
     if re.match(r"(if\s*\(.*\)\s*)?call\s+(exit|abort)\b", code) and room != "app":
         yield "only the program in src/app stops"
     if re.match(r"(save|data|include)\b(?!\s*[=%(])", code) or re.match(r"save\s*/", code):

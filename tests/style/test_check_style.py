@@ -109,6 +109,7 @@ BAD = [
     ("      self%length = self%length + by\n", "      stop 1\n", 33, "only the program"),
     ("      self%length = self%length + by\n", "      if (by > 0) error stop 'no'\n", 33, "only the program"),
     ("      self%length = self%length + by\n", "      if (by > 0) call abort()\n", 33, "only the program"),
+    ("      self%length = self%length + by\n", "      if (by > 0) call omp_set_num_threads(2)\n", 33, "the number of threads"),
     ("      self%length = self%length + by\n", "      go to 10\n", 33, "go to"),
     ("      self%length = self%length + by\n", "#endif\n", 33, "no preprocessor"),
     ("      self%length = self%length + by\n", 61*"\n", 28, "grow has 67 lines, more than 60"),
