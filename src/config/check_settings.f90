@@ -71,7 +71,7 @@ contains
       associate (given => values(row_of(values, 'forces', 'restitution')))
          if (given%is_active .and. settings%forces%restitution < least_restitution) then
             call raise(error, input_error, given%place//': ''restitution'' in &forces must be at least 0.01, '// &
-               'because a smaller value needs a very small time step; omit it to use ''damping_coefficient''')
+               'because a smaller value needs a very small time step; give ''damping_coefficient'' instead')
          end if
       end associate
       if (settings%guards%energy /= 'off' .and. .not. settings%output%energy_balance) then

@@ -10,7 +10,7 @@ module polydem_exclusive_entries
 
 contains
 
-   !> Leave one of both entries in use: the restitution if it is given, otherwise the damping coefficient. An entry of
+   !> Leave one of both entries in use: the damping coefficient if it is given, otherwise the restitution. An entry of
    !> the command line takes precedence over one of the file. The resolved text can then be read again.
    pure subroutine resolve_exclusive_entries(values, error)
       !> Values, (row of the table)
@@ -23,8 +23,8 @@ contains
       special = first_row('forces', 'restitution')
       usual = first_row('forces', 'damping_coefficient')
       if (.not. values(special)%is_active) return
-      use_special = values(special)%is_given
-      if (use_special .and. values(usual)%is_given) then
+      use_special = .not. values(usual)%is_given
+      if (values(special)%is_given .and. values(usual)%is_given) then
          if (values(special)%is_override .eqv. values(usual)%is_override) then
             call raise(error, input_error, values(special)%place//': '//label(entries(special))// &
                ' cannot be combined with '//label(entries(usual))//'; give only one of them')

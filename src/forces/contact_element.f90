@@ -18,8 +18,8 @@ module polydem_contact_element
       !> Elastic repulsion, and normal force without cohesion [N/m]; 0 for an expected contact
       real(wp) :: elastic = 0.0_wp, repulsion = 0.0_wp
       !> Shape of the body of an expected contact: greatest ratio of an edge to twice its distance from the centre,
-      !> square of the longest edge over the area, and square of the greatest radius [m2]
-      real(wp) :: edge_ratio = 0.0_wp, square_ratio = 0.0_wp, radius_square = 0.0_wp
+      !> square of the longest edge over the area, square of the greatest radius, and longest edge [m2, m]
+      real(wp) :: edge_ratio = 0.0_wp, square_ratio = 0.0_wp, radius_square = 0.0_wp, longest = 0.0_wp
       !> Moment of inertia of that body [kg m]
       real(wp) :: inertia = 0.0_wp
       !> Sum of the reciprocal masses of both bodies, and its reciprocal, the normal effective mass [m/kg, kg/m]

@@ -14,7 +14,7 @@ module polydem_force_law
    use polydem_damping_onset, only: damping_onset_t
    use polydem_errors, only: error_t
    use polydem_exact_friction, only: exact_friction_t
-   use polydem_force_part, only: force_part_t, resting_block_t, stage_on_damping
+   use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic, stage_on_damping
    use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
    use polydem_matuttis_chen_damping, only: matuttis_chen_damping_t
@@ -46,6 +46,8 @@ module polydem_force_law
       logical :: needs_cohesion = .false.
       !> Whether a part adds to the column `twist`
       logical :: needs_twist = .false.
+      !> Whether a part needs the shares of contacts with fixed bodies
+      logical :: needs_shares = .false.
       !> Whether a part needs the accelerations of the last step
       logical :: needs_accelerations = .false.
       !> Whether the energy of all elastic forces is half of elastic area/length
@@ -60,6 +62,7 @@ module polydem_force_law
       procedure :: collect_needs
       procedure :: measure
       procedure :: apply
+      procedure :: apply_elastic
       procedure :: stiffen
       procedure :: static_depth
       procedure :: undamped_warning
@@ -98,7 +101,7 @@ contains
          if (s%damping == 'matuttis_chen') call law%add(matuttis_chen_damping_t(name='Matuttis-Chen damping'), s)
          if (s%damping == 'rate' .and. s%damping_from_touch) &
             call law%add(damping_onset_t(name='from first touch'), s)
-         if (s%tilt_damping > 0.0_wp) call law%add(tilt_damping_t(name='damping of tilts'), s)
+         if (s%damping /= 'none' .and. s%tilt_damping > 0.0_wp) call law%add(tilt_damping_t(name='damping of tilts'), s)
          if (s%friction_coefficient > 0.0_wp) then
             if (s%friction == 'cundall_strack') call law%add(cundall_strack_t(name='Cundall-Strack friction'), s)
             if (s%friction == 'exact') call law%add(exact_friction_t(name='exact friction'), s)
@@ -159,6 +162,7 @@ contains
             law%needs_effective_area = law%needs_effective_area .or. part%needs_effective_area
             law%needs_cohesion = law%needs_cohesion .or. part%needs_cohesion
             law%needs_twist = law%needs_twist .or. part%needs_twist
+            law%needs_shares = law%needs_shares .or. part%needs_shares
             law%needs_accelerations = law%needs_accelerations .or. part%needs_accelerations
             law%energy_is_quadratic = law%energy_is_quadratic .or. part%energy_is_quadratic
             part%first_column = size(law%history_kinds) + 1
@@ -232,6 +236,24 @@ contains
          call law%parts(k)%part%add(bodies, dt, block, history)
       end do
    end subroutine apply
+
+   !> Compute the elastic forces of a block of contacts, and its characteristic lengths.
+   subroutine apply_elastic(law, bodies, block, history)
+      class(force_law_t), intent(in) :: law
+      !> Bodies with the positions of this step
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts; `inverse_length`, `lever`, `elastic` and `normal_force` are set
+      type(contact_block_t), intent(inout) :: block
+      !> Contact history
+      type(contact_history_t), intent(inout) :: history
+      integer :: k
+
+      block%elastic(:block%n) = 0.0_wp
+      block%normal_force(:block%n) = 0.0_wp
+      do k = 1, size(law%parts)
+         if (law%parts(k)%part%stage == stage_elastic) call law%parts(k)%part%add(bodies, 0.0_wp, block, history)
+      end do
+   end subroutine apply_elastic
 
    !> Add the springs and dashpots of all parts to those of a contact.
    subroutine stiffen(law, element)

@@ -49,6 +49,8 @@ module polydem_force_part
       logical :: needs_cohesion = .false.
       !> Whether it adds to the column `twist`
       logical :: needs_twist = .false.
+      !> Whether it needs the shares of contacts with fixed bodies
+      logical :: needs_shares = .false.
       !> Whether it needs the accelerations of the last step
       logical :: needs_accelerations = .false.
       !> Whether the energy of its elastic force is half of elastic area/length

@@ -17,6 +17,7 @@ module polydem_hunt_crossley
    type, extends(normal_damping_t) :: hunt_crossley_t
    contains
       procedure :: find_forces
+      procedure :: find_dashpots
       procedure :: stiffen
    end type hunt_crossley_t
 
@@ -37,6 +38,19 @@ contains
          force(c) = block%elastic(c)*share
       end do
    end subroutine find_forces
+
+   !> Find the dashpots F_el a of one block of contacts.
+   subroutine find_dashpots(self, block, dashpot)
+      class(hunt_crossley_t), intent(in) :: self
+      type(contact_block_t), intent(in) :: block
+      real(wp), intent(inout) :: dashpot(block_size)
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         dashpot(c) = block%elastic(c)*(self%coefficient*sqrt(1.0_wp/(block%mobility(c)*self%stiffness))) &
+            *(block%inverse_length(c)*block%length(c)/max(block%length(c), sqrt(block%area(c))))
+      end do
+   end subroutine find_dashpots
 
    !> Add stiffness and dashpot from the present force. An expected contact has no force and gets neither.
    subroutine stiffen(self, element)

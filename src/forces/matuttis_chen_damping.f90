@@ -61,6 +61,7 @@ contains
          end do
       end associate
       call self%add_limited(force, block)
+      if (self%fills_dashpots) call self%find_dashpots(block, block%dashpot)
    end subroutine add
 
 end module polydem_matuttis_chen_damping

@@ -20,10 +20,14 @@ module polydem_normal_damping
       real(wp) :: stiffness = 0.0_wp
       !> Dimensionless damping coefficient gamma
       real(wp) :: coefficient = 0.0_wp
+      !> Whether it fills the column `dashpot` of a block
+      logical :: fills_dashpots = .false.
    contains
       procedure :: add
       !> Compute the damping forces of a block of contacts from their present state
       procedure :: find_forces
+      !> Find the dashpots of a block of contacts
+      procedure :: find_dashpots
       !> Add damping forces to those of a block of contacts
       procedure, nopass :: add_limited
       procedure :: stiffen
@@ -47,6 +51,7 @@ contains
       end associate
       call self%find_forces(block, force)
       call self%add_limited(force, block)
+      if (self%fills_dashpots) call self%find_dashpots(block, block%dashpot)
    end subroutine add
 
    !> Compute the damping forces of a block of contacts, without a limit. Default: none.
@@ -61,6 +66,20 @@ contains
       end associate
       force(:block%n) = 0.0_wp
    end subroutine find_forces
+
+   !> Find the dashpots of a block of contacts, gamma sqrt(m E) L/l: force per normal velocity.
+   subroutine find_dashpots(self, block, dashpot)
+      class(normal_damping_t), intent(in) :: self
+      !> Contacts with their elastic forces
+      type(contact_block_t), intent(in) :: block
+      !> Dashpot of each contact [N s/m2]
+      real(wp), intent(inout) :: dashpot(block_size)
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         dashpot(c) = self%coefficient*sqrt(self%stiffness/block%mobility(c))*block%inverse_length(c)*block%length(c)
+      end do
+   end subroutine find_dashpots
 
    !> Add damping forces. Their sum with the elastic force is limited to repulsion.
    subroutine add_limited(force, block)
@@ -94,6 +113,7 @@ contains
       self%stiffness = settings%stiffness
       self%coefficient = settings%damping_coefficient
       self%dissipates = self%coefficient > 0.0_wp
+      self%fills_dashpots = settings%tilt_damping > 0.0_wp
    end subroutine take_coefficients
 
 end module polydem_normal_damping

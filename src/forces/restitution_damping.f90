@@ -30,6 +30,7 @@ module polydem_restitution_damping
    contains
       procedure :: configure
       procedure :: find_forces
+      procedure :: find_dashpots
       procedure :: stiffen
    end type restitution_damping_t
 
@@ -41,6 +42,7 @@ contains
       type(forces_settings_t), intent(in) :: settings
 
       call self%take_coefficients(settings)
+      self%needs_shares = .true.
       self%ratio = damping_ratio_of(settings%restitution)
       self%dissipates = self%ratio > 0.0_wp
    end subroutine configure
@@ -57,9 +59,22 @@ contains
          ! Bars that nearly cross turn without approach. L is at least the side of a square of the same area.
          reach = max(block%length(c), sqrt(block%area(c)))
          force(c) = 2.0_wp*self%ratio*sqrt(self%stiffness/block%mobility(c)) &
-            *sqrt(block%inverse_length(c)/reach)*block%rate(c)
+            *sqrt(block%inverse_length(c)/reach)*block%rate(c)*block%share_root(c)
       end do
    end subroutine find_forces
+
+   !> Find the dashpots 2 zeta sqrt(m k) of one block of contacts.
+   subroutine find_dashpots(self, block, dashpot)
+      class(restitution_damping_t), intent(in) :: self
+      type(contact_block_t), intent(in) :: block
+      real(wp), intent(inout) :: dashpot(block_size)
+      integer(ip) :: c
+
+      do c = 1_ip, block%n
+         dashpot(c) = 2.0_wp*self%ratio*sqrt(self%stiffness/block%mobility(c)) &
+            *sqrt(block%inverse_length(c)/max(block%length(c), sqrt(block%area(c))))*(block%length(c)*block%share_root(c))
+      end do
+   end subroutine find_dashpots
 
    !> Add the dashpot 2 zeta sqrt(m k).
    subroutine stiffen(self, element)

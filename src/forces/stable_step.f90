@@ -206,6 +206,7 @@ contains
          w = v
       end do
       element%square_ratio = longest*longest/area
+      element%longest = longest
    end subroutine describe_shape
 
 end module polydem_stable_step

@@ -1,17 +1,17 @@
-!> Damping of tilts: a torque T = -s sqrt(k I_eff) (w1 - w2) on the first body, the opposite on the second.
+!> Damping of tilts: normal damping acts along the whole contact, as a bed of dashpots.
 !>
-!> A face is a bed of springs. Its stiffness is E L/l against approach and k = E L/l L^2/12 against tilts (K.L. Johnson,
-!> Contact Mechanics, Cambridge 1985, Sec. 4.3). Normal damping follows the rate of the area, which does not change to
-!> first order when a face tilts about its middle. Friction dissipates only where bodies slip. So without this part,
-!> stacks and walls oscillate for very long. A bed of dashpots also damps tilts, and this torque is its second moment.
-!> I_eff = 1/(1/I1 + 1/I2), and s = 2 is critical damping of the tilt of two bodies. Corners, of length 0, roll freely.
+!> A dashpot d on the normal velocity that is spread evenly over the contact length L has the second moment d L^2/12: it
+!> resists a tilt of the two faces with the torque T = -d L^2/12 (w1 - w2) on the first body, and the opposite on the
+!> second (K.L. Johnson, Contact Mechanics, Cambridge 1985, Sec. 4.3, for springs). The rate of the area does not change
+!> to first order when a face tilts about its middle, so without this torque a body rocks on a face for very long. The
+!> contact of two corners has no length and rolls freely.
 !>
 !> The torque shifts the line of the normal force by at most L/2, because the corresponding pressures do not pull. A
 !> contact under tension has no such torque.
 module polydem_tilt_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: contact_block_t
-   use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
+   use polydem_contact_element, only: contact_element_t
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
@@ -22,9 +22,7 @@ module polydem_tilt_damping
 
    !> Damping of tilts
    type, extends(force_part_t) :: tilt_damping_t
-      !> Young's modulus in two dimensions E [N/m2]
-      real(wp) :: stiffness = 0.0_wp
-      !> Share s of sqrt(k I_eff)
+      !> Torque relative to that of an even bed of dashpots
       real(wp) :: share = 0.0_wp
    contains
       procedure :: configure
@@ -41,51 +39,38 @@ contains
 
       self%stage = stage_last
       self%needs_twist = .true.
-      self%stiffness = settings%stiffness
       self%share = settings%tilt_damping
    end subroutine configure
 
    !> Add the torque; the normal forces must be complete.
    subroutine add(self, bodies, dt, block, history)
       class(tilt_damping_t), intent(in) :: self
-      !> Bodies, for their moments of inertia
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: dt
-      !> Contacts; `twist` changes
+      !> Contacts with their dashpots; `twist` changes
       type(contact_block_t), intent(inout) :: block
       type(contact_history_t), intent(inout) :: history
-      real(wp) :: mobility, stiffness, limit, torque
+      real(wp) :: limit, torque
       integer(ip) :: c
 
-      associate (unused_dt => dt, unused_history => history)
+      associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
       end associate
       do c = 1_ip, block%n
-         ! The same as face_tilt_stiffness; calling a procedure of another file here costs 0.3 % of a step.
-         stiffness = self%stiffness*block%length(c)**3*block%inverse_length(c)/12.0_wp
-         associate (i => block%first(c), j => block%second(c))
-            mobility = bodies%inverse_inertia(i) + bodies%inverse_inertia(j)
-            torque = -self%share*sqrt(stiffness/mobility) &
-               *(bodies%angular_velocity(i) - bodies%angular_velocity(j))
-         end associate
+         torque = -(self%share/12.0_wp)*block%dashpot(c)*block%length(c)**2 &
+            *(block%angular_velocity(c, 1) - block%angular_velocity(c, 2))
          limit = 0.5_wp*block%length(c)*max(0.0_wp, block%normal_force(c))
          block%twist(c) = block%twist(c) + max(-limit, min(limit, torque))
       end do
    end subroutine add
 
-   !> Add the dashpot s sqrt(k I_eff).
+   !> Add the dashpot against tilts. An expected contact is as long as the longest edge.
    subroutine stiffen(self, element)
       class(tilt_damping_t), intent(in) :: self
-      !> The contact; the dashpot against tilts changes
+      !> The contact with its normal dashpot; the dashpot against tilts changes
       type(contact_element_t), intent(inout) :: element
-      real(wp) :: square
 
-      if (element%is_expected) then
-         ! An upper bound: no edge is longer than twice the greatest radius, and the other body may be fixed.
-         square = element%normal_stiffness*element%radius_square/3.0_wp*element%inertia
-      else
-         square = face_tilt_stiffness(self%stiffness, element)/element%rotational_mobility
-      end if
-      element%tilt_dashpot = element%tilt_dashpot + self%share*sqrt(square)
+      element%tilt_dashpot = element%tilt_dashpot &
+         + self%share*element%normal_dashpot*merge(element%longest, element%length, element%is_expected)**2/12.0_wp
    end subroutine stiffen
 
 end module polydem_tilt_damping

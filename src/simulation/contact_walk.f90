@@ -18,6 +18,7 @@ module polydem_contact_walk
    use polydem_range_results, only: range_results_t
    use polydem_simulation, only: simulation_t, sum_contacts_own => sum_contacts, sum_degenerate
    use polydem_walk_results, only: walk_results_t
+   use polydem_wall_shares, only: find_shares, set_shares
    use polydem_wall_terms, only: append_walls, join_walls
    implicit none
    private
@@ -50,6 +51,8 @@ contains
          last(n) = self%bodies%n
       end associate
       call reserve_sums(self%bodies%n, self%force_sums)
+      if (self%law%needs_shares) call find_shares(self%law, self%bodies, self%neighbours%pairs, self%history, self%isa, &
+                                                  self%walk%shares)
       !$omp parallel if (n > 1_ip) default(none) shared(self, dt, ends, last, n) private(r, k)
       !$omp do schedule(static, 1)
       do r = 1_ip, n
@@ -99,7 +102,7 @@ contains
       type(contact_block_t) :: block
       type(contact_terms_t) :: terms
       real(dp) :: clock(3), began
-      integer(ip) :: next, tested, n_blocks, low, high
+      integer(ip) :: next, tested, n_blocks, low, high, cursor
       logical :: timed
 
       began = wall_seconds()
@@ -108,6 +111,9 @@ contains
       tested = next + 1_ip
       n_blocks = 0_ip
       high = last(2)
+      cursor = 0_ip
+      if (self%law%needs_shares .and. self%walk%shares%n > 0_ip) &
+         cursor = count(self%walk%shares%pair(:self%walk%shares%n) <= ends(2), kind=ip)
       do while (next > ends(1))
          timed = mod(n_blocks, timed_blocks) == 0_ip
          n_blocks = n_blocks + 1_ip
@@ -117,6 +123,7 @@ contains
                             ends(1) + 1_ip, next, tested, self%history, block)
          end associate
          if (timed) clock(2) = wall_seconds()
+         if (self%law%needs_shares) call set_shares(self%walk%shares, cursor, block)
          call self%law%apply(self%bodies, dt, block, self%history)
          call terms_of_block(block, terms)
          ! Sums begin just before their first terms: no contact so far had a lower slot.

@@ -6,6 +6,7 @@ module polydem_walk_results
    use polydem_kinds, only: dp, ip, lp
    use polydem_passing, only: contact_guard_t
    use polydem_range_results, only: range_results_t
+   use polydem_wall_shares, only: wall_shares_t
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
@@ -27,6 +28,8 @@ module polydem_walk_results
       real(dp), allocatable :: upto(:)
       !> Contacts with fixed bodies
       type(wall_terms_t) :: walls
+      !> Shares of contacts with fixed bodies, if the force law needs them
+      type(wall_shares_t) :: shares
       !> Guard of the contacts
       type(contact_guard_t) :: contact_guard
       !> Contacts that are deep or degenerate
