@@ -14,15 +14,17 @@ module table_forces
 contains
 
    !> Add a part to the forces of a table of contacts.
-   subroutine add_to_table(part, bodies, dt, contacts, history)
+   subroutine add_to_table(part, bodies, dt, contacts, history, dashpot)
       class(force_part_t), intent(in) :: part
       type(bodies_t), intent(in) :: bodies
       !> Time since the last evaluation [s]
       real(wp), intent(in) :: dt
       type(contacts_t), intent(inout) :: contacts
       type(contact_history_t), intent(inout) :: history
+      !> Normal dashpot of all contacts, for a part that needs it [N s/m2]
+      real(wp), intent(in), optional :: dashpot
 
-      call walk(bodies, dt, contacts, history, part=part)
+      call walk(bodies, dt, contacts, history, part=part, dashpot=dashpot)
    end subroutine add_to_table
 
    !> Compute the forces of a table of contacts.
@@ -40,19 +42,22 @@ contains
    end subroutine evaluate_law
 
    !> Let the blocks of a table pass a law or a part.
-   subroutine walk(bodies, dt, contacts, history, law, part)
+   subroutine walk(bodies, dt, contacts, history, law, part, dashpot)
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: dt
       type(contacts_t), intent(inout) :: contacts
       type(contact_history_t), intent(inout) :: history
       type(force_law_t), intent(in), optional :: law
       class(force_part_t), intent(in), optional :: part
+      real(wp), intent(in), optional :: dashpot
       type(contact_block_t) :: block
       integer(ip) :: b, high
 
       do high = contacts%n, 1_ip, -block_size
          call load_block(bodies, contacts, high, block)
          call copy_motion(bodies, block)
+         block%share_root = 1.0_wp
+         if (present(dashpot)) block%dashpot = dashpot
          if (present(law)) call law%apply(bodies, dt, block, history)
          if (present(part)) call part%add(bodies, dt, block, history)
          do b = 1_ip, block%n
