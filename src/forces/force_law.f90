@@ -66,6 +66,7 @@ module polydem_force_law
       procedure :: stiffen
       procedure :: static_depth
       procedure :: undamped_warning
+      procedure :: rest_note
    end type force_law_t
 
 contains
@@ -296,5 +297,30 @@ contains
          end associate
       end do
    end function undamped_warning
+
+   !> Why bodies may not come to rest with this law; blank if they do (benchmark B23)
+   function rest_note(law) result(note)
+      class(force_law_t), intent(in) :: law
+      character(len=:), allocatable :: note
+      logical :: damps, damps_tilts, is_weak
+      integer :: k
+
+      note = ''
+      damps = .false.
+      damps_tilts = .false.
+      is_weak = .false.
+      do k = 1, size(law%parts)
+         associate (part => law%parts(k)%part)
+            damps = damps .or. part%dissipates
+            damps_tilts = damps_tilts .or. part%damps_tilts
+            is_weak = is_weak .or. (part%dissipates .and. part%is_weak)
+         end associate
+      end do
+      if (.not. law%energy_is_quadratic) note = note//', the area law gains energy where slender bodies rock'
+      if (.not. damps) note = note//', nothing is damped'
+      if (damps .and. is_weak) note = note//', damping is weak'
+      if (damps .and. .not. damps_tilts) note = note//', tilts are not damped'
+      if (note /= '') note = 'bodies may rock for long: '//note(3:)//'. The defaults of &forces let them rest'
+   end function rest_note
 
 end module polydem_force_law

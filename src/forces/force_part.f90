@@ -57,6 +57,10 @@ module polydem_force_part
       logical :: energy_is_quadratic = .false.
       !> Whether it dissipates energy in every normal impact
       logical :: dissipates = .false.
+      !> Whether it damps tilts
+      logical :: damps_tilts = .false.
+      !> Whether it is a damping that is too weak for bodies to come to rest within a second or so
+      logical :: is_weak = .false.
       !> Warning if no part of the law dissipates; not allocated if there is none
       character(len=:), allocatable :: undamped_warning
    contains

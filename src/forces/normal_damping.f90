@@ -35,6 +35,9 @@ module polydem_normal_damping
       procedure, non_overridable :: take_coefficients
    end type normal_damping_t
 
+   !> Below this coefficient a damping is weak; a face then has a restitution of three quarters
+   real(wp), parameter :: weak_coefficient = 0.25_wp
+
 contains
 
    !> Add the forces of `find_forces`. A damping with a contact history overrides this procedure.
@@ -113,6 +116,7 @@ contains
       self%stiffness = settings%stiffness
       self%coefficient = settings%damping_coefficient
       self%dissipates = self%coefficient > 0.0_wp
+      self%is_weak = self%coefficient < weak_coefficient
       self%fills_dashpots = settings%tilt_damping > 0.0_wp
    end subroutine take_coefficients
 

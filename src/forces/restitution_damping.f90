@@ -34,6 +34,9 @@ module polydem_restitution_damping
       procedure :: stiffen
    end type restitution_damping_t
 
+   !> Above this restitution damping is weak
+   real(wp), parameter :: weak_restitution = 0.75_wp
+
 contains
 
    !> Copy the parameters from the settings.
@@ -45,6 +48,7 @@ contains
       self%needs_shares = .true.
       self%ratio = damping_ratio_of(settings%restitution)
       self%dissipates = self%ratio > 0.0_wp
+      self%is_weak = settings%restitution > weak_restitution
    end subroutine configure
 
    !> Compute the damping forces of one block of contacts.

@@ -39,6 +39,7 @@ contains
 
       self%stage = stage_last
       self%needs_twist = .true.
+      self%damps_tilts = .true.
       self%share = settings%tilt_damping
    end subroutine configure
 

@@ -29,6 +29,8 @@ contains
                              ' of fixed bodies')
          call log%write_line('parts      '//s%settings%neighbours%finder//', '//s%law%description//gravity_text(s)// &
                              ', '//s%settings%integrate%scheme//motion_text(s)//balance_text(s))
+         if (gravity_text(s) /= '' .and. s%law%rest_note() /= '') &
+            call log%write_line('           note: '//s%law%rest_note())
          call log%write_line('step       dt = '//to_text(s%dt)//' s, '// &
                              to_text(s%dt/s%expected_stable_step, 3)//' of the stable time step '// &
                              to_text(s%expected_stable_step)//' s estimated from the shapes')

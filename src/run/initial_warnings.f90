@@ -4,10 +4,11 @@
 !> evaluates during its steps are in `monitor`.
 module polydem_initial_warnings
    use polydem_elementary, only: hypotenuse
-   use polydem_kinds, only: lp, wp
+   use polydem_fixed_overlaps, only: find_fixed_overlaps
+   use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
    use polydem_simulation, only: simulation_t
-   use polydem_strings, only: text_t, to_text
+   use polydem_strings, only: counted, text_t, to_text
    use polydem_scene_measures, only: scene_measures_t
    implicit none
    private
@@ -46,6 +47,7 @@ contains
       call warn_of_step(simulation, warnings)
       call warn_of_overlaps(simulation, measures, warnings)
       call warn_of_speeds(simulation, measures, warnings)
+      call warn_of_fixed_overlaps(simulation, warnings)
       ! A law that is not conservative needs damping, which removes the energy that the law adds.
       undamped = simulation%law%undamped_warning()
       if (undamped /= '') call add(warnings, undamped)
@@ -139,6 +141,24 @@ contains
             ': it may pass through other bodies. Increase stiffness in &forces, or use thicker bodies')
       end associate
    end subroutine warn_of_speeds
+
+   !> Warn of fixed bodies that overlap at the start. Every rank has all of them.
+   subroutine warn_of_fixed_overlaps(simulation, warnings)
+      type(simulation_t), intent(in) :: simulation
+      type(text_t), allocatable, intent(inout) :: warnings(:)
+      integer(lp) :: n
+      integer(ip) :: first, second
+      real(wp) :: area, place(2)
+
+      associate (bodies => simulation%bodies)
+         call find_fixed_overlaps(bodies, n, first, second, area, place)
+         if (n == 0_lp) return
+         call add(warnings, counted(n, 'pair')//' of fixed bodies overlap, most of all the bodies '// &
+                  to_text(bodies%id(first))//' and '//to_text(bodies%id(second))//' in '//to_text(area, 3)// &
+                  ' m2 near ('//to_text(place(1), 3)//', '//to_text(place(2), 3)//') m: a body that touches both there '// &
+                  'is pushed twice. Let walls share edges instead')
+      end associate
+   end subroutine warn_of_fixed_overlaps
 
    !> Append a warning to the list.
    pure subroutine add(warnings, text)

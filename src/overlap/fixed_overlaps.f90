@@ -1,0 +1,102 @@
+!> Overlaps between fixed bodies at the start: parts of walls that lie twice in the same place.
+module polydem_fixed_overlaps
+   use polydem_bodies, only: bodies_t
+   use polydem_convex_overlap, only: find_overlap, overlap_t
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_polygon, only: mass_properties
+   use polydem_sort_reals, only: sort_reals
+   implicit none
+   private
+   public :: find_fixed_overlaps
+
+   !> Overlaps below this share of the smaller area are rounding errors of edges in common
+   real(wp), parameter :: least_share = 1.0e-9_wp
+
+contains
+
+   !> Count the pairs of fixed bodies that overlap, and find the one with the largest overlap.
+   subroutine find_fixed_overlaps(bodies, n, first, second, area, place)
+      !> Bodies with rotated polygons
+      type(bodies_t), intent(in) :: bodies
+      !> Number of pairs
+      integer(lp), intent(out) :: n
+      !> Slots of the pair with the largest overlap, 0 if there is none
+      integer(ip), intent(out) :: first, second
+      !> Area of the largest overlap, and its centroid [m2, m]
+      real(wp), intent(out) :: area, place(2)
+      integer(ip), allocatable :: slot(:), ranked(:)
+      real(wp), allocatable :: low(:, :), high(:, :)
+      type(overlap_t) :: overlap
+      integer(ip) :: a, b, j, k, s
+
+      n = 0_lp
+      first = 0_ip
+      second = 0_ip
+      area = 0.0_wp
+      place = 0.0_wp
+      slot = pack([(s, s=1_ip, bodies%n)], bodies%fixed(:bodies%n))
+      if (size(slot) < 2) return
+      allocate (low(2, size(slot)), high(2, size(slot)), ranked(size(slot)))
+      do k = 1_ip, size(slot, kind=ip)
+         associate (from => bodies%vertex_start(slot(k)), to => bodies%vertex_start(slot(k) + 1_ip) - 1_ip)
+            low(:, k) = bodies%position(:, slot(k)) + minval(bodies%turned(:, from:to), dim=2)
+            high(:, k) = bodies%position(:, slot(k)) + maxval(bodies%turned(:, from:to), dim=2)
+         end associate
+      end do
+      call sort_reals(low(1, :), ranked)
+      ! Boxes in ascending order of their left ends: those that begin before a box ends may overlap it.
+      do k = 1_ip, size(slot, kind=ip)
+         a = ranked(k)
+         do j = k + 1_ip, size(slot, kind=ip)
+            b = ranked(j)
+            if (low(1, b) >= high(1, a)) exit
+            if (low(2, b) >= high(2, a) .or. low(2, a) >= high(2, b)) cycle
+            overlap = overlap_of(bodies, slot(a), slot(b))
+            if (.not. overlap%area > least_share*min(area_of(bodies, slot(a)), area_of(bodies, slot(b)))) cycle
+            n = n + 1_lp
+            if (overlap%area <= area) cycle
+            area = overlap%area
+            first = min(slot(a), slot(b))
+            second = max(slot(a), slot(b))
+            place = bodies%position(:, smaller_of(bodies, slot(a), slot(b))) + overlap%centroid
+         end do
+      end do
+   end subroutine find_fixed_overlaps
+
+   !> The body with the smaller radius
+   pure integer(ip) function smaller_of(bodies, i, j)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: i, j
+
+      smaller_of = merge(j, i, bodies%radius(j) < bodies%radius(i))
+   end function smaller_of
+
+   !> Overlap of two bodies, relative to the centre of the one with the smaller radius
+   pure function overlap_of(bodies, i, j) result(overlap)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: i, j
+      type(overlap_t) :: overlap
+      integer(ip) :: memory, p, q, rejected
+
+      p = smaller_of(bodies, i, j)
+      q = i + j - p
+      rejected = 0_ip
+      associate (start => bodies%vertex_start)
+         call find_overlap(bodies%turned(:, start(p):start(p + 1_ip) - 1_ip), &
+                           bodies%turned(:, start(q):start(q + 1_ip) - 1_ip), &
+                           bodies%position(:, q) - bodies%position(:, p), bodies%radius(p), bodies%radius(q), .false., &
+                           overlap, memory, rejected)
+      end associate
+   end function overlap_of
+
+   !> Area of a body [m2]
+   real(wp) function area_of(bodies, s)
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: s
+      real(wp) :: centroid(2), second
+
+      call mass_properties(bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip), area_of, &
+                           centroid, second)
+   end function area_of
+
+end module polydem_fixed_overlaps
