@@ -232,6 +232,7 @@ contains
          block%normal_force(:n) = 0.0_wp
          block%tangential_force(:n) = 0.0_wp
          block%twist(:n) = 0.0_wp
+         if (law%needs_twist) block%dashpot(:n) = 0.0_wp
       end associate
       do k = 1, size(law%parts)
          call law%parts(k)%part%add(bodies, dt, block, history)
