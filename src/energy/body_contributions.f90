@@ -21,7 +21,7 @@ module polydem_body_contributions
    !> about the origin [N]; sums over contacts of the absolute values of forces [N/m] and torques [N]
    integer, parameter :: n_wall_channels = 6
    !> Number of values of `motion_of`
-   integer, parameter :: n_motions = 5
+   integer, parameter :: n_motions = 7
 
 contains
 
@@ -161,7 +161,8 @@ contains
    end subroutine add_walls
 
    !> Kinetic energy [J/m], potential energy [J/m], momentum along x and y [N s/m] and angular momentum about the origin
-   !> [N s] of a free body
+   !> [N s] of a free body; then the sums of the absolute values of its momenta along x and y [N s/m], and of its orbital
+   !> angular momentum and its spin [N s]
    pure function motion_of(gravity, bodies, s) result(values)
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
@@ -176,6 +177,8 @@ contains
          values(2) = -m*(gravity(1)*x(1) + gravity(2)*x(2))
          values(3:4) = m*v
          values(5) = m*(x(1)*v(2) - x(2)*v(1)) + spin
+         values(6) = m*(abs(v(1)) + abs(v(2)))
+         values(7) = abs(m*(x(1)*v(2) - x(2)*v(1))) + abs(spin)
       end associate
    end function motion_of
 

@@ -17,8 +17,9 @@
 !> over bodies are exact sums, rounded once, then multiplied by the time step. Their bits do not depend on the number of
 !> threads and ranks.
 !>
-!> Residuals of momentum are relative to a scale of impulses: the sum of absolute values over contacts with fixed
-!> bodies, and over bodies for gravity. Forces that cancel within a fixed body therefore add to the scale.
+!> Residuals of momentum are relative to what moves: the largest sum over bodies of absolute momenta so far, plus the
+!> absolute impulses, of contacts with fixed bodies and of gravity on each body. A scene whose total momentum is zero
+!> therefore has a scale, and forces that cancel within a fixed body add to it.
 module polydem_energy_balance
    use polydem_bodies, only: bodies_t
    use polydem_body_contributions, only: add_powers, add_torques, add_walls, motion_of, n_channels, n_motions, &
@@ -39,6 +40,8 @@ module polydem_energy_balance
    type :: energy_balance_t
       !> Energy scale of the residual: largest kinetic energy or work of a channel so far [J/m]
       real(wp) :: energy_scale = 0.0_wp
+      !> Largest sums over bodies of absolute momenta [N s/m] and angular momenta [N s] so far
+      real(wp), private :: momentum_scale(2) = 0.0_wp
       !> Whether bodies and contacts are those of the last accumulated step. `count_step` sets it. The caller must
       !> clear it when a step begins; the last rates then have full weight, as is right in the middle of a step
       logical :: is_current = .false.
@@ -83,11 +86,11 @@ module polydem_energy_balance
       !> Unexplained energy over the largest kinetic energy or work so far, but at least over 1e-9 of the potential
       !> energy, which is the level of rounding errors
       real(wp) :: relative_energy_residual = 0.0_wp
-      !> Unexplained momentum, over the sum of the absolute momentum at the start and the absolute impulses of gravity
-      !> and of all contacts with fixed bodies
+      !> Unexplained momentum, over the largest sum of absolute momenta of the bodies so far plus the absolute impulses
+      !> of gravity and of all contacts with fixed bodies
       real(wp) :: relative_momentum_residual = 0.0_wp
-      !> Unexplained angular momentum, over the sum of the absolute angular momentum at the start and the absolute
-      !> angular impulses of gravity on each body and of all contacts with fixed bodies
+      !> Unexplained angular momentum, over the largest sum of absolute angular momenta of the bodies so far plus the
+      !> absolute angular impulses of gravity on each body and of all contacts with fixed bodies
       real(wp) :: relative_angular_residual = 0.0_wp
    end type balance_t
 
@@ -125,6 +128,7 @@ contains
       sums%is_current = .true.
       total = totals(sums, comm, gravity, bodies, forces, walls)
       sums%energy_scale = total(1)
+      sums%momentum_scale = total(6:7)
       sums%start = [total(1) + total(2), total(3:5)]
       sums%elastic_start = total(at_energy)
    end subroutine start_energy_balance
@@ -218,6 +222,7 @@ contains
       balance%potential = total(2)
       balance%momentum = total(3:4)
       balance%angular_momentum = total(5)
+      sums%momentum_scale = max(sums%momentum_scale, total(6:7))
       associate (works => dt*total(at_channels + 1:at_walls), on_walls => dt*total(at_walls + 1:), &
                  mass_time => dt*total(at_mass), torques => dt*total(at_torque:at_torque + 1))
          balance%elastic_work = works(1)
@@ -244,6 +249,8 @@ contains
       call serializer%field('/run/energy_balance_steps', sums%steps, '1', 'number of accumulated steps')
       call serializer%field('/run/elastic_start', sums%elastic_start, 'J/m', 'elastic energy at the start')
       call serializer%field('/run/energy_scale', sums%energy_scale, 'J/m', 'largest kinetic energy or work so far')
+      call serializer%field('/run/momentum_scale', sums%momentum_scale, 'N s/m, N s', &
+                        'largest sums over bodies of absolute momenta and angular momenta so far')
    end subroutine serialize_balance
 
    !> Serialize the channels of the bodies. When reading, the bodies may differ from those before.
@@ -293,8 +300,8 @@ contains
          missing_angular = b%angular_momentum - start(4) - b%angular_impulse
          b%relative_energy_residual = share(b%energy_residual, sums%energy_scale)
          b%relative_momentum_residual = share(abs(missing(1)) + abs(missing(2)), &
-                                              abs(start(2)) + abs(start(3)) + impulse_scale)
-         b%relative_angular_residual = share(missing_angular, abs(start(4)) + angular_scale)
+                                              sums%momentum_scale(1) + impulse_scale)
+         b%relative_angular_residual = share(missing_angular, sums%momentum_scale(2) + angular_scale)
       end associate
    end subroutine find_residuals
 

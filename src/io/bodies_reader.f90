@@ -12,7 +12,9 @@
 !>                                free body, infinite for a fixed body
 !>     id                (n)      optional, default: 1 to n
 !>
-!> Any other data set at the top level is an error, because it may be a misspelt name. Groups are ignored.
+!> Any other data set at the top level is an error, because it may be a misspelt name. Groups are ignored. The attributes
+!> origin_x and origin_y of the file, if there are any, are where the origin of its coordinates lies in those of the
+!> program that made the polygons [m]; a run does not use them, but copies them to its result.
 module polydem_bodies_reader
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_bodies_index, only: bodies_index_t, entry_text, read_index
@@ -23,7 +25,7 @@ module polydem_bodies_reader
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: read_bodies_file
+   public :: read_bodies_file, read_origin
 
    !> Number of bodies that are read together
    integer(ip), parameter :: block_size = 16384_ip
@@ -76,6 +78,26 @@ contains
       if (.not. allocated(error)) call list_blocks(file, real(density, dp), table, list, error)
       call file%close(error)
    end subroutine read_bodies_file
+
+   !> Read where the origin of the coordinates of a bodies file lies in those of the program that made the polygons.
+   subroutine read_origin(path, origin, error)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Place of the origin, 0 if the file does not have it, (2) [m]
+      real(dp), intent(out) :: origin(2)
+      !> Names the file and the attribute
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+
+      origin = 0.0_dp
+      if (allocated(error)) return
+      call file%open(path, error)
+      if (allocated(error)) return
+      call file%read_real_attribute('/', 'origin_x', origin(1), error)
+      call file%read_real_attribute('/', 'origin_y', origin(2), error)
+      if (.not. all(ieee_is_finite(origin))) call file%reject('origin_x and origin_y must be finite', error)
+      call file%close(error)
+   end subroutine read_origin
 
    !> Append the bodies of the file to a list, block by block.
    subroutine list_blocks(file, density, table, list, error)

@@ -36,6 +36,8 @@ module polydem_provenance
       integer(ip) :: processors = 0_ip
       !> Seed of the scene
       integer(ip) :: seed = 0_ip
+      !> Where the origin of the coordinates lies in those of the program that made the polygons, (2) [m]
+      real(dp) :: origin(2) = 0.0_dp
    contains
       procedure :: set
       procedure :: text_of
@@ -152,6 +154,8 @@ contains
       call file%write('/provenance/threads', provenance%threads, error)
       call file%write('/provenance/processors', provenance%processors, error)
       call file%write('/provenance/seed', provenance%seed, error)
+      call file%write('/provenance/origin_x', provenance%origin(1), error, 'm')
+      call file%write('/provenance/origin_y', provenance%origin(2), error, 'm')
       call file%write('/provenance/written', utc_now(), error)
    end subroutine write_provenance
 

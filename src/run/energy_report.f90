@@ -1,6 +1,7 @@
 !> The energy and momentum balance of a simulation as lines of the log.
 module polydem_energy_report
    use polydem_energy_balance, only: balance_t
+   use polydem_kinds, only: wp
    use polydem_log, only: log_t
    use polydem_simulation, only: simulation_t, compute_balance
    use polydem_strings, only: to_text
@@ -8,9 +9,13 @@ module polydem_energy_report
    private
    public :: write_energy_report
 
+   !> Unexplained energy above which there is a warning, as a fraction of the largest kinetic energy or work so far
+   real(wp), parameter :: suspicious = 0.01_wp
+
 contains
 
-   !> Write the work of each channel and the residuals of the energy and momentum balance; collective.
+   !> Write the work of each channel and the residuals of the energy and momentum balance, and a warning if much energy
+   !> is unexplained; collective. The guard `energy` warns of a gain while the run goes on; this is its end.
    subroutine write_energy_report(simulation, log)
       type(simulation_t), intent(inout) :: simulation
       type(log_t), intent(inout) :: log
@@ -25,6 +30,10 @@ contains
                           ' of the largest kinetic energy or work so far, momentum '// &
                           to_text(balance%relative_momentum_residual, 2)//', angular momentum '// &
                           to_text(balance%relative_angular_residual, 2))
+      if (balance%relative_energy_residual > suspicious) call log%write_line( &
+         'warning: the energy balance leaves '//to_text(balance%energy_residual, 3)//' J/m unexplained, '// &
+         to_text(balance%relative_energy_residual, 3)//' of the largest kinetic energy or work so far. Reduce dt '// &
+         'until this residual is small')
    end subroutine write_energy_report
 
 end module polydem_energy_report

@@ -27,6 +27,9 @@ module polydem_initial_warnings
    real(wp), parameter :: strongest_gravity = 5.0e3_wp
    !> Ratio of the pressure of the weight to the stiffness above which bodies at rest overlap deeply [1]
    real(wp), parameter :: softest = 0.05_wp
+   !> Number of last bits of a coordinate that a displacement per step and a depth of overlap need: the error of one of
+   !> them is then 2.5 %
+   real(wp), parameter :: needed_bits = 20.0_wp
 
 contains
 
@@ -48,6 +51,7 @@ contains
       call warn_of_overlaps(simulation, measures, warnings)
       call warn_of_speeds(simulation, measures, warnings)
       call warn_of_fixed_overlaps(simulation, warnings)
+      if (measures%free > 0_lp) call warn_of_rounding(simulation, measures, warnings)
       ! A law that is not conservative needs damping, which removes the energy that the law adds.
       undamped = simulation%law%undamped_warning()
       if (undamped /= '') call add(warnings, undamped)
@@ -159,6 +163,29 @@ contains
                   'is pushed twice. Let walls share edges instead')
       end associate
    end subroutine warn_of_fixed_overlaps
+
+   !> Warn of bodies so far from the origin that rounding of their coordinates holds them fast, or spoils their forces.
+   subroutine warn_of_rounding(simulation, measures, warnings)
+      type(simulation_t), intent(in) :: simulation
+      type(scene_measures_t), intent(in) :: measures
+      type(text_t), allocatable, intent(inout) :: warnings(:)
+      character(len=*), parameter :: remedy = 'Move the origin to the bodies (./polydem import --origin centre)'
+      character(len=:), allocatable :: bits
+
+      associate (s => simulation, bit => measures%last_bit, depth => measures%static_depth)
+         bits = ' of the last bit of the coordinates ('//to_text(bit, 3)//' m, as far from the origin as the free '// &
+            'bodies are)'
+         if (measures%speed > 0.0_wp .and. measures%speed*s%dt < needed_bits*bit .and. &
+             s%settings%integrate%accumulation /= 'compensated') call add(warnings, &
+            'the fastest free body moves '//to_text(measures%speed*s%dt, 3)//' m per step, '// &
+            to_text(measures%speed*s%dt/bit, 3)//bits//': rounding changes its speed, or stops it. '//remedy// &
+            ", set accumulation = 'compensated' in &integrate (with scheme velocity_verlet), or increase dt")
+         if (depth(1) > 0.0_wp .and. depth(1) < needed_bits*bit) call add(warnings, &
+            'the lightest free body sinks by about '//to_text(depth(1), 3)//' m under its weight, '// &
+            to_text(depth(1)/bit, 3)//bits//', and by '//to_text(depth(2), 3)//' m under the full height of the free '// &
+            'bodies: rounding changes the forces of contacts. '//remedy//', or decrease stiffness in &forces')
+      end associate
+   end subroutine warn_of_rounding
 
    !> Append a warning to the list.
    pure subroutine add(warnings, text)

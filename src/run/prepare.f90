@@ -1,6 +1,7 @@
 !> Preparation of a run: the scene, which all ranks build alike, the result folder, which the root rank manages, and the
 !> state of earlier attempts.
 module polydem_prepare
+   use polydem_bodies_reader, only: read_origin
    use polydem_checked_files, only: check_manifest
    use polydem_claim_folder, only: claim_folder
    use polydem_initial_warnings, only: warn_of_risks
@@ -123,6 +124,8 @@ contains
       scene = run%provenance%text_of('scene')
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
       call run%provenance%set('scene', scene)
+      if (settings%scene%name == 'file') call read_origin(settings%scene%bodies_file, run%provenance%origin, error)
+      if (allocated(error)) return
       run%provenance%processes = run%comm%size
       if (run%manifest%is_found .and. run%attempt%continues) &
          call find_restart(run%folder, run%manifest, settings, scene, run%attempt%may_change, run%earlier, error)

@@ -52,6 +52,11 @@ module polydem_scene_measures
       integer(lp) :: farthest = 0_lp
       !> Pressure under the full height of the free bodies, over the stiffness [1]
       real(wp) :: softness = 0.0_wp
+      !> Distance between neighbouring numbers at the farthest vertex of a free body from the origin [m]
+      real(wp) :: last_bit = 0.0_wp
+      !> Depth by which the lightest free body sinks into a body below it, and depth under the full height of the free
+      !> bodies: about load over stiffness [m]
+      real(wp) :: static_depth(2) = 0.0_wp
       !> Kinetic energy of the free bodies, and their weight times the extent along gravity [J/m]
       real(wp) :: kinetic = 0.0_wp, potential = 0.0_wp
       !> Elastic energy of the contacts [J/m]
@@ -96,7 +101,10 @@ contains
             measures%potential = gravity*measures%mass(3)*along(measures%extent)
             measures%fall_speed = sqrt(2.0_wp*gravity*along(measures%extent))
             measures%softness = measures%density(2)*gravity*along(measures%free_extent)/s%settings%forces%stiffness
+            measures%static_depth = [measures%mass(1)*gravity/s%settings%forces%stiffness, &
+                                     measures%softness*measures%diameter(2)]
          end if
+         measures%last_bit = spacing(maxval(abs(measures%free_extent)))
       end associate
       call find_stored_energy(simulation, measures%stored)
       call measure_contacts(simulation, measures)

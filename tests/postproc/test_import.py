@@ -1,5 +1,6 @@
 """Polygons of other programs as the bodies of a run."""
 
+import csv
 import json
 import os
 import subprocess
@@ -10,9 +11,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from polydem_post import ResultError
 from polydem_post.__main__ import main
-from polydem_post.bodies_file import ConcaveOutline, import_bodies, import_shapely, write_bodies
+from polydem_post.bodies_file import ConcaveOutline, import_bodies, import_shapely, origin_of, write_bodies
 from polydem_post.convex import concave_vertices, decompose
 from polydem_post.polygons import area_of, join, moments
+from polydem_post.trajectory import Trajectory
 
 PROGRAM = os.environ["POLYDEM_PROGRAM"]
 SQUARE = [(0.0, 0.0), (0.01, 0.0), (0.01, 0.01), (0.0, 0.01)]
@@ -76,6 +78,44 @@ def test_scales_give_metres(tmp_path):
     (tmp_path / "one.xy").write_text(text([(1e3 * x, 1e3 * y) for x, y in SQUARE]))
     import_bodies(tmp_path / "one.xy", tmp_path / "out.h5", scale=1e-3)
     assert_allclose(contents(tmp_path / "out.h5")["vertex"], SQUARE)
+
+
+def test_the_origin_of_far_bodies_comes_near_and_back(tmp_path, capsys):
+    east, north = 5.0e5, 5.4e6
+    far = [[(east + x, north + y) for x, y in ((0, 0), (1e-3, 0), (1e-3, 1e-3), (0, 1e-3))],
+           [(east - 2, north - 4), (east + 2, north - 4), (east + 2, north), (east - 2, north)]]
+    (tmp_path / "far.txt").write_text("\n\n".join([text(far[0]), text(far[1], "fixed")]))
+    scene = tmp_path / "scene.nml"
+    scene.write_text(f"&scene name = 'file' bodies_file = '{tmp_path}/bodies.h5' /\n"
+                     "&integrate duration = 1e-4 /\n&output contacts = .true. /\n")
+    command = ["import", str(tmp_path / "far.txt"), "-o", str(tmp_path / "bodies.h5"), "--force"]
+    warning = "warning: the lightest free body sinks by about"
+    for words, shift, is_far in (([], (0.0, 0.0), True), (["--origin", "centre"], (east, north - 2), False),
+                                 ([f"--origin={east + 8},{north - 9}"], (east + 8, north - 9), False)):
+        assert main(command + words) == 0
+        assert ("its origin is at" in capsys.readouterr().out) != is_far
+        assert origin_of(tmp_path / "bodies.h5") == shift
+        assert_allclose(contents(tmp_path / "bodies.h5")["vertex"], np.concatenate(far) - np.array(shift), atol=1e-9)
+        done = subprocess.run([PROGRAM, "run", "scene.nml", "--force"], cwd=tmp_path, capture_output=True, text=True,
+                              check=True)
+        assert (warning in done.stdout) == is_far, done.stdout
+        run = Trajectory(tmp_path / "results" / "scene")
+        assert run.origin == shift
+        assert len(run[-1].contacts) == 1
+        assert_array_equal(run[-1].position + shift, run.in_world()[-1].position)
+        assert main(["export", str(run.folder), "--to", "csv", "-o", str(tmp_path / "far.csv"), "--force"]) == 0
+        capsys.readouterr()
+        for name, x, y in (("far.csv", "position_x", "position_y"), ("far_contacts.csv", "point_x", "point_y")):
+            with (tmp_path / name).open(newline="") as file:
+                row = next(csv.DictReader(file))
+            assert_allclose([float(row[x]), float(row[y])], [east, north], rtol=0, atol=1e-3)
+
+
+@pytest.mark.parametrize("origin, message", [
+    ("middle", "must be 'centre' or a point"), ((1.0,), "two finite numbers"), ((1.0, np.nan), "two finite numbers")])
+def test_an_origin_is_a_point(tmp_path, origin, message):
+    with pytest.raises(ResultError, match=message):
+        write_bodies([SQUARE], tmp_path / "bodies.h5", origin=origin)
 
 
 def test_geojson_gives_properties(tmp_path):

@@ -110,6 +110,21 @@ def test_tables_recommend_count_and_tell_what_is_missing():
     assert tables["workprecision_stopped"].rows == [(SCENE, MODEL, "gear", "double", "8")]
 
 
+def test_the_recommendation_compares_times_on_the_same_pairs():
+    # Second order is offered in one of two pairs, and is the fastest there; in the other it is as slow as first order.
+    damped, elastic = "area/rate/none", "area/none/none"
+    samples = [sample("gear", "quadruple", steps, model=model) for model in (damped, elastic) for steps in (1024, 512)]
+    costs = {(damped, "velocity_verlet"): 1.2e-5, (damped, "velocity_verlet, second order"): 1e-5,
+             (damped, "gear"): 2e-5, (elastic, "velocity_verlet"): 1e-4, (elastic, "gear"): 1e-5}
+    samples += [sample(numerics, "double", steps, 1e-9, cost, model=model)
+                for (model, numerics), cost in costs.items() for steps in (8, 16)]
+    study = WorkPrecision(samples)
+    assert recommendation(study).rows[0][1:6] == ("gear", "double", "2 of 2", "1.41", "2")
+    rows = {row[1]: row[3:] for row in overall(study).rows if row[0] == "0.1"}
+    assert rows == {"velocity_verlet": ("2 of 2", "0", "3.46"), "gear": ("2 of 2", "1", "1.41"),
+                    "velocity_verlet, second order": ("2 of 2", "1", "3.16")}
+
+
 def test_a_model_without_a_reference_gives_no_points():
     samples = [each for each in made_up() if each.precision != "quadruple"]
     assert WorkPrecision(samples).curves == []

@@ -34,23 +34,25 @@ contains
       real(wp) :: fallen
 
       call table%begin('B15', 'blocks of 10 cm x 2 cm, each as far out as it can be')
-      call lean(table, 3_ip, 1.0e10_wp)
+      call lean(table, 3_ip, 1.0e10_wp, 1.0e-4_wp)
       if (.not. thorough) return
       call fall_within(table, 10_ip, 0.98_wp, 1.0e10_wp, 0.5_wp, fallen)
       call table%show('10 blocks, E = 1e10, at 0.98: the top block sinks in 0.5 s by [m]', fallen)
-      call lean(table, 10_ip, 1.0e12_wp)
+      call lean(table, 10_ip, 1.0e12_wp, 5.0e-5_wp)
    end subroutine run_overhang
 
-   subroutine lean(table, n, young)
+   !> A stack of n blocks stands at 0.98 of its overhangs, and falls at 1.02.
+   subroutine lean(table, n, young, sag)
       type(table_t), intent(inout) :: table
       integer(ip), intent(in) :: n
-      real(wp), intent(in) :: young
+      !> Stiffness [N/m2], and how far its top block may sink where it stands [m]
+      real(wp), intent(in) :: young, sag
       real(wp) :: fallen
       character(len=:), allocatable :: name
 
       name = to_text(n)//' blocks, E = '//to_text(young, 1)//', '
       call fall_within(table, n, 0.98_wp, young, 0.5_wp, fallen)
-      call table%expect_absolute(name//'at 0.98: the top block sinks in 0.5 s by [m]', 0.0_wp, fallen, 1.0e-4_wp)
+      call table%expect_absolute(name//'at 0.98: the top block sinks in 0.5 s by [m]', 0.0_wp, fallen, sag)
       call fall_within(table, n, 1.02_wp, young, 2.0_wp, fallen)
       call table%expect_true(name//'at 1.02: the top block falls by its height within 2 s', fallen > height)
    end subroutine lean

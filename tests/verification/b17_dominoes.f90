@@ -5,6 +5,9 @@
 !> runs are not copies of one run in other units. The expected constant is that of rigid dominoes with plastic
 !> collisions that do not slip on the floor (`domino_train`). In this benchmark dominoes can slip: a hit above two
 !> thirds of the height pushes the base backwards. At the chosen ratios mu = 0.5 prevents it.
+!>
+!> The tolerance is 5 %: the collisions of soft, damped dominoes are not quite plastic, and the wave is 3 % faster than
+!> that of the rigid train.
 module b17_dominoes
    use domino_train, only: domino_t, wave_speed
    use outlines, only: gravity
@@ -37,10 +40,10 @@ contains
       expected = wave_speed(row_of(1.0_wp))/sqrt(gravity)
       do k = 1, 3
          call topple(table, row_of(heights(k)), numbers(k))
-         call table%expect_relative('h = '//to_text(heights(k), 1)//' m: speed/sqrt(g h)', expected, numbers(k), 0.1_wp)
+         call table%expect_relative('h = '//to_text(heights(k), 1)//' m: speed/sqrt(g h)', expected, numbers(k), 0.05_wp)
       end do
       call table%expect_absolute('spread of the three over their mean', 0.0_wp, &
-                                 (maxval(numbers) - minval(numbers))*3.0_wp/sum(numbers), 0.02_wp)
+                                 (maxval(numbers) - minval(numbers))*3.0_wp/sum(numbers), 0.01_wp)
    end subroutine run_dominoes
 
    pure function row_of(height) result(row)

@@ -157,9 +157,9 @@ contains
       late = energy(simulation)
       exponent = 2.0_wp/(1.0_wp + slope)
       fitted = 9.0_wp*tau/((temperature/late)**(1.0_wp/exponent) - 1.0_wp)
-      call table%expect_relative('tau from the energies at 0 and 9 tau [s]', tau, fitted, 0.1_wp)
+      call table%expect_relative('tau from the energies at 0 and 9 tau [s]', tau, fitted, 0.05_wp)
       call table%expect_absolute('exponent of T over a decade of 1 + t/tau', -exponent, &
-                                 log(late/temperature)/log(10.0_wp), 0.1_wp)
+                                 log(late/temperature)/log(10.0_wp), 0.05_wp)
       call table%show('time simulated [s]', time_of(simulation))
    end subroutine cool
 

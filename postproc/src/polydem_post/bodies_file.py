@@ -6,16 +6,19 @@ import os
 import warnings
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, Optional, Union
 
+import h5py
 import numpy as np
 
 from .convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
 from .new_file import NewHdf5, new_file
 from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
 from .polygons import FloatArray, join
-from .result_file import ResultError, cannot_write
+from .result_file import ResultError, cannot_read, cannot_write
 
+#: What becomes the origin of a bodies file: a point (x, y) [m], the centre of the polygons, or nothing
+Origin = Optional[Union[str, tuple[float, float]]]
 #: Columns with several numbers per body
 WIDE = {"velocity": 2}
 #: Which numbers a column may have, beside being finite, and how messages say it
@@ -31,16 +34,18 @@ class ConcaveOutline(UserWarning):
 
 
 def import_bodies(path: str | os.PathLike[str], output: str | os.PathLike[str], *, form: str = "", scale: float = 1.0,
-                  fixed: Iterable[int] = (), decomposed: bool = False, overwrite: bool = False) -> int:
+                  fixed: Iterable[int] = (), decomposed: bool = False, overwrite: bool = False,
+                  origin: Origin = None) -> int:
     """Make a bodies file of the polygons of a file (WKT, GeoJSON, plain text); return the number of bodies.
 
-    Coordinates are multiplied by `scale` to give metres. `fixed` are numbers of outlines in the file, from 1. A concave
-    outline is an error, or with `decomposed` becomes several bodies with a warning.
+    Coordinates are multiplied by `scale` to give metres, then `origin` is subtracted as in `write_bodies`. `fixed` are
+    numbers of outlines in the file, from 1. A concave outline is an error, or with `decomposed` becomes several bodies
+    with a warning.
     """
     if Path(output).exists() and Path(output).samefile(path):
         raise ResultError(f"{output}: is the file that is imported; choose another name")
     return write_bodies(read_outlines(Path(path), form), output, scale=scale, fixed=fixed, decomposed=decomposed,
-                        overwrite=overwrite)
+                        overwrite=overwrite, origin=origin)
 
 
 def import_shapely(geometries: Any, output: str | os.PathLike[str], **options: Any) -> int:
@@ -49,10 +54,13 @@ def import_shapely(geometries: Any, output: str | os.PathLike[str], **options: A
 
 
 def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[str], *, scale: float = 1.0,
-                 fixed: Iterable[int] | Iterable[bool] = (), decomposed: bool = False, overwrite: bool = False) -> int:
+                 fixed: Iterable[int] | Iterable[bool] = (), decomposed: bool = False, overwrite: bool = False,
+                 origin: Origin = None) -> int:
     """Write outlines, or arrays (k, 2) of vertices [1/scale m], as a bodies file; return the number of bodies.
 
-    `fixed` has the numbers of the outlines, from 1, that become fixed bodies, or one truth value per outline.
+    `fixed` has the numbers of the outlines, from 1, that become fixed bodies, or one truth value per outline. `origin`
+    is a point (x, y) [m] that becomes the origin of the bodies, or 'centre', the middle of the bounding box of all
+    outlines, rounded to whole metres. The file stores it, and an export of a run adds it to the coordinates.
     """
     path = Path(output)
     given = [each if isinstance(each, Outline) else Outline(np.asarray(each, dtype=float), f"outline {number}")
@@ -62,11 +70,12 @@ def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[st
         raise ResultError(f"there is no outline {min(held - set(range(1, len(given) + 1)))}, only {len(given)}")
     if not (np.isfinite(scale) and scale > 0.0):
         raise ResultError(f"the scale is {scale}, but must be a number above 0")
+    shift = _shift(given, scale, origin)
     polygons: list[FloatArray] = []
     rows: list[dict[str, Any]] = []
     places: list[str] = []
     for number, outline in enumerate(given, 1):
-        pieces = _pieces(outline, scale, decomposed)
+        pieces = _pieces(outline, scale, shift, decomposed)
         properties = {**outline.properties, **({"fixed": True} if number in held else {})}
         if len(pieces) > 1 and {"mass", "inertia", "id"} & set(properties):
             raise ResultError(f"{outline.place}: a mass, an inertia or an id cannot be divided among its pieces")
@@ -79,7 +88,7 @@ def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[st
     columns.setdefault("fixed", np.zeros(len(rows), dtype=np.int8))
     if path.exists() and not overwrite:
         raise ResultError(f"{path}: exists already; --force replaces it")
-    _write(path, polygons, columns)
+    _write(path, polygons, columns, None if origin is None else shift)
     return len(polygons)
 
 
@@ -93,16 +102,40 @@ def _numbers(fixed: list[Any], count: int) -> set[int]:
     return {number for number, each in enumerate(fixed, 1) if each}
 
 
-def _pieces(outline: Outline, scale: float, decomposed: bool) -> list[FloatArray]:
+def origin_of(path: str | os.PathLike[str]) -> tuple[float, float]:
+    """The point that became the origin of a bodies file [m]; (0, 0) if none did."""
+    try:
+        with h5py.File(path) as file:
+            return float(file.attrs.get("origin_x", 0.0)), float(file.attrs.get("origin_y", 0.0))
+    except OSError as error:
+        raise cannot_read(Path(path), error) from error
+
+
+def _shift(outlines: list[Outline], scale: float, origin: Origin) -> FloatArray:
+    """The point that becomes the origin [m], (2)."""
+    if origin is None or not outlines:
+        return np.zeros(2)
+    if isinstance(origin, str):
+        if origin != "centre":
+            raise ResultError(f"the origin is '{origin}', but must be 'centre' or a point (x, y)")
+        points = np.concatenate([np.asarray(outline.points, dtype=float).reshape(-1, 2) for outline in outlines])
+        return np.round(0.5 * scale * (points.min(axis=0) + points.max(axis=0))) + 0.0
+    point = np.asarray(origin, dtype=float)
+    if point.shape != (2,) or not np.isfinite(point).all():
+        raise ResultError(f"the origin is {origin}, but must be 'centre' or a point of two finite numbers")
+    return point
+
+
+def _pieces(outline: Outline, scale: float, shift: FloatArray, decomposed: bool) -> list[FloatArray]:
     """The convex polygons of an outline: itself, unless it is concave."""
     try:
-        points = tidy(outline.points * scale)
+        points = tidy(outline.points * scale - shift)
         wrong = concave_vertices(points)
         if not wrong:
             return [points]
         insist_on_simple(points)
         if not decomposed:
-            x, y = points[wrong[0]] / scale
+            x, y = (points[wrong[0]] + shift) / scale
             raise OutlineError(f"it is concave at the vertex ({x:g}, {y:g}); --decompose makes several bodies of it")
         pieces = decompose(points)
     except OutlineError as error:
@@ -140,7 +173,7 @@ def _column(name: str, rows: list[dict[str, Any]], places: list[str]) -> Any:
     return column if width > 1 else column[:, 0]
 
 
-def _write(path: Path, polygons: list[FloatArray], columns: dict[str, Any]) -> None:
+def _write(path: Path, polygons: list[FloatArray], columns: dict[str, Any], origin: FloatArray | None) -> None:
     vertex, start = join(polygons)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -150,3 +183,5 @@ def _write(path: Path, polygons: list[FloatArray], columns: dict[str, Any]) -> N
         file["vertex"], file["vertex_start"] = vertex, start
         for name, values in columns.items():
             file[name] = values
+        if origin is not None:
+            file.attrs["origin_x"], file.attrs["origin_y"] = (float(each) for each in origin)

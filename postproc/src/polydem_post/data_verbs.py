@@ -33,6 +33,7 @@ def add_data_verbs(verbs: Any) -> None:
     bodies.add_argument("-o", "--output", type=Path, required=True, metavar="BODIES.h5")
     bodies.add_argument("--from", choices=("wkt", "geojson", "text"), dest="form", metavar="FORMAT")
     bodies.add_argument("--scale", type=float, default=1.0, metavar="S")
+    bodies.add_argument("--origin", type=_origin, metavar="ORIGIN")
     bodies.add_argument("--fixed", type=_numbers, default=[], metavar="A,B,C")
     bodies.add_argument("--decompose", action="store_true")
     bodies.add_argument("--force", action="store_true")
@@ -43,6 +44,17 @@ def _frames(text: str) -> slice | list[int]:
     if re.fullmatch(r"-?\d*:-?\d*(:-?\d*)?", text) and text.split(":")[2:] != ["0"]:
         return slice(*(int(word) if word else None for word in text.split(":")))
     return _numbers(text)
+
+
+def _origin(text: str) -> str | tuple[float, float]:
+    """The word centre, or a point like 500000,5400000."""
+    if text == "centre":
+        return text
+    try:
+        x, y = (float(word) for word in text.split(","))
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"'{text}' is neither centre nor like 500000,5400000") from error
+    return x, y
 
 
 def _numbers(text: str) -> list[int]:
@@ -71,11 +83,14 @@ def _progress(done: int, total: int) -> None:
 
 
 def _import(options: argparse.Namespace) -> None:
-    from .bodies_file import import_bodies
+    from .bodies_file import import_bodies, origin_of
 
     if not np.isfinite(options.scale):
         raise ResultError("--scale takes a number above 0")
     n = import_bodies(options.file, options.output, form=options.form or "", scale=options.scale, fixed=options.fixed,
-                      decomposed=options.decompose, overwrite=options.force)
+                      decomposed=options.decompose, overwrite=options.force, origin=options.origin)
+    if options.origin is not None:
+        x, y = origin_of(options.output)
+        print(f"{options.output}: its origin is at ({x!r}, {y!r}) m; export adds this to the coordinates")
     bodies, quoted = "1 body" if n == 1 else f"{n} bodies", str(options.output).replace("'", "''")
     print(f"{options.output}: {bodies}; in the namelist: &scene name = 'file', bodies_file = '{quoted}'")

@@ -58,6 +58,8 @@ class Trajectory:
         #: Numbers of the frames of this trajectory in the whole run
         self._numbers = np.arange(len(self.times))
         self._bodies: tuple[Path | None, dict[str, Any]] = (None, {})
+        #: What is added to positions and points of contact [m], (2); None if nothing is
+        self._shift: npt.NDArray[np.float64] | None = None
 
     # --- a sequence of frames -------------------------------------------------------------------------------------
 
@@ -256,6 +258,20 @@ class Trajectory:
         with self._files.open_any() as file:
             return {name: plain(entry) for name, entry in file["provenance"].items()}
 
+    @cached_property
+    def origin(self) -> tuple[float, float]:
+        """The point (x, y) that `import --origin` made the origin of this run [m]; (0, 0) if it did not."""
+        return float(self.provenance.get("origin_x", 0.0)), float(self.provenance.get("origin_y", 0.0))
+
+    def in_world(self) -> Trajectory:
+        """The trajectory with `origin` added to positions, vertices and points of contact.
+
+        Energies, angular momenta and torques of walls remain those about the origin of the run.
+        """
+        world = copy.copy(self)
+        world._shift = np.array(self.origin) if any(self.origin) else None
+        return world
+
     @property
     def state_hash(self) -> str:
         """Hash of the bits of the last state, 16 hexadecimal digits."""
@@ -283,9 +299,12 @@ class Trajectory:
         frames = file["frames"]
         if self._bodies[0] != segment.path:
             self._bodies = (segment.path, _bodies_in(file))
+        columns = {name: frames[name][row] for name in GROWING}
+        if self._shift is not None:
+            columns["position"] = columns["position"] + self._shift
         return sound_frame(segment.path, Frame(
-            step=int(segment.steps[row]), time=float(segment.times[row]), number=number,
-            **{name: frames[name][row] for name in GROWING}, **self._bodies[1], _source=self))
+            step=int(segment.steps[row]), time=float(segment.times[row]), number=number, **columns, **self._bodies[1],
+            _source=self))
 
     def contacts_of(self, frame: Frame) -> Contacts:
         """The contacts of a frame of this run; `frame.contacts` calls it."""
@@ -299,6 +318,8 @@ class Trajectory:
             shapes = {name: (high - low, *([2] if name in ("point", "normal", "force") else []))
                       for name in CONTACT_FIELDS}
             insist(segment.path, "contacts", columns, shapes)
+        if self._shift is not None:
+            columns["point"] = columns["point"] + self._shift
         try:
             return find_contacts(frame, columns)
         except ResultError as error:

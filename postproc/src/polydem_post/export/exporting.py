@@ -29,9 +29,10 @@ def export_result(run: Trajectory, form: str, output: str | os.PathLike[str], *,
                   overwrite: bool = False, report: Report | None = None) -> list[Path]:
     """Write the frames of a trajectory in one of FORMATS; return the files.
 
-    Contacts are written if the run has them, unless `contacts` is false. `output` is the first file; the names of the
-    others begin like it. Files that exist are an error unless `overwrite` is true. Memory does not grow with the number
-    of frames.
+    Coordinates are those before `import --origin`, except in a file of GSD, whose single precision does not hold
+    them. Contacts are written if the run has them, unless `contacts` is false. `output` is the first file; the names
+    of the others begin like it. Files that exist are an error unless `overwrite` is true. Memory does not grow with
+    the number of frames.
     """
     if form not in FORMATS:
         raise ResultError(f"there is no format {form}; there are {', '.join(FORMATS)}")
@@ -40,7 +41,7 @@ def export_result(run: Trajectory, form: str, output: str | os.PathLike[str], *,
         raise ResultError(f"{path}: the name of a file for --to {form} ends with {FORMATS[form]}")
     if len(run) == 0:
         raise ResultError(f"{run.folder}: holds no frames")
-    job = _Job(run, path, contacts and run.has_contacts, report)
+    job = _Job(run if form == "gsd" else run.in_world(), path, contacts and run.has_contacts, report)
     targets = job.targets(form)
     for name, target in targets.items():
         _insist_on_free_place(name, target, overwrite)
