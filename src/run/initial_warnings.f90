@@ -25,8 +25,11 @@ module polydem_initial_warnings
    real(wp), parameter :: densities(2) = [1.0_wp, 3.0e4_wp]
    !> Gravity above that of any geotechnical centrifuge [m/s2]
    real(wp), parameter :: strongest_gravity = 5.0e3_wp
-   !> Ratio of the pressure of the weight to the stiffness above which bodies at rest overlap deeply [1]
-   real(wp), parameter :: softest = 0.05_wp
+   !> Greatest density that was probably meant in g/cm3: it is less than that of most foams [kg/m3]
+   real(wp), parameter :: greatest_in_grams = 12.0_wp
+   !> Ratio of the pressure of the weight to the stiffness above which bodies at rest overlap deeply, and one at which
+   !> they overlap little [1]
+   real(wp), parameter :: softest = 0.05_wp, firm = 0.01_wp
    !> Number of last bits of a coordinate that a displacement per step and a depth of overlap need: the error of one of
    !> them is then 2.5 %
    real(wp), parameter :: needed_bits = 20.0_wp
@@ -75,6 +78,15 @@ contains
          if (density(2) > densities(2) .or. density(1) < densities(1)) call add(warnings, &
             'masses are in kg per metre of depth, lengths in metres: free bodies have densities from '// &
             to_text(density(1), 3)//' to '//to_text(density(2), 3)//' kg/m3, which no solid has; check the units')
+         if (density(1) >= densities(1) .and. density(1) <= greatest_in_grams) call add(warnings, &
+            'densities are in kg/m3: that of the lightest free body is '//to_text(density(1), 3)// &
+            ' kg/m3, as of a light foam; did you mean '//to_text(1000.0_wp*density(1), 3)//' kg/m3, which is '// &
+            to_text(density(1), 3)//' g/cm3?')
+      end associate
+      associate (scene => simulation%settings%scene)
+         if (scene%name == 'hopper' .and. scene%opening < measures%diameter(1)) call add(warnings, &
+            'opening = '//to_text(scene%opening, 3)//' m is less than the diameter of the smallest grain, '// &
+            to_text(measures%diameter(1), 3)//' m: hardly any grain flows out. Increase opening in &scene')
       end associate
       associate (g => simulation%settings%forces%gravity)
          gravity = hypotenuse(g(1), g(2))
@@ -84,8 +96,9 @@ contains
          ' times that of the Earth; check the units')
       if (measures%softness > softest) call add(warnings, &
          'the pressure under the full height of the free bodies is '//to_text(measures%softness, 3)// &
-         ' of the stiffness: the lowest bodies overlap deeply. Increase stiffness in &forces, and check that '// &
-         'lengths are in metres')
+         ' of the stiffness: the lowest bodies overlap deeply. Increase stiffness in &forces (with '// &
+         to_text(simulation%settings%forces%stiffness*measures%softness/firm, 2)//' it is '//to_text(firm, 2)// &
+         '), and check that lengths are in metres')
    end subroutine warn_of_units
 
    !> Warn of a time step that is unstable as soon as bodies touch.

@@ -18,7 +18,7 @@ module polydem_restart
    use polydem_serializer, only: serializer_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
-   use polydem_strings, only: to_text
+   use polydem_strings, only: quoted, to_text
    use polydem_timers, only: timers_t
    implicit none
    private
@@ -82,13 +82,36 @@ contains
                     '. Restore them, or add --changed to resume with the new settings from step '// &
                     to_text(earlier%step))
       else if (origin_of(checkpoint_path(folder, earlier%checkpoint), 'scene') /= scene) then
-         call raise(error, input_error, folder//' holds the result of another run: '//other_bodies// &
-                    '. Restore them (check the bodies file), or use --force instead of --continue to overwrite it')
+         call raise(error, input_error, folder//' holds the result of another run: '// &
+                    why_other(settings, changes)//'. Restore it, or use --force instead of --continue to overwrite '// &
+                    'the result')
       end if
       if (allocated(error)) return
       if (changes /= '') earlier%remark = earlier%remark//new_line('a')//'changed    '//changes
       call count_segments(folder, manifest, scene, changes /= '', earlier, error)
    end subroutine find_restart
+
+   !> Why the initial bodies differ from those of the earlier run: by entries, or by the contents of a file
+   function why_other(settings, changes) result(text)
+      type(settings_t), intent(in) :: settings
+      !> Entries that differ; empty if none does
+      character(len=*), intent(in) :: changes
+      character(len=:), allocatable :: text
+
+      associate (scene => settings%scene)
+         if (changes /= '') then
+            text = other_bodies//' by '//changes
+         else if (scene%bodies_file /= '') then
+            text = other_bodies//', though no entry does: the contents of bodies_file = '// &
+               quoted(trim(scene%bodies_file))//' changed'
+         else if (scene%packing /= '') then
+            text = other_bodies//', though no entry does: the contents of packing = '// &
+               quoted(trim(scene%packing))//' changed'
+         else
+            text = other_bodies//', though no entry does: another revision of this program made them'
+         end if
+      end associate
+   end function why_other
 
    !> Restart at step 0 without a checkpoint; keep the closed segments of a run of the same scene and settings.
    subroutine restart_without_checkpoint(folder, manifest, settings, scene, earlier, error)
@@ -105,7 +128,7 @@ contains
       if (.not. exists(path)) return
       changes = changed_entries(origin_of(path, 'resolved_input'), settings%resolved)
       former = origin_of(path, 'scene')
-      if (changes == '' .and. former /= scene) changes = other_bodies
+      if (changes == '' .and. former /= scene) changes = why_other(settings, changes)
       if (changes == '') then
          call count_segments(folder, manifest, scene, .false., earlier, error)
       else

@@ -10,6 +10,7 @@ module polydem_channel
    use polydem_pour, only: loose_spacing, displace_randomly
    use polydem_random, only: new_random, random_t
    use polydem_settings, only: scene_settings_t
+   use polydem_strings, only: to_text
    use polydem_walls, only: append_box, rectangle
    implicit none
    private
@@ -43,7 +44,8 @@ contains
       spacing = length/real(n, wp)
       if (spacing < loose_spacing(scene)) then
          call raise(error, input_error, 'fraction is too large for a row of grains without overlap at the start; '// &
-                    'lower fraction')
+                    'lower fraction to '// &
+                    to_text(real(floor(1.0e3_wp*scene%fraction*spacing/loose_spacing(scene)), wp)/1.0e3_wp, 3))
          return
       end if
       do k = 1_ip, n

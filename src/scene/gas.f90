@@ -13,6 +13,7 @@ module polydem_gas
    use polydem_random, only: new_random, random_t
    use polydem_settings, only: scene_settings_t
    use polydem_start_velocities, only: choose_moving_grains, draw_spins, draw_velocities, remove_momentum, set_speed
+   use polydem_strings, only: to_text
    use polydem_walls, only: append_box, rectangle
    implicit none
    private
@@ -27,15 +28,36 @@ contains
       type(body_list_t), intent(inout) :: list
       !> Allocated if the fraction is too large for a start without overlaps
       type(error_t), allocatable, intent(inout) :: error
-      type(random_t) :: random
+      type(random_t) :: random, start
       type(grains_t) :: grains
       real(wp), allocatable :: centres(:, :)
-      real(wp) :: area, width, inside(2, 4), spacing
+      real(wp) :: inside(2, 4), spacing
 
       allocate (centres(2, scene%bodies))
       random = new_random(scene%seed)
       call draw_grains(scene, random, scene%bodies, grains)
-      area = total_area(grains%area)/scene%fraction
+      start = random
+      call arrange(scene, grains, scene%fraction, random, inside, centres, spacing)
+      if (.not. spacing > 0.0_wp) then
+         call raise(error, input_error, 'fraction is too large for grains without overlap at the start; lower '// &
+                    'fraction'//largest_fraction(scene, grains, start))
+         return
+      end if
+      call append_moving_grains(list, scene, random, grains, centres)
+      call append_box(list, inside, scene%long_axis_max*sqrt(scene%size_ratio), closed=.true.)
+   end subroutine list_gas
+
+   !> Arrange the grains in the container that a fraction requires; the spacing is 0 if they do not fit.
+   subroutine arrange(scene, grains, fraction, random, inside, centres, spacing)
+      type(scene_settings_t), intent(in) :: scene
+      type(grains_t), intent(in) :: grains
+      real(wp), intent(in) :: fraction
+      type(random_t), intent(inout) :: random
+      !> Container (2, 4), centres (2, grain), distance of the centres [m]
+      real(wp), intent(out) :: inside(2, 4), centres(:, :), spacing
+      real(wp) :: area, width
+
+      area = total_area(grains%area)/fraction
       width = scene%width
       if (.not. width > 0.0_wp) width = sqrt(area)
       inside = rectangle(-0.5_wp*width, 0.5_wp*width, -0.5_wp*area/width, 0.5_wp*area/width)
@@ -49,13 +71,36 @@ contains
          call spread_out(inside, loose_spacing(scene), centres, spacing)
          call displace_randomly(random, spacing - scene%long_axis_max, centres)
       end if
-      if (.not. spacing > 0.0_wp) then
-         call raise(error, input_error, 'fraction is too large for grains without overlap at the start; lower fraction')
-         return
-      end if
-      call append_moving_grains(list, scene, random, grains, centres)
-      call append_box(list, inside, scene%long_axis_max*sqrt(scene%size_ratio), closed=.true.)
-   end subroutine list_gas
+   end subroutine arrange
+
+   !> The end of a message: ' to ' and the largest fraction, in steps of 0.01, with which the grains fit
+   function largest_fraction(scene, grains, start) result(text)
+      type(scene_settings_t), intent(in) :: scene
+      type(grains_t), intent(in) :: grains
+      !> State of the random numbers before the grains are arranged
+      type(random_t), intent(in) :: start
+      character(len=:), allocatable :: text
+      type(random_t) :: trial
+      real(wp), allocatable :: centres(:, :)
+      real(wp) :: inside(2, 4), spacing
+      integer :: fits, fails, k
+
+      allocate (centres(2, size(grains%area)))
+      fits = 0
+      fails = ceiling(100.0_wp*scene%fraction)
+      do while (fails - fits > 1)
+         k = (fits + fails)/2
+         trial = start
+         call arrange(scene, grains, real(k, wp)/100.0_wp, trial, inside, centres, spacing)
+         if (spacing > 0.0_wp) then
+            fits = k
+         else
+            fails = k
+         end if
+      end do
+      text = ''
+      if (fits > 0) text = ' to '//to_text(real(fits, wp)/100.0_wp, 2)
+   end function largest_fraction
 
    !> Append grains with random velocities and angular velocities. The total momentum is zero unless one grain alone
    !> moves.

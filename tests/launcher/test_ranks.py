@@ -44,6 +44,13 @@ class Ranks(Toy):
         self.assertEqual((noted["OMPI_MCA_rmaps_base_oversubscribe"], noted["OMPI_MCA_mpi_yield_when_idle"],
                           noted["OMP_WAIT_POLICY"]), ("1", "1", "passive"))
 
+    def test_a_number_of_threads_that_is_none_is_refused_alike_for_one_process_and_ranks(self):
+        for value in ("abc", "0", "-2", "1.5"):
+            for words in (("run", "x"), ("run", "x", "--ranks", "2")):
+                self.assertEqual(self.call(*words, OMP_NUM_THREADS=value), (
+                    2, "", f"polydem: OMP_NUM_THREADS={value}: an integer from 1 to 999999 was expected\n"))
+            self.assertEqual(self.call("run", "x", "--threads", "1", OMP_NUM_THREADS=value)[0], 0)
+
     def test_waiting_threads_soon_sleep_unless_the_user_has_chosen(self):
         for chosen, expected in (({}, "10000"), ({"GOMP_SPINCOUNT": "7"}, "7"), ({"OMP_WAIT_POLICY": "active"}, None)):
             noted = self.run_ranks("run", "x", "--ranks", "1", "--threads", "1", **chosen)[2]

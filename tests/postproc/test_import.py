@@ -171,12 +171,61 @@ def test_a_concave_outline_is_named_or_decomposed(tmp_path, capsys):
     path, output = tmp_path / "l.wkt", tmp_path / "out.h5"
     path.write_text(f"{wkt(SQUARE)}\n{wkt(L_SHAPE)}\n")
     assert main(["import", str(path), "-o", str(output)]) == 2
-    assert f"{path}:2: the outline cannot be a body: it is concave at the vertex (1, 1); --decompose makes several" \
-        in capsys.readouterr().err
+    assert f"{path}:2: the outline cannot be a body: it is concave at the vertex (1, 1); --decompose makes several " \
+        "separate bodies of it, which can move apart" in capsys.readouterr().err
     assert not output.exists()
     with pytest.warns(ConcaveOutline, match=r"l.wkt:2: the outline is concave and becomes 2 separate bodies"):
         assert import_bodies(path, output, decomposed=True, fixed=[2]) == 3
     assert_array_equal(contents(output)["fixed"], [0, 1, 1])
+
+
+# A square with a vertex on an edge, turned in single precision; the like in Lambert 93 coordinates; a closing vertex
+# that is off by rounding; a vertex within the tolerance of an edge.
+NEARLY_CONVEX = [
+    [(-8.470019340515137, 0.5455836057662964), (-7.678089141845703, 0.658928632736206),
+     (-7.084141731262207, 0.7439373731613159), (-7.367504119873047, 2.723762035369873),
+     (-9.347329139709473, 2.440399646759033), (-9.063966751098633, 0.4605748653411865)],
+    [(1051174.0, 6839999.9), (1051178.8, 6839991.7), (1051183.7, 6839994.6), (1051178.8, 6840002.7),
+     (1051176.4, 6840001.3)],
+    [(0.0, 0.0), (1.0, 0.0), (1.0, 0.5), (0.0, 0.5), (1e-10, -1e-10)],
+    [(0.0, 0.0), (0.5, 0.5e-9), (1.0, 0.0), (0.5, 1.0)],
+]
+# Deviations beyond the tolerance, at the origin and far from it, and an outline that crosses itself
+CONCAVE = [
+    [(0.0, 0.0), (0.5, 3e-9), (1.0, 0.0), (0.5, 1.0)],
+    [(6e6, 6e6), (6e6 + 0.5, 6e6 + 3e-8), (6e6 + 1.0, 6e6), (6e6 + 0.5, 6e6 + 1.0)],
+    [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 0.0), (0.5, 1.0)],
+]
+
+
+def program_says(points, folder):
+    """The messages of `check` on one free body of these vertices, just as they are."""
+    with h5py.File(folder / "raw.h5", "w") as file:
+        file["vertex"], file["vertex_start"] = np.array(points), [0, len(points)]
+        file["fixed"] = np.zeros(1, dtype=np.int8)
+    (folder / "raw.nml").write_text("&scene\n name = 'file'\n bodies_file = 'raw.h5'\n/\n"
+                                    "&integrate\n duration = 0.001\n/\n")
+    check = subprocess.run([PROGRAM, "check", "raw.nml"], cwd=folder, capture_output=True, text=True, check=False)
+    return check.returncode, check.stdout + check.stderr
+
+
+@pytest.mark.parametrize("points", NEARLY_CONVEX)
+def test_what_the_program_takes_is_imported(points, tmp_path):
+    assert program_says(points, tmp_path)[0] == 0
+    assert write_bodies([points], tmp_path / "out.h5") == 1
+
+
+@pytest.mark.parametrize("points", CONCAVE)
+def test_what_the_program_refuses_is_refused(points, tmp_path):
+    code, said = program_says(points, tmp_path)
+    assert code == 2 and ("convex" in said or "crosses" in said), said
+    with pytest.raises(ResultError, match="cannot be a body"):
+        write_bodies([points], tmp_path / "out.h5")
+
+
+def test_a_small_deviation_is_visible_at_large_coordinates(tmp_path):
+    with pytest.raises(ResultError, match=r"concave at the vertex \(6000000.5, 6000000.00000003"):
+        write_bodies([CONCAVE[1]], tmp_path / "out.h5")
 
 
 def features(*properties):
@@ -190,6 +239,12 @@ def features(*properties):
     ("a.wkt", "POINT (1 2)", "a.wkt:1: is not a POLYGON or MULTIPOLYGON of WKT: 'POINT (1 2)'"),
     ("a.wkt", "POLYGON ((0 0, 1 0, x 1))", "a.wkt:1: a vertex is not a pair of numbers"),
     ("a.wkt", "\nPOLYGON ((0 0, 1 0, 1 1)", "a.wkt:2: the brackets of the geometry do not match"),
+    ("a.wkt", "POLYGON((\n0 0,\n1 0,\n0 1,\n0 0))\n",
+     "a.wkt:1: the brackets of the geometry do not match; a geometry must stand on one line"),
+    ("a.wkt", "POLYGON (0 0, 1 0, 0 1, 0 0)", "a.wkt:1: a bracket pair is missing: POLYGON ((x y, ...)) was expected"),
+    ("a.wkt", "MULTIPOLYGON ((0 0, 1 0, 0 1))", "a bracket pair is missing: MULTIPOLYGON (((x y, ...))) was expected"),
+    ("a.wkt", "POLYGON (((0 0, 1 0, 0 1)))", "a.wkt:1: a bracket pair is too many: POLYGON ((x y, ...)) was expected"),
+    ("a.wkt", "POLYGON EMPTY", "a.wkt:1: the polygon is empty; remove this line"),
     ("a.wkt", "POLYGON ((0 0, 9 0, 9 9, 0 9), (1 1, 2 1, 2 2))", "a.wkt:1: the polygon has a hole"),
     ("a.wkt", "", "a.wkt: holds no polygons"),
     ("a.wkt", "POLYGON ((0 0, 1e200 0, 0 1))", "a.wkt:1: the outline cannot be a body: a coordinate is beyond 1e+50 m"),
@@ -197,6 +252,11 @@ def features(*properties):
     ("a.json", "[" * 100000, "a.json: its lists are nested too deeply"),
     ("a.json", '{"type": "Feature", "geometry": null}', "a.json: has no geometry"),
     ("a.json", '{"type": "Point", "coordinates": [0, 0]}', "a.json: is a Point, not a Polygon or MultiPolygon"),
+    ("a.json", '{"type": "Polygon", "coordinates": [[0, 0], [1, 0], [0, 1]]}',
+     "a.json: the coordinates have 2 list levels, but those of a Polygon have 3: [[[x, y], ...]]"),
+    ("a.json", '{"type": "MultiPolygon", "coordinates": [[[0, 0], [1, 0], [0, 1]]]}',
+     "a.json: the coordinates have 3 list levels, but those of a MultiPolygon have 4: [[[[x, y], ...]]]"),
+    ("a.json", features({"fixed": "true"}), "a.json: the fixed is 'true', but must be true or false, without quotes"),
     ("a.json", '{"type": "Polygon", "coordinates": [[[0], [1, 0], [1, 1]]]}', "the vertices are not pairs of numbers"),
     ("a.json", features({}, {"velocity": "fast"}), "a.json: feature 2: the velocity is 'fast', not 2 number(s)"),
     ("a.json", features({"id": 3}, {}), "a.json: feature 2: has no id, which other polygons have"),
@@ -212,6 +272,8 @@ def features(*properties):
     ("a.json", features({}, [1]), "a.json: feature 2: its properties are no object of GeoJSON"),
     ("a.txt", "0 0\n1 0\n1 one\n", "a.txt:3: is neither a vertex such as '0.1 0.2' nor the word fixed: '1 one'"),
     ("a.txt", "0 0\n1 0\n", "a.txt:1: the outline cannot be a body: it has 2 different vertices"),
+    ("a.txt", "# first\n0 0\n1 0\n1 1\n# second\n2 0\n3 0\n3 1\n",
+     "cross. The comment in line 5 does not end an outline; an empty line between outlines does"),
     ("a.txt", "\n0 0\n1 0\n2 0\n", "a.txt:2: the outline cannot be a body: it has 2 different vertices"),
     ("a.txt", "0 0\n1 1\n1 0\n0 1\n", "a.txt:1: the outline cannot be a body"),
     ("a.txt", text([STAR[k] for k in (0, 4, 8, 2, 6)]), "its edges 1 and 3 cross"),

@@ -134,6 +134,9 @@ def test_reads_a_table_as_spreadsheets_write_it(tmp_path):
         ("scene.seed\n1\n", 1, "needs a column name"),
         ("name,scene.seed,scene.seed\n", 1, "'scene.seed' is there twice"),
         ("name,seed\n", 1, "'seed' is not an entry"),
+        ("name;scene.seed\na;1\n", 1, "separate the columns with commas, as in name,scene.seed"),
+        ("name\tscene.seed\na\t1\n", 1, "separate the columns with commas, as in name,scene.seed"),
+        ("name,scene.seed,\na,1,\n", 1, "column 3 has no name; remove the comma too many from each line"),
         ("name,scene.seed x\n", 1, "is not an entry"),
         ("name,output.folder\n", 1, "output.folder cannot vary"),
         ("name,scene.seed\n", 0, "has no rows"),
@@ -143,6 +146,7 @@ def test_reads_a_table_as_spreadsheets_write_it(tmp_path):
         ("name,scene.seed\n../x,1\n", 2, "'../x' cannot be a name"),
         ("name,scene.seed\n,1\n", 2, "'' cannot be a name"),
         ('name,scene.seed\na,"1\n', 2, "is not CSV"),
+        ("name,scene.seed\nm\xfchle,1\n", 0, "is not text in UTF-8 (byte 17); save it in UTF-8"),
         ("name,scene.seed\n\x00,\x80", 0, ""),
     ],
 )

@@ -259,7 +259,7 @@ def other_bodies_are_not_taken_for_the_finished_run(program):
         copy("grains", "grains_2")
         for changed in ((), ("--changed",)):
             code, _, message = program.run("poured", *bed, *checkpoints, "--continue", *changed, scene="bed.nml")
-            assert code == BAD_INPUT and "the initial bodies differ" in message, (code, message)
+            assert code == BAD_INPUT and "the contents of packing = 'grains' changed" in message, (code, message)
             assert contents("poured") == before
 
 

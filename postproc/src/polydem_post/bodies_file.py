@@ -135,11 +135,12 @@ def _pieces(outline: Outline, scale: float, shift: FloatArray, decomposed: bool)
             return [points]
         insist_on_simple(points)
         if not decomposed:
-            x, y = (points[wrong[0]] + shift) / scale
-            raise OutlineError(f"it is concave at the vertex ({x:g}, {y:g}); --decompose makes several bodies of it")
+            vertex = ", ".join(repr(float(x)).removesuffix(".0") for x in (points[wrong[0]] + shift) / scale)
+            raise OutlineError(f"it is concave at the vertex ({vertex}); --decompose makes several separate bodies of "
+                               "it, which can move apart")
         pieces = decompose(points)
     except OutlineError as error:
-        raise ResultError(f"{outline.place}: the outline cannot be a body: {error}") from error
+        raise ResultError(f"{outline.place}: the outline cannot be a body: {error}{outline.hint}") from error
     warnings.warn(f"{outline.place}: the outline is concave and becomes {len(pieces)} separate bodies, which can move "
                   "apart", ConcaveOutline, stacklevel=4)
     return pieces
@@ -157,7 +158,8 @@ def _column(name: str, rows: list[dict[str, Any]], places: list[str]) -> Any:
         try:
             value = np.array(row.get(name, np.zeros(width)), dtype=float).reshape(width)
         except (TypeError, ValueError) as error:
-            raise ResultError(f"{place}: the {name} is {row[name]!r}, not {width} number(s)") from error
+            wanted = f"but must be {MEANINGS[name]}, without quotes" if name in MEANINGS else f"not {width} number(s)"
+            raise ResultError(f"{place}: the {name} is {row[name]!r}, {wanted}") from error
         if name in row and not (np.isfinite(value).all() and RANGES.get(name, np.isfinite)(value[0])):
             raise ResultError(f"{place}: the {name} is {row[name]!r}, but must be {MEANINGS.get(name, 'finite')}")
         values.append(value)

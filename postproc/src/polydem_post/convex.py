@@ -6,7 +6,11 @@ import numpy as np
 
 from .polygons import FloatArray, area_of
 
-#: Deviations of an outline that count as none, relative to its size
+#: A vertex is dropped if it is closer to its neighbour, or to the line of its neighbours, than this fraction of the
+#: size: redundant_share of src/geometry/polygon.f90
+REDUNDANT_SHARE = 1e-9
+
+#: Areas of triangles that count as none in a decomposition, relative to the size of the outline squared
 ROUNDOFF = 1e-12
 
 #: Greatest coordinate [m]: areas and moments of inertia of greater polygons overflow
@@ -18,47 +22,64 @@ class OutlineError(Exception):
 
 
 def tidy(points: FloatArray) -> FloatArray:
-    """The outline anticlockwise, without repeated and without redundant vertices; OutlineError if it has no area."""
+    """The outline anticlockwise, without repeated and without redundant vertices; OutlineError if it has no area.
+
+    The rule is that of the program (src/geometry/polygon.f90), so that both accept the same outlines.
+    """
     if points.ndim != 2 or points.shape[1] != 2:
         raise OutlineError("its vertices are not pairs of x and y")
     if not np.isfinite(points).all():
         raise OutlineError("a coordinate is not a finite number")
-    if np.abs(points).max(initial=0.0) > GREATEST:
+    greatest = float(np.abs(points).max(initial=0.0))
+    if greatest > GREATEST:
         raise OutlineError(f"a coordinate is beyond {GREATEST:g} m")
-    outline = points - points.mean(axis=0) if len(points) else points
-    size = float(np.abs(outline).max()) if len(points) else 0.0
-    kept = list(range(len(outline)))
-    found = True
-    while found and len(kept) >= 3:
-        found = False
-        for k in range(len(kept)):
-            before, here, after = (outline[kept[(k + step) % len(kept)]] for step in (-1, 0, 1))
-            repeated = np.abs(here - after).max() <= ROUNDOFF * size
-            if repeated or (abs(_cross(before, here, after)) <= ROUNDOFF * size**2
-                            and float((here - before) @ (after - here)) >= 0.0):
-                del kept[k]
-                found = True
-                break
+    n = len(points)
+    extent = max((float(np.hypot(*(points[k:] - points[k]).T).max()) for k in range(n)), default=0.0)
+    tolerance = REDUNDANT_SHARE * extent + 16.0 * np.finfo(float).eps * greatest
+    area = area_of(points)
+    kept = list(range(n)) if area > 0.0 else [-k % n for k in range(n)]
+    k = in_order = 0
+    while in_order < len(kept) and len(kept) > 2:
+        arriving = points[kept[k]] - points[kept[k - 1]]
+        leaving = points[kept[(k + 1) % len(kept)]] - points[kept[k]]
+        if _is_redundant(arriving, leaving, tolerance):
+            del kept[k]
+            in_order = 0
+            k %= len(kept)
+        else:
+            in_order += 1
+            k = (k + 1) % len(kept)
     if len(kept) < 3:
         raise OutlineError(f"it has {len(kept)} different vertices that are not on one line, but needs 3")
-    outline = points[kept]
-    if abs(area_of(outline)) <= ROUNDOFF * size**2:
+    if abs(area) <= tolerance * extent:
         raise OutlineError("it has no area")
-    return outline if area_of(outline) > 0.0 else outline[::-1]
+    return points[kept] if area > 0.0 else points[[*kept[1:], kept[0]]]
+
+
+def _is_redundant(arriving: FloatArray, leaving: FloatArray, tolerance: float) -> bool:
+    """Whether a vertex repeats the next one or lies between its neighbours; not the tip of a spike."""
+    return bool(np.hypot(*leaving) <= tolerance
+                or (abs(_turn(arriving, leaving)) <= tolerance * np.hypot(*(arriving + leaving))
+                    and arriving @ leaving > 0.0))
 
 
 def concave_vertices(outline: FloatArray) -> list[int]:
-    """Vertices of an anticlockwise outline at which it turns right, or from which on it goes round twice."""
-    n = len(outline)
-    size = float(np.abs(outline - outline.mean(axis=0)).max())
-    wrong = [k for k in range(n)
-             if _cross(outline[k - 1], outline[k], outline[(k + 1) % n]) < -ROUNDOFF * size**2]
+    """Vertices of a tidy outline at which it does not turn left, or from which on it goes round twice."""
+    edge = np.roll(outline, -1, axis=0) - outline
+    wrong = [k for k in range(len(outline)) if _turn(edge[k - 1], edge[k]) <= 0.0]
     if wrong:
         return wrong
-    edge = np.roll(outline, -1, axis=0) - outline
-    direction = np.arctan2(edge[:, 1], edge[:, 0])
-    turned = np.cumsum(np.mod(np.diff(np.append(direction, direction[0])), 2.0 * np.pi))
-    return [int(np.argmax(turned > 2.0 * np.pi + 1e-6))] if turned[-1] > 3.0 * np.pi else []
+    down = (edge[:, 1] < 0.0) | ((edge[:, 1] == 0.0) & (edge[:, 0] < 0.0))
+    rounds = np.cumsum(np.roll(down, 1) & ~down)
+    return [int(np.argmax(rounds > 1))] if rounds[-1] > 1 else []
+
+
+def _is_convex(points: FloatArray) -> bool:
+    """Whether an outline can be one body."""
+    try:
+        return not concave_vertices(tidy(points))
+    except OutlineError:
+        return False
 
 
 def insist_on_simple(outline: FloatArray) -> None:
@@ -129,16 +150,18 @@ def _joined(outline: FloatArray, one: list[int], other: list[int]) -> list[int] 
                 whole = one[k + 1 :] + one[: k + 1] if k + 1 < len(one) else one[:]
                 rest = [other[(m + 1 + step) % len(other)] for step in range(1, len(other) - 1)]
                 whole = whole + rest
-                turns = [_cross(*outline[[whole[j - 1], whole[j], whole[(j + 1) % len(whole)]]])
-                         for j in range(len(whole))]
-                size = float(np.abs(outline - outline.mean(axis=0)).max())
-                return whole if min(turns) >= -ROUNDOFF * size**2 else None
+                return whole if _is_convex(outline[whole]) else None
     return None
+
+
+def _turn(arriving: FloatArray, leaving: FloatArray) -> float:
+    """Cross product of two edges; positive: a turn to the left."""
+    return float(arriving[0] * leaving[1] - arriving[1] * leaving[0])
 
 
 def _cross(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
     """Twice the area of a triangle; positive: anticlockwise."""
-    return float((b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0]))
+    return _turn(b - a, c - b)
 
 
 def _inside(point: FloatArray, a: FloatArray, b: FloatArray, c: FloatArray) -> bool:

@@ -30,6 +30,8 @@ class Outline:
     place: str
     #: Values of PROPERTIES that the file gives
     properties: dict[str, Any] = field(default_factory=dict)
+    #: What a message adds if the outline cannot be a body
+    hint: str = ""
 
 
 def read_outlines(path: Path, form: str = "") -> list[Outline]:
@@ -40,9 +42,7 @@ def read_outlines(path: Path, form: str = "") -> list[Outline]:
                           f"{', '.join(READERS)}")
     try:
         text = path.read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ResultError(f"{path}: is not text in UTF-8 (byte {error.start})") from error
-    except OSError as error:
+    except (OSError, UnicodeDecodeError) as error:
         raise cannot_read(path, error) from error
     outlines = list(READERS[form](text, str(path)))
     if not outlines:
@@ -67,7 +67,7 @@ def _of_shapely(geometry: Any, place: str) -> Iterator[Outline]:
         raise ResultError(f"{place}: is a {geometry.geom_type}, not a polygon")
 
 
-def _from_rings(rings: list[Any], place: str, properties: dict[str, Any] | None = None) -> Outline:
+def _from_rings(rings: list[Any], place: str, properties: dict[str, Any] | None = None, hint: str = "") -> Outline:
     """The outline of a polygon; the last point of a ring repeats the first one."""
     if len(rings) != 1:
         holes = "a hole" if len(rings) == 2 else f"{len(rings) - 1} holes"
@@ -80,7 +80,7 @@ def _from_rings(rings: list[Any], place: str, properties: dict[str, Any] | None 
     except (TypeError, ValueError, IndexError) as error:
         raise ResultError(f"{place}: the vertices are not pairs of numbers") from error
     return Outline(points[:-1] if len(points) > 1 and (points[0] == points[-1]).all() else points, place,
-                   properties or {})
+                   properties or {}, hint)
 
 
 def _read_wkt(text: str, name: str) -> Iterator[Outline]:
@@ -90,9 +90,13 @@ def _read_wkt(text: str, name: str) -> Iterator[Outline]:
         words = re.sub(r"^SRID=\d+;", "", line.strip(), flags=re.IGNORECASE)
         if not words or words.startswith("#"):
             continue
-        kind = re.match(r"(MULTIPOLYGON|POLYGON)\s*(?:Z|M|ZM)?\s*(\(.*\))$", words, re.IGNORECASE)
+        if words.count("(") != words.count(")"):
+            raise ResultError(f"{place}: the brackets of the geometry do not match; a geometry must stand on one line")
+        kind = re.match(r"(MULTIPOLYGON|POLYGON)\s*(?:ZM|Z|M)?\s*(\(.*\)|EMPTY)$", words, re.IGNORECASE)
         if not kind:
             raise ResultError(f"{place}: is not a POLYGON or MULTIPOLYGON of WKT: {words[:60]!r}")
+        if kind[2].upper() == "EMPTY":
+            raise ResultError(f"{place}: the polygon is empty; remove this line")
         inner = kind[2][1:-1].strip()
         groups = _groups(inner, place) if kind[1].upper() == "MULTIPOLYGON" else [inner]
         for group in groups:
@@ -103,7 +107,9 @@ def _read_wkt(text: str, name: str) -> Iterator[Outline]:
                     raise ResultError(f"{place}: a vertex is not a pair of numbers: ({ring[:60]})")
                 rings.append([[float(each) for each in point] for point in points])
             if re.sub(r"[\s,]", "", _RING.sub("", group)) or not rings:
-                raise ResultError(f"{place}: the brackets of the geometry do not match")
+                example = "((x y, ...))" if kind[1].upper() == "POLYGON" else "(((x y, ...)))"
+                raise ResultError(f"{place}: a bracket pair is {'too many' if rings else 'missing'}: {kind[1].upper()} "
+                                  f"{example} was expected")
             yield _from_rings(rings, place)
 
 
@@ -156,22 +162,37 @@ def _of_geojson(geometry: Any, place: str, properties: dict[str, Any]) -> Iterat
         polygons = [coordinates] if kind == "Polygon" else coordinates
         if not isinstance(polygons, list) or not all(isinstance(rings, list) for rings in polygons):
             raise ResultError(f"{place}: the polygon has no lists of coordinates")
+        found, wanted = _levels(coordinates), 3 if kind == "Polygon" else 4
+        if found not in (0, wanted):
+            raise ResultError(f"{place}: the coordinates have {found} list levels, but those of a {kind} have "
+                              f"{wanted}: {'[' * wanted}x, y], ...{']' * (wanted - 1)}")
         for rings in polygons:
             yield _from_rings(rings, place, properties)
     else:
         raise ResultError(f"{place}: {f'is a {kind}' if kind else 'has no geometry'}, not a Polygon or MultiPolygon")
 
 
+def _levels(coordinates: Any) -> int:
+    """How many lists are around the first number; 0 if there is none."""
+    levels = 0
+    while isinstance(coordinates, list) and coordinates:
+        coordinates = coordinates[0]
+        levels += 1
+    return levels if isinstance(coordinates, (int, float)) else 0
+
+
 def _read_text(text: str, name: str) -> Iterator[Outline]:
     """One vertex per line, x and y; an empty line ends an outline; a line `fixed` makes its body fixed."""
     points: list[list[float]] = []
     properties: dict[str, Any] = {}
-    first = 0
+    first, hint = 0, ""
     for number, line in enumerate([*text.splitlines(), ""], 1):
         words = line.partition("#")[0].replace(",", " ").replace(";", " ").split()
         if not words and (points or properties) and not line.strip():
-            yield _from_rings([points] if points else [], f"{name}:{first}", properties)
-            points, properties = [], {}
+            yield _from_rings([points] if points else [], f"{name}:{first}", properties, hint)
+            points, properties, hint = [], {}, ""
+        elif not words and points and not hint:
+            hint = f". The comment in line {number} does not end an outline; an empty line between outlines does"
         elif words:
             first = first if points or properties else number
             if words == ["fixed"]:

@@ -45,6 +45,8 @@ class ResultError(Exception):
 
 def cannot_read(path: Path, error: Exception) -> ResultError:
     """The error that a file cannot be read, with the reason in a few words."""
+    if isinstance(error, UnicodeDecodeError):
+        return ResultError(f"{path}: is not text in UTF-8 (byte {error.start}); save it in UTF-8")
     again = "; a run may be writing this file: try again" if Path(path).name.endswith(OPEN_SUFFIX) else ""
     return ResultError(f"{path}: cannot be read ({reason(error)}){again}")
 

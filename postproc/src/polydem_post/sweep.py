@@ -133,6 +133,7 @@ def read_table(path: Path) -> tuple[list[str], list[Row]]:
     first, header = lines[0]
     problems = _problems_of_header(f"{path}:{first}", header)
     place_of_name = header.index(NAME) if NAME in header else 0
+    raise_all(problems if len(header) == 1 else [])
     columns = [word for word in header if word != NAME]
     rows = []
     for number, words in lines[1:]:
@@ -179,10 +180,14 @@ def raise_all(problems: list[str]) -> None:
 
 
 def _problems_of_header(place: str, header: list[str]) -> list[str]:
+    if len(header) == 1 and re.search(r"[; ]", header[0]):
+        return [f"{place}: separate the columns with commas, as in name,scene.seed"]
     problems = []
     if NAME not in header:
         problems.append(f"{place}: the table needs a column {NAME}, apart from those of entries like scene.seed")
-    for word in dict.fromkeys(header):
+    if "" in header:
+        problems.append(f"{place}: column {header.index('') + 1} has no name; remove the comma too many from each line")
+    for word in filter(None, dict.fromkeys(header)):
         if header.count(word) > 1:
             problems.append(f"{place}: the column {word!r} is there twice")
         if word != NAME:
