@@ -124,6 +124,7 @@ contains
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
       call run%provenance%set('scene', scene)
       run%provenance%processes = run%comm%size
+      if (allocated(run%attempt%threads%reason)) call run%provenance%set('thread_choice', run%attempt%threads%reason)
       if (run%manifest%is_found .and. run%attempt%continues) &
          call find_restart(run%folder, run%manifest, settings, scene, run%attempt%may_change, run%earlier, error)
       if (allocated(error)) return
