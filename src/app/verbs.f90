@@ -50,7 +50,8 @@ contains
          if (.not. allocated(error)) call read_settings(command%file, command%overrides, settings, error)
          call comm%all_reduce_error(error)
          if (.not. allocated(error)) call run_simulation(settings, command%force, error, attempt_t( &
-            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp), threads=threads), comm)
+            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp), &
+            threads=threads), comm)
          return
       end if
       call release_signals()

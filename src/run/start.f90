@@ -44,8 +44,8 @@ contains
       if (allocated(error)) return
       call build_scene(settings, self%bodies, self%motions, error, ranks%rank, ranks%size)
       call ranks%all_reduce_error(error)
-      if (present(threads) .and. .not. allocated(error)) call set_threads(threads, ranks, size(self%bodies%free, kind=ip), &
-                                                                          error)
+      if (present(threads) .and. .not. allocated(error)) &
+         call set_threads(threads, ranks, size(self%bodies%free, kind=ip), error)
       if (.not. allocated(error)) call start_with_bodies(settings, ranks, self, error)
    end subroutine new_simulation
 

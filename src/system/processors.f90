@@ -31,8 +31,8 @@ contains
       granted_processors = int(max(1.0_dp, min(real(affine, dp), aint(processor_quota('')))), ip)
    end function granted_processors
 
-   !> Processor time per elapsed time that the control groups of the process allow, of version 1 or 2: the least quota of
-   !> the groups that contain it; a huge number if there is none.
+   !> Processor time per elapsed time that the control groups of the process allow, of version 1 or 2: the least quota
+   !> of the groups that contain it; a huge number if there is none.
    real(dp) function processor_quota(root)
       !> Folder that contains proc and sys; empty except in tests
       character(len=*), intent(in) :: root
