@@ -9,6 +9,7 @@ module polydem_verbs
    use polydem_communicator, only: communicator_t
    use polydem_convert_file, only: convert_file
    use polydem_errors, only: error_t
+   use polydem_host, only: environment
    use polydem_kinds, only: dp, ip
    use polydem_oversubscription, only: oversubscription, oversubscription_text
    use polydem_process_limits, only: check_threads
@@ -20,6 +21,7 @@ module polydem_verbs
    use polydem_screen, only: print_line, warn
    use polydem_settings, only: bench_settings_t, settings_t
    use polydem_signals, only: release_signals
+   use polydem_thread_choice, only: thread_choice_t
    implicit none
    private
    public :: execute
@@ -34,6 +36,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(settings_t) :: settings
       type(bench_settings_t) :: bench
+      type(thread_choice_t) :: threads
       character(len=:), allocatable :: crowd, report
 
       if (command%help .or. command%version) then
@@ -42,12 +45,13 @@ contains
                                                                       git_revision//')', error)
          return
       end if
-      call choose_threads(command, error)
+      call set_threads(command, threads, error)
       if (command%verb == 'run') then
          if (.not. allocated(error)) call read_settings(command%file, command%overrides, settings, error)
          call comm%all_reduce_error(error)
          if (.not. allocated(error)) call run_simulation(settings, command%force, error, attempt_t( &
-            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp)), comm)
+            continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp), &
+            threads=threads), comm)
          return
       end if
       call release_signals()
@@ -58,7 +62,7 @@ contains
       select case (command%verb)
       case ('check')
          call read_settings(command%file, command%overrides, settings, error)
-         if (.not. allocated(error)) call check_simulation(settings, error, crowd)
+         if (.not. allocated(error)) call check_simulation(settings, error, crowd, threads)
       case ('replay')
          call warn(oversubscription_text(int(max(1, command%threads), ip), int(omp_get_num_procs(), ip)))
          call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error, &
@@ -80,20 +84,37 @@ contains
       end select
    end subroutine execute
 
-   !> Set the number of OpenMP threads: from the command line, otherwise the OpenMP default. Check it against system
-   !> limits.
-   subroutine choose_threads(command, error)
+   !> Set the number of OpenMP threads, and check it against system limits: from the command line, otherwise from
+   !> OMP_NUM_THREADS. Without both, `run` and `check` choose it once they know the scene, and `bench` sets its own.
+   subroutine set_threads(command, choice, error)
       type(command_t), intent(in) :: command
+      type(thread_choice_t), intent(out) :: choice
       type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: value
 
       if (command%verb == 'info' .or. command%verb == 'convert') return
       if (command%threads > 0) then
+         choice%reason = 'given by --threads'
          call check_threads(int(command%threads, ip), error)
          if (.not. allocated(error)) call omp_set_num_threads(command%threads)
       else if (command%verb /= 'replay') then
-         call omp_set_num_threads(min(omp_get_max_threads(), omp_get_thread_limit()))
+         value = environment('OMP_NUM_THREADS')
+         choice%is_open = command%verb /= 'bench' .and. .not. is_given(value)
+         if (choice%is_open) then
+            call omp_set_num_threads(1)
+         else
+            choice%reason = 'given by OMP_NUM_THREADS'
+            call omp_set_num_threads(min(omp_get_max_threads(), omp_get_thread_limit()))
+         end if
          call check_threads(int(omp_get_max_threads(), ip), error)
       end if
-   end subroutine choose_threads
+   end subroutine set_threads
+
+   !> Whether the value of OMP_NUM_THREADS is a number, or a list of numbers
+   pure logical function is_given(value)
+      character(len=*), intent(in) :: value
+
+      is_given = scan(adjustl(value), '0123456789+') == 1
+   end function is_given
 
 end module polydem_verbs

@@ -9,7 +9,7 @@ module polydem_oversubscription
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: oversubscription, oversubscription_text
+   public :: oversubscription, oversubscription_text, ranks_on_machine
 
    !> Rows of the data of a rank: hash of the machine name, number of threads, number of processors; then the mask of
    !> processors
@@ -47,6 +47,28 @@ contains
          if (text /= '') return
       end do
    end function oversubscription
+
+   !> Count the ranks on the machine of this rank, and find the processors that they may use. Collective.
+   subroutine ranks_on_machine(comm, ranks, mask)
+      class(communicator_t), intent(inout) :: comm
+      !> Number of ranks
+      integer(ip), intent(out) :: ranks
+      !> Processors that any of these ranks may use, one bit each
+      integer(lp), intent(out) :: mask(mask_words)
+      integer(lp), allocatable :: all_of_them(:), facts(:, :)
+      integer(ip), allocatable :: counts(:)
+      integer(lp) :: own
+      integer :: k
+
+      own = hash_of(host_name())
+      call comm%gather_longs([own, allowed_processors()], all_of_them, counts)
+      facts = reshape(all_of_them, [1 + mask_words, size(counts)])
+      ranks = int(count(facts(1, :) == own), ip)
+      mask = 0_lp
+      do k = 1, size(counts)
+         if (facts(1, k) == own) mask = ior(mask, facts(2:, k))
+      end do
+   end subroutine ranks_on_machine
 
    !> A warning if there are more threads than processors; else an empty text
    pure function oversubscription_text(threads, processors) result(text)

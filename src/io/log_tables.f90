@@ -29,12 +29,21 @@ contains
          call write_wrapped(log, 'caches     '//p%text_of('caches'))
          if (p%processes > 1_ip) call write_wrapped(log, 'processes  '//to_text(p%processes)//', by MPI, each with')
          call write_wrapped(log, 'threads    '//to_text(p%threads)//' on '//to_text(p%processors)// &
-                            ' processors')
+                            ' processors'//because(p%text_of('thread_choice')))
          call write_wrapped(log, 'input      '//printable(p%text_of('input_file'))//', seed '//to_text(p%seed))
          call write_wrapped(log, 'result     '//printable(folder))
          call write_wrapped(log, 'started    '//p%text_of('started'))
       end associate
    end subroutine write_header
+
+   !> A reason in brackets; empty if there is none
+   pure function because(reason) result(text)
+      character(len=*), intent(in) :: reason
+      character(len=:), allocatable :: text
+
+      text = ''
+      if (reason /= '') text = ' ('//reason//')'
+   end function because
 
    !> Write the time of each stage, per step and in total, and the speed of the run. Stages that never ran are omitted.
    subroutine write_timings(log, timers, seconds, steps, bodies)

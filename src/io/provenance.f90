@@ -89,6 +89,8 @@ contains
       ! Checkpoint from which this attempt of the run was restarted, and hash of the initial bodies
       call provenance%set('parent', 'none')
       call provenance%set('scene', '')
+      ! Why the run has so many threads
+      call provenance%set('thread_choice', '')
       provenance%cores = cores_online()
       provenance%load = load_average()
       provenance%threads = int(omp_get_max_threads(), ip)

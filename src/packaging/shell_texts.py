@@ -22,7 +22,7 @@ EXIT_CODES = (("0", "done"), ("1", "the run failed, for example because a guard 
               ("3", "a file or folder cannot be read or written, or a checksum is wrong"),
               ("75", "ended early with a checkpoint; the same command with --continue continues the run"))
 
-ENVIRONMENT = (("OMP_NUM_THREADS", "number of threads of a run without --threads"),
+ENVIRONMENT = (("OMP_NUM_THREADS", "number of threads of a run without --threads; if unset, the run chooses it"),
                ("GOMP_SPINCOUNT", "how long a waiting thread spins before it sleeps. If unset, for about 10 ms, which "
                 "slows runs on a machine that other programs use; with 10000 for less than 1 ms. The launcher of the "
                 "sources sets 10000"),

@@ -14,6 +14,7 @@ module polydem_check
    use polydem_start, only: new_simulation
    use polydem_strings, only: to_text
    use polydem_scene_measures, only: measure_scene, scene_measures_t
+   use polydem_thread_choice, only: thread_choice_t
    implicit none
    private
    public :: check_simulation
@@ -22,19 +23,21 @@ contains
 
    !> Build the scene and print the resolved settings, the models in use, sizes, masses, speeds, time step, memory and
    !> the warnings of a run at its start. A condition that stops a run at its first step is an error here, too.
-   subroutine check_simulation(settings, error, oversubscription)
+   subroutine check_simulation(settings, error, oversubscription, threads)
       type(settings_t), intent(in) :: settings
       !> Allocated for bad input, or if a run stops at its first step
       type(error_t), allocatable, intent(inout) :: error
       !> Warning if the ranks have more threads than there are processors; none if absent or empty
       character(len=*), intent(in), optional :: oversubscription
+      !> How the number of threads is determined; default: it is set already
+      type(thread_choice_t), intent(inout), optional :: threads
       type(simulation_t) :: simulation
       type(scene_measures_t) :: measures
       type(log_t) :: log
       integer(lp) :: before, after, frames
 
       before = resident_memory()
-      call new_simulation(settings, simulation, error)
+      call new_simulation(settings, simulation, error, threads=threads)
       if (allocated(error)) return
       after = resident_memory()
       call log%open('', error)

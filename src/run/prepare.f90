@@ -127,6 +127,7 @@ contains
       if (settings%scene%name == 'file') call read_origin(settings%scene%bodies_file, run%provenance%origin, error)
       if (allocated(error)) return
       run%provenance%processes = run%comm%size
+      if (allocated(run%attempt%threads%reason)) call run%provenance%set('thread_choice', run%attempt%threads%reason)
       if (run%manifest%is_found .and. run%attempt%continues) &
          call find_restart(run%folder, run%manifest, settings, scene, run%attempt%may_change, run%earlier, error)
       if (allocated(error)) return

@@ -17,6 +17,7 @@ module polydem_run
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_scene_measures, only: scene_measures_t
+   use polydem_thread_choice, only: thread_choice_t
    use polydem_trajectory_writer, only: trajectory_writer_t
    implicit none
    private
@@ -32,6 +33,8 @@ module polydem_run
       real(dp) :: limit = 0.0_dp
       !> Whether the screen shows nothing but the progress line
       logical :: is_brief = .false.
+      !> How the number of threads is determined
+      type(thread_choice_t) :: threads
    end type attempt_t
 
    !> State of a run

@@ -44,7 +44,6 @@ contains
       run%folder = result_folder(settings)
       if (run%attempt%continues) call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return
-      run%oversubscription = oversubscription(run%comm)
       call check_ranks(settings, run%comm, error)
       if (.not. allocated(error)) call build_and_lock(settings, force, run, last_state, error)
       if (.not. allocated(error)) then
@@ -52,6 +51,7 @@ contains
             call run%lock%release()
             return
          end if
+         run%oversubscription = oversubscription(run%comm)
          call prepare(settings, force, run, error)
       end if
       if (.not. allocated(error)) call open_output(run, error)

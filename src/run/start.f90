@@ -1,5 +1,6 @@
 !> Start of a run: all ranks build the scene and the simulation alike, restore a checkpoint, and open the output files.
 module polydem_start
+   use omp_lib, only: omp_get_thread_limit, omp_set_num_threads
    use polydem_broadcaster, only: broadcaster_t
    use polydem_checkpoint_fields, only: hash_scene_of
    use polydem_communicator, only: choose_communicator, communicator_t
@@ -8,6 +9,7 @@ module polydem_start
    use polydem_hash, only: hexadecimal
    use polydem_kinds, only: dp, ip
    use polydem_restart, only: restore, serialize_earlier
+   use polydem_process_limits, only: check_threads
    use polydem_result_files, only: checkpoint_path, n_checkpoints
    use polydem_run, only: run_t
    use polydem_run_output, only: frames_per_segment
@@ -17,6 +19,7 @@ module polydem_start
    use polydem_simulation, only: simulation_t
    use polydem_start_simulation, only: start_with_bodies
    use polydem_strings, only: to_text
+   use polydem_thread_choice, only: choose_threads, thread_choice_t
    implicit none
    private
    public :: new_simulation, build_start, recall, open_output
@@ -24,7 +27,7 @@ module polydem_start
 contains
 
    !> Build the scene and the simulation that the settings define. Collective; all ranks get the same error.
-   subroutine new_simulation(settings, self, error, comm)
+   subroutine new_simulation(settings, self, error, comm, threads)
       type(settings_t), intent(in) :: settings
       !> The simulation, ready to advance
       type(simulation_t), intent(out) :: self
@@ -32,6 +35,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       !> Ranks that share the bodies; default: this one alone
       class(communicator_t), intent(in), optional :: comm
+      !> How the number of threads is determined; default: it is set already
+      type(thread_choice_t), intent(inout), optional :: threads
       class(communicator_t), allocatable :: ranks
 
       call choose_communicator(ranks, comm)
@@ -39,8 +44,30 @@ contains
       if (allocated(error)) return
       call build_scene(settings, self%bodies, self%motions, error, ranks%rank, ranks%size)
       call ranks%all_reduce_error(error)
+      if (present(threads) .and. .not. allocated(error)) &
+         call set_threads(threads, ranks, size(self%bodies%free, kind=ip), error)
       if (.not. allocated(error)) call start_with_bodies(settings, ranks, self, error)
    end subroutine new_simulation
+
+   !> Set the number of OpenMP threads if it is still open. Collective; all ranks get the same error.
+   subroutine set_threads(choice, comm, free, error)
+      !> On return the number is set, and the reason known
+      type(thread_choice_t), intent(inout) :: choice
+      class(communicator_t), intent(inout) :: comm
+      !> Number of free bodies of this rank
+      integer(ip), intent(in) :: free
+      !> Allocated if the system does not allow so many threads
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: threads
+
+      if (.not. choice%is_open) return
+      call choose_threads(comm, free, threads, choice%reason)
+      threads = min(threads, int(omp_get_thread_limit(), ip))
+      call check_threads(threads, error)
+      call comm%all_reduce_error(error)
+      if (.not. allocated(error)) call omp_set_num_threads(int(threads))
+      choice%is_open = .false.
+   end subroutine set_threads
 
    !> Build the simulation at time 0, measure it and hash its scene, unless an earlier call did. Collective; all ranks
    !> get the same error.
@@ -52,7 +79,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (run%provenance%text_of('scene') /= '') return
-      call new_simulation(settings, run%simulation, error, run%comm)
+      call new_simulation(settings, run%simulation, error, run%comm, run%attempt%threads)
       if (allocated(error)) return
       call measure_scene(run%simulation, run%measures)
       call hash_scene_of(run%simulation, run%attempts%scene)

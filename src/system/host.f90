@@ -9,7 +9,7 @@ module polydem_host
    private
    public :: host_name, processor_name, processor_clock, processor_has, cache_sizes, memory_size, frequency_governor
    public :: kernel_release, boot_identity, cores_online
-   public :: load_average, environment, utc_now, is_terminal, resident_memory
+   public :: load_average, environment, first_line, utc_now, is_terminal, resident_memory
 
    !> Text for facts that the system does not report
    character(len=*), parameter :: unknown = 'unknown'
@@ -172,6 +172,7 @@ contains
 
    !> First line of a file; empty if it cannot be read
    function first_line(path) result(text)
+      !> Path of the file
       character(len=*), intent(in) :: path
       character(len=line_length) :: text
       integer :: unit, status

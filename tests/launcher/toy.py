@@ -101,6 +101,7 @@ class Toy(unittest.TestCase):
         self.write("postproc/pyproject.toml", "")
         self.write(".venv/.made", self.folder + "\n")
         self.write(".venv/.made_manual", "")
+        self.write(".venv/.made_test", "")
         for name in ("mpirun", "mpifort", "h5pfc"):
             self.write(f"mpi/{name}", MPIRUN)
             os.chmod(os.path.join(self.folder, "mpi", name), 0o755)

@@ -135,6 +135,61 @@ def threads_that_openmp_or_the_system_do_not_grant_are_refused(case):
     assert code == GOOD and "threads    1 on" in output and hash_of(output) == case.expected, output
 
 
+def threads_are_chosen_unless_they_are_given(case):
+    """Small scenes have one thread, larger ones at most the processors; an option wins over a variable."""
+    processors = len(os.sched_getaffinity(0))
+    small, large = (["run", "scene.nml", "--force", "--set", "output.folder=result", "--set", "integrate.duration=1e-5",
+                     "--set", f"scene.bodies={n}"] for n in (999, 1000))
+
+    def head(words, env):
+        code, output, message = case.call(*words, env=env)
+        assert code == GOOD and message == "", message
+        return re.search(r"^threads +(\d+) on \d+ processors \((.*)\)$", output, re.MULTILINE).groups()
+
+    assert head(small, {}) == ("1", "chosen for fewer than 1000 free bodies per rank")
+    threads, reason = head(large, {})
+    assert 1 <= int(threads) <= processors and re.fullmatch(
+        r"chosen for \d+ granted processors? and \d+ other running tasks?", reason), (threads, reason)
+    for words in small, large:
+        assert head(words, {"OMP_NUM_THREADS": "3,1"}) == ("3", "given by OMP_NUM_THREADS")
+        assert head([*words, "--threads", "2"], {"OMP_NUM_THREADS": "3"}) == ("2", "given by --threads")
+    assert head(large, {"OMP_THREAD_LIMIT": "1"})[0] == "1"
+
+
+def variables_of_the_runtime_change_nothing(case):
+    """Every variable of the runtime library of gfortran, with several values."""
+    variables = {
+        "STDIN_UNIT": ("0", "6", "7", "x"), "STDOUT_UNIT": ("0", "5", "7", "-1"), "STDERR_UNIT": ("5", "6", "7"),
+        "UNBUFFERED_ALL": ("y", "n"), "UNBUFFERED_PRECONNECTED": ("y",), "SHOW_LOCUS": ("n",),
+        "OPTIONAL_PLUS": ("y", "1"), "LIST_SEPARATOR": ("  ", " , ", ";"), "DEFAULT_RECL": ("8",),
+        "CONVERT_UNIT": ("big_endian", "swap", "native;big_endian:10-20", "none"), "ERROR_BACKTRACE": ("n", "y"),
+        "FORMATTED_BUFFER_SIZE": ("1", "7", "1000000"), "UNFORMATTED_BUFFER_SIZE": ("1", "7", "1000000")}
+
+    def outputs(env):
+        """What the verbs print; without times, memory and load."""
+        shutil.rmtree("varied", ignore_errors=True)
+        varied = "output.folder=varied"
+        printed = []
+        for words in (["run", "scene.nml", "--set", varied, "--set", "integrate.duration=3e-4"],
+                      ["run", "scene.nml", "--set", varied, "--continue", "--changed"], ["info", "varied", "--check"],
+                      ["check", "scene.nml"], ["replay", "trace.h5", "--steps", "2", "--oracle"],
+                      ["run", "nothing.nml"], ["check", "scene.nml", "--set", "integrate.dt=-1"]):
+            code, output, message = case.call(*words, env=env)
+            if words[0] == "run" and code == GOOD:
+                output = hash_of(output)
+            printed.append((words[0], code, re.sub(r"(?m)^(memory |ns_).*$|\d+\.\d+ (us|s)\b", "", output), message))
+        assert printed[1][2] == case.expected, printed[1]
+        case.assert_good("varied")
+        return printed
+
+    expected = outputs({})
+    for name, values in variables.items():
+        for value in values:
+            for found, wanted in zip(outputs({f"GFORTRAN_{name}": value}), expected):
+                assert found == wanted, (name, value, found, wanted)
+    assert outputs({f"GFORTRAN_{name}": values[0] for name, values in variables.items()}) == expected
+
+
 def memory_that_is_not_granted_is_named(case):
     """Limits of the memory, from enough for a few bodies to enough for many."""
     words = ["run", "scene.nml", "--force", "--threads", "1", "--set", "output.folder=result",
@@ -360,7 +415,8 @@ def the_parents_of_new_folders_are_brought_to_disk(case, library):
 
 
 TESTS = (too_many_threads_are_refused_before_anything_is_written,
-         threads_that_openmp_or_the_system_do_not_grant_are_refused, memory_that_is_not_granted_is_named,
+         threads_that_openmp_or_the_system_do_not_grant_are_refused, threads_are_chosen_unless_they_are_given,
+         variables_of_the_runtime_change_nothing, memory_that_is_not_granted_is_named,
          threads_that_take_turns_draw_a_warning, a_small_stack_is_refused, files_that_may_not_grow_are_named,
          nobody_need_read_what_is_printed, closed_streams_leave_files_alone,
          a_umask_that_takes_ones_own_rights_is_refused)

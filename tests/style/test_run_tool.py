@@ -9,7 +9,8 @@ import tempfile
 import unittest
 from pathlib import Path
 
-from run_tool import SKIPPED, TOOLS, find_tool, pinned_version, shell_scripts
+from check_style import text_files
+from run_tool import SKIPPED, TOOLS, find_tool, pinned_version, shell_scripts, what_to_read
 from test_check_style import GOOD
 
 ROOT = Path(__file__).resolve().parent.parent.parent
@@ -109,11 +110,27 @@ class Tools(unittest.TestCase):
             path.unlink()
         self.assertTrue({"polydem", ".ci/run", "inputs/slurm/job.sh"} <= set(shell_scripts(ROOT)))
 
+    def test_only_tracked_files_are_read(self):
+        self.assertEqual(what_to_read(self.root, "ruff"), ["postproc", "tests"])
+        subprocess.run(["git", "init", "--quiet", self.root], check=True)
+        subprocess.run(["git", "-C", self.root, "add", "src", "postproc/good.py", "polydem"], check=True)
+        self.write("postproc/draft.py", "import os\n")
+        self.write("src/state/draft.f90", "x\n")
+        self.write("draft.sh", "#!/bin/sh\nrm $1\n")
+        self.assertEqual(what_to_read(self.root, "ruff"), ["postproc/good.py"])
+        self.assertEqual(what_to_read(self.root, "fortitude"), ["src/state/good.f90"])
+        self.assertEqual(what_to_read(self.root, "shellcheck"), ["polydem"])
+        read = [os.path.relpath(path, self.root) for path in text_files(str(self.root))]
+        self.assertEqual(read, ["polydem", "postproc/good.py", "src/state/good.f90"])
+        # What is deleted but still tracked cannot be read.
+        (self.root / "postproc/good.py").unlink()
+        self.assertEqual(what_to_read(self.root, "ruff"), [])
+
     def test_a_tool_of_another_version_is_not_used(self):
         for tool in TOOLS:
             script = self.write(f"bin/{tool}", f"#!/bin/sh\necho {tool} 0.0.1\n")
             script.chmod(0o755)
-        for tool, (package, _) in TOOLS.items():
+        for tool, (package, *_) in TOOLS.items():
             code, output = self.run_tool(tool, self.root / "bin")
             self.assertEqual(code, SKIPPED)
             self.assertIn(f"is 0.0.1, but {pinned_version(ROOT, package)} is wanted", output)
