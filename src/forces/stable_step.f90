@@ -8,17 +8,21 @@
 !>
 !> The parts of the force law add the stiffnesses and dashpots (`stiffen`). The stiffness against tilts is added to the
 !> squared frequency of the other two.
+!>
+!> Before bodies touch, the contacts of a body are expected ones (`expected_contact`).
 module polydem_stable_step
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
+   use polydem_expected_contact, only: expect_contact
    use polydem_force_law, only: force_law_t
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_stability_limit, only: stability_table_t, limit_at
    implicit none
    private
-   public :: contact_numbers, stable_step_of_contacts, stable_step_of_shapes
+   public :: contact_numbers, stable_step_of_contacts, stable_step_of_shapes, &
+      stable_step_alone
 
    !> Assumed number of contacts of the two equal bodies of an expected contact: four of each body
    real(wp), parameter :: assumed_contacts = 8.0_wp
@@ -60,41 +64,90 @@ contains
    end subroutine stable_step_of_contacts
 
    !> Find the stable step expected from the shapes of the free bodies, and the body that limits it. Each body is
-   !> assumed to have contacts with equal bodies, with the greatest stiffness that its edges allow.
-   subroutine stable_step_of_shapes(law, table, bodies, step, critical)
+   !> assumed to have contacts with equal bodies that it hits at a given speed, with the greatest stiffness that its
+   !> outline allows.
+   subroutine stable_step_of_shapes(law, table, bodies, speed, step, critical, depth)
       !> Force law; `measure` is not required
       type(force_law_t), intent(in) :: law
       !> Stability limit of the integration scheme
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
+      !> Speed of approach of the bodies [m/s]; 0: contacts without depth
+      real(wp), intent(in) :: speed
       !> Stable step [s], huge if there is no free body
       real(wp), intent(out) :: step
       !> Slot of the body that limits the step, 0 if there is no free body
       integer(ip), intent(out) :: critical
-      type(contact_element_t) :: element
-      real(wp) :: g(4), this
-      integer(ip) :: k, s
+      !> Depth of its expected contact, area over length [m]; 0 if there is no free body
+      real(wp), intent(out) :: depth
+      real(wp), allocatable :: steps(:)
+      real(wp) :: unused
+      integer(ip) :: k, n
 
+      n = size(bodies%free, kind=ip)
       step = huge(step)
       critical = 0_ip
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
-         call describe_shape(bodies, s, element)
-         g(1) = assumed_contacts*bodies%inverse_mass(s)
-         g(2) = assumed_contacts*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
-         g(3) = 0.0_wp
-         g(4) = assumed_contacts*bodies%inverse_inertia(s)
-         element%normal_mass = 0.5_wp*bodies%mass(s)
-         element%normal_mobility = 2.0_wp*bodies%inverse_mass(s)
-         element%tangential_mass = 1.0_wp/(g(2)/assumed_contacts)
-         call law%stiffen(element)
-         this = step_of_element(table, element, g)
-         if (this < step) then
-            step = this
-            critical = s
-         end if
+      depth = 0.0_wp
+      if (n == 0_ip) return
+      allocate (steps(n))
+      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) &
+      !$omp    shared(law, table, bodies, speed, steps, n) private(k, unused)
+      do k = 1_ip, n
+         call find_expected_step(law, table, bodies, bodies%free(k), speed, steps(k), unused)
       end do
+      !$omp end parallel do
+      k = minloc(steps, 1, kind=ip)
+      critical = bodies%free(k)
+      call find_expected_step(law, table, bodies, critical, speed, step, depth)
    end subroutine stable_step_of_shapes
+
+   !> Find the stable step of the expected contacts of a body.
+   subroutine find_expected_step(law, table, bodies, s, speed, step, depth)
+      type(force_law_t), intent(in) :: law
+      type(stability_table_t), intent(in) :: table
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      !> Speed of approach [m/s]
+      real(wp), intent(in) :: speed
+      !> Stable step [s]
+      real(wp), intent(out) :: step
+      !> Depth of the contact [m]
+      real(wp), intent(out) :: depth
+      type(contact_element_t) :: element
+      real(wp) :: g(4), outline, share
+
+      call expect_contact(law, bodies, s, speed, element, outline)
+      depth = element%depth
+      g(1) = assumed_contacts*bodies%inverse_mass(s)
+      g(2) = assumed_contacts*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
+      g(3) = 0.0_wp
+      g(4) = assumed_contacts*bodies%inverse_inertia(s)
+      element%tangential_mass = 1.0_wp/(g(2)/assumed_contacts)
+      call law%stiffen(element)
+      ! The contacts of a body share its outline, and so do their dashpots. The springs do not, for accuracy: then an
+      ! impact of two bodies takes at least ten steps.
+      share = min(1.0_wp, outline/(0.5_wp*assumed_contacts*element%length))
+      element%normal_dashpot = element%normal_dashpot*share
+      element%tilt_dashpot = element%tilt_dashpot*share
+      step = step_of_element(table, element, g)
+   end subroutine find_expected_step
+
+   !> Stable step of a contact whose bodies have no other contacts [s]
+   real(wp) function stable_step_alone(law, table, bodies, contacts, c)
+      type(force_law_t), intent(in) :: law
+      !> Stability limit of the integration scheme
+      type(stability_table_t), intent(in) :: table
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with their forces
+      type(contacts_t), intent(in) :: contacts
+      !> Index of the contact
+      integer(ip), intent(in) :: c
+      real(wp) :: numbers(max(contacts%first(c), contacts%second(c)))
+
+      numbers([contacts%first(c), contacts%second(c)]) = 1.0_wp
+      stable_step_alone = step_of_contact(law, table, bodies, numbers, contacts, c)
+   end function stable_step_alone
 
    !> Stable step of contact c [s]
    real(wp) function step_of_contact(law, table, bodies, numbers, contacts, c)
@@ -180,32 +233,5 @@ contains
          step_of_element = limit_at(table, damping)/frequency
       end associate
    end function step_of_element
-
-   !> Start an expected contact from the shape of its body.
-   pure subroutine describe_shape(bodies, s, element)
-      type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: s
-      type(contact_element_t), intent(out) :: element
-      real(wp) :: dx, dy, length, distance, longest, area
-      integer(ip) :: v, w
-
-      element%is_expected = .true.
-      element%inertia = bodies%inertia(s)
-      longest = 0.0_wp
-      area = 0.0_wp
-      w = bodies%vertex_start(s + 1_ip) - 1_ip
-      do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-         dx = bodies%shape(1, v) - bodies%shape(1, w)
-         dy = bodies%shape(2, v) - bodies%shape(2, w)
-         length = sqrt(dx*dx + dy*dy)
-         distance = abs(dx*bodies%shape(2, w) - dy*bodies%shape(1, w))/length
-         longest = max(longest, length)
-         area = area + 0.5_wp*length*distance
-         element%edge_ratio = max(element%edge_ratio, length/(2.0_wp*distance))
-         element%radius_square = max(element%radius_square, bodies%shape(1, v)**2 + bodies%shape(2, v)**2)
-         w = v
-      end do
-      element%square_ratio = longest*longest/area
-   end subroutine describe_shape
 
 end module polydem_stable_step

@@ -32,6 +32,9 @@ contains
          call log%write_line('step       dt = '//to_text(s%dt)//' s, '// &
                              to_text(s%dt/s%expected_stable_step, 3)//' of the stable time step '// &
                              to_text(s%expected_stable_step)//' s estimated from the shapes')
+         if (s%expected%body > 0_lp) call log%write_line('           for impacts at '// &
+            to_text(s%expected%speed, 3)//' m/s ('//s%expected%origin//'), which make contacts of body '// &
+            to_text(s%expected%body)//' '//to_text(s%expected%depth, 3)//' m deep')
          if (measures%contacts > 0_lp) call log%write_line('           '//to_text(s%dt/measures%stable_step, 3)// &
             ' of the stable time step '//to_text(measures%stable_step)//' s of the initial contacts')
          call log%write_line('duration   '//to_text(real(s%n_steps, wp)*s%dt)//' s, '//to_text(s%n_steps)// &
