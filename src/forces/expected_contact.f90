@@ -143,6 +143,7 @@ contains
 
       edge = element
       edge%speed = 0.0_wp
+      edge%depth = 0.0_wp
       edge%length = cut%length
       edge%edge_ratio = cut%length/(2.0_wp*cut%distance)
       edge%square_ratio = cut%length**2/area

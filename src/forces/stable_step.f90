@@ -22,7 +22,7 @@ module polydem_stable_step
    implicit none
    private
    public :: contact_numbers, stable_step_of_contacts, stable_step_of_shapes, &
-      stable_step_alone
+      stable_step_alone, stiffest_product
 
    !> Assumed number of contacts of the two equal bodies of an expected contact: four of each body
    real(wp), parameter :: assumed_contacts = 8.0_wp
@@ -50,7 +50,8 @@ contains
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(law, table, bodies, numbers, contacts, steps) private(c)
       do c = 1_ip, contacts%n
-         steps(c) = step_of_contact(law, table, bodies, numbers, contacts, c)
+         steps(c) = step_of_contact(law, table, bodies, [numbers(contacts%first(c)), numbers(contacts%second(c))], &
+                                    contacts, c)
       end do
       !$omp end parallel do
       step = huge(step)
@@ -143,10 +144,8 @@ contains
       type(contacts_t), intent(in) :: contacts
       !> Index of the contact
       integer(ip), intent(in) :: c
-      real(wp) :: numbers(max(contacts%first(c), contacts%second(c)))
 
-      numbers([contacts%first(c), contacts%second(c)]) = 1.0_wp
-      stable_step_alone = step_of_contact(law, table, bodies, numbers, contacts, c)
+      stable_step_alone = step_of_contact(law, table, bodies, [1.0_wp, 1.0_wp], contacts, c)
    end function stable_step_alone
 
    !> Stable step of contact c [s]
@@ -154,7 +153,8 @@ contains
       type(force_law_t), intent(in) :: law
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
-      real(wp), intent(in) :: numbers(:)
+      !> Numbers of contacts of its first and of its second body
+      real(wp), intent(in) :: numbers(2)
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: c
       type(contact_element_t) :: element
@@ -162,8 +162,8 @@ contains
 
       g = 0.0_wp
       alone = 0.0_wp
-      call add_body(contacts%first(c), contacts%arm_first(:, c))
-      call add_body(contacts%second(c), contacts%arm_second(:, c))
+      call add_body(contacts%first(c), contacts%arm_first(:, c), numbers(1))
+      call add_body(contacts%second(c), contacts%arm_second(:, c), numbers(2))
       element%area = contacts%area(c)
       element%length = contacts%length(c)
       element%inverse_length = contacts%inverse_length(c)
@@ -181,9 +181,9 @@ contains
    contains
 
       !> Add the normal, tangential, mixed and rotational mobility of one body.
-      subroutine add_body(s, arm)
+      subroutine add_body(s, arm, number)
          integer(ip), intent(in) :: s
-         real(wp), intent(in) :: arm(2)
+         real(wp), intent(in) :: arm(2), number
          real(wp) :: along, across, mine(4)
 
          if (bodies%fixed(s)) return
@@ -194,10 +194,77 @@ contains
          mine(3) = along*across*bodies%inverse_inertia(s)
          mine(4) = bodies%inverse_inertia(s)
          alone = alone + mine
-         g = g + mine*numbers(s)
+         g = g + mine*number
       end subroutine add_body
 
    end function step_of_contact
+
+   !> Product of ratio L/l and mobility below which no contact, alone, has a stable step below a given one [m/kg].
+   !>
+   !> Frequencies follow this product, and dashpots at most the product with the root of the greatest mass. So the
+   !> lightest pair and the heaviest body at a wall bound all others. Arms are at most the greatest radius R: they increase
+   !> the mobility by a share of m R^2/I.
+   real(wp) function stiffest_product(law, table, bodies, step) result(product)
+      type(force_law_t), intent(in) :: law
+      !> Stability limit of the integration scheme
+      type(stability_table_t), intent(in) :: table
+      type(bodies_t), intent(in) :: bodies
+      !> Time step [s]
+      real(wp), intent(in) :: step
+      real(wp) :: mobilities(2), turning
+      integer(ip) :: s
+
+      product = huge(product)
+      mobilities = [0.0_wp, huge(1.0_wp)]
+      turning = 0.0_wp
+      do s = 1_ip, bodies%n
+         if (.not. bodies%inverse_mass(s) > 0.0_wp .or. bodies%fixed(s)) cycle
+         mobilities(1) = max(mobilities(1), 2.0_wp*bodies%inverse_mass(s))
+         mobilities(2) = min(mobilities(2), bodies%inverse_mass(s))
+         turning = max(turning, bodies%radius(s)**2*bodies%inverse_inertia(s)*bodies%mass(s))
+      end do
+      if (mobilities(1) > 0.0_wp) product = min(product_at(mobilities(1)), product_at(mobilities(2)))
+
+   contains
+
+      !> The product at a mobility, by bisection of powers of 2 and then of their fractions; on the safe side
+      real(wp) function product_at(mobility)
+         real(wp), intent(in) :: mobility
+         real(wp) :: factor
+         integer :: k
+
+         product_at = mobility
+         do k = 1, 200
+            if (is_stable(mobility, product_at/mobility)) exit
+            product_at = 0.5_wp*product_at
+         end do
+         factor = 2.0_wp
+         do k = 1, 200
+            if (.not. is_stable(mobility, factor*product_at/mobility)) factor = sqrt(factor)
+            if (factor < 1.01_wp) exit
+            if (is_stable(mobility, factor*product_at/mobility)) product_at = factor*product_at
+         end do
+      end function product_at
+
+      !> Whether the step is stable for a contact of unit arms and of twice their length
+      logical function is_stable(mobility, ratio)
+         real(wp), intent(in) :: mobility, ratio
+         type(contact_element_t) :: element
+         real(wp) :: g(4)
+
+         element%ratio = ratio
+         element%length = 2.0_wp
+         element%inverse_length = 0.5_wp*ratio
+         element%normal_mobility = mobility
+         element%normal_mass = 1.0_wp/mobility
+         element%rotational_mobility = turning*mobility
+         g = [mobility*(1.0_wp + turning), mobility*(1.0_wp + turning), mobility*turning, mobility*turning]
+         element%tangential_mass = 1.0_wp/mobility
+         call law%stiffen(element)
+         is_stable = step_of_element(table, element, g) >= step
+      end function is_stable
+
+   end function stiffest_product
 
    !> Number of contacts of each body, (slot)
    pure function contact_numbers(n_bodies, incidence) result(numbers)
