@@ -227,22 +227,21 @@ contains
 
    contains
 
-      !> The product at a mobility, by bisection of powers of 2 and then of their fractions; on the safe side
+      !> The product at a mobility, on the safe side by 1 %
       real(wp) function product_at(mobility)
          real(wp), intent(in) :: mobility
          real(wp) :: factor
          integer :: k
 
-         product_at = mobility
-         do k = 1, 200
-            if (is_stable(mobility, product_at/mobility)) exit
-            product_at = 0.5_wp*product_at
-         end do
-         factor = 2.0_wp
-         do k = 1, 200
-            if (.not. is_stable(mobility, factor*product_at/mobility)) factor = sqrt(factor)
+         product_at = sqrt(sqrt(tiny(mobility)))*mobility
+         factor = 16.0_wp
+         do k = 1, 2000
             if (factor < 1.01_wp) exit
-            if (is_stable(mobility, factor*product_at/mobility)) product_at = factor*product_at
+            if (is_stable(mobility, factor*product_at/mobility)) then
+               product_at = factor*product_at
+            else
+               factor = sqrt(factor)
+            end if
          end do
       end function product_at
 
