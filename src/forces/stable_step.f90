@@ -67,7 +67,7 @@ contains
    !> Find the stable step expected from the shapes of the free bodies, and the body that limits it. Each body is
    !> assumed to have contacts with equal bodies that it hits at a given speed, with the greatest stiffness that its
    !> outline allows.
-   subroutine stable_step_of_shapes(law, table, bodies, speed, step, critical, depth)
+   subroutine stable_step_of_shapes(law, table, bodies, speed, step, critical, depth, length, damped)
       !> Force law; `measure` is not required
       type(force_law_t), intent(in) :: law
       !> Stability limit of the integration scheme
@@ -81,14 +81,18 @@ contains
       integer(ip), intent(out) :: critical
       !> Depth of its expected contact, area over length [m]; 0 if there is no free body
       real(wp), intent(out) :: depth
+      !> Length of that contact [m], and its stable step over that without dashpots
+      real(wp), intent(out), optional :: length, damped
       real(wp), allocatable :: steps(:)
-      real(wp) :: unused
+      real(wp) :: unused(3), found(3)
       integer(ip) :: k, n
 
       n = size(bodies%free, kind=ip)
       step = huge(step)
       critical = 0_ip
       depth = 0.0_wp
+      if (present(length)) length = 0.0_wp
+      if (present(damped)) damped = 1.0_wp
       if (n == 0_ip) return
       allocate (steps(n))
       !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) &
@@ -99,11 +103,14 @@ contains
       !$omp end parallel do
       k = minloc(steps, 1, kind=ip)
       critical = bodies%free(k)
-      call find_expected_step(law, table, bodies, critical, speed, step, depth)
+      call find_expected_step(law, table, bodies, critical, speed, step, found)
+      depth = found(1)
+      if (present(length)) length = found(2)
+      if (present(damped)) damped = found(3)
    end subroutine stable_step_of_shapes
 
    !> Find the stable step of the expected contacts of a body.
-   subroutine find_expected_step(law, table, bodies, s, speed, step, depth)
+   subroutine find_expected_step(law, table, bodies, s, speed, step, found)
       type(force_law_t), intent(in) :: law
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
@@ -113,13 +120,12 @@ contains
       real(wp), intent(in) :: speed
       !> Stable step [s]
       real(wp), intent(out) :: step
-      !> Depth of the contact [m]
-      real(wp), intent(out) :: depth
+      !> Depth and length of the contact [m], and its stable step over that without dashpots
+      real(wp), intent(out) :: found(3)
       type(contact_element_t) :: element
       real(wp) :: g(4), outline, share
 
       call expect_contact(law, bodies, s, speed, element, outline)
-      depth = element%depth
       g(1) = assumed_contacts*bodies%inverse_mass(s)
       g(2) = assumed_contacts*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
       g(3) = 0.0_wp
@@ -132,6 +138,10 @@ contains
       element%normal_dashpot = element%normal_dashpot*share
       element%tilt_dashpot = element%tilt_dashpot*share
       step = step_of_element(table, element, g)
+      element%normal_dashpot = 0.0_wp
+      element%tangential_dashpot = 0.0_wp
+      element%tilt_dashpot = 0.0_wp
+      found = [element%depth, element%length, step/step_of_element(table, element, g)]
    end subroutine find_expected_step
 
    !> Stable step of a contact whose bodies have no other contacts [s]

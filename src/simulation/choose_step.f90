@@ -27,13 +27,13 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(force_law_t) :: law
       integer(ip) :: critical
-      real(wp) :: steps, stable, depth, has_free(1), has_depth(1)
+      real(wp) :: steps, stable, depth, length, damped, has_free(1), found(3)
       integer(lp) :: limiting
 
       call choose_parts(self%settings%forces, law)
       call find_expected_speed(self)
       call stable_step_of_shapes(law, self%integrator%stability(), self%bodies, self%expected%speed, stable, critical, &
-                                 depth)
+                                 depth, length, damped)
       has_free = merge(1.0_wp, 0.0_wp, critical > 0_ip)
       call reduce_to_greatest(self%comm, has_free)
       limiting = 0_lp
@@ -42,12 +42,14 @@ contains
       call keep_greatest(self%comm, stable, limiting)
       self%expected_stable_step = -stable
       self%expected%body = limiting
+      found = 0.0_wp
       if (critical > 0_ip) then
-         if (int(self%bodies%id(critical), lp) /= limiting) depth = 0.0_wp
+         if (int(self%bodies%id(critical), lp) == limiting) found = [depth, length, damped]
       end if
-      has_depth = depth
-      call reduce_to_greatest(self%comm, has_depth)
-      self%expected%depth = has_depth(1)
+      call reduce_to_greatest(self%comm, found)
+      self%expected%depth = found(1)
+      self%expected%length = found(2)
+      self%expected%damped = found(3)
       associate (settings => self%settings%integrate)
          self%dt = settings%dt
          if (self%dt <= 0.0_wp .and. (has_free(1) < 1.0_wp .or. .not. self%expected_stable_step > 0.0_wp)) then

@@ -49,6 +49,8 @@ module polydem_simulation
       character(len=:), allocatable :: origin
       !> Depth of the contact of two equal bodies, area over length [m]
       real(wp) :: depth = 0.0_wp
+      !> Length of this contact [m], and its stable step over that without dashpots
+      real(wp) :: length = 0.0_wp, damped = 1.0_wp
       !> Identifier of the body whose contacts limit the step; 0 if there is no free body
       integer(lp) :: body = 0_lp
    end type expected_impact_t
