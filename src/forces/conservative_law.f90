@@ -131,7 +131,7 @@ contains
    !> that of a face, K_n L^2/12. (This is no bound for rotations; none of 2600 random contacts of all kinds had a
    !> frequency more than 8 % above it.)
    !>
-   !> An expected contact is a face on the longest edge of two equal bodies, where l b is the area.
+   !> An expected contact is one of two equal bodies, where l b is the area.
    subroutine stiffen(self, element)
       class(conservative_law_t), intent(in) :: self
       !> The contact; stiffness against approach and tilts changes, and its ratio if it is an expected contact
@@ -139,7 +139,7 @@ contains
 
       if (element%is_expected) then
          element%ratio = element%square_ratio
-         element%normal_stiffness = element%normal_stiffness + self%stiffness*element%ratio
+         element%normal_stiffness = element%normal_stiffness + steepening*(self%stiffness*element%ratio)
       else
          element%normal_stiffness = element%normal_stiffness + steepening*(self%stiffness*element%ratio)
          element%tilt_stiffness = element%tilt_stiffness + steepening*face_tilt_stiffness(self%stiffness, element)

@@ -13,13 +13,16 @@ module polydem_contact_element
       !> Ratio L/l of the length of the contact to the characteristic length; the elastic part sets that of an expected
       !> contact
       real(wp) :: ratio = 0.0_wp
-      !> Area [m2], length L [m] and reciprocal characteristic length 1/l [1/m]; 0 for an expected contact
+      !> Area [m2], length L [m] and reciprocal characteristic length 1/l [1/m]; of an expected contact the greatest
+      !> length, else 0
       real(wp) :: area = 0.0_wp, length = 0.0_wp, inverse_length = 0.0_wp
       !> Elastic repulsion, and normal force without cohesion [N/m]; 0 for an expected contact
       real(wp) :: elastic = 0.0_wp, repulsion = 0.0_wp
-      !> Shape of the body of an expected contact: greatest ratio of an edge to twice its distance from the centre,
-      !> square of the longest edge over the area, square of the greatest radius, and longest edge [m2, m]
-      real(wp) :: edge_ratio = 0.0_wp, square_ratio = 0.0_wp, radius_square = 0.0_wp, longest = 0.0_wp
+      !> Expected contact: greatest ratio of its length to twice its distance from the centre, square of the length over
+      !> the area of the body, and square of the greatest radius of the body [m2]
+      real(wp) :: edge_ratio = 0.0_wp, square_ratio = 0.0_wp, radius_square = 0.0_wp
+      !> Speed of approach [m/s] and depth, area over length [m], of an expected contact
+      real(wp) :: speed = 0.0_wp, depth = 0.0_wp
       !> Moment of inertia of that body [kg m]
       real(wp) :: inertia = 0.0_wp
       !> Sum of the reciprocal masses of both bodies, and its reciprocal, the normal effective mass [m/kg, kg/m]

@@ -52,18 +52,24 @@ contains
       end do
    end subroutine find_dashpots
 
-   !> Add stiffness and dashpot from the present force. An expected contact has no force and gets neither.
+   !> Add stiffness and dashpot from the present force. The force of an expected contact rises with the damping of its
+   !> approach, 1 + a v, and it has the dashpot of its greatest depth.
    subroutine stiffen(self, element)
       class(hunt_crossley_t), intent(in) :: self
       !> The contact; normal stiffness and dashpot change
       type(contact_element_t), intent(inout) :: element
+      real(wp) :: share
 
-      if (element%is_expected) return
+      share = self%coefficient*sqrt(1.0_wp/(element%normal_mobility*self%stiffness))*element%ratio &
+         /max(element%length, sqrt(element%area))
+      if (element%is_expected) then
+         element%normal_dashpot = element%normal_dashpot + share*element%normal_stiffness*element%depth
+         element%normal_stiffness = element%normal_stiffness*(1.0_wp + share*element%speed)
+         return
+      end if
       if (element%repulsion > element%elastic) &
          element%normal_stiffness = element%normal_stiffness*(element%repulsion/element%elastic)
-      element%normal_dashpot = element%normal_dashpot &
-         + self%coefficient*sqrt(1.0_wp/(element%normal_mobility*self%stiffness))*element%elastic*element%ratio &
-         /max(element%length, sqrt(element%area))
+      element%normal_dashpot = element%normal_dashpot + share*element%elastic
    end subroutine stiffen
 
 end module polydem_hunt_crossley

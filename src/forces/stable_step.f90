@@ -8,17 +8,21 @@
 !>
 !> The parts of the force law add the stiffnesses and dashpots (`stiffen`). The stiffness against tilts is added to the
 !> squared frequency of the other two.
+!>
+!> Before bodies touch, the contacts of a body are expected ones (`expected_contact`).
 module polydem_stable_step
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
+   use polydem_expected_contact, only: expect_contact
    use polydem_force_law, only: force_law_t
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_stability_limit, only: stability_table_t, limit_at
    implicit none
    private
-   public :: contact_numbers, stable_step_of_contacts, stable_step_of_shapes
+   public :: contact_numbers, stable_step_of_contacts, stable_step_of_shapes, &
+      stable_step_alone, stiffest_product
 
    !> Assumed number of contacts of the two equal bodies of an expected contact: four of each body
    real(wp), parameter :: assumed_contacts = 8.0_wp
@@ -46,7 +50,8 @@ contains
       !$omp parallel do if (contacts%n > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(law, table, bodies, numbers, contacts, steps) private(c)
       do c = 1_ip, contacts%n
-         steps(c) = step_of_contact(law, table, bodies, numbers, contacts, c)
+         steps(c) = step_of_contact(law, table, bodies, [numbers(contacts%first(c)), numbers(contacts%second(c))], &
+                                    contacts, c)
       end do
       !$omp end parallel do
       step = huge(step)
@@ -60,48 +65,106 @@ contains
    end subroutine stable_step_of_contacts
 
    !> Find the stable step expected from the shapes of the free bodies, and the body that limits it. Each body is
-   !> assumed to have contacts with equal bodies, with the greatest stiffness that its edges allow.
-   subroutine stable_step_of_shapes(law, table, bodies, step, critical)
+   !> assumed to have contacts with equal bodies that it hits at a given speed, with the greatest stiffness that its
+   !> outline allows.
+   subroutine stable_step_of_shapes(law, table, bodies, speed, step, critical, depth, length, damped)
       !> Force law; `measure` is not required
       type(force_law_t), intent(in) :: law
       !> Stability limit of the integration scheme
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
+      !> Speed of approach of the bodies [m/s]; 0: contacts without depth
+      real(wp), intent(in) :: speed
       !> Stable step [s], huge if there is no free body
       real(wp), intent(out) :: step
       !> Slot of the body that limits the step, 0 if there is no free body
       integer(ip), intent(out) :: critical
-      type(contact_element_t) :: element
-      real(wp) :: g(4), this
-      integer(ip) :: k, s
+      !> Depth of its expected contact, area over length [m]; 0 if there is no free body
+      real(wp), intent(out) :: depth
+      !> Length of that contact [m], and its stable step over that without dashpots
+      real(wp), intent(out), optional :: length, damped
+      real(wp), allocatable :: steps(:)
+      real(wp) :: unused(3), found(3)
+      integer(ip) :: k, n
 
+      n = size(bodies%free, kind=ip)
       step = huge(step)
       critical = 0_ip
-      do k = 1_ip, size(bodies%free, kind=ip)
-         s = bodies%free(k)
-         call describe_shape(bodies, s, element)
-         g(1) = assumed_contacts*bodies%inverse_mass(s)
-         g(2) = assumed_contacts*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
-         g(3) = 0.0_wp
-         g(4) = assumed_contacts*bodies%inverse_inertia(s)
-         element%normal_mass = 0.5_wp*bodies%mass(s)
-         element%normal_mobility = 2.0_wp*bodies%inverse_mass(s)
-         element%tangential_mass = 1.0_wp/(g(2)/assumed_contacts)
-         call law%stiffen(element)
-         this = step_of_element(table, element, g)
-         if (this < step) then
-            step = this
-            critical = s
-         end if
+      depth = 0.0_wp
+      if (present(length)) length = 0.0_wp
+      if (present(damped)) damped = 1.0_wp
+      if (n == 0_ip) return
+      allocate (steps(n))
+      !$omp parallel do if (n > min_parallel_size) schedule(static) default(none) &
+      !$omp    shared(law, table, bodies, speed, steps, n) private(k, unused)
+      do k = 1_ip, n
+         call find_expected_step(law, table, bodies, bodies%free(k), speed, steps(k), unused)
       end do
+      !$omp end parallel do
+      k = minloc(steps, 1, kind=ip)
+      critical = bodies%free(k)
+      call find_expected_step(law, table, bodies, critical, speed, step, found)
+      depth = found(1)
+      if (present(length)) length = found(2)
+      if (present(damped)) damped = found(3)
    end subroutine stable_step_of_shapes
+
+   !> Find the stable step of the expected contacts of a body.
+   subroutine find_expected_step(law, table, bodies, s, speed, step, found)
+      type(force_law_t), intent(in) :: law
+      type(stability_table_t), intent(in) :: table
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      !> Speed of approach [m/s]
+      real(wp), intent(in) :: speed
+      !> Stable step [s]
+      real(wp), intent(out) :: step
+      !> Depth and length of the contact [m], and its stable step over that without dashpots
+      real(wp), intent(out) :: found(3)
+      type(contact_element_t) :: element
+      real(wp) :: g(4), outline, share
+
+      call expect_contact(law, bodies, s, speed, element, outline)
+      g(1) = assumed_contacts*bodies%inverse_mass(s)
+      g(2) = assumed_contacts*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
+      g(3) = 0.0_wp
+      g(4) = assumed_contacts*bodies%inverse_inertia(s)
+      element%tangential_mass = 1.0_wp/(g(2)/assumed_contacts)
+      call law%stiffen(element)
+      ! The contacts of a body share its outline, and so do their dashpots. The springs do not, for accuracy: then an
+      ! impact of two bodies takes at least ten steps.
+      share = min(1.0_wp, outline/(0.5_wp*assumed_contacts*element%length))
+      element%normal_dashpot = element%normal_dashpot*share
+      element%tilt_dashpot = element%tilt_dashpot*share
+      step = step_of_element(table, element, g)
+      element%normal_dashpot = 0.0_wp
+      element%tangential_dashpot = 0.0_wp
+      element%tilt_dashpot = 0.0_wp
+      found = [element%depth, element%length, step/step_of_element(table, element, g)]
+   end subroutine find_expected_step
+
+   !> Stable step of a contact whose bodies have no other contacts [s]
+   real(wp) function stable_step_alone(law, table, bodies, contacts, c)
+      type(force_law_t), intent(in) :: law
+      !> Stability limit of the integration scheme
+      type(stability_table_t), intent(in) :: table
+      type(bodies_t), intent(in) :: bodies
+      !> Contacts with their forces
+      type(contacts_t), intent(in) :: contacts
+      !> Index of the contact
+      integer(ip), intent(in) :: c
+
+      stable_step_alone = step_of_contact(law, table, bodies, [1.0_wp, 1.0_wp], contacts, c)
+   end function stable_step_alone
 
    !> Stable step of contact c [s]
    real(wp) function step_of_contact(law, table, bodies, numbers, contacts, c)
       type(force_law_t), intent(in) :: law
       type(stability_table_t), intent(in) :: table
       type(bodies_t), intent(in) :: bodies
-      real(wp), intent(in) :: numbers(:)
+      !> Numbers of contacts of its first and of its second body
+      real(wp), intent(in) :: numbers(2)
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: c
       type(contact_element_t) :: element
@@ -109,8 +172,8 @@ contains
 
       g = 0.0_wp
       alone = 0.0_wp
-      call add_body(contacts%first(c), contacts%arm_first(:, c))
-      call add_body(contacts%second(c), contacts%arm_second(:, c))
+      call add_body(contacts%first(c), contacts%arm_first(:, c), numbers(1))
+      call add_body(contacts%second(c), contacts%arm_second(:, c), numbers(2))
       element%area = contacts%area(c)
       element%length = contacts%length(c)
       element%inverse_length = contacts%inverse_length(c)
@@ -128,9 +191,9 @@ contains
    contains
 
       !> Add the normal, tangential, mixed and rotational mobility of one body.
-      subroutine add_body(s, arm)
+      subroutine add_body(s, arm, number)
          integer(ip), intent(in) :: s
-         real(wp), intent(in) :: arm(2)
+         real(wp), intent(in) :: arm(2), number
          real(wp) :: along, across, mine(4)
 
          if (bodies%fixed(s)) return
@@ -141,10 +204,76 @@ contains
          mine(3) = along*across*bodies%inverse_inertia(s)
          mine(4) = bodies%inverse_inertia(s)
          alone = alone + mine
-         g = g + mine*numbers(s)
+         g = g + mine*number
       end subroutine add_body
 
    end function step_of_contact
+
+   !> Product of ratio L/l and mobility below which no contact, alone, has a stable step below a given one [m/kg].
+   !>
+   !> Frequencies follow this product, and dashpots at most the product with the root of the greatest mass. So the
+   !> lightest pair and the heaviest body at a wall bound all others. Arms are at most the greatest radius R: they increase
+   !> the mobility by a share of m R^2/I.
+   real(wp) function stiffest_product(law, table, bodies, step) result(product)
+      type(force_law_t), intent(in) :: law
+      !> Stability limit of the integration scheme
+      type(stability_table_t), intent(in) :: table
+      type(bodies_t), intent(in) :: bodies
+      !> Time step [s]
+      real(wp), intent(in) :: step
+      real(wp) :: mobilities(2), turning
+      integer(ip) :: s
+
+      product = huge(product)
+      mobilities = [0.0_wp, huge(1.0_wp)]
+      turning = 0.0_wp
+      do s = 1_ip, bodies%n
+         if (.not. bodies%inverse_mass(s) > 0.0_wp .or. bodies%fixed(s)) cycle
+         mobilities(1) = max(mobilities(1), 2.0_wp*bodies%inverse_mass(s))
+         mobilities(2) = min(mobilities(2), bodies%inverse_mass(s))
+         turning = max(turning, bodies%radius(s)**2*bodies%inverse_inertia(s)*bodies%mass(s))
+      end do
+      if (mobilities(1) > 0.0_wp) product = min(product_at(mobilities(1)), product_at(mobilities(2)))
+
+   contains
+
+      !> The product at a mobility, on the safe side by 1 %
+      real(wp) function product_at(mobility)
+         real(wp), intent(in) :: mobility
+         real(wp) :: factor
+         integer :: k
+
+         product_at = sqrt(sqrt(tiny(mobility)))*mobility
+         factor = 16.0_wp
+         do k = 1, 2000
+            if (factor < 1.01_wp) exit
+            if (is_stable(mobility, factor*product_at/mobility)) then
+               product_at = factor*product_at
+            else
+               factor = sqrt(factor)
+            end if
+         end do
+      end function product_at
+
+      !> Whether the step is stable for a contact of unit arms and of twice their length
+      logical function is_stable(mobility, ratio)
+         real(wp), intent(in) :: mobility, ratio
+         type(contact_element_t) :: element
+         real(wp) :: g(4)
+
+         element%ratio = ratio
+         element%length = 2.0_wp
+         element%inverse_length = 0.5_wp*ratio
+         element%normal_mobility = mobility
+         element%normal_mass = 1.0_wp/mobility
+         element%rotational_mobility = turning*mobility
+         g = [mobility*(1.0_wp + turning), mobility*(1.0_wp + turning), mobility*turning, mobility*turning]
+         element%tangential_mass = 1.0_wp/mobility
+         call law%stiffen(element)
+         is_stable = step_of_element(table, element, g) >= step
+      end function is_stable
+
+   end function stiffest_product
 
    !> Number of contacts of each body, (slot)
    pure function contact_numbers(n_bodies, incidence) result(numbers)
@@ -180,33 +309,5 @@ contains
          step_of_element = limit_at(table, damping)/frequency
       end associate
    end function step_of_element
-
-   !> Start an expected contact from the shape of its body.
-   pure subroutine describe_shape(bodies, s, element)
-      type(bodies_t), intent(in) :: bodies
-      integer(ip), intent(in) :: s
-      type(contact_element_t), intent(out) :: element
-      real(wp) :: dx, dy, length, distance, longest, area
-      integer(ip) :: v, w
-
-      element%is_expected = .true.
-      element%inertia = bodies%inertia(s)
-      longest = 0.0_wp
-      area = 0.0_wp
-      w = bodies%vertex_start(s + 1_ip) - 1_ip
-      do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-         dx = bodies%shape(1, v) - bodies%shape(1, w)
-         dy = bodies%shape(2, v) - bodies%shape(2, w)
-         length = sqrt(dx*dx + dy*dy)
-         distance = abs(dx*bodies%shape(2, w) - dy*bodies%shape(1, w))/length
-         longest = max(longest, length)
-         area = area + 0.5_wp*length*distance
-         element%edge_ratio = max(element%edge_ratio, length/(2.0_wp*distance))
-         element%radius_square = max(element%radius_square, bodies%shape(1, v)**2 + bodies%shape(2, v)**2)
-         w = v
-      end do
-      element%square_ratio = longest*longest/area
-      element%longest = longest
-   end subroutine describe_shape
 
 end module polydem_stable_step

@@ -64,14 +64,14 @@ contains
       end do
    end subroutine add
 
-   !> Add the dashpot against tilts. An expected contact is as long as the longest edge.
+   !> Add the dashpot against tilts.
    subroutine stiffen(self, element)
       class(tilt_damping_t), intent(in) :: self
       !> The contact with its normal dashpot; the dashpot against tilts changes
       type(contact_element_t), intent(inout) :: element
 
       element%tilt_dashpot = element%tilt_dashpot &
-         + self%share*element%normal_dashpot*merge(element%longest, element%length, element%is_expected)**2/12.0_wp
+         + self%share*element%normal_dashpot*element%length**2/12.0_wp
    end subroutine stiffen
 
 end module polydem_tilt_damping

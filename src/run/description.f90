@@ -12,6 +12,9 @@ module polydem_description
    private
    public :: describe, list_overlaps
 
+   !> Share of the undamped stable step below which the log gives damping as the reason for a short step
+   real(wp), parameter :: strongly_damped = 0.3_wp
+
 contains
 
    !> Write the models that the scene uses, its counts and measures, and the time step relative to its stable value.
@@ -34,6 +37,12 @@ contains
          call log%write_line('step       dt = '//to_text(s%dt)//' s, '// &
                              to_text(s%dt/s%expected_stable_step, 3)//' of the stable time step '// &
                              to_text(s%expected_stable_step)//' s estimated from the shapes')
+         if (s%expected%body > 0_lp) call log%write_line('           for impacts at '// &
+            to_text(s%expected%speed, 3)//' m/s ('//s%expected%origin//'), which make contacts of body '// &
+            to_text(s%expected%body)//' '//to_text(s%expected%depth, 3)//' m deep and '// &
+            to_text(s%expected%length, 3)//' m long')
+         if (s%expected%damped < strongly_damped) call log%write_line('           (strong damping of such contacts '// &
+            'reduces it to '//to_text(s%expected%damped, 3)//' of the step without damping; shorter contacts allow more)')
          if (measures%contacts > 0_lp) call log%write_line('           '//to_text(s%dt/measures%stable_step, 3)// &
             ' of the stable time step '//to_text(measures%stable_step)//' s of the initial contacts')
          call log%write_line('duration   '//to_text(real(s%n_steps, wp)*s%dt)//' s, '//to_text(s%n_steps)// &

@@ -5,6 +5,7 @@
 module polydem_initial_warnings
    use polydem_elementary, only: hypotenuse
    use polydem_fixed_overlaps, only: find_fixed_overlaps
+   use polydem_guards, only: shorter_step
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
    use polydem_simulation, only: simulation_t
@@ -106,11 +107,15 @@ contains
       type(simulation_t), intent(in) :: simulation
       type(text_t), allocatable, intent(inout) :: warnings(:)
 
+      character(len=:), allocatable :: remedy
+
+      remedy = 'Reduce dt, or omit it'
+      if (.not. simulation%settings%integrate%dt > 0.0_wp) remedy = 'Reduce fraction in &integrate'
       associate (dt => simulation%dt, stable => simulation%expected_stable_step)
          if (dt <= stable) return
          call add(warnings, 'dt = '//to_text(dt)//' s is '//to_text(dt/stable, 3)//' times the stable time step '// &
                   to_text(stable, 3)//' s estimated from the shapes: the integration of contacts of '// &
-                  'these bodies will be unstable. Reduce dt, or omit it')
+                  'these bodies will be unstable. '//remedy)
       end associate
    end subroutine warn_of_step
 
@@ -145,13 +150,13 @@ contains
             to_text(measures%thinnest)//')'
          if (measures%move > fast_fraction*measures%thickness) call add(warnings, 'body '// &
             to_text(measures%farthest)//' moves '//to_text(measures%move/measures%thickness, 3)//thinnest// &
-            ' in one step: it may pass through other bodies undetected. Reduce dt')
+            ' in one step: it may pass through other bodies undetected; '//shorter_step(s%settings%integrate))
          fastest = max(measures%wall_speed, merge(measures%fall_speed, 0.0_wp, measures%free > 0_lp))
          mover = 'a body that falls through the extent'
          if (measures%wall_speed >= fastest) mover = 'a wall'
          if (measures%move <= fast_fraction*measures%thickness .and. fastest*s%dt > fast_fraction*measures%thickness) &
             call add(warnings, mover//' reaches '//to_text(fastest, 3)//' m/s and then moves '// &
-            to_text(fastest*s%dt/measures%thickness, 3)//thinnest//' in one step. Reduce dt')
+            to_text(fastest*s%dt/measures%thickness, 3)//thinnest//' in one step; '//shorter_step(s%settings%integrate))
          if (measures%impact > fast_fraction*measures%thickness) call add(warnings, 'body '// &
             to_text(measures%fastest)//' is so fast that stopping it takes an overlap of '// &
             'about '//to_text(measures%impact, 3)//' m, '//to_text(measures%impact/measures%thickness, 3)//thinnest// &

@@ -6,19 +6,19 @@ module polydem_monitor
    use polydem_contact_depth, only: any_deeper, deepest_contact, depth_share, depth_text
    use polydem_energy_guard, only: check_energy, energy_guard_t, open_energy_guard
    use polydem_errors, only: error_t
-   use polydem_guards, only: place_of
+   use polydem_guards, only: place_of, shorter_step, warn_share
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_passing, only: passing_text
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
-   use polydem_stability_check, only: check_stability
+   use polydem_stability_check, only: check_stability, check_suspects, greatest_share
    use polydem_strings, only: to_text, counted
    use polydem_warning, only: warning_t
    implicit none
    private
    public :: monitor_t, new_monitor, check_step, checks_contacts, report_pending_warnings, write_warning_counts, &
-      serialize_monitor, warning_counts, set_warning_counts
+      finds_stiff, serialize_monitor, warning_counts, set_warning_counts
 
    !> Guards and their findings
    type :: monitor_t
@@ -36,6 +36,8 @@ module polydem_monitor
       real(wp), private :: warned = 0.0_wp
       !> Greatest dt / stable dt so far [1]
       real(wp) :: greatest_share = 0.0_wp
+      !> Whether a rank has a contact in this step that is too stiff for dt, as `finds_stiff` says
+      logical :: has_stiff = .false.
    end type monitor_t
 
    !> Steps between checks of guards that do not run in every step
@@ -85,7 +87,14 @@ contains
       associate (settings => simulation%settings%guards)
          if (settings%overlap /= 'off' .or. settings%passing /= 'off') &
             call check_contact_guards(monitor, simulation, error)
-         if (check_all .and. settings%step /= 'off') call check_time_step(monitor, simulation, log, error)
+         if (settings%step /= 'off') then
+            if (simulation%comm%size == 1_ip) monitor%has_stiff = finds_stiff(monitor, simulation)
+            if (check_all) then
+               call check_time_step(monitor, simulation, log, error)
+            else if (monitor%has_stiff) then
+               call respond_to_stiffness(monitor, simulation, log, error)
+            end if
+         end if
          if (check_all .and. settings%energy /= 'off') call check_energy(monitor%energy, simulation, error)
          if (check_all .or. settings%passing == 'stop') call simulation%comm%all_reduce_error(error)
       end associate
@@ -232,8 +241,8 @@ contains
          if (settings%overlap == 'stop') call s%comm%all_reduce_text(text, share)
          if (.not. allocated(text)) return
          call monitor%overlap%respond(settings%overlap, 'step '//to_text(s%step)//': '//text// &
-                                    '. Reduce dt, increase stiffness in &forces, or remove deep initial '// &
-                                    'overlaps (relaxed_depth in &guards)', error, share)
+                                    '. Increase stiffness in &forces, remove deep initial overlaps (relaxed_depth '// &
+                                    'in &guards), or '//shorter_step(s%settings%integrate), error, share)
       end associate
    end subroutine respond_to_depth
 
@@ -249,11 +258,35 @@ contains
          found = findloc(s%walk%suspects%pair(:s%walk%suspects%n), s%walk%passing_pair, dim=1)
          place = place_of(s%bodies, s%walk%suspects%first(found), s%walk%suspects%second(found))
          call monitor%passing%respond(s%settings%guards%passing, 'step '//to_text(s%step)//': '// &
-                                    passing_text(s%bodies, s%walk%suspects, s%bodies%radius, found), error, &
+                                    passing_text(s%bodies, s%walk%suspects, s%bodies%radius, found, &
+                                                 shorter_step(s%settings%integrate)), error, &
                                     -real(place, dp))
          if (allocated(error)) error%place = place
       end associate
    end subroutine respond_to_passing
+
+   !> Whether this rank has a contact in this step whose dt / stable dt, alone, exceeds all that the log warns of so far
+   logical function finds_stiff(monitor, simulation)
+      type(monitor_t), intent(in) :: monitor
+      type(simulation_t), intent(in) :: simulation
+
+      finds_stiff = .false.
+      if (simulation%settings%guards%step == 'off' .or. simulation%walk%suspects%n == 0_ip) return
+      finds_stiff = greatest_share(simulation) > max(warn_share, 1.1_wp*monitor%warned)
+   end function finds_stiff
+
+   !> Respond to a contact that is too stiff for dt, in the step in which it becomes so. Collective.
+   subroutine respond_to_stiffness(monitor, simulation, log, error)
+      type(monitor_t), intent(inout) :: monitor
+      type(simulation_t), intent(inout) :: simulation
+      type(log_t), intent(inout) :: log
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: warning
+      real(wp) :: share
+
+      call check_suspects(simulation, share, warning, error)
+      call note_share(monitor, share, warning, log)
+   end subroutine respond_to_stiffness
 
    !> Compare dt to the stable time step of the contacts. A further warning needs a ratio that is larger by a tenth.
    subroutine check_time_step(monitor, simulation, log, error)
@@ -268,12 +301,24 @@ contains
       call simulation%comm%all_reduce_text(warning)
       share = 0.0_wp
       if (stable < huge(stable)) share = simulation%dt/stable
+      call note_share(monitor, share, warning, log)
+   end subroutine check_time_step
+
+   !> Keep the greatest dt / stable dt, and write a warning about a greater one.
+   subroutine note_share(monitor, share, warning, log)
+      type(monitor_t), intent(inout) :: monitor
+      !> dt / stable dt
+      real(wp), intent(in) :: share
+      !> Unallocated: none
+      character(len=:), allocatable, intent(in) :: warning
+      type(log_t), intent(inout) :: log
+
       monitor%greatest_share = max(monitor%greatest_share, share)
       if (.not. allocated(warning)) return
       monitor%large_steps = monitor%large_steps + 1_lp
       if (share <= 1.1_wp*monitor%warned) return
       monitor%warned = share
       call log%write_line('warning: '//warning)
-   end subroutine check_time_step
+   end subroutine note_share
 
 end module polydem_monitor

@@ -6,10 +6,10 @@ module polydem_scene_measures
    use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
    use polydem_elementary, only: hypotenuse
    use polydem_energy_guard, only: find_stored_energy
+   use polydem_expected_speed, only: greatest_wall_speed
    use polydem_guards, only: greatest_displacement, place_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_body, owns_pair
-   use polydem_prescribed_motion, only: motion_t
    use polydem_simulation, only: simulation_t
    use polydem_stability_check, only: find_stable_step
    use polydem_strings, only: to_text
@@ -93,7 +93,7 @@ contains
          if (slot > 0_ip) measures%farthest = int(s%bodies%id(slot), lp)
          call keep_greatest(comm, measures%move, measures%farthest)
          do k = 1, size(s%motions)
-            measures%wall_speed = max(measures%wall_speed, greatest_speed(s%motions(k), s%bodies%radius))
+            measures%wall_speed = max(measures%wall_speed, greatest_wall_speed(s%motions(k), s%bodies%radius))
          end do
          gravity = hypotenuse(s%settings%forces%gravity(1), s%settings%forces%gravity(2))
          if (gravity > 0.0_wp) then
@@ -286,26 +286,5 @@ contains
          w = v
       end do
    end function area_of
-
-   !> Greatest speed of any point of the bodies of a prescribed motion [m/s]
-   pure real(wp) function greatest_speed(motion, radius)
-      type(motion_t), intent(in) :: motion
-      !> Greatest distance of a vertex from the centre of each body, (slot) [m]
-      real(wp), intent(in) :: radius(:)
-      integer :: k
-
-      greatest_speed = 0.0_wp
-      select case (motion%kind)
-      case ('rotation')
-         do k = 1, size(motion%slots)
-            greatest_speed = max(greatest_speed, abs(motion%rate)*(radius(motion%slots(k)) + hypotenuse( &
-                             motion%position(1, k) - motion%pivot(1), motion%position(2, k) - motion%pivot(2))))
-         end do
-      case ('translation')
-         greatest_speed = hypotenuse(motion%velocity(1), motion%velocity(2))
-      case default
-         greatest_speed = motion%frequency*hypotenuse(motion%amplitude(1), motion%amplitude(2))
-      end select
-   end function greatest_speed
 
 end module polydem_scene_measures

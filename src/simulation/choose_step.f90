@@ -5,9 +5,10 @@ module polydem_choose_step
    use polydem_kinds, only: ip, lp, wp
    use polydem_origin, only: place_of
    use polydem_simulation, only: simulation_t
+   use polydem_expected_speed, only: find_expected_speed
    use polydem_stable_step, only: stable_step_of_shapes
    use polydem_strings, only: to_text
-   use polydem_whole_run, only: reduce_to_greatest, reduce_to_least
+   use polydem_whole_run, only: keep_greatest, reduce_to_greatest
    implicit none
    private
    public :: choose_step
@@ -26,14 +27,29 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(force_law_t) :: law
       integer(ip) :: critical
-      real(wp) :: steps, least(1), has_free(1)
+      real(wp) :: steps, stable, depth, length, damped, has_free(1), found(3)
+      integer(lp) :: limiting
 
       call choose_parts(self%settings%forces, law)
-      call stable_step_of_shapes(law, self%integrator%stability(), self%bodies, least(1), critical)
+      call find_expected_speed(self)
+      call stable_step_of_shapes(law, self%integrator%stability(), self%bodies, self%expected%speed, stable, critical, &
+                                 depth, length, damped)
       has_free = merge(1.0_wp, 0.0_wp, critical > 0_ip)
-      call reduce_to_least(self%comm, least)
       call reduce_to_greatest(self%comm, has_free)
-      self%expected_stable_step = least(1)
+      limiting = 0_lp
+      if (critical > 0_ip) limiting = int(self%bodies%id(critical), lp)
+      stable = -stable
+      call keep_greatest(self%comm, stable, limiting)
+      self%expected_stable_step = -stable
+      self%expected%body = limiting
+      found = 0.0_wp
+      if (critical > 0_ip) then
+         if (int(self%bodies%id(critical), lp) == limiting) found = [depth, length, damped]
+      end if
+      call reduce_to_greatest(self%comm, found)
+      self%expected%depth = found(1)
+      self%expected%length = found(2)
+      self%expected%damped = found(3)
       associate (settings => self%settings%integrate)
          self%dt = settings%dt
          if (self%dt <= 0.0_wp .and. (has_free(1) < 1.0_wp .or. .not. self%expected_stable_step > 0.0_wp)) then

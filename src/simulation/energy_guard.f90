@@ -10,6 +10,7 @@ module polydem_energy_guard
    use polydem_communicator, only: communicator_t
    use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
+   use polydem_guards, only: shorter_step
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: owns_pair
    use polydem_simulation, only: simulation_t, compute_balance
@@ -81,7 +82,7 @@ contains
                                     'gain of '//to_text(growth, 3)//' J/m, '//to_text(growth/scale, 3)// &
                                     ' of the largest kinetic energy or work so far; fastest body '//to_text(id)// &
                                     ' at ('//to_text(real(position(1), wp))//', '//to_text(real(position(2), wp))// &
-                                    ') m. Reduce dt, or check for deep overlaps', error)
+                                    ') m. Check for deep overlaps, or '//shorter_step(simulation%settings%integrate), error)
       end associate
    end subroutine check_energy
 

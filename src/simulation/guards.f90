@@ -5,13 +5,13 @@ module polydem_guards
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: far, dp, ip, lp, wp
-   use polydem_settings, only: guards_settings_t
+   use polydem_settings, only: guards_settings_t, integrate_settings_t
    use polydem_strings, only: to_text
    use polydem_warning, only: warning_t
    implicit none
    private
    public :: motion_guard_t, new_motion_guard, have_valid_poses, check_poses, move_within_limit, find_coasting, &
-      check_motion, check_step, check_contacts, place_of, greatest_displacement
+      check_motion, check_step, check_contacts, place_of, greatest_displacement, shorter_step, warn_share
 
    !> Guard of the displacement of bodies per step
    type :: motion_guard_t
@@ -21,6 +21,8 @@ module polydem_guards
       character(len=:), allocatable :: choice
       !> Warnings of too large displacements
       type(warning_t) :: warning
+      !> Clause that says how to shorten the time step
+      character(len=:), allocatable :: remedy
       !> Slots of the bodies that may move
       integer(ip), allocatable :: moving(:)
    end type motion_guard_t
@@ -30,16 +32,28 @@ module polydem_guards
 
 contains
 
+   !> Clause that says how to shorten the time step: 'reduce dt' if the user chose it
+   pure function shorter_step(settings) result(clause)
+      type(integrate_settings_t), intent(in) :: settings
+      character(len=:), allocatable :: clause
+
+      clause = 'reduce dt'
+      if (.not. settings%dt > 0.0_wp) clause = 'reduce fraction in &integrate'
+   end function shorter_step
+
    !> Prepare the guard for the present bodies.
-   subroutine new_motion_guard(guard, settings, bodies, moving)
+   subroutine new_motion_guard(guard, settings, bodies, moving, remedy)
       type(motion_guard_t), intent(out) :: guard
       type(guards_settings_t), intent(in) :: settings
       !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
       !> Slots of the bodies that may move
       integer(ip), intent(in) :: moving(:)
+      !> Clause that says how to shorten the time step
+      character(len=*), intent(in) :: remedy
 
       guard%choice = settings%displacement
+      guard%remedy = remedy
       guard%moving = moving
       guard%limit = huge(1.0_wp)
       if (guard%choice == 'off' .or. bodies%n == 0_ip) return
@@ -215,8 +229,8 @@ contains
          to_text(bodies%velocity(1, s))//', '//to_text(bodies%velocity(2, s))// &
          ') m/s and the angular velocity '//to_text(bodies%angular_velocity(s))// &
          ' 1/s; no point of it may move more than '//to_text(guard%limit)// &
-         ' m in a step, otherwise bodies could pass through each other. Reduce dt, or check for deep '// &
-         'overlaps at the start'
+         ' m in a step, otherwise bodies could pass through each other. Check for deep overlaps at the start, or '// &
+         guard%remedy
    end function motion_text
 
    !> Whether the state of a body is finite and no point of it moves too far in a step; false for NaN
@@ -272,7 +286,7 @@ contains
    end function move_of
 
    !> Compare the time step with the stable time step of the contacts: warning above one half of it, error above it.
-   subroutine check_step(bodies, contacts, step, dt, stable, critical, warning, error)
+   subroutine check_step(bodies, contacts, step, dt, stable, critical, remedy, warning, error)
       type(bodies_t), intent(in) :: bodies
       type(contacts_t), intent(in) :: contacts
       !> Number of the step
@@ -283,6 +297,8 @@ contains
       real(wp), intent(in) :: stable
       !> Index of the contact that determines it, 0 if there is none
       integer(ip), intent(in) :: critical
+      !> Sentences that follow the message: what is assumed, and what to do
+      character(len=*), intent(in) :: remedy
       !> Allocated if dt exceeds `warn_share` of the stable time step, but not the stable time step
       character(len=:), allocatable, intent(out) :: warning
       !> Names the contact if dt exceeds the stable time step
@@ -294,10 +310,10 @@ contains
          text = 'step '//to_text(step)//': dt = '//to_text(dt)//' s is '//to_text(dt/stable, 3)// &
             ' of the stable step, set by the contact of the bodies '//to_text(bodies%id(i))//' and '// &
             to_text(bodies%id(j))//' at ('//to_text(bodies%position(1, i) + contacts%arm_first(1, critical))//', '// &
-            to_text(bodies%position(2, i) + contacts%arm_first(2, critical))//') m'
+            to_text(bodies%position(2, i) + contacts%arm_first(2, critical))//') m'//remedy
       end associate
       if (dt > stable) then
-         call raise(error, run_error, text//'. Reduce dt')
+         call raise(error, run_error, text)
       else
          warning = text
       end if

@@ -9,11 +9,12 @@ module polydem_local_bodies
    use polydem_finder_statistics, only: finder_statistics_t
    use polydem_force_law, only: force_law_t, new_force_law
    use polydem_force_sums, only: start_sums
-   use polydem_guards, only: new_motion_guard
+   use polydem_guards, only: new_motion_guard, shorter_step, warn_share
    use polydem_kinds, only: ip, wp
    use polydem_neighbours, only: new_neighbours
    use polydem_passing, only: new_contact_guard
    use polydem_simulation, only: simulation_t, former_direction
+   use polydem_stable_step, only: stiffest_product
    implicit none
    private
    public :: fit_to_bodies
@@ -53,6 +54,8 @@ contains
       call allocate_history(self)
       call new_contact_guard(self%walk%contact_guard, self%settings%guards, self%bodies, &
                              column_of(self%history, 'direction'))
+      if (self%settings%guards%step /= 'off') self%walk%contact_guard%soft = &
+         stiffest_product(self%law, self%integrator%stability(), self%bodies, self%dt/warn_share)
       self%generation = self%generation + 1_ip
    end subroutine fit_to_bodies
 
@@ -74,7 +77,8 @@ contains
       integer :: n
 
       n = size(self%moving) - count(self%bodies%in_halo)
-      if (self%generation == 0_ip) call new_motion_guard(self%guard, self%settings%guards, self%bodies, self%moving(:n))
+      if (self%generation == 0_ip) call new_motion_guard(self%guard, self%settings%guards, self%bodies, &
+                                                         self%moving(:n), shorter_step(self%settings%integrate))
       self%guard%moving = self%moving(:n)
    end subroutine rebuild_guard
 

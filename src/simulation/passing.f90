@@ -33,6 +33,8 @@ module polydem_passing
       real(wp) :: least_depth = huge(1.0_wp)
       !> Contacts that are not deeper than this are surely none [m]
       real(wp) :: shallow = 2.0_wp**(maxexponent(1.0_wp)/2)
+      !> Contacts with a greater product of ratio L/l and mobility may be too stiff for the time step [m/kg]
+      real(wp) :: soft = huge(1.0_wp)
       !> Column of the contact history with the directions of the last step; 0 if there is none
       integer :: column = 0
    end type contact_guard_t
@@ -65,7 +67,7 @@ contains
       type(contact_block_t), intent(in) :: block
       !> Contact history; the direction is read and set
       type(contact_history_t), intent(inout) :: history
-      !> Whether each contact is deep or degenerate; set if any is
+      !> Whether each contact is deep, degenerate or stiff; set if any is
       logical, intent(inout) :: suspect(block_size)
       !> Whether any may be
       logical, intent(out) :: any_suspect
@@ -76,7 +78,8 @@ contains
 
       deepest = -1.0_wp
       do c = 1_ip, block%n
-         deepest = max(deepest, max(block%degenerate(c), block%area(c) - guard%shallow*block%length(c)))
+         deepest = max(deepest, max(block%degenerate(c), block%area(c) - guard%shallow*block%length(c), &
+                                    block%length(c)*block%inverse_length(c)*block%mobility(c) - guard%soft))
       end do
       any_suspect = deepest > 0.0_wp
       if (any_suspect) call find_suspects(guard, bodies, block, suspect)
@@ -97,7 +100,7 @@ contains
       end do
    end subroutine test_block
 
-   !> Find the contacts that are deep or degenerate.
+   !> Find the contacts that are deep, degenerate or stiff.
    pure subroutine find_suspects(guard, bodies, block, suspect)
       type(contact_guard_t), intent(in) :: guard
       type(bodies_t), intent(in) :: bodies
@@ -106,7 +109,8 @@ contains
       integer(ip) :: c
 
       do c = 1_ip, block%n
-         suspect(c) = block%degenerate(c) > 0.0_wp
+         suspect(c) = block%degenerate(c) > 0.0_wp &
+            .or. block%length(c)*block%inverse_length(c)*block%mobility(c) > guard%soft
          if (suspect(c) .or. guard%least_depth >= huge(1.0_wp)) cycle
          suspect(c) = block%area(c) > guard%least_depth*block%length(c) &
             *min(bodies%thickness(block%first(c)), bodies%thickness(block%second(c)))
@@ -130,7 +134,7 @@ contains
    end function passes
 
    !> Message about a contact whose bodies pass through each other
-   function passing_text(bodies, contacts, radius, c) result(text)
+   function passing_text(bodies, contacts, radius, c, shorter_step) result(text)
       !> Bodies at the end of the step
       type(bodies_t), intent(in) :: bodies
       !> Contacts of the step
@@ -139,6 +143,8 @@ contains
       real(wp), intent(in) :: radius(:)
       !> Index of the contact
       integer(ip), intent(in) :: c
+      !> Clause that says how to shorten the time step
+      character(len=*), intent(in) :: shorter_step
       character(len=:), allocatable :: text
 
       associate (i => contacts%first(c), j => contacts%second(c))
@@ -154,7 +160,7 @@ contains
          end if
       end associate
       text = text//': one may pass through the other. Increase the stiffness, use thicker or slower bodies, or '// &
-         'reduce dt'
+         shorter_step
 
    contains
 

@@ -41,6 +41,20 @@ module polydem_simulation
       real(wp) :: move = 0.0_wp
    end type relaxation_t
 
+   !> The impact for which the time step is chosen
+   type :: expected_impact_t
+      !> Speed of approach [m/s]
+      real(wp) :: speed = 0.0_wp
+      !> Where the speed comes from
+      character(len=:), allocatable :: origin
+      !> Depth of the contact of two equal bodies, area over length [m]
+      real(wp) :: depth = 0.0_wp
+      !> Length of this contact [m], and its stable step over that without dashpots
+      real(wp) :: length = 0.0_wp, damped = 1.0_wp
+      !> Identifier of the body whose contacts limit the step; 0 if there is no free body
+      integer(lp) :: body = 0_lp
+   end type expected_impact_t
+
    !> The complete state of a simulation on one rank
    type :: simulation_t
       !> Settings of the run
@@ -95,6 +109,8 @@ module polydem_simulation
       real(wp) :: dt = 0.0_wp
       !> Stable time step estimated from the shapes [s]
       real(wp) :: expected_stable_step = 0.0_wp
+      !> The impact for which it is estimated
+      type(expected_impact_t) :: expected
       !> Guard of the displacement per step
       type(motion_guard_t) :: guard
       !> Summary of the relaxation before time 0

@@ -1,14 +1,16 @@
 !> Comparison of the time step with the stable time step of the present contacts.
 module polydem_stability_check
-   use polydem_errors, only: error_t
+   use polydem_contacts, only: contacts_t
+   use polydem_errors, only: error_t, raise, run_error
    use polydem_guards, only: check_step
-   use polydem_kinds, only: ip, wp
+   use polydem_kinds, only: dp, ip, wp
    use polydem_simulation, only: simulation_t
-   use polydem_stable_step, only: contact_numbers, stable_step_of_contacts
-   use polydem_whole_run, only: reduce_to_least
+   use polydem_stable_step, only: contact_numbers, stable_step_alone, stable_step_of_contacts
+   use polydem_strings, only: to_text
+   use polydem_whole_run, only: reduce_to_greatest, reduce_to_least
    implicit none
    private
-   public :: check_stability, find_stable_step
+   public :: check_stability, check_suspects, find_stable_step, greatest_share
 
 contains
 
@@ -26,7 +28,8 @@ contains
       integer(ip) :: critical
 
       call find_stable_step(self, stable, critical)
-      call check_step(self%bodies, self%contacts, self%step, self%dt, stable, critical, warning, failure)
+      call check_step(self%bodies, self%contacts, self%step, self%dt, stable, critical, &
+                      remedy_text(self, self%contacts, critical), warning, failure)
       if (.not. allocated(failure)) return
       if (self%settings%guards%step /= 'stop') then
          warning = failure%message
@@ -34,6 +37,89 @@ contains
          call move_alloc(failure, error)
       end if
    end subroutine check_stability
+
+   !> Greatest dt / stable dt of the suspects of this rank, each contact alone; 0 if there is none
+   real(wp) function greatest_share(self)
+      type(simulation_t), intent(in) :: self
+      integer(ip) :: worst
+
+      call find_stiffest(self, greatest_share, worst)
+   end function greatest_share
+
+   !> Find the suspect with the greatest dt / stable dt, each contact alone.
+   subroutine find_stiffest(self, share, worst)
+      type(simulation_t), intent(in) :: self
+      !> Greatest dt / stable dt, 0 if there is no suspect
+      real(wp), intent(out) :: share
+      !> Its index among the suspects, 0 if there is none
+      integer(ip), intent(out) :: worst
+      real(wp) :: this
+      integer(ip) :: c
+
+      share = 0.0_wp
+      worst = 0_ip
+      associate (suspects => self%walk%suspects, bodies => self%bodies)
+         do c = 1_ip, suspects%n
+            if (.not. suspects%length(c)*suspects%inverse_length(c)*(bodies%inverse_mass(suspects%first(c)) &
+                + bodies%inverse_mass(suspects%second(c))) > self%walk%contact_guard%soft) cycle
+            this = self%dt/stable_step_alone(self%law, self%integrator%stability(), bodies, suspects, c)
+            if (this <= share) cycle
+            share = this
+            worst = c
+         end do
+      end associate
+   end subroutine find_stiffest
+
+   !> Compare the time step with the stable time step of each suspect alone. This finds short contacts; the stable step of
+   !> all contacts together is less (`check_stability`). All ranks get the message of the stiffest contact. Collective.
+   subroutine check_suspects(self, share, warning, error)
+      type(simulation_t), intent(inout) :: self
+      !> Greatest dt / stable dt of the suspects of all ranks
+      real(wp), intent(out) :: share
+      !> Allocated if dt is large, or if it is unstable and `step` of &guards is not 'stop'
+      character(len=:), allocatable, intent(out) :: warning
+      !> Allocated if dt is unstable and `step` of &guards is 'stop'
+      type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: failure
+      real(wp) :: greatest(1)
+      integer(ip) :: worst
+
+      call find_stiffest(self, share, worst)
+      if (worst > 0_ip) call check_step(self%bodies, self%walk%suspects, self%step, self%dt, self%dt/share, worst, &
+                                        remedy_text(self, self%walk%suspects, worst), warning, failure)
+      if (allocated(failure)) warning = failure%message
+      call self%comm%all_reduce_text(warning, real(share, dp))
+      greatest = share
+      call reduce_to_greatest(self%comm, greatest)
+      share = greatest(1)
+      if (.not. allocated(warning) .or. share <= 1.0_wp .or. self%settings%guards%step /= 'stop') return
+      call raise(error, run_error, warning)
+      deallocate (warning)
+   end subroutine check_suspects
+
+   !> Sentences about a contact that is too stiff for dt: the speed of its impact and the one assumed, and the remedy
+   function remedy_text(self, contacts, c) result(text)
+      type(simulation_t), intent(in) :: self
+      type(contacts_t), intent(in) :: contacts
+      !> Index of the contact; 0: none
+      integer(ip), intent(in) :: c
+      character(len=:), allocatable :: text
+      real(wp) :: mobility, speed
+
+      text = '. Reduce dt'
+      if (c == 0_ip .or. self%settings%integrate%dt > 0.0_wp) return
+      mobility = self%bodies%inverse_mass(contacts%first(c)) + self%bodies%inverse_mass(contacts%second(c))
+      ! The energy of the contact is as yet that of the approach, and that of the spring.
+      speed = sqrt((contacts%rate(c)/contacts%length(c))**2 &
+                   + contacts%elastic(c)*contacts%area(c)/contacts%length(c)*mobility)
+      text = '. Its bodies met at about '//to_text(speed, 3)//' m/s; dt is chosen for '// &
+         to_text(self%expected%speed, 3)//' m/s ('//self%expected%origin//'). '
+      if (speed > self%expected%speed) then
+         text = text//'Increase speed in &integrate'
+      else
+         text = text//'Reduce fraction in &integrate'
+      end if
+   end function remedy_text
 
    !> Find the stable time step of the present contacts. Collective.
    subroutine find_stable_step(self, stable, critical)

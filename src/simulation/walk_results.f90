@@ -18,7 +18,7 @@ module polydem_walk_results
       integer(lp) :: step = -1_lp
       !> Results of the ranges of pairs, one per thread
       type(range_results_t), allocatable :: ranges(:)
-      !> Their contacts, if the table is asked for, and those of them that are deep or degenerate
+      !> Their contacts, if the table is asked for, and those of them that are suspects
       type(contact_rows_t), allocatable :: all_of(:), suspects_of(:)
       !> Their contacts with fixed bodies
       type(wall_terms_t), allocatable :: walls_of(:)
@@ -32,7 +32,7 @@ module polydem_walk_results
       type(wall_shares_t) :: shares
       !> Guard of the contacts
       type(contact_guard_t) :: contact_guard
-      !> Contacts that are deep or degenerate
+      !> Contacts that are deep, degenerate or stiff
       type(contacts_t) :: suspects
       !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none
       integer(ip) :: passing_pair = 0_ip

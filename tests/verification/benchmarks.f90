@@ -24,6 +24,7 @@ module benchmarks
    use b19_hopper, only: run_hopper
    use b20_heap, only: run_heap
    use b21_drum_froude, only: run_drum_froude
+   use b22_automatic_step, only: run_automatic_step
    use b23_rest, only: run_rest
    use b24_cut_floor, only: run_cut_floor
    use s32_flat_impact, only: run_flat_impact
@@ -37,7 +38,7 @@ module benchmarks
    !> Names in the order in which they run
    character(len=8), parameter :: benchmark_names(*) = [character(len=8) :: &
       'B1', 'B2', 'B3', '3.2', '3.3', '3.4', 'B4', 'B5', 'B6', 'B7', 'B8', 'B9', 'B10', 'B11', 'B12', 'B13', &
-      'B14', 'B15', 'B16', 'B17', 'B18', 'B19', 'B20', 'B21', 'B23', 'B24']
+      'B14', 'B15', 'B16', 'B17', 'B18', 'B19', 'B20', 'B21', 'B22', 'B23', 'B24']
    !> Benchmarks without a short version
    character(len=8), parameter :: long_names(*) = [character(len=8) :: 'B17', 'B19', 'B20', 'B21']
 
@@ -101,6 +102,8 @@ contains
          call run_heap(table)
       case ('B21')
          call run_drum_froude(table)
+      case ('B22')
+         call run_automatic_step(table, thorough)
       case ('B23')
          call run_rest(table, thorough)
       case ('B24')

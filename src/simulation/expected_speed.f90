@@ -1,0 +1,115 @@
+!> The speed at which bodies are expected to meet, for the choice of the time step.
+!>
+!> It is the greatest of three: the difference of the velocities of any two bodies at the start, including their spins;
+!> the speed after a fall of the highest free body to the lowest point of the scene (with moving walls: through the whole
+!> extent); and the greatest speed of a wall. Each is an upper bound that does not depend on the frame of reference.
+module polydem_expected_speed
+   use polydem_elementary, only: hypotenuse
+   use polydem_kinds, only: ip, wp
+   use polydem_prescribed_motion, only: motion_t
+   use polydem_simulation, only: simulation_t
+   use polydem_whole_run, only: reduce_to_greatest, reduce_to_least
+   implicit none
+   private
+   public :: find_expected_speed, greatest_wall_speed
+
+contains
+
+   !> Set the expected speed and its origin: the entry `speed` of &integrate, or an estimate. Collective; all ranks get
+   !> the same.
+   subroutine find_expected_speed(self)
+      !> The simulation with settings, ranks, bodies and motions; `expected` is set
+      type(simulation_t), intent(inout) :: self
+      real(wp) :: start, fall, wall
+      integer :: k
+
+      associate (expected => self%expected)
+         expected%speed = self%settings%integrate%speed
+         expected%origin = 'speed in &integrate'
+         if (expected%speed > 0.0_wp) return
+         call find_start_speed(self, start)
+         call find_fall_speed(self, fall)
+         wall = 0.0_wp
+         do k = 1, size(self%motions)
+            wall = max(wall, greatest_wall_speed(self%motions(k), self%bodies%radius))
+         end do
+         expected%speed = max(start, fall, wall)
+         expected%origin = 'the velocities at the start'
+         if (fall > start) expected%origin = 'a fall through the scene'
+         if (wall > max(start, fall)) expected%origin = 'the speed of the walls'
+      end associate
+   end subroutine find_expected_speed
+
+   !> Find an upper bound of the difference of the velocities of any points of two bodies at the start [m/s].
+   subroutine find_start_speed(self, speed)
+      type(simulation_t), intent(inout) :: self
+      real(wp), intent(out) :: speed
+      real(wp) :: least(2), greatest(2), spin
+      integer(ip) :: s
+
+      least = huge(1.0_wp)
+      greatest = -huge(1.0_wp)
+      associate (bodies => self%bodies)
+         do s = 1_ip, bodies%n
+            spin = bodies%radius(s)*abs(bodies%angular_velocity(s))
+            least = min(least, bodies%velocity(:, s) - spin)
+            greatest = max(greatest, bodies%velocity(:, s) + spin)
+         end do
+      end associate
+      call reduce_to_least(self%comm, least)
+      call reduce_to_greatest(self%comm, greatest)
+      speed = 0.0_wp
+      if (all(greatest >= least)) speed = hypotenuse(greatest(1) - least(1), greatest(2) - least(2))
+   end subroutine find_start_speed
+
+   !> Find the speed after a fall of the highest free body to the lowest point of the scene [m/s].
+   subroutine find_fall_speed(self, speed)
+      type(simulation_t), intent(inout) :: self
+      real(wp), intent(out) :: speed
+      real(wp) :: strength, up(2), highest(1), lowest(1), height
+      integer(ip) :: s, v
+
+      speed = 0.0_wp
+      associate (bodies => self%bodies, gravity => self%settings%forces%gravity)
+         strength = hypotenuse(gravity(1), gravity(2))
+         if (.not. strength > 0.0_wp) return
+         up = -gravity/strength
+         highest = -huge(1.0_wp)
+         lowest = huge(1.0_wp)
+         do s = 1_ip, bodies%n
+            do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
+               height = sum(up*(bodies%position(:, s) + bodies%turned(:, v)))
+               lowest = min(lowest, height)
+               if (.not. bodies%fixed(s) .or. size(self%motions) > 0) highest = max(highest, height)
+            end do
+         end do
+         call reduce_to_greatest(self%comm, highest)
+         call reduce_to_least(self%comm, lowest)
+         speed = sqrt(2.0_wp*strength*max(0.0_wp, highest(1) - lowest(1)))
+      end associate
+   end subroutine find_fall_speed
+
+   !> Greatest speed of any point of the bodies of a prescribed motion [m/s]
+   pure real(wp) function greatest_wall_speed(motion, radius)
+      !> The motion with its bodies
+      type(motion_t), intent(in) :: motion
+      !> Greatest distance of a vertex from the centre of each body, (slot) [m]
+      real(wp), intent(in) :: radius(:)
+      integer :: k
+
+      greatest_wall_speed = 0.0_wp
+      select case (motion%kind)
+      case ('rotation')
+         do k = 1, size(motion%slots)
+            greatest_wall_speed = max(greatest_wall_speed, abs(motion%rate)*(radius(motion%slots(k)) &
+                                  + hypotenuse(motion%position(1, k) - motion%pivot(1), &
+                                               motion%position(2, k) - motion%pivot(2))))
+         end do
+      case ('translation')
+         greatest_wall_speed = hypotenuse(motion%velocity(1), motion%velocity(2))
+      case default
+         greatest_wall_speed = motion%frequency*hypotenuse(motion%amplitude(1), motion%amplitude(2))
+      end select
+   end function greatest_wall_speed
+
+end module polydem_expected_speed
