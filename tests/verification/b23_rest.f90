@@ -90,20 +90,21 @@ contains
       type(table_t), intent(inout) :: table
       character(len=*), intent(in) :: model, friction, name
       logical, intent(in) :: whole, must_rest
-      real(wp), parameter :: aspects(7) = [1.0_wp, 20.0_wp, 30.0_wp, 2.0_wp, 3.0_wp, 5.0_wp, 10.0_wp]
+      real(wp), parameter :: aspects(7) = [1.0_wp, 10.0_wp, 20.0_wp, 30.0_wp, 2.0_wp, 3.0_wp, 5.0_wp]
       real(wp), parameter :: tilts(3) = [0.0_wp, 0.05_wp, 0.3_wp]
       type(body_list_t) :: list
       type(worst_t) :: worst
       real(wp) :: w, h
       integer :: j, k
 
-      do k = 1, merge(size(aspects), 3, whole)
+      do k = 1, merge(size(aspects), merge(2, 4, must_rest), whole)
          w = sqrt(area*aspects(k))
          h = area/w
          do j = 1, merge(3, 2, whole)
             call put_floor(list)
             call list%append(block_at(0.0_wp, 0.5_wp*(h*cos(tilts(j)) + w*sin(tilts(j))) + 0.005_wp, w, h, tilts(j)))
-            call settle(table, list, model, friction, 0.5_wp, 0.0_wp, 3.0_wp, worst)
+            call settle(table, list, model, friction, 0.5_wp, 0.0_wp, merge(3.0_wp, 1.5_wp, whole .or. .not. must_rest), &
+                        worst)
          end do
       end do
       call judge(table, 'bars', name, worst, must_rest)
@@ -129,7 +130,8 @@ contains
          do j = 1, merge(3, 1, whole)
             call put_floor(list)
             call list%append(block_at(0.0_wp, 0.5_wp*h + 1.0e-5_wp, w, h, 0.0_wp))
-            call settle(table, list, model, friction, coefficients(k), shares(j)*atan(coefficients(k)), 3.0_wp, worst)
+            call settle(table, list, model, friction, coefficients(k), shares(j)*atan(coefficients(k)), &
+                        merge(3.0_wp, 1.5_wp, whole .or. .not. must_rest), worst)
          end do
       end do
       call judge(table, 'slopes', name, worst, must_rest)
@@ -155,7 +157,8 @@ contains
                call list%append(block_at(merge(0.02_wp, -0.02_wp, mod(i, 2) == 0)*w, &
                                          (i - 0.5_wp)*h + i*1.0e-4_wp, w, h, 0.0_wp))
             end do
-            call settle(table, list, model, friction, 0.5_wp, 0.0_wp, 4.0_wp, worst)
+            call settle(table, list, model, friction, 0.5_wp, 0.0_wp, merge(4.0_wp, 2.0_wp, whole .or. .not. must_rest), &
+                        worst)
          end do
       end do
       call judge(table, 'stacks', name, worst, must_rest)
