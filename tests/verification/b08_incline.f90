@@ -56,7 +56,8 @@ contains
       type(error_t), allocatable :: error
       real(wp) :: early, late
 
-      call put_on_slope(slope, 0.0_wp, size_of_block, mu, 'friction = '''//friction//''' tilt_damping = 0', simulation, error)
+      call put_on_slope(slope, 0.0_wp, size_of_block, mu, 'friction = '''//friction//''' tilt_damping = 0', &
+                        simulation, error)
       if (.not. allocated(error)) call steps(simulation, 10000, error)
       early = downhill(slope, simulation%bodies%velocity(:, 2))
       if (.not. allocated(error)) call steps(simulation, 10000, error)

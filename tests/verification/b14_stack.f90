@@ -87,8 +87,8 @@ contains
 
       call read_settings_text('stack.nml', '&scene name = ''stack'' width = 0.01 height = 0.01 bodies = '// &
                               to_text(n)// &
-                              ' / &forces friction = '''//friction//''' damping_coefficient = 1'//area_law//' stiffness = '// &
-                                 to_text(young)// &
+                              ' / &forces friction = '''//friction//''' damping_coefficient = 1'// &
+                              area_law//' stiffness = '//to_text(young)// &
                               ' / &integrate duration = 1000 / &output energy_balance = .false. /', &
                               no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)

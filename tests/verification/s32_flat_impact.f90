@@ -148,8 +148,8 @@ contains
       gap = 2.0_wp*speed*dt*phase
       call list%append(block_at(-0.5_wp*(width + gap), 0.0_wp, width, width, 0.0_wp), velocity=[speed, 0.0_wp])
       call list%append(block_at(0.5_wp*(width + gap), 0.0_wp, width, width, 0.0_wp), velocity=[-speed, 0.0_wp])
-      call begin('&forces gravity = 0, 0 friction = ''none'' law = ''area'' '//forces//' /'//integrate_text(dt), list, simulation, &
-                 error)
+      call begin('&forces gravity = 0, 0 friction = ''none'' law = ''area'' '//forces//' /'//integrate_text(dt), &
+                 list, simulation, error)
    end subroutine approach
 
    pure real(wp) function separation_speed(simulation)
