@@ -38,6 +38,8 @@ module polydem_wall_shares
       integer(ip), allocatable, private :: count_of(:)
       !> Sums of L/l n n^T over the contacts of each free body: xx, xy, yy, (3, slot)
       real(wp), allocatable, private :: tensor(:, :)
+      !> Remembered edges of the pairs of each block, a copy
+      type(contact_history_t), allocatable, private :: mine(:)
    end type wall_shares_t
 
 contains
@@ -152,26 +154,33 @@ contains
       integer(ip), intent(in) :: low, high
       !> The list; ratio and direction of these pairs are set
       type(wall_shares_t), intent(inout) :: shares
-      type(contact_history_t) :: mine
       type(contact_block_t) :: block
       integer(ip) :: first(block_size), second(block_size), c, k, n, next, tested
 
       n = high - low + 1_ip
       first(:n) = pairs%first(shares%pair(low:high))
       second(:n) = pairs%second(shares%pair(low:high))
-      if (allocated(history%memory)) mine%memory = history%memory(shares%pair(low:high))
       shares%ratio(low:high) = 0.0_wp
       next = n
       tested = n + 1_ip
-      do while (next >= 1_ip)
-         call fill_block(bodies, first(:n), second(:n), law%needs_effective_area, isa, 1_ip, next, tested, mine, block)
-         call law%apply_elastic(bodies, block, mine)
-         do c = 1_ip, block%n
-            k = low + block%pair(c) - 1_ip
-            shares%ratio(k) = block%length(c)*block%inverse_length(c)
-            shares%direction(:, k) = block%direction(c, :)
+      associate (mine => shares%mine((low - 1_ip)/block_size + 1_ip))
+         if (allocated(history%memory)) then
+            do c = 1_ip, n
+               mine%memory(c) = history%memory(shares%pair(low + c - 1_ip))
+            end do
+         else
+            mine%memory(:n) = 0_ip
+         end if
+         do while (next >= 1_ip)
+            call fill_block(bodies, first(:n), second(:n), law%needs_effective_area, isa, 1_ip, next, tested, mine, block)
+            call law%apply_elastic(bodies, block, mine)
+            do c = 1_ip, block%n
+               k = low + block%pair(c) - 1_ip
+               shares%ratio(k) = block%length(c)*block%inverse_length(c)
+               shares%direction(:, k) = block%direction(c, :)
+            end do
          end do
-      end do
+      end associate
    end subroutine find_ratios
 
    !> Compute the shares from the ratios and directions of all listed contacts.
@@ -239,7 +248,7 @@ contains
       integer(ip), intent(in) :: n
       type(wall_shares_t), intent(inout) :: shares
       integer(ip), allocatable :: longer(:)
-      integer(ip) :: room
+      integer(ip) :: room, k
 
       room = 0_ip
       if (allocated(shares%pair)) room = size(shares%pair, kind=ip)
@@ -251,8 +260,12 @@ contains
       allocate (longer(room))
       if (shares%n > 0_ip) longer(:shares%n) = shares%body(:shares%n)
       call move_alloc(longer, shares%body)
-      if (allocated(shares%root)) deallocate (shares%root, shares%ratio, shares%direction)
+      if (allocated(shares%root)) deallocate (shares%root, shares%ratio, shares%direction, shares%mine)
       allocate (shares%root(room), shares%ratio(room), shares%direction(2, room))
+      allocate (shares%mine((room - 1_ip)/block_size + 1_ip))
+      do k = 1_ip, size(shares%mine, kind=ip)
+         allocate (shares%mine(k)%memory(block_size))
+      end do
    end subroutine reserve_pairs
 
 end module polydem_wall_shares

@@ -25,7 +25,7 @@ DANGERS = (
     ("bed", ("scene.short_axis=8", "scene.long_axis_min=8", "scene.long_axis_max=11"), "lengths are in metres", 0),
     ("gas", ("scene.overlap=.true.", "scene.fraction=0.9"), "deep contacts at the start: ", 0),
     ("gas", ("scene.speed=500",), "it may pass through other bodies undetected", 1),
-    ("gas", ("forces.damping=none",), "the area law is not conservative", 0),
+    ("gas", ("forces.law=area", "forces.damping=none"), "the area law is not conservative", 0),
 )
 
 

@@ -10,7 +10,7 @@
 !> only with E^(-1/3).
 module b08_incline
    use outlines, only: gravity, integrate_text
-   use trial, only: begin, block_at, steps
+   use trial, only: area_law, begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_contact_history, only: column_of
@@ -56,7 +56,8 @@ contains
       type(error_t), allocatable :: error
       real(wp) :: early, late
 
-      call put_on_slope(slope, 0.0_wp, size_of_block, mu, 'friction = '''//friction//'''', simulation, error)
+      call put_on_slope(slope, 0.0_wp, size_of_block, mu, 'friction = '''//friction//''' tilt_damping = 0', &
+                        simulation, error)
       if (.not. allocated(error)) call steps(simulation, 10000, error)
       early = downhill(slope, simulation%bodies%velocity(:, 2))
       if (.not. allocated(error)) call steps(simulation, 10000, error)
@@ -76,7 +77,7 @@ contains
       type(error_t), allocatable :: error
       real(wp) :: start(2), middle(2), load
 
-      call put_on_slope(slope, 0.0_wp, size, mu, '', simulation, error)
+      call put_on_slope(slope, 0.0_wp, size, mu, 'tilt_damping = 0', simulation, error)
       if (allocated(error)) return
       start = simulation%bodies%position(:, 2)
       call steps(simulation, n, error)
@@ -106,7 +107,7 @@ contains
       real(wp) :: middle(2), slope
 
       slope = atan(0.99_wp*mu)
-      call put_on_slope(slope, 0.0_wp, size_of_block, mu, 'friction = ''exact''', simulation, error)
+      call put_on_slope(slope, 0.0_wp, size_of_block, mu, 'friction = ''exact'' tilt_damping = 0', simulation, error)
       if (.not. allocated(error)) call steps(simulation, n, error)
       if (.not. allocated(error)) middle = simulation%bodies%position(:, 2)
       if (.not. allocated(error)) call steps(simulation, n, error)
@@ -192,7 +193,8 @@ contains
       call list%append(block_at(cos(slope)*centre(1) + sin(slope)*centre(2), &
                        cos(slope)*centre(2) - sin(slope)*centre(1), &
                                 size(1), size(2), -slope - tilt))
-      call begin('&forces friction_coefficient = 1 damping_coefficient = 1 stiffness = '//to_text(young)//' /'// &
+      call begin('&forces friction_coefficient = 1 damping_coefficient = 1'//area_law//' stiffness = '// &
+                 to_text(young)//' /'// &
                  integrate_text(5.0e-6_wp*sqrt(1.0e7_wp/young)), list, simulation, error)
    end subroutine put_on_edge
 
@@ -222,7 +224,7 @@ contains
       call list%append(block_at(sin(slope)*distance, cos(slope)*distance, size(1), size(2), -slope), &
                        velocity=[speed*cos(slope), -speed*sin(slope)])
       call begin('&forces '//forces//' friction_coefficient = '//to_text(mu, &
-                 17)//' damping_coefficient = 1 /'// &
+                 17)//' damping_coefficient = 1 law = ''area'' /'// &
                  integrate_text(1.0e-5_wp), list, simulation, error)
    end subroutine put_on_slope
 

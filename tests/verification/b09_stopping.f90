@@ -23,9 +23,9 @@ contains
       type(table_t), intent(inout) :: table
 
       call table%begin('B9', 'a block slides on a level floor until it stops')
-      call slide_to_rest(table, 'spring', '', .true.)
-      call slide_to_rest(table, 'exact', 'friction = ''exact'' tilt_damping = 2', .true.)
-      call slide_to_rest(table, 'exact, tilts undamped', 'friction = ''exact''', .false.)
+      call slide_to_rest(table, 'spring', 'tilt_damping = 0', .true.)
+      call slide_to_rest(table, 'exact', 'friction = ''exact'' tilt_damping = 1', .true.)
+      call slide_to_rest(table, 'exact, tilts undamped', 'friction = ''exact'' tilt_damping = 0', .false.)
    end subroutine run_stopping
 
    !> Slide from 0.5 m/s to rest.

@@ -15,7 +15,7 @@
 !> k_t^(-1/2), by a factor of about ten when k_t is a hundred times larger.
 module b10_stick_slip
    use outlines, only: gravity, pi
-   use trial, only: begin, block_at, steps
+   use trial, only: area_law, begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
@@ -147,7 +147,8 @@ contains
       ! A cosine is a sine with the phase of a quarter of a period.
       motion%start = -0.5_wp*pi/motion%frequency
       call begin('&forces '//friction//' friction_coefficient = '//to_text(mu, 17)// &
-                 ' damping_coefficient = '//to_text(gamma_coefficient, 17)//' / &integrate dt = '//to_text(dt, 17)// &
+                 ' damping_coefficient = '//to_text(gamma_coefficient, 17)//area_law//' / &integrate dt = '// &
+                 to_text(dt, 17)// &
                  ' duration = 1000 / &output energy_balance = .false. /', list, simulation, error, motion, [2_ip, 3_ip])
    end subroutine build
 

@@ -5,7 +5,7 @@
 !> to the variation of its radius by the factor cos(pi/n), 0.9988 for 64.
 module b11_sliding_to_rolling
    use outlines, only: gravity, inertia_ratio, integrate_text, pi, regular_polygon
-   use trial, only: begin, block_at, steps
+   use trial, only: area_law, begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
@@ -33,8 +33,8 @@ contains
       call list%append(regular_polygon(corners, radius, -0.1_wp, radius*cos(pi/64.0_wp), pi/64.0_wp - 0.5_wp*pi), &
                        velocity=[speed, 0.0_wp])
       call list%append(block_at(0.0_wp, -0.05_wp, 1.0_wp, 0.1_wp, 0.0_wp), fixed=.true.)
-      call begin('&forces friction_coefficient = 0.3 damping_coefficient = 1 /'//integrate_text(dt), list, &
-                 simulation, error)
+      call begin('&forces friction_coefficient = 0.3 damping_coefficient = 1'//area_law//' /'// &
+                 integrate_text(dt), list, simulation, error)
       do k = 1, 100000
          if (.not. allocated(error)) call steps(simulation, 1, error)
          if (allocated(error)) exit

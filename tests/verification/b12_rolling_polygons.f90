@@ -12,7 +12,7 @@
 !> damping are so strong that impacts are plastic.
 module b12_rolling_polygons
    use outlines, only: gravity, inertia_ratio, integrate_text, pi, regular_polygon
-   use trial, only: begin, block_at, steps
+   use trial, only: area_law, begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
@@ -142,7 +142,7 @@ contains
          call list%append(block_at(place(1), place(2), 2.0_wp*under*face, thickness, -slope), fixed=.true.)
       end do
       call begin('&forces friction_coefficient = 5 tangential_damping = 5 damping_coefficient = '// &
-                 to_text(damping)//' stiffness = '//to_text(young)//' /'// &
+                 to_text(damping)//area_law//' stiffness = '//to_text(young)//' /'// &
                          integrate_text(1.0e-6_wp*sqrt(1.0e9_wp/young)), list, simulation, error)
    end subroutine put_on_slope
 

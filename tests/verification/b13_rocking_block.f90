@@ -12,7 +12,7 @@
 !> a support is plastic. The block pivots about a point above a support.
 module b13_rocking_block
    use outlines, only: gravity, integrate_text
-   use trial, only: begin, block_at, steps
+   use trial, only: area_law, begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
@@ -94,7 +94,7 @@ contains
                        start))
       call list%append(block_at(under - 0.5_wp*width, -0.05_wp, width, 0.1_wp, 0.0_wp), fixed=.true.)
       call list%append(block_at(1.5_wp*width - under, -0.05_wp, width, 0.1_wp, 0.0_wp), fixed=.true.)
-      call begin('&forces friction_coefficient = 5 damping_coefficient = '//to_text(damping)//' stiffness = '// &
+      call begin('&forces friction_coefficient = 5 damping_coefficient = '//to_text(damping)//area_law//' stiffness = '// &
                  to_text(young)//' /'//integrate_text(1.0e-6_wp*sqrt(1.0e10_wp/young)), list, simulation, error)
    end subroutine put_on_corner
 

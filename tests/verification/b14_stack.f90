@@ -10,7 +10,7 @@
 !> E/(rho g w))^(1/3) blocks, 29.9 at E = 1e7 and 64 at E = 1e8. Stacks of 24 and 36 blocks get a small push.
 module b14_stack
    use outlines, only: gravity
-   use trial, only: steps
+   use trial, only: area_law, steps
    use verification_table, only: table_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
@@ -87,8 +87,8 @@ contains
 
       call read_settings_text('stack.nml', '&scene name = ''stack'' width = 0.01 height = 0.01 bodies = '// &
                               to_text(n)// &
-                              ' / &forces friction = '''//friction//''' damping_coefficient = 1 stiffness = '// &
-                                 to_text(young)// &
+                              ' / &forces friction = '''//friction//''' damping_coefficient = 1'// &
+                              area_law//' stiffness = '//to_text(young)// &
                               ' / &integrate duration = 1000 / &output energy_balance = .false. /', &
                               no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)

@@ -9,7 +9,7 @@
 !> E = 1e10 fall (shown).
 module b15_overhang
    use outlines, only: integrate_text
-   use trial, only: begin, block_at, steps
+   use trial, only: area_law, begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
@@ -96,7 +96,8 @@ contains
          call list%append(block_at(x, (real(k, wp) - 0.5_wp)*height, width, height, 0.0_wp))
       end do
       call list%append(block_at(0.0_wp, -0.5_wp*height, width, height, 0.0_wp), fixed=.true.)
-      call begin('&forces friction_coefficient = 1 damping_coefficient = 1 stiffness = '//to_text(young)//' /'// &
+      call begin('&forces friction_coefficient = 1 damping_coefficient = 1'//area_law//' stiffness = '// &
+                 to_text(young)//' /'// &
                  integrate_text(2.0e-6_wp*sqrt(1.0e10_wp/young)), list, simulation, error)
    end subroutine build
 

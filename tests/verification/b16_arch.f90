@@ -9,7 +9,7 @@
 !> are compared with that critical thickness.
 module b16_arch
    use outlines, only: gravity, integrate_text, pi
-   use trial, only: begin, block_at, steps
+   use trial, only: area_law, begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
@@ -75,7 +75,8 @@ contains
       end do
       call list%append(block_at(1.0_wp, -0.1_wp, 0.5_wp, 0.2_wp, 0.0_wp), fixed=.true.)
       call list%append(block_at(-1.0_wp, -0.1_wp, 0.5_wp, 0.2_wp, 0.0_wp), fixed=.true.)
-      call begin('&forces friction_coefficient = 2 damping_coefficient = 1 stiffness = '//to_text(young)//' /'// &
+      call begin('&forces friction_coefficient = 2 damping_coefficient = 1'//area_law//' stiffness = '// &
+                 to_text(young)//' /'// &
                  integrate_text(1.0e-5_wp*sqrt(1.0e10_wp/young)), list, simulation, error)
       sunk = 0.0_wp
       if (.not. allocated(error)) start = simulation%bodies%position(2, n/2_ip)

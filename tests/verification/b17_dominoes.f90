@@ -11,7 +11,7 @@
 module b17_dominoes
    use domino_train, only: domino_t, wave_speed
    use outlines, only: gravity
-   use trial, only: begin, block_at, steps
+   use trial, only: area_law, begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
@@ -102,7 +102,7 @@ contains
       call list%append(block_at(0.5_wp*real(n, wp)*pitch, -0.5_wp*row%height, 2.0_wp*real(n, wp)*pitch, row%height, &
                                 0.0_wp), fixed=.true.)
       call begin('&forces friction_coefficient = 0.5 damping_coefficient = 4 tangential_damping = 1 '// &
-                 'stiffness = 1e7 /'// &
+                 'stiffness = 1e7'//area_law//' /'// &
                  '&integrate duration = 1000 / &output energy_balance = .false. /', list, simulation, error)
    end subroutine build
 

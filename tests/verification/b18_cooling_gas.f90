@@ -17,7 +17,7 @@
 !> inertia, so they do not turn. The damping at walls uses a very small mass, so impacts on walls lose no energy.
 module b18_cooling_gas
    use outlines, only: pi, regular_polygon
-   use trial, only: begin, block_at, steps
+   use trial, only: area_law, begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
@@ -37,7 +37,7 @@ module b18_cooling_gas
    !> Damping coefficient of the gas
    real(wp), parameter :: gas_damping = 0.3_wp
    !> Namelist without the damping coefficient
-   character(len=*), parameter :: rest = ' gravity = 0, 0 friction = ''none'' stiffness = 1e8 / '// &
+   character(len=*), parameter :: rest = area_law//' gravity = 0, 0 friction = ''none'' stiffness = 1e8 / '// &
       '&integrate dt = 1e-5 duration = 1000 / &output energy_balance = .false. /'
 
 contains

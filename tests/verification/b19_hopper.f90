@@ -7,7 +7,7 @@
 !> Beverloo's k = 1.4, which was measured with spheres, and the k for which Q^(2/3) is linear in D. Q is measured while
 !> the discharged share of the grains grows from 20 % to 60 %, and in both halves of this interval.
 module b19_hopper
-   use trial, only: steps
+   use trial, only: area_law, steps
    use verification_table, only: table_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
@@ -61,7 +61,8 @@ contains
 
       call read_settings_text('hopper.nml', '&scene name = ''hopper'' slope = 60 bodies = '//to_text(n_grains)// &
                               ' width = 0.45 opening = '//to_text(opening, 17)// &
-                              ' / &forces friction_coefficient = 0.3 damping_coefficient = 0.3 stiffness = 1e6 /'// &
+                              ' / &forces friction_coefficient = 0.3 damping_coefficient = 0.3 stiffness = 1e6'// &
+                              area_law//' /'// &
                               ' &integrate duration = 100 / &output energy_balance = .false. /', &
                               no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)

@@ -9,7 +9,7 @@
 module b20_heap
    use omp_lib, only: omp_get_max_threads, omp_set_num_threads
    use outlines, only: pi
-   use trial, only: steps
+   use trial, only: area_law, steps
    use verification_table, only: table_t
    use polydem_bodies, only: state_hash
    use polydem_errors, only: error_t
@@ -103,7 +103,7 @@ contains
 
       call read_settings_text('heap.nml', '&scene name = ''heap'' bodies = 200 seed = '//to_text(seed)//' '//scene// &
                               ' / &neighbours finder = '''//finder//''' / &forces damping_coefficient = 0.5 '// &
-                                 forces// &
+                                 forces//area_law// &
                               ' / &integrate '//integrate//' / &output energy_balance = .false. /', &
                               no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)

@@ -6,7 +6,7 @@
 !> Here it is about 3500 and 35000. With a tenth of that, 400 grains of one seed differed by 2.8 degrees.
 module b21_drum_froude
    use outlines, only: gravity, pi
-   use trial, only: steps
+   use trial, only: area_law, steps
    use verification_table, only: table_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
@@ -61,7 +61,7 @@ contains
                               ' motion_start = '//to_text(0.3_wp*stretch, 17)// &
                               ' motion_ramp = '//to_text(0.1_wp*stretch, 17)// &
                               ' / &forces gravity = 0, '//to_text(-share*gravity, 17)// &
-                              ' friction_coefficient = 0.4 damping_coefficient = 0.5 stiffness = 1e7'// &
+                              ' friction_coefficient = 0.4 damping_coefficient = 0.5 stiffness = 1e7'//area_law// &
                               ' / &integrate duration = '//to_text(3.0_wp*stretch, 17)// &
                               ' / &output energy_balance = .false. /', no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)

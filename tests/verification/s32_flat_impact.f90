@@ -9,7 +9,7 @@
 !> order in the step, that of the worst phase of first order.
 module s32_flat_impact
    use outlines, only: gravity, integrate_text, pi
-   use trial, only: begin, block_at, steps
+   use trial, only: area_law, begin, block_at, steps
    use verification_table, only: table_t
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t
@@ -128,7 +128,7 @@ contains
       sag = mass*gravity*length/(young*width)
       call list%append(block_at(0.0_wp, 0.5_wp*width, width, width, 0.0_wp))
       call list%append(block_at(0.0_wp, -0.5_wp*thickness, 2.0_wp*width, thickness, 0.0_wp), fixed=.true.)
-      call begin('&forces damping_coefficient = 1 /'//integrate_text(1.0e-5_wp), list, simulation, error)
+      call begin('&forces damping_coefficient = 1'//area_law//' /'//integrate_text(1.0e-5_wp), list, simulation, error)
       if (.not. allocated(error)) call steps(simulation, 4000, error)
       call table%note_error(error)
       if (allocated(error)) return
@@ -148,8 +148,8 @@ contains
       gap = 2.0_wp*speed*dt*phase
       call list%append(block_at(-0.5_wp*(width + gap), 0.0_wp, width, width, 0.0_wp), velocity=[speed, 0.0_wp])
       call list%append(block_at(0.5_wp*(width + gap), 0.0_wp, width, width, 0.0_wp), velocity=[-speed, 0.0_wp])
-      call begin('&forces gravity = 0, 0 friction = ''none'' '//forces//' /'//integrate_text(dt), list, simulation, &
-                 error)
+      call begin('&forces gravity = 0, 0 friction = ''none'' law = ''area'' '//forces//' /'//integrate_text(dt), &
+                 list, simulation, error)
    end subroutine approach
 
    pure real(wp) function separation_speed(simulation)

@@ -42,8 +42,8 @@ contains
       call table%begin('3.3', 'normal impact of the corner of a square on a thick floor, elastic')
       call list%append(block_at(0.0_wp, reach + 0.5_wp*speed*dt, width, width, 0.25_wp*pi), velocity=[0.0_wp, -speed])
       call list%append(block_at(0.0_wp, -0.5_wp*thickness, 4.0_wp*width, thickness, 0.0_wp), fixed=.true.)
-      call begin('&forces gravity = 0, 0 friction = ''none'' damping = ''none'' /'//integrate_text(dt), list, &
-                 simulation, error)
+      call begin('&forces gravity = 0, 0 friction = ''none'' damping = ''none'' law = ''area'' /'//integrate_text(dt), &
+                 list, simulation, error)
       deepest = 0.0_wp
       duration = 0.0_wp
       do k = 1, 10000

@@ -55,8 +55,8 @@ contains
       call list%append(regular_polygon(corners, radius, 0.0_wp, radius + 0.5_wp*normal*dt, -0.5_wp*pi), &
                        velocity=[along, -normal], angular_velocity=spin)
       call list%append(block_at(0.0_wp, -0.5_wp, 1.0_wp, 1.0_wp, 0.0_wp), fixed=.true.)
-      call begin('&forces gravity = 0, 0 damping = ''none'' friction_coefficient = '//to_text(mu)//' stiffness = '// &
-                 to_text(young)//' /'//integrate_text(dt), list, simulation, error)
+      call begin('&forces gravity = 0, 0 damping = ''none'' law = ''area'' friction_coefficient = '//to_text(mu)// &
+                 ' stiffness = '//to_text(young)//' /'//integrate_text(dt), list, simulation, error)
       has_touched = .false.
       do k = 1, 100000
          if (.not. allocated(error)) call advance(simulation, error)

@@ -14,6 +14,9 @@ module trial
    private
    public :: begin, steps, block_at
 
+   !> Entries of &forces of the model that most expected values are for: the area law, with damping of its rate alone
+   character(len=*), parameter, public :: area_law = " law = 'area' tilt_damping = 0"
+
 contains
 
    !> Create a simulation from a list of bodies and a namelist without the group &scene.
