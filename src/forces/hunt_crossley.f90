@@ -9,6 +9,7 @@ module polydem_hunt_crossley
    use polydem_contact_element, only: contact_element_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
+   use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: hunt_crossley_t
@@ -16,12 +17,22 @@ module polydem_hunt_crossley
    !> Damping in proportion to the elastic force
    type, extends(normal_damping_t) :: hunt_crossley_t
    contains
+      procedure :: configure
       procedure :: find_forces
       procedure :: find_dashpots
       procedure :: stiffen
    end type hunt_crossley_t
 
 contains
+
+   !> Copy the parameters from the settings. At rest the dashpot is in proportion to the load, so this damping is weak.
+   subroutine configure(self, settings)
+      class(hunt_crossley_t), intent(inout) :: self
+      type(forces_settings_t), intent(in) :: settings
+
+      call self%take_coefficients(settings)
+      self%is_weak = .true.
+   end subroutine configure
 
    !> Compute the damping forces of one block of contacts.
    subroutine find_forces(self, block, force)

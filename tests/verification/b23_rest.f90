@@ -189,7 +189,7 @@ contains
    subroutine put_floor(list)
       type(body_list_t), intent(out) :: list
 
-      call list%append(block_at(0.0_wp, -0.05_wp, 1.0_wp, 0.1_wp, 0.0_wp), fixed=.true.)
+      call list%append(block_at(0.0_wp, -0.05_wp, 10.0_wp, 0.1_wp, 0.0_wp), fixed=.true.)
    end subroutine put_floor
 
    !> Run a scene, and keep the worst of its last quarter.
