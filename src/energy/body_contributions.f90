@@ -161,8 +161,8 @@ contains
    end subroutine add_walls
 
    !> Kinetic energy [J/m], potential energy [J/m], momentum along x and y [N s/m] and angular momentum about the origin
-   !> [N s] of a free body; then the sums of the absolute values of its momenta along x and y [N s/m], and of its orbital
-   !> angular momentum and its spin [N s]
+   !> [N s] of a free body; then the sums of the absolute values of its momenta along x and y [N s/m], and of its
+   !> orbital angular momentum and its spin [N s]
    pure function motion_of(gravity, bodies, s) result(values)
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)

@@ -1,11 +1,11 @@
 !> The contact that a body is expected to have with an equal body that it hits at a given speed.
 !>
 !> It is described for each edge of the body: the overlap of the body with its mirror image beyond the edge. At the
-!> greatest depth, the kinetic energy of the approach has become that of the spring: m_eff v^2 = K d^2, where the depth d
-!> is the area of the overlap over its length L, and K the stiffness of a contact of this length. (The conservative law
-!> has this energy; the area law has more, so the depth is an upper bound.) A contact of a round polygon thus spans many
-!> edges. A wall is half as stiff as an equal body, and a round body sinks 2^(1/3) times as deep into it; the frequency of
-!> both is less than with the equal body.
+!> greatest depth, the kinetic energy of the approach has become that of the spring: m_eff v^2 = K d^2, where the
+!> depth d is the area of the overlap over its length L, and K the stiffness of a contact of this length. (The
+!> conservative law has this energy; the area law has more, so the depth is an upper bound.) A contact of a round
+!> polygon thus spans many edges. A wall is half as stiff as an equal body, and a round body sinks 2^(1/3) times as
+!> deep into it; the frequency of both is less than with the equal body.
 module polydem_expected_contact
    use polydem_bodies, only: bodies_t
    use polydem_contact_element, only: contact_element_t

@@ -72,11 +72,13 @@ contains
       class(restitution_damping_t), intent(in) :: self
       type(contact_block_t), intent(in) :: block
       real(wp), intent(inout) :: dashpot(block_size)
+      real(wp) :: reach
       integer(ip) :: c
 
       do c = 1_ip, block%n
+         reach = max(block%length(c), sqrt(block%area(c)))
          dashpot(c) = 2.0_wp*self%ratio*sqrt(self%stiffness/block%mobility(c)) &
-            *sqrt(block%inverse_length(c)/max(block%length(c), sqrt(block%area(c))))*(block%length(c)*block%share_root(c))
+            *sqrt(block%inverse_length(c)/reach)*(block%length(c)*block%share_root(c))
       end do
    end subroutine find_dashpots
 

@@ -212,8 +212,8 @@ contains
    !> Product of ratio L/l and mobility below which no contact, alone, has a stable step below a given one [m/kg].
    !>
    !> Frequencies follow this product, and dashpots at most the product with the root of the greatest mass. So the
-   !> lightest pair and the heaviest body at a wall bound all others. Arms are at most the greatest radius R: they increase
-   !> the mobility by a share of m R^2/I.
+   !> lightest pair and the heaviest body at a wall bound all others. Arms are at most the greatest radius R: they
+   !> increase the mobility by a share of m R^2/I.
    real(wp) function stiffest_product(law, table, bodies, step) result(product)
       type(force_law_t), intent(in) :: law
       !> Stability limit of the integration scheme

@@ -12,9 +12,9 @@
 !>                                free body, infinite for a fixed body
 !>     id                (n)      optional, default: 1 to n
 !>
-!> Any other data set at the top level is an error, because it may be a misspelt name. Groups are ignored. The attributes
-!> origin_x and origin_y of the file, if there are any, are where the origin of its coordinates lies in those of the
-!> program that made the polygons [m]; a run does not use them, but copies them to its result.
+!> Any other data set at the top level is an error, because it may be a misspelt name. Groups are ignored. The
+!> attributes origin_x and origin_y of the file, if there are any, are where the origin of its coordinates lies in
+!> those of the program that made the polygons [m]; a run does not use them, but copies them to its result.
 module polydem_bodies_reader
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
    use polydem_bodies_index, only: bodies_index_t, entry_text, read_index

@@ -42,7 +42,8 @@ contains
             to_text(s%expected%body)//' '//to_text(s%expected%depth, 3)//' m deep and '// &
             to_text(s%expected%length, 3)//' m long')
          if (s%expected%damped < strongly_damped) call log%write_line('           (strong damping of such contacts '// &
-            'reduces it to '//to_text(s%expected%damped, 3)//' of the step without damping; shorter contacts allow more)')
+            'reduces it to '//to_text(s%expected%damped, 3)// &
+            ' of the step without damping; shorter contacts allow more)')
          if (measures%contacts > 0_lp) call log%write_line('           '//to_text(s%dt/measures%stable_step, 3)// &
             ' of the stable time step '//to_text(measures%stable_step)//' s of the initial contacts')
          call log%write_line('duration   '//to_text(real(s%n_steps, wp)*s%dt)//' s, '//to_text(s%n_steps)// &

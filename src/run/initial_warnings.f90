@@ -177,8 +177,8 @@ contains
          if (n == 0_lp) return
          call add(warnings, counted(n, 'pair')//' of fixed bodies overlap, most of all the bodies '// &
                   to_text(bodies%id(first))//' and '//to_text(bodies%id(second))//' in '//to_text(area, 3)// &
-                  ' m2 near ('//to_text(place(1), 3)//', '//to_text(place(2), 3)//') m: a body that touches both there '// &
-                  'is pushed twice. Let walls share edges instead')
+                  ' m2 near ('//to_text(place(1), 3)//', '//to_text(place(2), 3)//') m: a body that touches both '// &
+                  'there is pushed twice. Let walls share edges instead')
       end associate
    end subroutine warn_of_fixed_overlaps
 
@@ -200,7 +200,7 @@ contains
             ", set accumulation = 'compensated' in &integrate (with scheme velocity_verlet), or increase dt")
          if (depth(1) > 0.0_wp .and. depth(1) < needed_bits*bit) call add(warnings, &
             'the lightest free body sinks by about '//to_text(depth(1), 3)//' m under its weight, '// &
-            to_text(depth(1)/bit, 3)//bits//', and by '//to_text(depth(2), 3)//' m under the full height of the free '// &
+            to_text(depth(1)/bit, 3)//bits//', and by '//to_text(depth(2), 3)//' m under the full height of the '// &
             'bodies: rounding changes the forces of contacts. '//remedy//', or decrease stiffness in &forces')
       end associate
    end subroutine warn_of_rounding

@@ -51,8 +51,8 @@ contains
          last(n) = self%bodies%n
       end associate
       call reserve_sums(self%bodies%n, self%force_sums)
-      if (self%law%needs_shares) call find_shares(self%law, self%bodies, self%neighbours%pairs, self%history, self%isa, &
-                                                  self%walk%shares)
+      if (self%law%needs_shares) &
+         call find_shares(self%law, self%bodies, self%neighbours%pairs, self%history, self%isa, self%walk%shares)
       !$omp parallel if (n > 1_ip) default(none) shared(self, dt, ends, last, n) private(r, k)
       !$omp do schedule(static, 1)
       do r = 1_ip, n

@@ -82,7 +82,8 @@ contains
                                     'gain of '//to_text(growth, 3)//' J/m, '//to_text(growth/scale, 3)// &
                                     ' of the largest kinetic energy or work so far; fastest body '//to_text(id)// &
                                     ' at ('//to_text(real(position(1), wp))//', '//to_text(real(position(2), wp))// &
-                                    ') m. Check for deep overlaps, or '//shorter_step(simulation%settings%integrate), error)
+                                    ') m. Check for deep overlaps, or '// &
+                                    shorter_step(simulation%settings%integrate), error)
       end associate
    end subroutine check_energy
 

@@ -1,8 +1,9 @@
 !> The speed at which bodies are expected to meet, for the choice of the time step.
 !>
 !> It is the greatest of three: the difference of the velocities of any two bodies at the start, including their spins;
-!> the speed after a fall of the highest free body to the lowest point of the scene (with moving walls: through the whole
-!> extent); and the greatest speed of a wall. Each is an upper bound that does not depend on the frame of reference.
+!> the speed after a fall of the highest free body to the lowest point of the scene (with moving walls: through the
+!> whole extent); and the greatest speed of a wall. Each is an upper bound that does not depend on the frame of
+!> reference.
 module polydem_expected_speed
    use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp

@@ -70,8 +70,9 @@ contains
       end associate
    end subroutine find_stiffest
 
-   !> Compare the time step with the stable time step of each suspect alone. This finds short contacts; the stable step of
-   !> all contacts together is less (`check_stability`). All ranks get the message of the stiffest contact. Collective.
+   !> Compare the time step with the stable time step of each suspect alone. This finds short contacts; the stable
+   !> step of all contacts together is less (`check_stability`). All ranks get the message of the stiffest contact.
+   !> Collective.
    subroutine check_suspects(self, share, warning, error)
       type(simulation_t), intent(inout) :: self
       !> Greatest dt / stable dt of the suspects of all ranks

@@ -183,7 +183,8 @@ contains
             mine%memory(:n) = 0_ip
          end if
          do while (next >= 1_ip)
-            call fill_block(bodies, first(:n), second(:n), law%needs_effective_area, isa, 1_ip, next, tested, mine, block)
+            call fill_block(bodies, first(:n), second(:n), law%needs_effective_area, isa, 1_ip, next, tested, mine, &
+                         block)
             call law%apply_elastic(bodies, block, mine)
             do c = 1_ip, block%n
                k = low + block%pair(c) - 1_ip

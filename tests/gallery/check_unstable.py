@@ -13,7 +13,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-MESSAGE = re.compile(r"polydem: (step \d+: .*bod(?:y|ies) \d+.* at \([-+.0-9E]+, [-+.0-9E]+\) m.*(?:[Rr]educe (?:dt|fraction)|Increase speed).*)")
+MESSAGE = re.compile(r"polydem: (step \d+: .*bod(?:y|ies) \d+.* at \([-+.0-9E]+, [-+.0-9E]+\) m.*"
+                     r"(?:[Rr]educe (?:dt|fraction)|Increase speed).*)")
 RUN_ERROR = 1
 #: Overrides that leave a run to its other guards
 BLIND = ("guards.step=off", "guards.overlap=stop")

@@ -94,7 +94,8 @@ contains
                        start))
       call list%append(block_at(under - 0.5_wp*width, -0.05_wp, width, 0.1_wp, 0.0_wp), fixed=.true.)
       call list%append(block_at(1.5_wp*width - under, -0.05_wp, width, 0.1_wp, 0.0_wp), fixed=.true.)
-      call begin('&forces friction_coefficient = 5 damping_coefficient = '//to_text(damping)//area_law//' stiffness = '// &
+      call begin('&forces friction_coefficient = 5 damping_coefficient = '//to_text(damping)//area_law// &
+                 ' stiffness = '// &
                  to_text(young)//' /'//integrate_text(1.0e-6_wp*sqrt(1.0e10_wp/young)), list, simulation, error)
    end subroutine put_on_corner
 

@@ -40,7 +40,8 @@ contains
       expected = wave_speed(row_of(1.0_wp))/sqrt(gravity)
       do k = 1, 3
          call topple(table, row_of(heights(k)), numbers(k))
-         call table%expect_relative('h = '//to_text(heights(k), 1)//' m: speed/sqrt(g h)', expected, numbers(k), 0.05_wp)
+         call table%expect_relative('h = '//to_text(heights(k), 1)//' m: speed/sqrt(g h)', expected, numbers(k), &
+                                    0.05_wp)
       end do
       call table%expect_absolute('spread of the three over their mean', 0.0_wp, &
                                  (maxval(numbers) - minval(numbers))*3.0_wp/sum(numbers), 0.01_wp)

@@ -116,14 +116,16 @@ contains
 
       call list%append(regular_polygon(64, radius, 0.0_wp, 0.0_wp, 0.0_wp), velocity=[half, 0.0_wp])
       call list%append(regular_polygon(64, radius, 0.0583_wp, 0.0_wp, 0.0_wp), velocity=[-half, 0.0_wp])
-      call begin('&forces gravity = 0, 0 law = ''conservative'' damping = ''none'' friction = ''none'' / &integrate '// &
+      call begin('&forces gravity = 0, 0 law = ''conservative'' damping = ''none'' friction = ''none'' '// &
+                 '/ &integrate '// &
                  'duration = 0.0543 /', list, simulation, error)
       do k = 1, simulation%n_steps
          if (.not. allocated(error)) call advance(simulation, error)
       end do
       call table%note_error(error)
       if (allocated(error)) return
-      call table%expect_relative('two 64-gons, undamped: speed afterwards [m/s]', half, simulation%bodies%velocity(1, 2), &
+      call table%expect_relative('two 64-gons, undamped: speed afterwards [m/s]', half, &
+                                 simulation%bodies%velocity(1, 2), &
                                  1.0e-3_wp)
    end subroutine collide_round
 

@@ -45,7 +45,8 @@ contains
       logical, intent(in) :: thorough
       character(len=16), parameter :: frictions(3) = [character(len=16) :: 'cundall_strack', 'exact', 'none']
       character(len=60), parameter :: dampings(7) = [character(len=60) :: 'restitution = 0.3', 'restitution = 0.8', &
-         'damping_coefficient = 0.5', 'damping_coefficient = 0.1', "damping = 'hunt_crossley' damping_coefficient = 300", &
+         'damping_coefficient = 0.5', 'damping_coefficient = 0.1', &
+         "damping = 'hunt_crossley' damping_coefficient = 300", &
          "damping = 'matuttis_chen' damping_coefficient = 0.5", 'restitution = 0.5 tilt_damping = 0']
       integer :: k
 
@@ -103,8 +104,8 @@ contains
          do j = 1, merge(3, 2, whole)
             call put_floor(list)
             call list%append(block_at(0.0_wp, 0.5_wp*(h*cos(tilts(j)) + w*sin(tilts(j))) + 0.005_wp, w, h, tilts(j)))
-            call settle(table, list, model, friction, 0.5_wp, 0.0_wp, merge(3.0_wp, 1.5_wp, whole .or. .not. must_rest), &
-                        worst)
+            call settle(table, list, model, friction, 0.5_wp, 0.0_wp, &
+                        merge(3.0_wp, 1.5_wp, whole .or. .not. must_rest), worst)
          end do
       end do
       call judge(table, 'bars', name, worst, must_rest)
@@ -157,8 +158,8 @@ contains
                call list%append(block_at(merge(0.02_wp, -0.02_wp, mod(i, 2) == 0)*w, &
                                          (i - 0.5_wp)*h + i*1.0e-4_wp, w, h, 0.0_wp))
             end do
-            call settle(table, list, model, friction, 0.5_wp, 0.0_wp, merge(4.0_wp, 2.0_wp, whole .or. .not. must_rest), &
-                        worst)
+            call settle(table, list, model, friction, 0.5_wp, 0.0_wp, &
+                        merge(4.0_wp, 2.0_wp, whole .or. .not. must_rest), worst)
          end do
       end do
       call judge(table, 'stacks', name, worst, must_rest)

@@ -44,7 +44,8 @@ contains
                   call bounce(table, laws(j), 'restitution = 0.5', cuts(k), corner == 1, 0.5_wp**(4*v - 3), e)
                   if (k == 1 .and. v == 1) whole = merge(0.5_wp, e, j == 1 .or. corner == 0)
                   call table%expect_absolute(trim(laws(j))//', '//trim(merge('corner', 'face  ', corner == 1))//', '// &
-                                             cut_text(cuts(k))//', '//merge('0.5 m/s ', '0.03 m/s', v == 1)//': restitution', &
+                                             cut_text(cuts(k))//', '//merge('0.5 m/s ', '0.03 m/s', v == 1)// &
+                                             ': restitution', &
                                              whole, e, 0.03_wp*whole)
                end do
             end do
@@ -52,7 +53,8 @@ contains
          call rest_on(table, laws(j), cuts(1), depth)
          do k = 2, merge(5, 3, thorough)
             call rest_on(table, laws(j), cuts(k), deep)
-            call table%show(trim(laws(j))//', '//cut_text(cuts(k))//': static depth over that of the whole floor', deep/depth)
+            call table%show(trim(laws(j))//', '//cut_text(cuts(k))//': static depth over that of the whole floor', &
+                            deep/depth)
          end do
          do k = 1, merge(5, 3, thorough)
             call bounce(table, laws(j), 'damping_coefficient = 0.2', cuts(k), .false., 0.5_wp, e)
