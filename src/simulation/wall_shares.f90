@@ -78,8 +78,16 @@ contains
       shares%n = 0_ip
       if (bodies%n - size(bodies%free, kind=ip) < 2_ip) return
       call reserve_bodies(bodies%n, shares)
-      from = findloc(bodies%fixed, .true., dim=1, kind=ip)
-      to = findloc(bodies%fixed, .true., dim=1, kind=ip, back=.true.)
+      from = 1_ip
+      do while (from <= bodies%n)
+         if (bodies%fixed(from)) exit
+         from = from + 1_ip
+      end do
+      to = bodies%n
+      do while (to >= from)
+         if (bodies%fixed(to)) exit
+         to = to - 1_ip
+      end do
       do p = 1_ip, pairs%n, block_size
          n = 0_ip
          do k = p, min(pairs%n, p + block_size - 1_ip)
@@ -158,8 +166,10 @@ contains
       integer(ip) :: first(block_size), second(block_size), c, k, n, next, tested
 
       n = high - low + 1_ip
-      first(:n) = pairs%first(shares%pair(low:high))
-      second(:n) = pairs%second(shares%pair(low:high))
+      do c = 1_ip, n
+         first(c) = pairs%first(shares%pair(low + c - 1_ip))
+         second(c) = pairs%second(shares%pair(low + c - 1_ip))
+      end do
       shares%ratio(low:high) = 0.0_wp
       next = n
       tested = n + 1_ip
