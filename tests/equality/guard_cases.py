@@ -85,7 +85,7 @@ VARIED = {
     "forces.tangential_damping": "0.5", "forces.friction_tolerance": "1e-6",
     "guards.displacement_limit": "0.2", "guards.overlap_limit": "0.5", "guards.energy_limit": "0.5",
     "guards.listed_depth": "1e-4", "guards.relaxed_depth": "1e-3",
-    "integrate.dt": "5e-5", "integrate.fraction": "0.1", "integrate.duration": "0.025",
+    "integrate.dt": "5e-5", "integrate.fraction": "0.1", "integrate.speed": "3", "integrate.duration": "0.025",
     "exchange.margin": "1e-3", "exchange.imbalance": "2",
     "output.folder": None, "output.frame_interval": "0.002", "output.frames_per_segment": "3",
     "output.log_interval": "1e-3",
