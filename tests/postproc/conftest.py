@@ -39,6 +39,7 @@ def small_drum(tmp_path_factory):
     """A run of the program: 150 bodies that fall and settle in a drum, 11 frames with contacts."""
     folder = tmp_path_factory.mktemp("small_drum")
     (folder / "drum.nml").write_text("&scene\n name = 'drum'\n boxes = 150\n/\n"
+                                     "&forces law = 'area' damping_coefficient = 0.0251 tilt_damping = 0 /\n"
                                      "&neighbours\n finder = 'quadtree'\n/\n"
                                      "&integrate\n duration = 0.2\n/\n"
                                      "&output\n frame_interval = 0.02\n contacts = .true.\n/\n", encoding="utf-8")
