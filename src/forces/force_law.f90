@@ -300,7 +300,7 @@ contains
    end function undamped_warning
 
    !> Why bodies may not come to rest with this law; blank if they do (benchmark B23)
-   function rest_note(law) result(note)
+   pure function rest_note(law) result(note)
       class(force_law_t), intent(in) :: law
       character(len=:), allocatable :: note
       logical :: damps, damps_tilts, is_weak
