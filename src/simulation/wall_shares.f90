@@ -49,6 +49,7 @@ contains
       type(force_law_t), intent(in) :: law
       !> Bodies with rotated polygons
       type(bodies_t), intent(in) :: bodies
+      !> Pairs of the list of neighbours
       type(pair_list_t), intent(in) :: pairs
       !> Contact history of the pairs; it is not changed
       type(contact_history_t), intent(in) :: history
