@@ -108,16 +108,17 @@ contains
    pure subroutine turn_back(t, n, d)
       real(dp), intent(in) :: t
       real(dp), intent(inout) :: n(2), d(2)
-      real(dp) :: to_n(2), to_d(2), error
+      real(dp) :: to_n(2), to_d(2), sum, error
 
       call multiply(t, d(1), to_n(1), to_n(2))
       call multiply(t, n(1), to_d(1), to_d(2))
       to_n(2) = to_n(2) + t*d(2)
       to_d(2) = to_d(2) + t*n(2)
-      call add(n(1), -to_n(1), n(1), error)
-      n(2) = (n(2) - to_n(2)) + error
-      call add(d(1), to_d(1), d(1), error)
-      d(2) = (d(2) + to_d(2)) + error
+      ! A sum must not share memory with its terms.
+      call add(n(1), -to_n(1), sum, error)
+      n = [sum, (n(2) - to_n(2)) + error]
+      call add(d(1), to_d(1), sum, error)
+      d = [sum, (d(2) + to_d(2)) + error]
    end subroutine turn_back
 
    !> Length of the vector (x, y)
