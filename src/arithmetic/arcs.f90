@@ -114,7 +114,7 @@ contains
       call multiply(t, n(1), to_d(1), to_d(2))
       to_n(2) = to_n(2) + t*d(2)
       to_d(2) = to_d(2) + t*n(2)
-      ! The sum is not written over a summand, which a compiler may read again.
+      ! A sum must not share memory with its terms.
       call add(n(1), -to_n(1), sum, error)
       n = [sum, (n(2) - to_n(2)) + error]
       call add(d(1), to_d(1), sum, error)

@@ -34,7 +34,7 @@ module polydem_wall_shares
       real(wp), allocatable :: root(:)
       !> Ratio L/l of each contact, 0 if the polygons do not overlap, and its direction, (x or y, pair)
       real(wp), allocatable, private :: ratio(:), direction(:, :)
-      !> Number of pairs of each free body with fixed bodies, (slot); 0 between two steps
+      !> Number of pairs, then of contacts, of each free body with fixed bodies, (slot); 0 between two steps
       integer(ip), allocatable, private :: count_of(:)
       !> Sums of L/l n n^T over the contacts of each free body: xx, xy, yy, (3, slot)
       real(wp), allocatable, private :: tensor(:, :)
@@ -49,7 +49,7 @@ contains
       type(force_law_t), intent(in) :: law
       !> Bodies with rotated polygons
       type(bodies_t), intent(in) :: bodies
-      !> Pair list of the step
+      !> Pairs of the list of neighbours
       type(pair_list_t), intent(in) :: pairs
       !> Contact history of the pairs; it is not changed
       type(contact_history_t), intent(in) :: history
@@ -206,16 +206,22 @@ contains
       end do
       do k = 1_ip, shares%n
          associate (t => shares%tensor(:, shares%body(k)), n => shares%direction(:, k), r => shares%ratio(k))
-            if (r > 0.0_wp) t = t + r*[n(1)*n(1), n(1)*n(2), n(2)*n(2)]
+            if (.not. r > 0.0_wp) cycle
+            t = t + r*[n(1)*n(1), n(1)*n(2), n(2)*n(2)]
          end associate
+         shares%count_of(shares%body(k)) = shares%count_of(shares%body(k)) + 1_ip
       end do
       do k = 1_ip, shares%n
          shares%root(k) = 1.0_wp
          associate (t => shares%tensor(:, shares%body(k)), n => shares%direction(:, k), r => shares%ratio(k))
-            if (.not. r > 0.0_wp) cycle
+            ! A contact alone has exactly 1, however many pairs the boxes make: no bit depends on the boxes.
+            if (.not. r > 0.0_wp .or. shares%count_of(shares%body(k)) < 2_ip) cycle
             whole = n(1)*n(1)*t(1) + 2.0_wp*n(1)*n(2)*t(2) + n(2)*n(2)*t(3)
             shares%root(k) = sqrt(min(1.0_wp, r/whole))
          end associate
+      end do
+      do k = 1_ip, shares%n
+         shares%count_of(shares%body(k)) = 0_ip
       end do
    end subroutine divide
 

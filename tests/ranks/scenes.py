@@ -2,7 +2,8 @@
 
 #: Namelists by name, without the groups that `write_scene` adds
 SCENES = {
-    # Grains fall in a drum that already turns; friction with memory.
+    # Grains fall in a drum that already turns; friction with memory. Grains on two segments share the dashpot of the
+    # default restitution.
     "drum": """\
 &scene
    name = 'drum' bodies = 300 speed = 1.0

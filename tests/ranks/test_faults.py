@@ -151,7 +151,7 @@ def test_ranks_that_outlive_their_leader_keep_others_out(whole, tmp_path):
 def test_ranks_whose_folder_was_taken_over_end_and_write_nothing_more(whole, tmp_path):
     folder = tmp_path / "result"
     options = ("integrate.duration=1000", "checkpoint.steps=0", "output.frame_interval=0", "output.log_interval=900",
-               "guards.overlap=off", "guards.passing=off")
+               "guards.overlap=off", "guards.passing=off", "guards.step=off")
     process = start(whole / "scene.nml", folder, 2, 1, [word for option in options for word in ("--set", option)])
     # Once the first frame has its file, the run writes nothing for a long time.
     wait_for(lambda: any(folder.glob("trajectory_*")), process)
