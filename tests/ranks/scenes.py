@@ -36,13 +36,6 @@ SCENES = {
 &forces gravity = 0, -80 stiffness = 2e5 damping_from_touch = .true. damping_coefficient = 0.2 midstep_slip = .false. /
 &integrate accumulation = 'compensated' fraction = 0.2 duration = 0.02 /
 """,
-    # Walls of several pieces, whose contacts with a grain share the dashpot of a restitution: all defaults.
-    "pieces": """\
-&scene name = 'hopper' bodies = 150 opening = 0.04 slope = 60 speed = 1.0 /
-&boxes largest_ratio = 2 /
-&forces gravity = 0, -80 stiffness = 1e5 /
-&integrate duration = 0.012 /
-""",
     # At rest: nothing goes over a border unless the border moves.
     "stack": """\
 &scene name = 'stack' bodies = 9 width = 0.01 height = 0.01 /

@@ -22,7 +22,7 @@ LEAST_SETTLEMENTS = {"drum": 100, "gas": 100, "hopper": 100, "bed": 100, "stack"
 #: What is tried unless all is: every scene on several numbers of ranks, every finder and number of threads somewhere
 QUICK = [(scene, ranks, 1 + (ranks + k) % 2, FINDERS[(3 * k + n) % len(FINDERS)])
          for k, scene in enumerate(SCENES)
-         for n, ranks in enumerate(((2, 4, 3), (1, 3, 7), (2, 3, 4), (1, 4, 2), (2, 3, 7), (2, 3, 4))[k])]
+         for n, ranks in enumerate(((2, 4, 3), (1, 3, 7), (2, 3, 4), (1, 4, 2), (2, 3, 7))[k])]
 
 
 def pytest_generate_tests(metafunc):
