@@ -134,7 +134,7 @@ contains
          n = n + 1_ip
          shares%pair(n) = shares%pair(k)
          ! Exchanged, not overwritten: the counts of all bodies are still to be cleared.
-         call swap(shares%body(n), shares%body(k))
+         if (n < k) call swap(shares%body(n), shares%body(k))
       end do
       shares%n = n
       do k = 1_ip, n_all
