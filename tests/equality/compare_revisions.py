@@ -3,8 +3,8 @@
 usage: compare_revisions.py [--base REVISION] [--only PATTERN] [--list] [--keep] [--jobs N]
        compare_revisions.py --time [REPEATS]
 
-Builds the base revision (once) and the working tree in build/guard, without MPI and with it, does the same runs with
-both and compares bit for bit: state hash, frames, contacts, forces on walls, ledger, counters, traces, single steps.
+Builds the base revision (HEAD if none is given) and the working tree in build/guard, without MPI and with it, does the
+same runs with both and compares bit for bit: state hash, frames, contacts, forces on walls, ledger, counters, traces, single steps.
 PATTERN is a regular expression for names of cases (--list shows them). Results of runs that differ stay in
 build/guard/*/work/cases, with --keep all. --time compares the times of steps instead. Exit code 0: all equal, 1: not.
 
@@ -25,7 +25,7 @@ import guard_python
 from guard_cases import Case, generated_cases
 from guard_names import BASE, PRESENT
 from guard_results import differences, read_result, read_samples
-from guard_runs import GuardError, Side, extract, write_bodies
+from guard_runs import GuardError, Side, call, extract, write_bodies
 
 ROOT = guard_python.ROOT
 #: Updates of bodies in a shortened run of inputs, and the greatest number of its steps
@@ -176,7 +176,7 @@ def report(outcomes, seconds):
 
 def main():
     parser = argparse.ArgumentParser(usage=__doc__.split("usage: ")[1].split("\n\n")[0], add_help=True)
-    parser.add_argument("--base", default="92775d2")
+    parser.add_argument("--base", default="HEAD")
     parser.add_argument("--only", default="")
     parser.add_argument("--list", action="store_true")
     parser.add_argument("--keep", action="store_true")
@@ -185,11 +185,12 @@ def main():
     arguments = parser.parse_args()
     folder = ROOT / "build" / "guard"
     has_mpi = shutil.which("mpirun") is not None and shutil.which("mpifort") is not None
-    base = Side(BASE, folder / arguments.base / "source", folder / arguments.base, has_mpi)
-    present = Side(PRESENT, ROOT, folder / "present", has_mpi)
     began = time.monotonic()
     try:
-        extract(ROOT, arguments.base, base.sources)
+        revision = call(["git", "-C", ROOT, "rev-parse", "--short", f"{arguments.base}^{{commit}}"]).strip()
+        base = Side(BASE, folder / revision / "source", folder / revision, has_mpi)
+        present = Side(PRESENT, ROOT, folder / "present", has_mpi)
+        extract(ROOT, revision, base.sources)
         base.build(say, frozen=True)
         present.build(say, frozen=False)
         with ThreadPoolExecutor(arguments.jobs) as pool:

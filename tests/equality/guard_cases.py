@@ -32,11 +32,11 @@ SCENES = {
 SIZES = {**SCENES["bed"], "scene.bodies": "200", "scene.size_ratio": "10", "scene.motion": "oscillation",
          "scene.motion_amplitude": "1e-3, 2e-3", "scene.motion_frequency": "100"}
 #: Frames with everything in them, some to a segment; nothing that depends on the time that something takes
-OUTPUT = {"output.contacts": ".true.", "output.frames_per_segment": "4", "exchange.balance": "counted"}
+OUTPUT = {"output.contacts": ".true.", "output.frames_per_segment": "4", "decomposition.balance": "counted"}
 N_FRAMES = 10
 
 #: Coefficients of order one for each damping
-COEFFICIENTS = {"rate": "0.1", "hunt_crossley": "5", "book": "0.1", "none": None}
+COEFFICIENTS = {"rate": "0.1", "hunt_crossley": "5", "matuttis_chen": "0.1", "none": None}
 #: Entries that make contacts second order: a condition, and their value where a case does not say another. Their
 #: default differs between revisions.
 SECOND_ORDER = {"forces.damping_from_touch": (("forces.damping", "rate"), ".true."),
@@ -74,19 +74,19 @@ VARIED = {
     "scene.width": "0.15",
     "scene.width@heap": "1.0", "scene.width@incline": "0.03", "scene.width@stack": "0.02", "scene.height": "0.015",
     "scene.opening": "0.05", "scene.slope": "40", "scene.fraction": "0.25", "scene.speed": "1.5", "scene.spin": "20",
-    "scene.movers": "5", "scene.motion_pivot": "0.01, 0.02", "scene.motion_rate": "1",
+    "scene.moving_grains": "5", "scene.motion_pivot": "0.01, 0.02", "scene.motion_rate": "1",
     "scene.motion_velocity": "0.1, 0.2",
     "scene.motion_amplitude": "1e-3, 0", "scene.motion_frequency": "50", "scene.motion_start": "0.005",
     "scene.motion_ramp": "0.01", "scene.motion_bodies": "82, 84", "scene.bodies_file": None,
     "boxes.largest_ratio": "2", "boxes.margin": "1e-4", "neighbours.skin": "1e-3",
     "forces.gravity": "10, -40", "forces.stiffness": "1e6", "forces.damping_coefficient": "0.2",
     "forces.restitution": "0.3",
-    "forces.tilt_damping": "1", "forces.friction_coefficient": "0.6", "forces.tangential_stiffness": "0.5",
+    "forces.tilt_damping": "0.5", "forces.friction_coefficient": "0.6", "forces.tangential_stiffness": "0.5",
     "forces.tangential_damping": "0.5", "forces.friction_tolerance": "1e-6",
     "guards.displacement_limit": "0.2", "guards.overlap_limit": "0.5", "guards.energy_limit": "0.5",
     "guards.listed_depth": "1e-4", "guards.relaxed_depth": "1e-3",
     "integrate.dt": "5e-5", "integrate.fraction": "0.1", "integrate.speed": "3", "integrate.duration": "0.025",
-    "exchange.margin": "1e-3", "exchange.imbalance": "2",
+    "decomposition.margin": "1e-3", "decomposition.imbalance": "2",
     "output.folder": None, "output.frame_interval": "0.002", "output.frames_per_segment": "3",
     "output.log_interval": "1e-3",
     "output.trace_steps": "20", "output.trace_start": "0.01",
@@ -163,7 +163,7 @@ def generated(name, settings, **others):
     order = {name: value for name, ((key, word), value) in SECOND_ORDER.items() if settings.get(key, word) == word}
     settings = {**OUTPUT, "output.frame_interval": f"{interval:.6g}", **order, **settings}
     # How work that was timed is shared differs from run to run, and with it the counters of ranks.
-    whole = settings["exchange.balance"] != "measured"
+    whole = settings["decomposition.balance"] != "measured"
     return Case(name, {key: value for key, value in settings.items() if value is not None}, whole=whole, **others)
 
 
@@ -204,7 +204,7 @@ def entry_cases(entries):
             if entry.name == "scene.boxes":
                 settings.pop("scene.bodies")
             name = f"entries/{entry.name}={value.replace(', ', ',')}" + f"@{scene}" * (scene != "drum")
-            yield generated(name, settings, ranks=3 if entry.name.startswith("exchange.") else None)
+            yield generated(name, settings, ranks=3 if entry.name.startswith("decomposition.") else None)
 
 
 def fits(key, settings, entries):
@@ -233,6 +233,8 @@ def values_of(entry, scene):
     key = f"{entry.name}@{scene}" if f"{entry.name}@{scene}" in VARIED else entry.name
     if key not in VARIED:
         raise ValueError(f"{entry.name} is a namelist entry without a value in VARIED of guard_cases.py: add one")
+    if VARIED[key] == entry.default:
+        raise ValueError(f"{entry.name} has its default as value in VARIED of guard_cases.py: give it another")
     if VARIED[key] is None and entry.name not in ELSEWHERE:
         raise ValueError(f"{entry.name} has no value in VARIED of guard_cases.py, and ELSEWHERE does not say why")
     return [] if VARIED[key] is None else [VARIED[key]]
@@ -255,15 +257,15 @@ def process_cases():
               "hopper": {"integrate.scheme": "gear", "forces.midstep_slip": ".true."},
               "stack": {"forces.friction": "none", "forces.tilt_damping": "0.5"},
               "sizes": {"integrate.accumulation": "compensated", "forces.damping_from_touch": ".true."}}
-    often = {"exchange.margin": "1e-4", "exchange.imbalance": "1"}
+    often = {"decomposition.margin": "1e-4", "decomposition.imbalance": "1"}
     for name, scene in several.items():
         settings = {**scene, **harder[name], **often}
         yield generated(f"threads/{name}-2", settings, threads=2)
         for ranks in RANKS:
             yield generated(f"ranks/{name}-{ranks}", settings, ranks=ranks, threads=1 + (ranks == 2))
-    yield generated("ranks/measured-3", {**SIZES, **often, "exchange.balance": "measured"}, ranks=3)
+    yield generated("ranks/measured-3", {**SIZES, **often, "decomposition.balance": "measured"}, ranks=3)
     yield generated("ranks/exact-friction-2", {**SCENES["drum"], **often, "forces.friction": "exact"}, ranks=2)
-    yield generated("ranks/morton-3", {**SIZES, **often, "exchange.cut": "morton"}, ranks=3)
+    yield generated("ranks/morton-3", {**SIZES, **often, "decomposition.partition": "morton"}, ranks=3)
     for name, scene in (("drum", SCENES["drum"]), ("sizes", SIZES), ("gas", SCENES["gas"])):
         longer = 10 * float(scene["integrate.duration"]) * 80 / float(scene["scene.bodies"])
         settings = {**scene, **harder[name], **often, "integrate.duration": f"{longer:.6g}", "checkpoint.steps": "100",

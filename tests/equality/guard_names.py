@@ -97,25 +97,4 @@ class Names:
 BASE = Names()
 
 #: What the present tree calls what the base revision called otherwise
-#: Ranks send along one more number of each pair, for `guards.passing`, so how many bytes they send is not compared.
-#: Variants of finders are choices of a bench, not of a run.
-PRESENT = Names(
-    entries={"exchange.cut": "decomposition.partition", "output.ledger": "output.energy_balance",
-             "scene.movers": "scene.moving_grains"},
-    groups={"exchange": "decomposition"},
-    words={"forces.damping=book": "matuttis_chen",
-           **{f"neighbours.finder={name}": None for name in ("quadtree_called", "quadtree_o2", "sort_and_sweep_o2")}},
-    data={"trajectory/ledger/": "energy_balance/", "checkpoint/run/ledger_start": "run/energy_balance_start",
-          "checkpoint/run/ledger_steps": "run/energy_balance_steps",
-          "checkpoint/run/far_moves": "run/displacement_warnings", "checkpoint/run/energy_looks": "run/energy_warnings",
-          "checkpoint/bodies/book": "bodies/power_sum",
-          "checkpoint/bodies/torque_book": "bodies/torque_sum", "checkpoint/bodies/wall_book": "bodies/wall_sum"},
-    counters={"bytes in messages": None, "bytes at the start": None, "settlements": "redistributions",
-              "divisions of space": "partitions of space", "processes": "ranks",
-              "ghosts, summed over steps": "halo bodies, summed over steps", "messages to ghosts": "halo messages",
-              "bytes to ghosts": "halo bytes", "most of a process: bodies": "maximum per rank: bodies",
-              "most of a process: pairs": "maximum per rank: pairs",
-              "most of a process: ghosts": "maximum per rank: halo bodies",
-              "most of a process: messages": "maximum per rank: messages",
-              "most of a process: bytes": "maximum per rank: bytes", "pair_contradictions": "pair contradictions",
-              "leavers": "left_leaf"})
+PRESENT = Names()

@@ -14,7 +14,7 @@ IGNORED = re.compile(r"\w+/provenance/.*|profile/(profile/.*|status|counters/sco
 CONTINUED = {f"counter profile {name}" for name in ("steps", "contacts", "bodies")}
 #: Counters that do not depend on which rank has which body
 OF_THE_WHOLE_RUN = CONTINUED | {f"counter profile {name}" for name in
-                                ("contacts without direction", "pair_contradictions", "processes")}
+                                ("contacts without direction", "pair contradictions", "ranks")}
 #: Data of a trajectory that do not grow from frame to frame
 STANDING = re.compile(r"trajectory/(bodies/.*|walls/id)")
 
