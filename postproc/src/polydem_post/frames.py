@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -33,6 +34,10 @@ class FrameSource(Protocol):
 
     def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
         """Which bodies have a prescribed motion."""
+        ...
+
+    def origin_for(self, frame: Frame) -> tuple[float, float]:
+        """The point that was subtracted from the coordinates of a frame [m]."""
         ...
 
 
@@ -252,6 +257,19 @@ class Frame:
         """Indices of bodies in the columns of this frame from their k identifiers [1], (k)."""
         return _index_of(self, np.atleast_1d(identifiers))
 
+    def write_bodies(self, path: str | PathLike[str], *, overwrite: bool = False) -> int:
+        """Write the bodies as a bodies file, from which a run can start; return their number.
+
+        In the namelist: &scene name = 'file', bodies_file = the path. The file has vertices in the world, identifiers,
+        fixed bodies, velocities, angular velocities, masses and moments of inertia, all to the last bit; the centres of
+        mass of the run follow from the vertices, within rounding. Angles and time begin at 0, and friction begins
+        without history: to continue a run to the same bits, use its checkpoints. Fixed bodies have no velocity in the
+        file: give `motion` in the namelist. `bodies_file.write_bodies` writes other outlines and columns.
+        """
+        from .bodies_file import write_frame
+
+        return write_frame(self, path, self._source.origin_for(self) if self._source else (0.0, 0.0), overwrite)
+
     def to_pandas(self) -> Any:
         """The bodies as a pandas table with the identifiers as index; vectors become two columns (position_x)."""
         from .tables import body_table
@@ -273,6 +291,9 @@ class _Given:
 
     def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
         return np.zeros(len(frame), dtype=bool)
+
+    def origin_for(self, frame: Frame) -> tuple[float, float]:
+        return 0.0, 0.0
 
 
 def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:
