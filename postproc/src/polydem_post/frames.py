@@ -20,6 +20,9 @@ __all__ = ["Contacts", "Frame", "Walls", "find_contacts", "sound_frame"]
 #: What a contact has of its own; the rest follows from the bodies
 CONTACT_FIELDS = ("first", "second", "area", "point", "normal", "force")
 
+#: Distances of vertices that are held in memory at once
+MOST_DISTANCES = 2**20
+
 
 class FrameSource(Protocol):
     """What gives the contacts and walls of a frame when they are asked for."""
@@ -207,8 +210,21 @@ class Frame:
         distance = cross / np.hypot(edge[:, 0], edge[:, 1])
         return 2.0 * np.minimum.reduceat(distance, self.vertex_start[:-1]) if len(self) else np.empty(0)
 
-    @property
+    @cached_property
     def diameter(self) -> FloatArray:
+        """Largest distance between two vertices of each body [m], (n)."""
+        largest = np.empty(len(self))
+        for corners in np.unique(self.corners):
+            rows = np.flatnonzero(self.corners == corners)
+            most = max(1, MOST_DISTANCES // int(corners) ** 2)
+            for part in np.array_split(rows, -(-len(rows) // most)):
+                points = self.shape[self.vertex_start[part][:, None] + np.arange(corners)]
+                apart = points[:, :, None, :] - points[:, None, :, :]
+                largest[part] = np.sqrt((apart**2).sum(-1).max(axis=(1, 2)))
+        return largest
+
+    @property
+    def equivalent_diameter(self) -> FloatArray:
         """Diameter of the circle with the area of each body [m], (n)."""
         return np.sqrt(4.0 * self.area / np.pi)
 
