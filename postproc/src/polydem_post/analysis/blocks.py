@@ -57,10 +57,11 @@ def block_average(values: Any, weights: Any = None, *, blocks: int = 0) -> Block
     independent, and their scatter gives the error (H. Flyvbjerg & H.G. Petersen, J. Chem. Phys. 91 (1989) 461).
 
     With r the deviation from the mean, the integrated autocorrelation time is 1/2 + sum_k <r(i) r(i + k)>/<r^2>, with
-    the sum to five of these times (A.D. Sokal, in Functional Integration (1997) 131). A block has ten such times or
-    more, and there are 4 to 40 blocks; `blocks` chooses their number instead. A series shorter than 20 correlation
-    times has the warning `ShortSeries`. The true mean lies within `error` times Student's t for `blocks` - 1 degrees of
-    freedom. With `weights` the mean is sum(w v)/sum(w), and r is w (v - mean).
+    the sum to five of these times (A.D. Sokal, in Functional Integration (1997) 131). A block has ten times
+    that time less one half, or more, and there are 4 to 40 blocks; `blocks` chooses their number instead. A series
+    shorter than 20 correlation times has the warning `ShortSeries`. In 95 % of all cases the true mean lies within
+    `error` times Student's t for `blocks` - 1 degrees of freedom. With `weights` the mean is sum(w v)/sum(w), and r is
+    w (v - mean).
     """
     series = np.asarray(values, dtype=float)
     if series.ndim != 1 or len(series) == 0 or not np.isfinite(series).all():
