@@ -77,7 +77,7 @@ frame = run.at(0.5 * (flow.times[steady.start] + flow.times[steady.stop]))
 across = measure.profile(run[steady], "velocity", np.linspace(-0.5 * OPENING, 0.5 * OPENING, 7), axis="x",
                          between=(-0.01, 0.02), weight="mass")
 forces = measure.force_distribution(frame, bins=np.linspace(0.0, 6.0, 13))
-diameter = float(np.median(frame.diameter[frame.free]))
+diameter = float(np.median(frame.equivalent_diameter[frame.free]))
 fields = measure.coarse_grain(frame, measure.lucy(3.0 * diameter), 0.5 * diameter)
 pressure = 0.5 * np.trace(fields.stress, axis1=2, axis2=3)
 print(f"t = {frame.time:.3f} s: coordination {measure.coordination_number(frame):.2f}, without rattlers "

@@ -16,7 +16,7 @@ module polydem_channel
    private
    public :: list_channel
 
-   !> Height of the channel over the largest diameter of a grain
+   !> Height of the channel over the largest long axis of a grain
    real(wp), parameter :: height_share = 1.2_wp
 
 contains

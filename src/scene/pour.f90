@@ -16,7 +16,7 @@ module polydem_pour
    private
    public :: place_grains, loose_spacing, loose_spacing_ratio, displace_randomly
 
-   !> Distance of loose grains over the largest diameter of a grain
+   !> Distance of loose grains over the largest long axis of a grain
    real(wp), parameter :: loose_spacing_ratio = 1.02_wp
 
 contains

@@ -7,7 +7,7 @@ module overlap_cases
    use polydem_random, only: random_t
    implicit none
    private
-   public :: rectangle, regular, median_diameter, turned, overlap_of, roundoff, two_pi
+   public :: rectangle, regular, irregular, turned, overlap_of, roundoff, two_pi
    public :: far, worst_area, worst_normal, worst_normal_far, worst_moment, worst_centroid
 
    !> Full turn [rad]
@@ -53,7 +53,7 @@ contains
    end function regular
 
    !> Irregular polygon in a circle about its centre
-   function median_diameter(random, corners, radius) result(vertices)
+   function irregular(random, corners, radius) result(vertices)
       !> Source of its irregularity
       type(random_t), intent(inout) :: random
       !> Number of vertices
@@ -68,7 +68,7 @@ contains
          angle = start + two_pi*(real(k, wp) + random%between(0.0_wp, 0.6_wp))/real(corners, wp)
          vertices(:, k) = radius*[cos(angle), sin(angle)]
       end do
-   end function median_diameter
+   end function irregular
 
    !> Points turned about the origin
    pure function turned(points, angle) result(image)

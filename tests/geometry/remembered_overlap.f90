@@ -1,6 +1,6 @@
 !> What a time step does with a remembered pair, and shapes and positions for the tests of it.
 module remembered_overlap
-   use overlap_cases, only: median_diameter, rectangle, regular, turned, two_pi
+   use overlap_cases, only: irregular, rectangle, regular, turned, two_pi
    use polydem_convex_overlap, only: find_overlap, overlap_t
    use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
@@ -165,8 +165,8 @@ contains
       m = int(random%between(3.0_wp, 12.99_wp), ip)
       angle = random%between(0.0_wp, two_pi)
       distance = random%between(0.8_wp, 2.0_wp)
-      pair%p = median_diameter(random, n, 1.0_wp)
-      pair%q = median_diameter(random, m, random%between(1.0_wp, 3.0_wp))
+      pair%p = irregular(random, n, 1.0_wp)
+      pair%q = irregular(random, m, random%between(1.0_wp, 3.0_wp))
       select case (kind)
       case (1)
          distance = distance*0.5_wp*(1.0_wp + radius_of(pair%q))

@@ -2,14 +2,17 @@
 
 import dataclasses
 import inspect
+import warnings
 
 import numpy as np
 import polydem_post.analysis as analysis
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from polydem_post import Frame, ResultError
+from polydem_post import Frame, ResultError, Trajectory
 from polydem_post.analysis import (
+    ShortSeries,
     anisotropy,
+    block_average,
     body_stress,
     coarse_grain,
     coordination_number,
@@ -27,11 +30,19 @@ from polydem_post.analysis import (
     rectangle,
     solid_fraction,
     stress_tensor,
+    surface_angle,
 )
+from polydem_post.analysis.windows import area_inside
 from polydem_post.columns import columns_of, field_names
 from polydem_post.polygons import area_of, clip
+from polydem_post.statistics import _student
 
 SQUARE = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
+
+
+def student(blocks):
+    """Half the width of an interval of 95 %, in errors from so many blocks."""
+    return np.array([-_student(0.025, int(number) - 1) for number in np.ravel(blocks)]).reshape(np.shape(blocks))
 
 
 def squares(centres, **options):
@@ -217,8 +228,6 @@ def heap_column(tmp_path_factory):
     import os
     import subprocess
 
-    from polydem_post import Trajectory
-
     folder = tmp_path_factory.mktemp("stack")
     (folder / "stack.nml").write_text("&scene\n name = 'stack'\n bodies = 10\n width = 0.01\n height = 0.01\n/\n"
                                       "&integrate\n duration = 0.01\n/\n&output\n contacts = .true.\n/\n")
@@ -367,6 +376,171 @@ def test_a_profile_over_frames_weighs_every_part_alike():
     assert_allclose(found.weight, [0.25, 0.75])
     with pytest.raises(ResultError, match="at least one frame"):
         profile([], "velocity", [0.0, 1.0])
+
+
+def test_parts_in_slabs_are_those_of_clipping():
+    random = np.random.default_rng(3)
+    outlines = []
+    for centre in random.uniform(-3, 3, (60, 2)):
+        angles = np.sort(random.uniform(0, 2 * np.pi, random.integers(3, 9)))
+        outlines.append(centre + random.uniform(0.2, 1.0) * np.column_stack([np.cos(angles), 0.6 * np.sin(angles)]))
+    held = random.random(60) < 0.1
+    frame = Frame.from_polygons(outlines, fixed=held)
+    edges, cut = np.array([-2.0, -1.3, -1.25, 0.4, 2.7]), (-1.1, 2.3)
+    turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    for between in (None, cut):
+        found = profile(frame, "velocity", edges, axis=(0.6, 0.8), between=between)
+        low, high = between or (-20.0, 20.0)
+        for weight, below, above in zip(found.weight, edges, edges[1:]):
+            window = rectangle(below, -high, above, -low) @ turn.T  # the other axis is (0.8, -0.6)
+            assert weight == pytest.approx(area_inside(frame, window)[~held].sum(), rel=1e-12, abs=1e-14)
+
+
+def test_fluctuations_are_those_about_a_linear_profile():
+    # Rows of squares with the velocity 3 y along x: slabs of one, two or three rows have no fluctuation, but the
+    # deviation from the mean of a slab of two rows would be 1.5.
+    heights = np.repeat(np.arange(12.0), 5)
+    places = np.column_stack([np.tile(np.arange(5.0), 12), heights])
+    shear = np.column_stack([3.0 * heights, 0.0 * heights])
+    for rows in (1, 2, 3):
+        found = profile(squares(places, velocity=shear), "velocity", np.arange(-0.5, 12.0, rows))
+        assert_allclose(found.fluctuation, 0.0, atol=1e-12)
+        assert np.isnan(found.error).all()
+    # With random parts of known size added, these come out, in components and as a temperature.
+    random = np.random.default_rng(11)
+    noise = (0.7, 0.2) * random.normal(size=(200, 60, 2))
+    frames = [squares(places, velocity=shear + each, time=float(k)) for k, each in enumerate(noise)]
+    found = profile(frames, "velocity", np.arange(-0.5, 12.0, 2))
+    assert_allclose(found.fluctuation[:, 0], 0.7, rtol=0.06)  # 2000 values: 1.6 % is the standard error
+    assert_allclose(found.fluctuation[:, 1], 0.2, rtol=0.06)
+    temperature = 0.5 * np.sum(found.fluctuation**2, axis=1)
+    assert temperature.mean() == pytest.approx(0.5 * (0.7**2 + 0.2**2), rel=0.02)
+    # The frames are independent: the errors are those of as many values.
+    assert_allclose(found.error, np.broadcast_to(np.array([0.7, 0.2]) / np.sqrt(2000), (6, 2)), rtol=0.6)
+    assert found.error[:, 0].mean() == pytest.approx(0.7 / np.sqrt(2000), rel=0.15)
+
+
+def test_errors_of_a_tilted_profile_hold_the_truth():
+    # Rows of a bed that is tilted by 25 degrees slide with velocities along the slope that fluctuate about k/2, each
+    # row with its own correlated noise: about 95 of 100 intervals of Student's t hold the truth.
+    degrees, rows, noise = 25.0, 40, 0.3
+    turn = turned(np.eye(2), np.radians(degrees))
+    downhill = -turn[0]
+    values = ar1(np.random.default_rng(4), 0.8, (3, rows, 300)).transpose(0, 2, 1)
+    series = 0.5 * np.arange(rows) + noise * values
+    outlines = [turned(SQUARE + np.array([0.0, y]), np.radians(degrees)) for y in range(rows)]
+    held = 0
+    for run in series:
+        frames = [Frame.from_polygons(outlines, velocity=each[:, None] * downhill, time=0.1 * k)
+                  for k, each in enumerate(run)]
+        found = profile(frames, lambda frame: frame.velocity @ downhill, np.arange(-0.5, rows), angle=degrees,
+                        between=(-1.0, 1.0))
+        assert_allclose(found.mean, run.mean(axis=0), rtol=1e-9)
+        assert_allclose(found.weight, 1.0, rtol=1e-9)
+        held += np.sum(np.abs(found.mean - 0.5 * np.arange(rows)) <= student(found.blocks) * found.error)
+        # The mean of 300 values with a correlation time of 4.5 has the error noise sqrt(2*4.5/300).
+        assert np.sqrt(np.mean(found.error**2)) == pytest.approx(noise * np.sqrt(9.0 / 300), rel=0.25)
+        vectors = profile(frames[:60], "velocity", np.arange(-0.5, rows), axis=turn[1])
+        assert_allclose(vectors.mean @ downhill, run[:60].mean(axis=0), rtol=1e-9)
+    assert 0.89 <= held / (3 * rows) <= 0.99
+    with pytest.raises(ResultError, match="an axis or an angle"):
+        profile(frames[0], "velocity", [0.0, 1.0], axis="x", angle=3.0)
+
+
+def ar1(random, memory, shape):
+    """Series of mean 0 and variance 1 with the autocorrelation memory**k: n values along the last axis."""
+    noise = random.normal(size=shape)
+    values = np.empty(shape)
+    values[..., 0] = noise[..., 0]
+    for k in range(1, shape[-1]):
+        values[..., k] = memory * values[..., k - 1] + np.sqrt(1.0 - memory**2) * noise[..., k]
+    return values
+
+
+@pytest.mark.parametrize("memory", [0.0, 0.6, 0.9])
+def test_errors_from_blocks_hold_the_truth(memory):
+    n, cases = 1000, 400
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ShortSeries)
+        found = [block_average(series) for series in ar1(np.random.default_rng(7), memory, (cases, n))]
+    assert np.mean([abs(each.mean) <= student(each.blocks) * each.error for each in found]) == pytest.approx(
+        0.95, abs=0.03)
+    time = 0.5 * (1.0 + memory) / (1.0 - memory)
+    assert np.median([each.correlation_time for each in found]) == pytest.approx(time, rel=0.08)
+    exact = np.sqrt(2.0 * time / n)
+    assert np.sqrt(np.mean([each.error**2 for each in found])) == pytest.approx(exact, rel=0.08)
+    # As if the values were independent: far too small an error.
+    if memory > 0.5:
+        assert np.mean([abs(each.mean) <= 1.96 / np.sqrt(n) for each in found]) < 0.75
+    assert {each.count for each in found} == {n} and max(each.blocks for each in found) <= 40
+
+
+def test_a_mean_with_weights_is_that_of_all_parts():
+    values, weights = np.array([1.0, 2.0, 4.0, 3.0, 9.0, 5.0]), np.array([1.0, 2.0, 0.0, 1.0, 1.0, 3.0])
+    with pytest.warns(ShortSeries):
+        found = block_average(values, weights, blocks=3)
+    assert found.mean == pytest.approx((weights @ values) / 8.0)
+    sums = [weights[k:k + 2] @ (values[k:k + 2] - found.mean) for k in (0, 2, 4)]
+    assert found.error == pytest.approx(np.sqrt(1.5 * np.sum(np.square(sums))) / 8.0)
+    assert found.blocks == 3
+    # Independent values of weights that vary fourfold: the error is that of sum(w v)/sum(w).
+    random = np.random.default_rng(9)
+    weights = random.uniform(0.5, 2.0, 400)
+    errors = [block_average(random.normal(size=400), weights).error for _ in range(50)]
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.sqrt(np.sum(weights**2)) / weights.sum(), rel=0.08)
+
+
+def test_a_short_series_says_so():
+    series = ar1(np.random.default_rng(1), 0.95, (100,))
+    with pytest.warns(ShortSeries, match="correlation times, fewer than 20"):
+        found = block_average(series)
+    assert found.is_short and found.blocks == 4
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert np.isnan(block_average([1.0, 2.0, 3.0]).error)
+        assert block_average(np.ones(50)).error == 0.0
+    for wrong in ([], [np.nan, 1.0], [[1.0, 2.0]]):
+        with pytest.raises(ResultError, match="finite values"):
+            block_average(wrong)
+    with pytest.raises(ResultError, match="one weight per value"):
+        block_average([1.0, 2.0], [1.0, -1.0])
+    with pytest.raises(ResultError, match="2 to 5 blocks, not 6"):
+        block_average(np.arange(5.0), blocks=6)
+
+
+def test_the_mean_angle_of_a_surface_that_fluctuates():
+    angles = 24.0 + 1.5 * ar1(np.random.default_rng(8), 0.8, (400,))
+    angles[:100] += np.linspace(-20.0, 0.0, 100)  # the start, which `after` leaves out
+    frames = []
+    for k, degrees in enumerate(angles):
+        slope = np.tan(np.radians(degrees))
+        slabs = [np.array([(x, -9), (x + 1, -9), (x + 1, slope * (x + 1)), (x, slope * x)]) for x in range(-4, 4)]
+        frames.append(Frame.from_polygons(slabs, time=0.25 * k))
+    found = surface_angle(frames, after=25.0, columns=10)
+    assert_allclose(found.angles, angles[100:], atol=1e-9)
+    assert_allclose(found.times, 0.25 * np.arange(100, 400))
+    assert found.mean == pytest.approx(angles[100:].mean())
+    assert found.correlation_time == pytest.approx(0.25 * 4.5, rel=0.35)
+    assert found.error == pytest.approx(1.5 * np.sqrt(9.0 / 300), rel=0.4)
+    assert abs(found.mean - 24.0) < student(found.blocks) * found.error
+    given = surface_angle(iter(frames), after=25.0, between=(-1.0, 3.5), columns=10, blocks=6)
+    assert given.mean == pytest.approx(found.mean) and given.blocks == 6
+    with pytest.raises(ResultError, match="no frames from 1000 s on"):
+        surface_angle(frames, after=1000.0)
+
+
+def test_the_angle_of_a_run(small_drum):
+    run = Trajectory(small_drum)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ShortSeries)
+        found = surface_angle(run, after=0.1)
+    late = run[run.times >= 0.1]
+    bounds = late[0].bounds[late[0].free]
+    low, high = bounds[:, 0].min(), bounds[:, 2].max()
+    middle = 0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high
+    assert_allclose(found.angles, [free_surface(frame, *middle).angle for frame in late])
+    assert_array_equal(found.times, late.times)
+    assert 4 <= found.blocks <= len(late) and found.error > 0.0
 
 
 def falling(n_frames=5):

@@ -134,9 +134,20 @@ def test_shapes_of_a_rectangle():
     frame = Frame.from_polygons([[(1, 1), (5, 1), (5, 3), (1, 3)]], density=3.0)
     assert_allclose(frame.position, [[3, 2]])
     assert_allclose([frame.area[0], frame.mass[0], frame.inertia[0]], [8.0, 24.0, 24.0 * (16 + 4) / 12])
-    assert_allclose([frame.radius[0], frame.thickness[0], frame.diameter[0]], [5**0.5, 2.0, (32 / np.pi) ** 0.5])
+    assert_allclose([frame.radius[0], frame.thickness[0], frame.diameter[0]], [5**0.5, 2.0, 20**0.5])
+    assert_allclose(frame.equivalent_diameter, [(32 / np.pi) ** 0.5])
     assert_allclose(frame.bounds, [[1, 1, 5, 3]])
     assert frame.corners[0] == 4
+
+
+def test_diameters_are_those_of_the_program(run):
+    words = next(line for line in (run.folder / "log.txt").read_text().splitlines() if line.startswith("sizes"))
+    found = [float(word) for word in re.findall(r"\d\.\d+E[+-]\d+", words)]
+    diameter = run[-1].diameter[run[-1].free]
+    # The program takes the lower one of two medians.
+    expected = [diameter.min(), diameter.max(), np.sort(diameter)[(len(diameter) + 1) // 2 - 1]]
+    assert_allclose(found, expected, rtol=0.005)  # the log has three digits
+    assert (diameter > 1.02 * run[-1].equivalent_diameter[run[-1].free]).all()
 
 
 def test_kinetic_energies_sum_to_the_balance(run):

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
-from polydem_post import ResultError
+from polydem_post import Frame, ResultError
 from polydem_post.__main__ import main
 from polydem_post.bodies_file import ConcaveOutline, import_bodies, import_shapely, origin_of, write_bodies
 from polydem_post.convex import concave_vertices, decompose
@@ -310,3 +310,96 @@ def test_arrays_become_bodies(tmp_path):
         assert list(file["fixed"]) == [1, 0]
     with pytest.raises(ResultError, match="one truth value for each of 2 outlines"):
         write_bodies([np.array(SQUARE), FLOOR], tmp_path / "out.h5", fixed=[True], overwrite=True)
+
+
+def run_of(path, folder, *settings):
+    """A run from a bodies file: its trajectory."""
+    (folder / "again.nml").write_text(f"&scene\n name = 'file'\n bodies_file = '{path}'\n/\n"
+                                      "&integrate\n duration = 1e-4\n/\n")
+    done = subprocess.run([PROGRAM, "run", "again.nml", "--force", *settings], cwd=folder, capture_output=True,
+                          text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return Trajectory(folder / "results" / "again")
+
+
+def assert_same_start(first, frame):
+    """The first frame of a run has the bodies of another frame: to the last bit but for positions and angles."""
+    for name in ("id", "fixed", "mass", "inertia", "vertex_start"):
+        assert_array_equal(getattr(first, name), getattr(frame, name), err_msg=name)
+    for name in ("velocity", "angular_velocity"):
+        assert_array_equal(getattr(first, name)[frame.free], getattr(frame, name)[frame.free], err_msg=name)
+    rounding = 8 * np.finfo(float).eps * np.abs(frame.vertex).max()  # of a coordinate
+    assert_allclose(first.position, frame.position, rtol=0, atol=rounding)
+    assert_allclose(first.vertex, frame.vertex, rtol=0, atol=rounding)
+    assert_allclose(first.density[frame.free], frame.density[frame.free], rtol=8 * rounding / frame.thickness.min())
+    assert not first.angle.any() and first.time == 0.0
+
+
+def test_a_run_starts_from_a_frame_of_another(small_drum, tmp_path):
+    run = Trajectory(small_drum)
+    frame = run[-1]
+    assert frame.write_bodies(tmp_path / "late.h5") == len(frame)
+    assert_array_equal(contents(tmp_path / "late.h5")["vertex"], frame.vertex)
+    assert np.ptp(frame.angle[frame.free]) > 1.0 and frame.speed[frame.free].max() > 0.01
+    again = run_of(tmp_path / "late.h5", tmp_path, "--set=output.contacts=.true.")
+    assert_same_start(again[0], frame)
+    # The contacts are the same, too: the bodies lie where they lay.
+    for one, other in zip(*([each.contacts.first, each.contacts.second] for each in (again[0], frame))):
+        assert_array_equal(one, other)
+    with pytest.raises(ResultError, match="overwrite=True"):
+        frame.write_bodies(tmp_path / "late.h5")
+    assert run[0].write_bodies(tmp_path / "late.h5", overwrite=True) == len(frame)
+
+
+def test_a_frame_keeps_masses_moving_walls_and_the_origin(tmp_path):
+    # Bodies with identifiers, masses and inertias of their own; a wall with a mass that moves, and one without.
+    outlines = [SQUARE, [(x + 0.02, y + 0.001) for x, y in SQUARE], FLOOR, [(x, y + 0.1) for x, y in FLOOR]]
+    write_bodies(np.array(outlines[:2]).tolist() + outlines[2:], tmp_path / "one.h5", fixed=[3, 4],
+                 velocity=[[0.1, 0.2], [1 / 3, 0], [0, 0], [0, 0]], angular_velocity=[2 / 7, -1.0, 0, 0],
+                 density=[1000.0, 1234.5, np.inf, np.inf], mass=[0.0, 0.77, np.inf, 3.0],
+                 inertia=[0.0, 1.1e-5, np.inf, np.inf], id=[9, 4, 2, 7], origin=(100.0, 50.0), scale=1.0)
+    moved = ("--set=scene.motion=translation", "--set=scene.motion_bodies=2", "--set=scene.motion_velocity=0.3,0")
+    first = run_of(tmp_path / "one.h5", tmp_path, *moved)
+    frame = first[-1]
+    assert_array_equal(frame.id, [2, 4, 7, 9])
+    assert_array_equal(frame.mass[:3], [np.inf, 0.77, 3.0])
+    assert frame.mass[3] == pytest.approx(1000.0 * 1e-4, rel=1e-12) and frame.inertia[1] == 1.1e-5
+    assert np.isinf(frame.inertia[[0, 2]]).all()
+    assert frame.speed[0] == pytest.approx(0.3)
+    frame.write_bodies(tmp_path / "two.h5")
+    assert origin_of(tmp_path / "two.h5") == (100.0, 50.0)
+    (tmp_path / "second").mkdir()
+    again = run_of(tmp_path / "two.h5", tmp_path / "second")
+    assert again.origin == (100.0, 50.0)
+    assert_same_start(again[0], frame)
+    assert not again[0].speed[0]
+    # In the world the coordinates have the origin, so there is none to store.
+    far = first.in_world()[-1]
+    far.write_bodies(tmp_path / "far.h5")
+    assert origin_of(tmp_path / "far.h5") == (0.0, 0.0)
+    assert_array_equal(contents(tmp_path / "far.h5")["vertex"], far.vertex)
+
+
+def test_columns_of_bodies(tmp_path):
+    write_bodies([SQUARE, FLOOR], tmp_path / "out.h5", velocity=(0.5, -1.0), density=1500, id=np.array([3, 1]))
+    found = contents(tmp_path / "out.h5")
+    assert set(found) == {"vertex", "vertex_start", "fixed", "velocity", "density", "id"}
+    assert_array_equal(found["velocity"], [[0.5, -1.0], [0.5, -1.0]])
+    assert_array_equal(found["density"], [1500.0, 1500.0])
+    assert_array_equal(found["id"], [3, 1])
+    made = Frame.from_polygons([np.array(SQUARE), np.array(FLOOR)], fixed=[False, True], velocity=[[1, 2], [0, 0]])
+    assert made.write_bodies(tmp_path / "made.h5") == 2
+    assert_same_start(run_of(tmp_path / "made.h5", tmp_path)[0], made)
+
+
+@pytest.mark.parametrize("columns, message", [
+    ({"speed": 1.0}, "no column speed; its columns are fixed, velocity"),
+    ({"velocity": [1.0, 2.0, 3.0]}, r"velocity has the shape \(3,\), but must have \(2, 2\), one value for each of 2"),
+    ({"mass": [1.0]}, r"mass has the shape \(1,\)"),
+    ({"mass": [np.inf, 1.0]}, "outline 1: the mass is inf, but must be a number not below 0"),
+    ({"density": [1.0, 0.0]}, "outline 2: the density is 0.0, but must be a number above 0"),
+    ({"id": 5}, "the id 5 is that of outline 1, too")])
+def test_wrong_columns_are_errors(columns, message, tmp_path):
+    with pytest.raises(ResultError, match=message):
+        write_bodies([SQUARE, FLOOR], tmp_path / "out.h5", **columns)
+    assert not (tmp_path / "out.h5").exists()

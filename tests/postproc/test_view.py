@@ -54,7 +54,7 @@ def test_positions_and_angles_are_rounded_as_stated(view, run):
         error = np.abs(np.cumsum(change, axis=0) * fact["quantum"] - true).max()
         assert error <= 0.5001 * fact["quantum"]
     free = ~run[0].fixed
-    assert facts["series"]["x"]["quantum"] == pytest.approx(1e-3 * np.median(run[0].diameter[free]))
+    assert facts["series"]["x"]["quantum"] == pytest.approx(1e-3 * np.median(run[0].equivalent_diameter[free]))
 
 
 @pytest.mark.parametrize("arguments, message", [

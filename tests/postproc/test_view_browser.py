@@ -79,7 +79,7 @@ def test_the_browser_finds_the_cells_of_the_tree_and_the_boxes(page, run):
               for rows in (there[:, :3], np.column_stack((cells.low, cells.side)))]
     assert len(places[0] & places[1]) >= len(cells.side) - 4
     boxes = np.array(js(page, "return Array.from(viewer.run.boxes())")).reshape(-1, 4)
-    assert np.abs(boxes - run[-1].bounds).max() < 2e-3 * np.median(run[0].diameter)
+    assert np.abs(boxes - run[-1].bounds).max() < 2e-3 * np.median(run[0].equivalent_diameter)
 
 
 def reference(run, number, facts, shown, size, colour):

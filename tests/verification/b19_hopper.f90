@@ -2,7 +2,7 @@
 !>
 !> In two dimensions the rate is Q = C rho sqrt(g) (D - k d)^(3/2) (W.A. Beverloo, H.A. Leniger & J. van de Velde,
 !> Chem. Eng. Sci. 15 (1961) 260, with one dimension less), independent of the filling height. The exponent is the slope
-!> of log Q over log(D - k d) with the mean diameter d of the grains. It depends on k. Here k = 1, because centres of
+!> of log Q over log(D - k d) with the mean axis d of the grains. It depends on k. Here k = 1, because centres of
 !> grains pass through D - d (C. Mankoc et al., Granular Matter 9 (2007) 407). Also shown are the exponent for
 !> Beverloo's k = 1.4, which was measured with spheres, and the k for which Q^(2/3) is linear in D. Q is measured while
 !> the discharged share of the grains grows from 20 % to 60 %, and in both halves of this interval.
@@ -21,12 +21,12 @@ module b19_hopper
    public :: run_hopper
 
    !> Mean of short and mean long axis of the grains [m]
-   real(wp), parameter :: diameter = 0.00875_wp
+   real(wp), parameter :: mean_axis = 0.00875_wp
    integer(ip), parameter :: n_grains = 1500_ip
 
 contains
 
-   !> Run openings of 6 to 12 diameters; wider ones would empty the silo before the flow is steady.
+   !> Run openings of 6 to 12 mean axes; wider ones would empty the silo before the flow is steady.
    subroutine run_hopper(table)
       !> Table to fill
       type(table_t), intent(inout) :: table
@@ -36,7 +36,7 @@ contains
 
       call table%begin('B19', 'flow of 1500 grains out of a hopper')
       do k = 1, size(openings)
-         call flow(table, openings(k)*diameter, early(k), late(k))
+         call flow(table, openings(k)*mean_axis, early(k), late(k))
          rate(k) = 2.0_wp/(1.0_wp/early(k) + 1.0_wp/late(k))
          call table%show('D = '//to_text(openings(k), 2)//' d: grains per second', rate(k))
       end do

@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Optional, Union
+from typing import TYPE_CHECKING, Any, Optional, Union
 
 import h5py
 import numpy as np
@@ -16,6 +17,9 @@ from .new_file import NewHdf5, new_file
 from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
 from .polygons import FloatArray, join
 from .result_file import ResultError, cannot_read, cannot_write
+
+if TYPE_CHECKING:
+    from .frames import Frame
 
 #: What becomes the origin of a bodies file: a point (x, y) [m], the centre of the polygons, or nothing
 Origin = Optional[Union[str, tuple[float, float]]]
@@ -27,6 +31,9 @@ RANGES: dict[str, Callable[[Any], Any]] = {
     "density": lambda x: x > 0.0, "mass": lambda x: x >= 0.0, "inertia": lambda x: x >= 0.0}
 MEANINGS = {"fixed": "true or false", "id": "a whole number from 0 to 2147483647", "density": "a number above 0",
             "mass": "a number not below 0", "inertia": "a number not below 0"}
+#: What stands in the file for an infinite value of a fixed body. Its mass is infinite unless it is given, whatever its
+#: density.
+INFINITE = {"mass": 0.0, "inertia": 0.0, "density": 2500.0}
 
 
 class ConcaveOutline(UserWarning):
@@ -55,14 +62,24 @@ def import_shapely(geometries: Any, output: str | os.PathLike[str], **options: A
 
 def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[str], *, scale: float = 1.0,
                  fixed: Iterable[int] | Iterable[bool] = (), decomposed: bool = False, overwrite: bool = False,
-                 origin: Origin = None) -> int:
+                 origin: Origin = None, **columns: Any) -> int:
     """Write outlines, or arrays (k, 2) of vertices [1/scale m], as a bodies file; return the number of bodies.
 
     `fixed` has the numbers of the outlines, from 1, that become fixed bodies, or one truth value per outline. `origin`
     is a point (x, y) [m] that becomes the origin of the bodies, or 'centre', the middle of the bounding box of all
     outlines, rounded to whole metres. The file stores it, and an export of a run adds it to the coordinates.
+
+    The other `columns` have one value per outline, or one for all:
+
+        velocity          [m/s]    of the centre of mass, (n, 2) or (2); 0 for fixed bodies
+        angular_velocity  [rad/s]  anticlockwise; 0 for fixed bodies
+        density           [kg/m3]  default: that of the namelist
+        mass              [kg/m]   default, and meaning of 0: from polygon and density; infinite for fixed bodies
+        inertia           [kg m]   about the centre of mass; default, and meaning of 0: from mass and polygon, likewise
+        id                [1]      identifiers, all different; default: 1 to n
+
+    The mass, inertia and density of a fixed body may be infinite, as in the columns of a `Frame`.
     """
-    path = Path(output)
     given = [each if isinstance(each, Outline) else Outline(np.asarray(each, dtype=float), f"outline {number}")
              for number, each in enumerate(outlines, 1)]
     held = _numbers(list(fixed), len(given))
@@ -70,25 +87,63 @@ def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[st
         raise ResultError(f"there is no outline {min(held - set(range(1, len(given) + 1)))}, only {len(given)}")
     if not (np.isfinite(scale) and scale > 0.0):
         raise ResultError(f"the scale is {scale}, but must be a number above 0")
+    given = [replace(each, properties={**each.properties, "fixed": True}) if number in held else each
+             for number, each in enumerate(given, 1)]
+    given = _with_columns(given, columns)
     shift = _shift(given, scale, origin)
+    path = Path(output)
+    return _save(path, given, scale, shift, decomposed, None if origin is None else shift, overwrite)
+
+
+def write_frame(frame: Frame, output: str | os.PathLike[str], origin: tuple[float, float], overwrite: bool) -> int:
+    """Write the bodies of a frame; `origin` is what the coordinates lack, and is stored with them [m]."""
+    given = [Outline(outline, f"body {number}") for number, outline in zip(frame.id, frame.vertices)]
+    given = _with_columns(given, {
+        "fixed": frame.fixed, "mass": frame.mass, "inertia": frame.inertia, "id": frame.id,
+        "velocity": np.where(frame.fixed[:, None], 0.0, frame.velocity),
+        "angular_velocity": np.where(frame.fixed, 0.0, frame.angular_velocity)})
+    return _save(Path(output), given, 1.0, np.zeros(2), False, np.array(origin) if any(origin) else None, overwrite)
+
+
+def _with_columns(outlines: list[Outline], columns: dict[str, Any]) -> list[Outline]:
+    """The outlines with a value of each column."""
+    chosen: list[dict[str, Any]] = [dict(outline.properties) for outline in outlines]
+    for name, values in columns.items():
+        if name not in PROPERTIES:
+            raise ResultError(f"a bodies file has no column {name}; its columns are {', '.join(PROPERTIES)}")
+        shape = (len(outlines), WIDE[name]) if name in WIDE else (len(outlines),)
+        array = np.asarray(values)
+        if array.shape not in (shape, shape[1:]):
+            raise ResultError(f"{name} has the shape {array.shape}, but must have {shape}, one value for each of "
+                              f"{len(outlines)} outlines, or {shape[1:]}, one for all")
+        for properties, value in zip(chosen, np.broadcast_to(array, shape).tolist()):
+            properties[name] = value
+    for properties in chosen:
+        if properties.get("fixed"):
+            properties.update({name: finite for name, finite in INFINITE.items() if properties.get(name) == np.inf})
+    return [replace(outline, properties=properties) for outline, properties in zip(outlines, chosen)]
+
+
+def _save(path: Path, outlines: list[Outline], scale: float, shift: FloatArray, decomposed: bool,
+          origin: FloatArray | None, overwrite: bool) -> int:
+    """Write outlines, or their convex pieces, with their properties; return the number of bodies."""
     polygons: list[FloatArray] = []
     rows: list[dict[str, Any]] = []
     places: list[str] = []
-    for number, outline in enumerate(given, 1):
-        pieces = _pieces(outline, scale, shift, decomposed)
-        properties = {**outline.properties, **({"fixed": True} if number in held else {})}
-        if len(pieces) > 1 and {"mass", "inertia", "id"} & set(properties):
+    for outline in outlines:
+        parts = _pieces(outline, scale, shift, decomposed)
+        if len(parts) > 1 and {"mass", "inertia", "id"} & set(outline.properties):
             raise ResultError(f"{outline.place}: a mass, an inertia or an id cannot be divided among its pieces")
-        polygons += pieces
-        rows += [properties] * len(pieces)
-        places += [outline.place] * len(pieces)
+        polygons += parts
+        rows += [outline.properties] * len(parts)
+        places += [outline.place] * len(parts)
     if not polygons:
         raise ResultError(f"{path}: there are no bodies to write")
     columns = {name: _column(name, rows, places) for name in PROPERTIES if any(name in row for row in rows)}
     columns.setdefault("fixed", np.zeros(len(rows), dtype=np.int8))
     if path.exists() and not overwrite:
-        raise ResultError(f"{path}: exists already; --force replaces it")
-    _write(path, polygons, columns, None if origin is None else shift)
+        raise ResultError(f"{path}: exists already; --force replaces it, in Python overwrite=True")
+    _write(path, polygons, columns, origin)
     return len(polygons)
 
 

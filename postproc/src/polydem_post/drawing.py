@@ -33,7 +33,8 @@ WALL_COLOUR, PLAIN_COLOUR, UNKNOWN_COLOUR = "0.62", "#d9b98a", "0.85"
 FORCE_COLOUR, CONTACT_COLOUR, BOX_COLOUR, CELL_COLOUR = "#a01020", "#d55e00", "#0072b2", "#7a3db8"
 COMPRESSED_COLOUR, PULLED_COLOUR = "#a01020", "#0072b2"
 
-#: Width of the line of the largest force as a share of the median diameter of the free bodies, and greatest width [pt]
+#: Width of the line of the largest force as a share of the median equivalent diameter of the free bodies, and greatest
+#: width [pt]
 WIDEST_FORCE, WIDEST_LINE = 0.45, 8.0
 
 #: Share of the forces and stresses that the scale of widths and lengths covers: those of a few impacts are greater
@@ -42,7 +43,7 @@ COVERED_FORCES = 99.0
 #: Widths of lines that are told apart
 WIDTHS = 32
 
-#: Width of outlines as a share of the median diameter of the free bodies, and least and greatest width [pt]
+#: Width of outlines as a share of the median equivalent diameter of the free bodies, and least and greatest width [pt]
 OUTLINE, OUTLINES = 0.05, (0.05, 0.8)
 
 
@@ -232,9 +233,9 @@ def force_width(frame: Frame, scale: float) -> float:
 
 
 def _typical_size(frame: Frame) -> float:
-    """Median diameter of the free bodies, of circles of the same area [m]."""
+    """Median equivalent diameter of the free bodies [m]."""
     free = ~frame.fixed
-    return float(np.median(frame.diameter[free])) if free.any() else 0.0
+    return float(np.median(frame.equivalent_diameter[free])) if free.any() else 0.0
 
 
 def _forces(frame: Frame, look: SettledLook, scale: float) -> list[PathCollection]:

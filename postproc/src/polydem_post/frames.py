@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,6 +20,9 @@ __all__ = ["Contacts", "Frame", "Walls", "find_contacts", "sound_frame"]
 #: What a contact has of its own; the rest follows from the bodies
 CONTACT_FIELDS = ("first", "second", "area", "point", "normal", "force")
 
+#: Distances of vertices that are held in memory at once
+MOST_DISTANCES = 2**20
+
 
 class FrameSource(Protocol):
     """What gives the contacts and walls of a frame when they are asked for."""
@@ -33,6 +37,10 @@ class FrameSource(Protocol):
 
     def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
         """Which bodies have a prescribed motion."""
+        ...
+
+    def origin_for(self, frame: Frame) -> tuple[float, float]:
+        """The point that was subtracted from the coordinates of a frame [m]."""
         ...
 
 
@@ -202,8 +210,21 @@ class Frame:
         distance = cross / np.hypot(edge[:, 0], edge[:, 1])
         return 2.0 * np.minimum.reduceat(distance, self.vertex_start[:-1]) if len(self) else np.empty(0)
 
-    @property
+    @cached_property
     def diameter(self) -> FloatArray:
+        """Largest distance between two vertices of each body [m], (n)."""
+        largest = np.empty(len(self))
+        for corners in np.unique(self.corners):
+            rows = np.flatnonzero(self.corners == corners)
+            most = max(1, MOST_DISTANCES // int(corners) ** 2)
+            for part in np.array_split(rows, -(-len(rows) // most)):
+                points = self.shape[self.vertex_start[part][:, None] + np.arange(corners)]
+                apart = points[:, :, None, :] - points[:, None, :, :]
+                largest[part] = np.sqrt((apart**2).sum(-1).max(axis=(1, 2)))
+        return largest
+
+    @property
+    def equivalent_diameter(self) -> FloatArray:
         """Diameter of the circle with the area of each body [m], (n)."""
         return np.sqrt(4.0 * self.area / np.pi)
 
@@ -252,6 +273,19 @@ class Frame:
         """Indices of bodies in the columns of this frame from their k identifiers [1], (k)."""
         return _index_of(self, np.atleast_1d(identifiers))
 
+    def write_bodies(self, path: str | PathLike[str], *, overwrite: bool = False) -> int:
+        """Write the bodies as a bodies file, from which a run can start; return their number.
+
+        In the namelist: &scene name = 'file', bodies_file = the path. The file has vertices in the world, identifiers,
+        fixed bodies, velocities, angular velocities, masses and moments of inertia, all to the last bit; the centres of
+        mass of the run follow from the vertices, within rounding. Angles and time begin at 0, and friction begins
+        without history: to continue a run to the same bits, use its checkpoints. Fixed bodies have no velocity in the
+        file: give `motion` in the namelist. `bodies_file.write_bodies` writes other outlines and columns.
+        """
+        from .bodies_file import write_frame
+
+        return write_frame(self, path, self._source.origin_for(self) if self._source else (0.0, 0.0), overwrite)
+
     def to_pandas(self) -> Any:
         """The bodies as a pandas table with the identifiers as index; vectors become two columns (position_x)."""
         from .tables import body_table
@@ -273,6 +307,9 @@ class _Given:
 
     def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
         return np.zeros(len(frame), dtype=bool)
+
+    def origin_for(self, frame: Frame) -> tuple[float, float]:
+        return 0.0, 0.0
 
 
 def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:

@@ -114,7 +114,7 @@ QUANTITIES = {
     "angular_velocity": Quantity("angular velocity", "rad/s", lambda f: f.angular_velocity, "PuOr", "both"),
     "angle": Quantity("angle", "rad", lambda f: np.mod(f.angle, 2.0 * np.pi), "twilight", "turn"),
     "rotation": Quantity("rotation since the start", "rad", lambda f: f.angle, "PuOr", "both"),
-    "size": Quantity("diameter of equal area", "m", lambda f: f.diameter, "cividis", "data",
+    "size": Quantity("equivalent diameter", "m", lambda f: f.equivalent_diameter, "cividis", "data",
                      constant=True),
     "mass": Quantity("mass per depth", "kg/m", lambda f: _given(f.mass), "cividis", "data", constant=True),
     "density": Quantity("density", "kg/m3", lambda f: _given(f.mass) / f.area, "cividis", "data", constant=True),

@@ -350,6 +350,10 @@ class Trajectory:
             return frame.fixed
         return frame.fixed & np.isin(frame.id, np.atleast_1d(chosen))
 
+    def origin_for(self, frame: Frame) -> tuple[float, float]:
+        """The point that the coordinates of a frame lack [m]: `origin`, and (0, 0) in a trajectory in the world."""
+        return self.origin if self._shift is None else (0.0, 0.0)
+
 
 def _bodies_in(file: h5py.File) -> dict[str, Any]:
     """Columns of bodies that do not change; a stored mass of 0 is an infinite one."""

@@ -31,9 +31,6 @@ LONGEST = 4.0
 #: Highest level of the root
 TOP_LEVEL = 30
 
-#: Distances of vertices that are computed at once
-MOST_DISTANCES = 2**20
-
 
 @dataclass(frozen=True)
 class CellGrid:
@@ -67,7 +64,7 @@ class Cells:
 
 def cell_grid(frame: Frame) -> CellGrid | None:
     """The grid of a run from its first frame; nothing if there is no body with a size."""
-    reach = _half_diameters(frame)
+    reach = 0.5 * frame.diameter
     free = ~frame.fixed
     median = np.median(reach[free]) if free.any() else np.inf
     bodies = np.flatnonzero(reach <= LONGEST * median)
@@ -103,18 +100,3 @@ def _root_level(at: np.ndarray) -> int:
     """Level of the smallest cell that contains all finest cells."""
     spread = int(np.bitwise_or.reduce((at ^ at[0]).ravel()))
     return spread.bit_length()
-
-
-def _half_diameters(frame: Frame) -> np.ndarray:
-    """Half the greatest distance of two vertices of each body [m], (n)."""
-    shape, start = frame.shape, frame.vertex_start
-    half = np.empty(len(start) - 1)
-    count = np.diff(start)
-    for corners in np.unique(count):
-        rows = np.flatnonzero(count == corners)
-        most = max(1, MOST_DISTANCES // int(corners) ** 2)
-        for part in np.array_split(rows, -(-len(rows) // most)):
-            points = shape[start[part][:, None] + np.arange(corners)]
-            apart = points[:, :, None, :] - points[:, None, :, :]
-            half[part] = 0.5 * np.sqrt((apart**2).sum(-1).max(axis=(1, 2)))
-    return half

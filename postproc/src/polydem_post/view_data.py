@@ -16,7 +16,8 @@ from .result_file import ResultError, reason
 from .trajectory import Trajectory
 from .tree_cells import cell_grid
 
-#: Quantum of positions as a share of the median diameter, of angles [rad], and of velocities as a share of the greatest
+#: Quantum of positions as a share of the median equivalent diameter, of angles [rad], and of velocities as a share of
+#: the greatest
 POSITION_SHARE, ANGLE_QUANTUM, VELOCITY_SHARE = 1e-3, 2.0**-10, 1.0 / 2047.0
 
 #: Steps of the magnitude of a force (its square root is rounded), of its direction, and of the arm of a contact
@@ -182,13 +183,13 @@ def _pack_columns(packed: Packed, columns: dict[str, _Rows], first: Frame) -> fl
     """Positions, angles and velocities; returns the greatest radius of the free bodies."""
     free = ~first.fixed
     chosen = free if free.any() else np.ones(len(free), dtype=bool)
-    diameter = float(np.median(first.diameter[chosen]))
+    diameter = float(np.median(first.equivalent_diameter[chosen]))
     quanta = {"x": POSITION_SHARE * diameter, "y": POSITION_SHARE * diameter, "angle": ANGLE_QUANTUM}
     for name, collected in columns.items():
         series = collected.read().reshape(len(collected.count), -1)
         quantum = quanta.get(name) or (float(np.abs(series).max(initial=0.0)) * VELOCITY_SHARE or 1.0)
         packed.add_series(name, series, quantum)
-    packed.facts["diameter"] = diameter
+    packed.facts["size"] = diameter
     return float(first.radius[chosen].max())
 
 

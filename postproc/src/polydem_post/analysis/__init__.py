@@ -4,6 +4,7 @@ Functions of one time take a `Frame`, those of several times a `Trajectory` or a
 forces and times are in SI units with unit depth. Only free bodies count unless a function says otherwise.
 """
 
+from .blocks import BlockAverage, ShortSeries, block_average
 from .fields import Fields, Kernel, coarse_grain, gaussian, lucy
 from .flow import FlowRate, flow_rate, mass_beyond
 from .fraction import solid_fraction
@@ -20,12 +21,13 @@ from .network import (
 )
 from .profiles import Profile, profile
 from .stress import Stress, body_stress, stress_tensor
-from .surface import Surface, free_surface
+from .surface import Surface, SurfaceAngle, free_surface, surface_angle
 from .windows import Window, rectangle
 
 __all__ = [
-    "Anisotropy", "Displacements", "Distribution", "Fields", "FlowRate", "Kernel", "Profile", "Stress", "Surface",
-    "Window", "anisotropy", "body_stress", "coarse_grain", "coordination_number", "fabric_tensor", "flow_rate",
-    "force_distribution", "free_surface", "gaussian", "lacey_index", "lucy", "mass_beyond", "mean_squared_displacement",
-    "profile", "rattlers", "rectangle", "solid_fraction", "stress_tensor",
+    "Anisotropy", "BlockAverage", "Displacements", "Distribution", "Fields", "FlowRate", "Kernel", "Profile",
+    "ShortSeries", "Stress", "Surface", "SurfaceAngle", "Window", "anisotropy", "block_average", "body_stress",
+    "coarse_grain", "coordination_number", "fabric_tensor", "flow_rate", "force_distribution", "free_surface",
+    "gaussian", "lacey_index", "lucy", "mass_beyond", "mean_squared_displacement", "profile", "rattlers", "rectangle",
+    "solid_fraction", "stress_tensor", "surface_angle",
 ]

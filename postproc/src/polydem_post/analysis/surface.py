@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,8 @@ import numpy as np
 from ..frames import Frame
 from ..polygons import FloatArray, following
 from ..result_file import ResultError
+from ..trajectory import Trajectory
+from .blocks import block_average
 
 
 @dataclass(frozen=True)
@@ -51,3 +54,55 @@ def free_surface(frame: Frame, low: float, high: float, columns: int = 50) -> Su
     slope, height = np.polyfit(surface[:, 0], surface[:, 1], 1)
     distance = (surface[:, 1] - slope * surface[:, 0] - height) / np.hypot(1.0, slope)
     return Surface(surface, float(np.degrees(np.arctan(slope))), float(np.sqrt(np.mean(distance**2))))
+
+
+@dataclass(frozen=True)
+class SurfaceAngle:
+    """Mean angle of a free surface over time, and its standard error.
+
+    Fields:
+
+        times             [s]       times of the frames, (frames)
+        angles            [degree]  angle in each frame, (frames)
+        mean              [degree]  mean over the frames
+        error             [degree]  standard error of the mean, from blocks of frames
+        blocks            [1]       number of blocks; the error has one degree of freedom less
+        correlation_time  [s]       integrated autocorrelation time of the angles
+    """
+
+    times: FloatArray
+    angles: FloatArray
+    mean: float
+    error: float
+    blocks: int
+    correlation_time: float
+
+
+def surface_angle(frames: Iterable[Frame], *, after: float = 0.0, between: tuple[float, float] | None = None,
+                  columns: int = 50, blocks: int = 0) -> SurfaceAngle:
+    """Mean angle of the free surface over the frames from the time `after` [s] on, with its standard error.
+
+    The angle of each frame is that of `free_surface` between two places (low, high) [m] on the x axis, by default the
+    middle half of the extent of the free bodies in the first of these frames. The error is that of `block_average`,
+    which says how blocks are chosen and warns of a run that is too short; frames must be at equal intervals of time.
+    Choose `after` so that the flow is steady: what drifts has no mean. As in GDR MiDi, Eur. Phys. J. E 14 (2004) 341.
+    """
+    chosen = frames[frames.times >= after] if isinstance(frames, Trajectory) else frames
+    times, angles = [], []
+    for frame in chosen:
+        if frame.time < after:
+            continue
+        if between is None:
+            bounds = frame.bounds[frame.free]
+            if len(bounds) == 0:
+                raise ResultError(f"there are no free bodies at step {frame.step}")
+            low, high = float(bounds[:, 0].min()), float(bounds[:, 2].max())
+            between = 0.75 * low + 0.25 * high, 0.25 * low + 0.75 * high
+        times.append(frame.time)
+        angles.append(free_surface(frame, *between, columns).angle)
+    if not times:
+        raise ResultError(f"there are no frames from {after:g} s on")
+    found = block_average(angles, blocks=blocks)
+    interval = (times[-1] - times[0]) / max(len(times) - 1, 1)
+    return SurfaceAngle(np.array(times), np.array(angles), found.mean, found.error, found.blocks,
+                        interval * found.correlation_time)

@@ -21,7 +21,7 @@ class Texels {
 }
 
 /** Width of the line of the force that has the widest [m]. */
-function widestForce(run) { return 0.45 * run.facts.diameter; }
+function widestForce(run) { return 0.45 * run.facts.size; }
 
 /** Lines from the centres of two bodies to their contact point, as wide as the force; to a wall none. */
 function forceSegments(run, list) {
@@ -51,7 +51,7 @@ function forceSegments(run, list) {
 
 /** A square at each contact point. */
 function contactSegments(run, list) {
-  const t = run.contacts(), half = 0.05 * run.facts.diameter, [originX, originY] = run.origin;
+  const t = run.contacts(), half = 0.05 * run.facts.size, [originX, originY] = run.origin;
   list.clear(2 * t.most);
   const {data} = list;
   for (let c = 0, k = 0; c < t.n; c++, k += 8) {

@@ -220,7 +220,7 @@ class Painter {
     this.view = {middle: [this.shown.x - originX, this.shown.y - originY],
       scale: [2 / (step * width), 2 / (step * height)], elements: [0.5 * width, 0.5 * height]};
     this.uploadBodies(colour);
-    this.drawBodies(run.facts.diameter / step >= LEAST_OUTLINED * this.ratio);
+    this.drawBodies(run.facts.size / step >= LEAST_OUTLINED * this.ratio);
     for (const name of Object.keys(OVERLAYS)) {
       if (!overlays.has(name)) continue;
       const {make, shapes, colour: ink} = OVERLAYS[name], layer = this.layers[name];
