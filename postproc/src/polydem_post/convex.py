@@ -121,7 +121,7 @@ def insist_on_simple(outline: FloatArray) -> None:
     low = np.array([np.minimum(begin[run], end[run]).min(axis=0) for run in runs])
     high = np.array([np.maximum(begin[run], end[run]).max(axis=0) for run in runs])
     for k, run in enumerate(runs):
-        crossing = []
+        crossing: list[tuple[int, int]] = []
         for other in k + np.flatnonzero(((low[k:] <= high[k]) & (high[k:] >= low[k])).all(axis=1)):
             one, two = (each.ravel() for each in np.meshgrid(run, runs[other], indexing="ij"))
             apart = (two > one + 1) & ((one > 0) | (two < n - 1))
