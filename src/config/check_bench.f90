@@ -2,7 +2,7 @@
 module polydem_check_bench
    use polydem_errors, only: error_t, input_error, raise
    use polydem_namelist_entries, only: bench_group
-   use polydem_origin, only: place_of
+   use polydem_origin, only: overrides_of, place_of
    use polydem_settings, only: bench_settings_t
    use polydem_strings, only: to_text, quoted, text_t
    implicit none
@@ -26,7 +26,8 @@ contains
       integer :: k
 
       if (size(bench%names) /= size(bench%scenes)) call raise_at('names', 'has '//to_text(size(bench%names))// &
-         ' values, but there are '//to_text(size(bench%scenes))//' scenes', bench, error)
+         ' values, but there are '//to_text(size(bench%scenes))//" in 'scenes'"//overrides_of(bench, bench_group), &
+         bench, error)
       if (max(size(bench%names), size(bench%finders), size(bench%threads)) > longest_list) call raise_at('names', &
          'and other lists cannot have more than '//to_text(longest_list)//' values', bench, error)
       if (allocated(error)) return

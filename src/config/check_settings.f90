@@ -17,6 +17,10 @@ module polydem_check_settings
    !> What is said of entries beyond these two limits
    character(len=*), parameter :: too_long = 'must not exceed 1e5 times'
    character(len=*), parameter :: too_many = 'must not exceed 2^30 corners divided by'
+   !> Upper limit of the ratio of the sides of a body. A polygon that is longer has hardly an area
+   real(wp), parameter :: slenderness_limit = 1.0e6_wp
+   !> What is said of entries beyond this limit, and of containers without room for a grain
+   character(len=*), parameter :: too_slender = 'must not exceed 1e6 times', too_small = 'must be 0, or at least'
    !> Angle of a full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586_wp
    !> Lower limit of the restitution. Below it, the stable time step is proportional to the square root of the
@@ -25,6 +29,8 @@ module polydem_check_settings
 
    !> Scenes in which `width` is the width of the container; in other scenes it is the width of a block
    character(len=*), parameter :: grain_scenes(4) = [character(len=6) :: 'hopper', 'gas', 'bed', 'heap']
+   !> Scenes in which it is the width of a block
+   character(len=*), parameter :: block_scenes(2) = [character(len=7) :: 'incline', 'stack']
 
 contains
 
@@ -50,6 +56,16 @@ contains
          call require(scene%opening <= longest, too_long, 'opening', 'long_axis_max', values, error)
          call require(scene%width <= longest .or. all(scene%name /= grain_scenes), &
             too_long, 'width', 'long_axis_max', values, error)
+         call require(scene%width >= scene%short_axis .or. all(scene%name /= grain_scenes) .or. &
+            .not. scene%width > 0.0_wp, too_small, 'width', 'short_axis', values, error)
+         call require(scene%radius >= scene%short_axis .or. .not. scene%radius > 0.0_wp, &
+            too_small, 'radius', 'short_axis', values, error)
+         call require(scene%long_axis_max <= slenderness_limit*scene%short_axis, &
+            too_slender, 'long_axis_max', 'short_axis', values, error)
+         if (any(scene%name == block_scenes)) then
+            call require(scene%width <= slenderness_limit*scene%height, too_slender, 'width', 'height', values, error)
+            call require(scene%height <= slenderness_limit*scene%width, too_slender, 'height', 'width', values, error)
+         end if
          call require(scene%bodies*most_corners <= corner_limit, too_many, 'bodies', 'corners_max', values, error)
          call require(scene%boxes*most_corners <= corner_limit, too_many, 'boxes', 'corners_max', values, error)
          call require(scene%moving_grains <= scene%bodies, 'must not exceed', 'moving_grains', 'bodies', values, error)
@@ -81,17 +97,18 @@ contains
    end subroutine check_settings
 
    !> Raise an error about two entries of &scene if their relation does not hold. The error names the place of `key` if
-   !> this entry is given, otherwise the place of `other`.
+   !> this entry is given, otherwise the place of `other`; of both, the place on the command line.
    pure subroutine require(holds, relation, key, other, values, error)
       logical, intent(in) :: holds
       character(len=*), intent(in) :: relation, key, other
       type(value_t), intent(in) :: values(:)
       type(error_t), allocatable, intent(inout) :: error
-      integer :: row
+      integer :: row, second
 
       if (holds) return
       row = row_of(values, 'scene', key)
-      if (.not. values(row)%is_given) row = row_of(values, 'scene', other)
+      second = row_of(values, 'scene', other)
+      if (.not. values(row)%is_given .or. (values(second)%is_override .and. .not. values(row)%is_override)) row = second
       call raise(error, input_error, values(row)%place//': '''//key//''' in &scene '//relation// &
          ' '''//other//'''')
    end subroutine require

@@ -1,10 +1,13 @@
 !> Where settings come from: the base of the types that `make_entries.py` makes of the table of entries.
 module polydem_origin
-   use polydem_namelist_entries, only: first_row
+   use polydem_namelist_entries, only: entries, first_row
    use polydem_strings, only: text_t
    implicit none
    private
-   public :: origin_t, place_of
+   public :: origin_t, overrides_of, place_of
+
+   !> Beginning of the place of an override of the command line
+   character(len=*), parameter :: option = '--set '
 
    !> Origin of settings
    type :: origin_t
@@ -33,5 +36,26 @@ contains
       place = settings%file
       if (allocated(settings%places)) place = settings%places(first_row(group, key))%text
    end function place_of
+
+   !> Overrides of a group on the command line, for the end of a message that says what follows from several entries:
+   !> ' (with --set group.key=value, ...)'; empty if there are none
+   pure function overrides_of(settings, group) result(text)
+      !> Settings of a run or a bench
+      class(origin_t), intent(in) :: settings
+      !> Namelist group
+      character(len=*), intent(in) :: group
+      character(len=:), allocatable :: text
+      integer :: row
+
+      text = ''
+      if (.not. allocated(settings%places)) return
+      do row = 1, size(entries)
+         if (entries(row)%group /= group .or. first_row(group, entries(row)%key) /= row) cycle
+         associate (place => settings%places(row)%text)
+            if (index(place, option) == 1) text = text//trim(merge(' (with', ',     ', text == ''))//' '//place
+         end associate
+      end do
+      if (text /= '') text = text//')'
+   end function overrides_of
 
 end module polydem_origin

@@ -8,6 +8,7 @@ module polydem_resolve_entries
    use polydem_errors, only: error_t, input_error, raise
    use polydem_former_words, only: present_name, renaming
    use polydem_kinds, only: ip, wp
+   use polydem_missing_entries, only: example_of, list_groups, missing_text
    use polydem_namelist_entries, only: bench_group, entries, entry_t, first_row, group_length, groups, keys_of, required
    use polydem_namelist_statements, only: read_statements, statement_t
    use polydem_namelist_tokens, only: source_t
@@ -36,13 +37,16 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(statement_t), allocatable :: statements(:)
       type(statement_t) :: given(size(entries))
+      character(len=group_length), allocatable :: present_groups(:)
+      character(len=:), allocatable :: text
       integer :: row
 
       call read_statements(source, statements, error)
       if (allocated(error)) return
       if (size(statements) == 0) then
-         call raise(error, input_error, source%name//': the file contains no namelist group; it needs '// &
-            trim(merge('&bench               ', '&scene and &integrate', of_bench)))
+         text = example_of('scene')//' '//example_of('integrate')
+         if (of_bench) text = example_of(bench_group)
+         call raise(error, input_error, source%name//': the file contains no namelist group; for example: '//text)
          return
       end if
       call collect_statements(statements, of_bench, given, error)
@@ -51,8 +55,9 @@ contains
       if (allocated(error)) return
 
       allocate (values(size(entries)))
+      call list_groups(statements, given, present_groups)
       do row = 1, size(entries)
-         call resolve_row(source, of_bench, given, row, values, error)
+         call resolve_row(source, of_bench, present_groups, given, row, values, error)
          if (allocated(error)) return
       end do
       do row = 1, size(entries)
@@ -234,9 +239,11 @@ contains
    end function value_of_override
 
    !> Find the value of a row: the given value, or the default.
-   pure subroutine resolve_row(source, of_bench, given, row, values, error)
+   pure subroutine resolve_row(source, of_bench, present_groups, given, row, values, error)
       type(source_t), intent(in) :: source
       logical, intent(in) :: of_bench
+      !> Groups of the file and of overrides, (any)
+      character(len=*), intent(in) :: present_groups(:)
       type(statement_t), intent(in) :: given(:)
       integer, intent(in) :: row
       type(value_t), intent(inout) :: values(:)
@@ -252,8 +259,7 @@ contains
          else if (entry%default /= required) then
             call read_value(entry, default_statement(source, entry), values(row), error)
          else if (values(row)%is_active) then
-            call raise(error, input_error, source%name//': '//label(entry)//' is required'// &
-               reason(entry, values)//expected(entry))
+            call raise(error, input_error, source%name//': '//missing_text(entry, values, present_groups))
          else
             call set_unused(source, entry, values(row))
          end if
@@ -308,34 +314,6 @@ contains
       value%integers = [(0_ip, k=1, merge(entry%count, 0, entry%type == 'integer'))]
       allocate (value%texts(0))
    end subroutine set_unused
-
-   !> Condition under which an entry is required, such as ' with name = 'hopper''; empty if it is always required
-   pure function reason(entry, values) result(text)
-      type(entry_t), intent(in) :: entry
-      type(value_t), intent(in) :: values(:)
-      character(len=:), allocatable :: text, key
-
-      text = ''
-      if (entry%needs == '') return
-      key = entry%needs(:index(entry%needs, ':') - 1)
-      text = ' with '//key//' = '//quoted(values(first_row(entry%group, key))%text)
-   end function reason
-
-   !> Description of a required entry: choices, or meaning, bounds and unit; for the end of a message
-   pure function expected(entry) result(text)
-      type(entry_t), intent(in) :: entry
-      character(len=:), allocatable :: text
-
-      select case (entry%type)
-      case ('word')
-         text = suggestion('', split_words(entry%allowed))
-      case default
-         text = ' ('//trim(entry%meaning)
-         if (entry%allowed /= '') text = text//', '//trim(entry%allowed)
-         if (entry%unit /= '') text = text//' ['//trim(entry%unit)//']'
-         text = text//')'
-      end select
-   end function expected
 
    !> Check that a given entry is in use. An entry of the file may be unused because of an override.
    pure subroutine check_use(given, home, values, error)

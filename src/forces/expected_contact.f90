@@ -19,6 +19,9 @@ module polydem_expected_contact
    real(wp), parameter :: deepest = 0.5_wp
    !> Greatest number of iterations of the depth; the error of its logarithm falls to a half or less in each
    integer, parameter :: most_iterations = 12
+   !> Number of edges of a body at which cuts begin. A cut spans many edges of a body that has more, and the cuts at
+   !> their neighbours differ little
+   integer(ip), parameter :: most_cuts = 512_ip
 
    !> Cut through a body, parallel to an edge
    type :: cut_t
@@ -51,8 +54,8 @@ contains
       low = bodies%vertex_start(s)
       high = bodies%vertex_start(s + 1_ip) - 1_ip
       call start_contact(bodies, s, speed, element, outline, area)
-      w = high
-      do v = low, high
+      do v = low, high, 1_ip + (high - low)/most_cuts
+         w = merge(high, v - 1_ip, v == low)
          call find_depth(law, bodies%shape(:, low:high), w - low + 1_ip, v - low + 1_ip, area, element, cut)
          element%edge_ratio = max(element%edge_ratio, cut%widest/(2.0_wp*cut%distance))
          element%square_ratio = max(element%square_ratio, cut%widest**2/area)
@@ -60,7 +63,6 @@ contains
             element%length = cut%widest
             element%depth = 2.0_wp*cut%area/cut%length
          end if
-         w = v
       end do
    end subroutine expect_contact
 

@@ -15,6 +15,9 @@ module polydem_polygon
    !> the size: far above the rounding errors of a text file, far below any effect on a result.
    real(wp), parameter :: redundant_share = 1.0e-9_wp
 
+   !> Number of vertices, neighbours in their list, that `diameter` compares together
+   integer(ip), parameter :: run = 64_ip
+
 contains
 
    !> Bring a polygon into standard form, or report why this is impossible.
@@ -46,6 +49,10 @@ contains
       end if
 
       extent = diameter(vertices)
+      if (.not. extent < sqrt(huge(extent))) then
+         problem = 'is so large that squares of its lengths overflow'
+         return
+      end if
       tolerance = redundant_share*extent + 16.0_wp*epsilon(1.0_wp)*maxval(abs(vertices))
       area = signed_area(vertices)
       if (abs(area) <= tolerance*extent) then
@@ -68,26 +75,33 @@ contains
    pure subroutine drop_redundant(vertices, tolerance, kept, m)
       real(wp), intent(in) :: vertices(:, :), tolerance
       integer(ip), intent(inout) :: kept(:), m
-      integer(ip) :: k, in_order
-      logical :: redundant
+      integer(ip), allocatable :: next(:), former(:)
+      integer(ip) :: here, in_order, k, n
+      logical, allocatable :: stays(:)
 
-      k = 1_ip
+      n = m
+      if (n < 1_ip) return
+      next = [(1_ip + modulo(k, n), k=1_ip, n)]
+      former = [(1_ip + modulo(k - 2_ip, n), k=1_ip, n)]
+      allocate (stays(n), source=.true.)
+      here = 1_ip
       in_order = 0_ip
       do while (in_order < m .and. m > 2_ip)
-         associate (before => vertices(:, kept(1_ip + modulo(k - 2_ip, m))), here => vertices(:, kept(k)), &
-                    after => vertices(:, kept(1_ip + modulo(k, m))))
-            redundant = is_redundant(here - before, after - here, tolerance)
+         associate (before => vertices(:, kept(former(here))), corner => vertices(:, kept(here)), &
+                    after => vertices(:, kept(next(here))))
+            if (is_redundant(corner - before, after - corner, tolerance)) then
+               stays(here) = .false.
+               next(former(here)) = next(here)
+               former(next(here)) = former(here)
+               m = m - 1_ip
+               in_order = 0_ip
+            else
+               in_order = in_order + 1_ip
+            end if
          end associate
-         if (redundant) then
-            kept(k:m - 1_ip) = kept(k + 1_ip:m)
-            m = m - 1_ip
-            in_order = 0_ip
-            k = 1_ip + modulo(k - 1_ip, m)
-         else
-            in_order = in_order + 1_ip
-            k = 1_ip + modulo(k, m)
-         end if
+         here = next(here)
       end do
+      kept(1:m) = pack(kept(1:n), stays)
    end subroutine drop_redundant
 
    !> Whether a vertex is redundant: it repeats a neighbour or lies between its neighbours. The tip of a spike, where
@@ -176,40 +190,105 @@ contains
    end subroutine mass_properties
 
    !> Greatest distance between two vertices [m]
+   !>
+   !> Many vertices are divided into runs. Two runs are compared only if their boxes leave room for a greater distance.
    pure real(wp) function diameter(vertices)
-      !> Vertices in any order, (2, n) [m]
+      !> Vertices in any order, fast if neighbours in the list are near each other, (2, n) [m]
       real(wp), intent(in) :: vertices(:, :)
+      real(wp), allocatable :: low(:, :), high(:, :)
       real(wp) :: greatest
-      integer(ip) :: j, k
+      integer(ip) :: a, b, n
       ! Distances whose squares are less than this share of the greatest square are shorter, in spite of rounding.
       real(wp), parameter :: share = 1.0_wp - 32.0_wp*epsilon(1.0_wp)
 
+      n = size(vertices, 2, kind=ip)
+      call bound_runs(vertices, low, high)
+      ! A great distance to begin with
       greatest = 0.0_wp
-      do k = 2_ip, size(vertices, 2, kind=ip)
-         do j = 1_ip, k - 1_ip
-            greatest = max(greatest, square_of(k, j))
+      if (n > run) greatest = greatest_square(vertices, [1_ip, n], [1_ip, 1_ip])
+      do a = 1_ip, size(low, 2, kind=ip)
+         do b = 1_ip, a
+            if (square_of_boxes(a, b) < greatest) cycle
+            greatest = max(greatest, greatest_square(vertices, run_of(a, n), run_of(b, n)))
          end do
       end do
       ! Of subnormal squares, all distances are measured.
       if (greatest < tiny(greatest)/epsilon(greatest)) greatest = 0.0_wp
       diameter = 0.0_wp
-      do k = 2_ip, size(vertices, 2, kind=ip)
-         do j = 1_ip, k - 1_ip
-            if (square_of(k, j) < share*greatest) cycle
-            diameter = max(diameter, hypotenuse(vertices(1, k) - vertices(1, j), vertices(2, k) - vertices(2, j)))
+      do a = 1_ip, size(low, 2, kind=ip)
+         do b = 1_ip, a
+            if (square_of_boxes(a, b) < share*greatest) cycle
+            diameter = max(diameter, greatest_distance(vertices, run_of(a, n), run_of(b, n), share*greatest))
          end do
       end do
 
    contains
 
-      !> Square of the distance between two vertices [m2]
-      pure real(wp) function square_of(k, j)
-         integer(ip), intent(in) :: k, j
+      !> Upper bound of the squares of distances between two runs, rounded like these [m2]
+      pure real(wp) function square_of_boxes(r, s)
+         integer(ip), intent(in) :: r, s
 
-         square_of = (vertices(1, k) - vertices(1, j))**2 + (vertices(2, k) - vertices(2, j))**2
-      end function square_of
+         square_of_boxes = max(high(1, r) - low(1, s), high(1, s) - low(1, r))**2 &
+                           + max(high(2, r) - low(2, s), high(2, s) - low(2, r))**2
+      end function square_of_boxes
 
    end function diameter
+
+   !> First and last vertex of a run of neighbours in a list of n vertices
+   pure function run_of(r, n) result(range)
+      integer(ip), intent(in) :: r, n
+      integer(ip) :: range(2)
+
+      range = [(r - 1_ip)*run + 1_ip, min(r*run, n)]
+   end function run_of
+
+   !> Find the boxes of the runs of a list of vertices.
+   pure subroutine bound_runs(vertices, low, high)
+      real(wp), intent(in) :: vertices(:, :)
+      !> Lower left and upper right corners, (2, run) [m]
+      real(wp), allocatable, intent(out) :: low(:, :), high(:, :)
+      integer(ip) :: n, n_runs, r, range(2)
+
+      n = size(vertices, 2, kind=ip)
+      n_runs = (n + run - 1_ip)/run
+      allocate (low(2, n_runs), high(2, n_runs))
+      do r = 1_ip, n_runs
+         range = run_of(r, n)
+         low(:, r) = minval(vertices(:, range(1):range(2)), dim=2)
+         high(:, r) = maxval(vertices(:, range(1):range(2)), dim=2)
+      end do
+   end subroutine bound_runs
+
+   !> Greatest square of the distance between vertices of two ranges, which are equal or do not overlap [m2]
+   pure real(wp) function greatest_square(vertices, a, b)
+      real(wp), intent(in) :: vertices(:, :)
+      integer(ip), intent(in) :: a(2), b(2)
+      integer(ip) :: j, k
+
+      greatest_square = 0.0_wp
+      do k = a(1), a(2)
+         do j = b(1), min(b(2), merge(k - 1_ip, b(2), a(1) == b(1)))
+            greatest_square = max(greatest_square, (vertices(1, k) - vertices(1, j))**2 &
+                                                    + (vertices(2, k) - vertices(2, j))**2)
+         end do
+      end do
+   end function greatest_square
+
+   !> Greatest distance between vertices of two ranges whose square is not below a bound [m]
+   pure real(wp) function greatest_distance(vertices, a, b, least)
+      real(wp), intent(in) :: vertices(:, :), least
+      integer(ip), intent(in) :: a(2), b(2)
+      integer(ip) :: j, k
+
+      greatest_distance = 0.0_wp
+      do k = a(1), a(2)
+         do j = b(1), min(b(2), merge(k - 1_ip, b(2), a(1) == b(1)))
+            if ((vertices(1, k) - vertices(1, j))**2 + (vertices(2, k) - vertices(2, j))**2 < least) cycle
+            greatest_distance = max(greatest_distance, &
+                                    hypotenuse(vertices(1, k) - vertices(1, j), vertices(2, k) - vertices(2, j)))
+         end do
+      end do
+   end function greatest_distance
 
    !> Greatest distance of a vertex from the origin [m]
    pure real(wp) function greatest_radius(vertices)

@@ -45,14 +45,11 @@ contains
       integer :: k
 
       call check_names(file, error)
+      call count_points(file, 'vertex', n_vertices, error)
+      call check_number(file, n_vertices, error)
       call file%read('vertex_start', table%vertex_start, error)
       if (allocated(error)) return
       table%n = size(table%vertex_start, kind=ip) - 1_ip
-      if (table%n < 1_ip) then
-         call file%reject('vertex_start must have n + 1 entries for n bodies, with n at least 1', error)
-         return
-      end if
-      call count_points(file, 'vertex', n_vertices, error)
       call check_starts(file, table, n_vertices, error)
       call read_flags(file, table, error)
       call read_identifiers(file, table, error)
@@ -104,6 +101,27 @@ contains
       end if
    end subroutine count_points
 
+   !> Check the number of bodies before their data are read: each has a vertex. A compressed file may claim many.
+   subroutine check_number(file, n_vertices, error)
+      type(hdf5_file_t), intent(in) :: file
+      integer(lp), intent(in) :: n_vertices
+      type(error_t), allocatable, intent(inout) :: error
+      integer(lp), allocatable :: extent(:)
+
+      call file%shape_of('vertex_start', extent, error)
+      if (allocated(error)) return
+      ! The reader refuses another number of dimensions before it reads anything.
+      if (size(extent) /= 1) return
+      if (extent(1) < 2_lp) then
+         call file%reject('vertex_start must have n + 1 entries for n bodies, with n at least 1', error)
+      else if (extent(1) - 1_lp > n_vertices) then
+         call file%reject('vertex_start defines '//to_text(extent(1) - 1_lp)//' bodies, but vertex has '// &
+                          to_text(n_vertices)//' rows', error)
+      end if
+      call check_rows(file, 'fixed', int(min(extent(1) - 1_lp, int(huge(1_ip), lp)), ip), error)
+      call check_rows(file, 'id', int(min(extent(1) - 1_lp, int(huge(1_ip), lp)), ip), error)
+   end subroutine check_number
+
    !> Check the distribution of the vertices over bodies: every body has at least one.
    pure subroutine check_starts(file, table, n_vertices, error)
       type(hdf5_file_t), intent(in) :: file
@@ -131,7 +149,7 @@ contains
       end do
    end subroutine check_starts
 
-   !> Check that an optional data set has one row per body.
+   !> Check that a data set, if it is there, has one row per body.
    subroutine check_rows(file, name, n, error)
       type(hdf5_file_t), intent(in) :: file
       character(len=*), intent(in) :: name

@@ -17,6 +17,9 @@ module polydem_result_info
    private
    public :: describe_program, describe_result
 
+   !> Lock of a run that writes to a folder
+   character(len=*), parameter :: lock_name = 'running.lock'
+
    !> Entries of the provenance that are printed for a profile; for other files only the first two
    character(len=*), parameter :: facts(*) = [character(len=16) :: 'version', 'revision', 'build_type', 'compiler', &
                                               'options', 'precision', 'host', 'processor', 'instruction_set', &
@@ -82,11 +85,31 @@ contains
          number = number + 1_ip
       end do
       if (exists(segment_path(path, number)//open_suffix)) then
-         call describe_file(segment_path(path, number)//open_suffix, log, error)
+         call describe_open_segment(path, segment_path(path, number)//open_suffix, log, error)
       else if (is_empty .and. number == 1_ip) then
          call raise(error, input_error, path//': this folder contains no result, neither profile.h5 nor a trajectory')
       end if
    end subroutine describe_folder
+
+   !> Describe the segment that is not closed. While a run writes it, the system may keep other readers out.
+   subroutine describe_open_segment(folder, path, log, error)
+      character(len=*), intent(in) :: folder, path
+      type(log_t), intent(inout) :: log
+      type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: unread
+      type(hdf5_file_t) :: file
+
+      call file%open(path, unread)
+      if (.not. allocated(unread)) then
+         call file%close(error)
+         if (.not. allocated(error)) call describe_file(path, log, error)
+      else if (exists(folder//'/'//lock_name)) then
+         call log%write_line(path)
+         call log%write_line('   is being written by a run')
+      else if (exists(path)) then
+         call move_alloc(unread, error)
+      end if
+   end subroutine describe_open_segment
 
    !> Describe one HDF5 file of a result.
    subroutine describe_file(path, log, error)

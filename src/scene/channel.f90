@@ -44,8 +44,8 @@ contains
       spacing = length/real(n, wp)
       if (spacing < loose_spacing(scene)) then
          call raise(error, input_error, 'fraction is too large for a row of grains without overlap at the start; '// &
-                    'lower fraction to '// &
-                    to_text(real(floor(1.0e3_wp*scene%fraction*spacing/loose_spacing(scene)), wp)/1.0e3_wp, 3))
+                    'lower fraction to '//to_text(0.99_wp*scene%fraction*spacing/loose_spacing(scene), 3)// &
+                    ', or lower long_axis_max')
          return
       end if
       do k = 1_ip, n

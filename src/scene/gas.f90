@@ -40,7 +40,7 @@ contains
       call arrange(scene, grains, scene%fraction, random, inside, centres, spacing)
       if (.not. spacing > 0.0_wp) then
          call raise(error, input_error, 'fraction is too large for grains without overlap at the start; lower '// &
-                    'fraction'//largest_fraction(scene, grains, start))
+                    'fraction'//largest_fraction(scene, grains, start)//', or change width or long_axis_max')
          return
       end if
       call append_moving_grains(list, scene, random, grains, centres)
@@ -73,33 +73,40 @@ contains
       end if
    end subroutine arrange
 
-   !> The end of a message: ' to ' and the largest fraction, in steps of 0.01, with which the grains fit
+   !> The end of a message: ' to ' and a fraction with which the grains fit, near the largest one
    function largest_fraction(scene, grains, start) result(text)
       type(scene_settings_t), intent(in) :: scene
       type(grains_t), intent(in) :: grains
       !> State of the random numbers before the grains are arranged
       type(random_t), intent(in) :: start
       character(len=:), allocatable :: text
-      type(random_t) :: trial
+      type(random_t) :: random
       real(wp), allocatable :: centres(:, :)
-      real(wp) :: inside(2, 4), spacing
-      integer :: fits, fails, k
+      real(wp) :: inside(2, 4), spacing, fits, fails, trial
+      ! Number of trials; below a millionth of the given fraction the bodies of the walls are the problem
+      integer, parameter :: most_trials = 26
+      integer :: k
 
       allocate (centres(2, size(grains%area)))
-      fits = 0
-      fails = ceiling(100.0_wp*scene%fraction)
-      do while (fails - fits > 1)
-         k = (fits + fails)/2
-         trial = start
-         call arrange(scene, grains, real(k, wp)/100.0_wp, trial, inside, centres, spacing)
+      fits = 0.0_wp
+      fails = scene%fraction
+      do k = 1, most_trials
+         if (fits >= 0.98_wp*fails) exit
+         trial = 0.5_wp*(fits + fails)
+         ! The number that the message names is the one that was tried.
+         text = to_text(trial, 2)
+         read (text, *) trial
+         if (trial <= fits .or. trial >= fails) exit
+         random = start
+         call arrange(scene, grains, trial, random, inside, centres, spacing)
          if (spacing > 0.0_wp) then
-            fits = k
+            fits = trial
          else
-            fails = k
+            fails = trial
          end if
       end do
       text = ''
-      if (fits > 0) text = ' to '//to_text(real(fits, wp)/100.0_wp, 2)
+      if (fits > 0.0_wp) text = ' to '//to_text(fits, 2)
    end function largest_fraction
 
    !> Append grains with random velocities and angular velocities. The total momentum is zero unless one grain alone

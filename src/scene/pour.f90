@@ -14,7 +14,7 @@ module polydem_pour
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: place_grains, loose_spacing, loose_spacing_ratio, displace_randomly
+   public :: place_grains, container_entries, loose_spacing, loose_spacing_ratio, displace_randomly
 
    !> Distance of loose grains over the largest long axis of a grain
    real(wp), parameter :: loose_spacing_ratio = 1.02_wp
@@ -67,17 +67,34 @@ contains
       if (scene%size_ratio > 1.0_wp) then
          call fit_cells(outline, loose_spacing_ratio*grains%length, random, centres, spread)
          if (.not. spread > 0.0_wp) call raise(error, input_error, 'the container has no room for grains of such '// &
-            'different sizes; enlarge the container or reduce the number of grains')
+            'different sizes; enlarge the container (width), or lower bodies or size_ratio')
          return
       end if
       call fill_lattice(outline, loose_spacing(scene), centres, n_found)
       if (n_found < n) then
          call raise(error, input_error, 'the container has room for '//to_text(n_found)//' loose grains, not for ' &
-                    //to_text(n)//'; enlarge the container or reduce the number of grains')
+                    //to_text(n)//'; enlarge the container ('//container_entries(scene%name)// &
+                    '), or lower bodies or long_axis_max')
          return
       end if
       call displace_randomly(random, loose_spacing(scene) - scene%long_axis_max, centres)
    end subroutine pour_loosely
+
+   !> Entries of &scene that enlarge the container of a scene, for a message
+   pure function container_entries(name) result(text)
+      !> Name of the scene
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: text
+
+      select case (name)
+      case ('drum')
+         text = 'radius'
+      case ('hopper')
+         text = 'opening, width'
+      case default
+         text = 'width'
+      end select
+   end function container_entries
 
    !> Distance of the centres of loose grains on the lattice [m]
    pure real(wp) function loose_spacing(scene)

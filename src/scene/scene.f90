@@ -18,7 +18,7 @@ module polydem_scene
    use polydem_hopper, only: list_hopper
    use polydem_incline, only: list_incline
    use polydem_kinds, only: ip, lp, wp
-   use polydem_origin, only: place_of
+   use polydem_origin, only: overrides_of, place_of
    use polydem_prescribed_motion, only: motion_t, new_motion
    use polydem_settings, only: scene_settings_t, settings_t
    use polydem_stack, only: list_stack
@@ -26,6 +26,9 @@ module polydem_scene
    implicit none
    private
    public :: build_scene
+
+   !> Entries that determine shapes and masses of generated bodies, for a message
+   character(len=*), parameter :: sizes = 'short_axis, long_axis_max, fraction, radius, width, height and density'
 
 contains
 
@@ -50,15 +53,23 @@ contains
 
       origin = place_of(settings, 'scene', 'name')//': &scene'
       if (settings%scene%name == 'file') then
-         origin = settings%scene%bodies_file
-         if (.not. exists(origin)) call raise(error, input_error, place_of(settings, 'scene', 'bodies_file') &
-                                              //": 'bodies_file' in &scene: "//origin//': there is no such file')
-         if (.not. allocated(error)) call read_bodies_file(origin, settings%scene%density, list, error)
-         if (allocated(error)) return
+         associate (path => settings%scene%bodies_file)
+            origin = place_of(settings, 'scene', 'bodies_file')//": 'bodies_file' in &scene"
+            if (.not. exists(path)) call raise(error, input_error, path//': there is no such file')
+            if (.not. allocated(error)) call read_bodies_file(path, settings%scene%density, list, error)
+            if (.not. allocated(error)) then
+               call new_bodies(list, bodies, error)
+               if (allocated(error)) error%message = path//': '//error%message
+            end if
+         end associate
       else
          call list_generated(settings, list, error)
+         if (.not. allocated(error)) then
+            call new_bodies(list, bodies, error)
+            if (allocated(error)) error%message = error%message//' (the bodies follow from '//sizes//' in &scene)'
+         end if
+         if (allocated(error)) error%message = error%message//overrides_of(settings, 'scene')
       end if
-      if (.not. allocated(error)) call new_bodies(list, bodies, error)
       if (allocated(error)) then
          error%message = origin//': '//error%message
          return

@@ -3,7 +3,7 @@ module polydem_choose_step
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_law, only: choose_parts, force_law_t
    use polydem_kinds, only: ip, lp, wp
-   use polydem_origin, only: place_of
+   use polydem_origin, only: overrides_of, place_of
    use polydem_simulation, only: simulation_t
    use polydem_expected_speed, only: find_expected_speed
    use polydem_stable_step, only: stable_step_of_shapes
@@ -67,7 +67,8 @@ contains
             call raise(error, input_error, place_of(self%settings, 'integrate', 'duration')//': a duration of '// &
                        to_text(settings%duration)//' s with dt = '//to_text(self%dt)//' s requires '// &
                        to_text(steps)//' steps, but only 1 to '//to_text(most_steps)// &
-                       ' are allowed. Change dt or duration in &integrate')
+                       ' are allowed. Change duration, dt, fraction or speed in &integrate'// &
+                       overrides_of(self%settings, 'integrate'))
             return
          end if
          self%n_steps = nint(steps, lp)

@@ -1,4 +1,4 @@
-!> Signals (POSIX): INT, TERM and USR1, which ask a run to end, and the signals of failed writes.
+!> Signals (POSIX): INT, TERM, USR1 and HUP, which ask a run to end, and the signals of failed writes.
 !>
 !> The first signal of a kind is only recorded; the second one ends the program at once. The operating system keeps the
 !> record, not a variable: an empty handler is installed for one call, after which the signal has its default action
@@ -15,12 +15,12 @@ module polydem_signals
    private
    public :: await_signals, caught_signal, hold_usr1, ignore_write_signals, release_signals
 
-   !> SIGINT, SIGTERM and SIGUSR1 (POSIX, Linux)
-   integer(c_int), parameter :: numbers(3) = [2_c_int, 15_c_int, 10_c_int]
+   !> SIGINT, SIGTERM, SIGUSR1, and SIGHUP, when the terminal closes (POSIX, Linux)
+   integer(c_int), parameter :: numbers(4) = [2_c_int, 15_c_int, 10_c_int, 1_c_int]
    !> SIGUSR1
    integer(c_int), parameter :: usr1 = numbers(3)
    !> Names of these signals
-   character(len=*), parameter :: names(3) = [character(len=4) :: 'INT', 'TERM', 'USR1']
+   character(len=*), parameter :: names(4) = [character(len=4) :: 'INT', 'TERM', 'USR1', 'HUP']
    !> SIGPIPE and SIGXFSZ (Linux): the reader has closed the pipe; the file would exceed the limit of ulimit -f
    integer(c_int), parameter :: write_signals(2) = [13_c_int, 25_c_int]
    !> Bits of SA_RESTART (interrupted calls continue) and SA_RESETHAND (the handler serves one call) of Linux

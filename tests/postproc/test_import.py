@@ -4,6 +4,7 @@ import csv
 import json
 import os
 import subprocess
+import time
 
 import h5py
 import numpy as np
@@ -403,3 +404,34 @@ def test_wrong_columns_are_errors(columns, message, tmp_path):
     with pytest.raises(ResultError, match=message):
         write_bodies([SQUARE, FLOOR], tmp_path / "out.h5", **columns)
     assert not (tmp_path / "out.h5").exists()
+
+
+def test_outlines_of_100_000_corners_take_seconds(tmp_path):
+    """A circle becomes a body, and a flower with as many corners is refused."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 100_000, endpoint=False)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    began = time.process_time()
+    assert write_bodies([circle], tmp_path / "circle.h5") == 1
+    # Vertices between their neighbours on one line go.
+    assert 10_000 < len(contents(tmp_path / "circle.h5")["vertex"]) < 100_000
+    with pytest.raises(ResultError, match="it is concave at the vertex"):
+        write_bodies([circle * (1.0 + 0.1 * np.cos(7.0 * angle))[:, None]], tmp_path / "flower.h5")
+    circle[[500, 90_000]] = circle[[90_000, 500]]
+    with pytest.raises(ResultError, match=r"its edges \d+ and \d+ cross"):
+        write_bodies([circle], tmp_path / "crossing.h5")
+    # A test of all pairs took minutes.
+    assert time.process_time() - began < 60.0
+
+
+@pytest.mark.parametrize("digits", [400, 5000])
+def test_coordinates_may_have_hundreds_of_digits(tmp_path, digits):
+    for name, number in (("good", "0." + digits * "3"), ("great", digits * "3")):
+        (tmp_path / f"{name}.wkt").write_text(f"POLYGON ((0 0, {number} 0, 1 1, 0 1, 0 0))\n")
+        (tmp_path / f"{name}.txt").write_text(f"0 0\n{number} 0\n1 1\n0 1\n")
+        (tmp_path / f"{name}.geojson").write_text(
+            f'{{"type": "Polygon", "coordinates": [[[0, 0], [{number}, 0], [1, 1], [0, 1], [0, 0]]]}}')
+    for suffix in ("wkt", "txt", "geojson"):
+        assert import_bodies(tmp_path / f"good.{suffix}", tmp_path / f"{suffix}.h5") == 1
+        assert_array_equal(contents(tmp_path / f"{suffix}.h5")["vertex"][1], [1.0 / 3.0, 0.0])
+        with pytest.raises(ResultError, match=f"great.{suffix}.*a coordinate is not a finite number"):
+            import_bodies(tmp_path / f"great.{suffix}", tmp_path / "no.h5")

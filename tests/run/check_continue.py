@@ -121,7 +121,7 @@ def cut(path, length):
 
 
 def a_signal_ends_a_run_with_a_checkpoint(case):
-    for number in (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT):
+    for number in (signal.SIGUSR1, signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         folder = number.name
         code, output, message = case.interrupt(folder, number)
         assert code == EARLY, (code, message)

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
 import numpy as np
 
 from .polygons import FloatArray, area_of
@@ -12,6 +15,9 @@ REDUNDANT_SHARE = 1e-9
 
 #: Areas of triangles that count as none in a decomposition, relative to the size of the outline squared
 ROUNDOFF = 1e-12
+
+#: Vertices, neighbours on the outline, that are compared together
+RUN = 64
 
 #: Greatest coordinate [m]: areas and moments of inertia of greater polygons overflow
 GREATEST = 1e50
@@ -33,22 +39,10 @@ def tidy(points: FloatArray) -> FloatArray:
     greatest = float(np.abs(points).max(initial=0.0))
     if greatest > GREATEST:
         raise OutlineError(f"a coordinate is beyond {GREATEST:g} m")
-    n = len(points)
-    extent = max((float(np.hypot(*(points[k:] - points[k]).T).max()) for k in range(n)), default=0.0)
+    extent = _extent(points)
     tolerance = REDUNDANT_SHARE * extent + 16.0 * np.finfo(float).eps * greatest
     area = area_of(points)
-    kept = list(range(n)) if area > 0.0 else [-k % n for k in range(n)]
-    k = in_order = 0
-    while in_order < len(kept) and len(kept) > 2:
-        arriving = points[kept[k]] - points[kept[k - 1]]
-        leaving = points[kept[(k + 1) % len(kept)]] - points[kept[k]]
-        if _is_redundant(arriving, leaving, tolerance):
-            del kept[k]
-            in_order = 0
-            k %= len(kept)
-        else:
-            in_order += 1
-            k = (k + 1) % len(kept)
+    kept = _without_redundant(points, tolerance, area > 0.0)
     if len(kept) < 3:
         raise OutlineError(f"it has {len(kept)} different vertices that are not on one line, but needs 3")
     if abs(area) <= tolerance * extent:
@@ -56,19 +50,56 @@ def tidy(points: FloatArray) -> FloatArray:
     return points[kept] if area > 0.0 else points[[*kept[1:], kept[0]]]
 
 
-def _is_redundant(arriving: FloatArray, leaving: FloatArray, tolerance: float) -> bool:
+def _extent(points: FloatArray) -> float:
+    """Greatest distance of two vertices. Runs of neighbours are compared only if their boxes are far enough apart."""
+    if not len(points):
+        return 0.0
+    runs = [points[k : k + RUN] for k in range(0, len(points), RUN)]
+    low, high = (np.array([each(run, axis=0) for run in runs]) for each in (np.min, np.max))
+    far = points[np.argmax(np.hypot(*(points - points[0]).T))]
+    extent = float(np.hypot(*(points - far).T).max())
+    for k, run in enumerate(runs):
+        reach = np.maximum(high[k] - low[: k + 1], high[: k + 1] - low[k])
+        for other in np.flatnonzero(np.hypot(*reach.T) > extent):
+            extent = max(extent, float(np.hypot(*(run[:, None] - runs[other][None]).T).max()))
+    return extent
+
+
+def _without_redundant(points: FloatArray, tolerance: float, is_anticlockwise: bool) -> list[int]:
+    """Numbers of the vertices that stay, in anticlockwise order from the first."""
+    n = len(points)
+    order = list(range(n)) if is_anticlockwise else [-k % n for k in range(n)]
+    place = points[order].tolist()
+    following, former = [*range(1, n), 0], [n - 1, *range(n - 1)]
+    stays, left = [True] * n, n
+    here = in_order = 0
+    while in_order < left and left > 2:
+        (x0, y0), (x1, y1), (x2, y2) = place[former[here]], place[here], place[following[here]]
+        if _is_redundant((x1 - x0, y1 - y0), (x2 - x1, y2 - y1), tolerance):
+            stays[here] = False
+            following[former[here]], former[following[here]] = following[here], former[here]
+            left -= 1
+            in_order = 0
+        else:
+            in_order += 1
+        here = following[here]
+    return [vertex for vertex, keeps in zip(order, stays) if keeps]
+
+
+def _is_redundant(arriving: tuple[float, float], leaving: tuple[float, float], tolerance: float) -> bool:
     """Whether a vertex repeats the next one or lies between its neighbours; not the tip of a spike."""
-    return bool(np.hypot(*leaving) <= tolerance
-                or (abs(_turn(arriving, leaving)) <= tolerance * np.hypot(*(arriving + leaving))
-                    and arriving @ leaving > 0.0))
+    (ax, ay), (bx, by) = arriving, leaving
+    return (math.hypot(bx, by) <= tolerance
+            or (abs(ax * by - ay * bx) <= tolerance * math.hypot(ax + bx, ay + by) and ax * bx + ay * by > 0.0))
 
 
 def concave_vertices(outline: FloatArray) -> list[int]:
     """Vertices of a tidy outline at which it does not turn left, or from which on it goes round twice."""
     edge = np.roll(outline, -1, axis=0) - outline
-    wrong = [k for k in range(len(outline)) if _turn(edge[k - 1], edge[k]) <= 0.0]
-    if wrong:
-        return wrong
+    before = np.roll(edge, 1, axis=0)
+    wrong = np.flatnonzero(_turns(before, edge) <= 0.0)
+    if len(wrong):
+        return [int(k) for k in wrong]
     down = (edge[:, 1] < 0.0) | ((edge[:, 1] == 0.0) & (edge[:, 0] < 0.0))
     rounds = np.cumsum(np.roll(down, 1) & ~down)
     return [int(np.argmax(rounds > 1))] if rounds[-1] > 1 else []
@@ -83,12 +114,23 @@ def _is_convex(points: FloatArray) -> bool:
 
 
 def insist_on_simple(outline: FloatArray) -> None:
-    """OutlineError if two edges of an outline cross or touch."""
+    """OutlineError if two edges of an outline cross or touch. Runs of edges are compared if their boxes meet."""
     n = len(outline)
-    for k in range(n):
-        for other in range(k + 2, n - (k == 0)):
-            if _meet(outline[k], outline[(k + 1) % n], outline[other], outline[(other + 1) % n]):
-                raise OutlineError(f"its edges {k + 1} and {other + 1} cross")
+    begin, end = outline, np.roll(outline, -1, axis=0)
+    runs = [np.arange(k, min(k + RUN, n)) for k in range(0, n, RUN)]
+    low = np.array([np.minimum(begin[run], end[run]).min(axis=0) for run in runs])
+    high = np.array([np.maximum(begin[run], end[run]).max(axis=0) for run in runs])
+    for k, run in enumerate(runs):
+        crossing: list[tuple[int, int]] = []
+        for other in k + np.flatnonzero(((low[k:] <= high[k]) & (high[k:] >= low[k])).all(axis=1)):
+            one, two = (each.ravel() for each in np.meshgrid(run, runs[other], indexing="ij"))
+            apart = (two > one + 1) & ((one > 0) | (two < n - 1))
+            one, two = one[apart], two[apart]
+            meets = _meet(begin[one], end[one], begin[two], end[two])
+            crossing += zip(one[meets].tolist(), two[meets].tolist())
+        if crossing:
+            first, second = min(crossing)
+            raise OutlineError(f"its edges {first + 1} and {second + 1} cross")
 
 
 def decompose(outline: FloatArray) -> list[FloatArray]:
@@ -173,12 +215,16 @@ def _least_angle(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
     return _cross(a, b, c) / max(float(np.sum(side**2)) for side in (b - a, c - b, a - c))
 
 
-def _meet(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> bool:
-    """Whether two segments have a point in common."""
-    one, two, three, four = _cross(a, b, c), _cross(a, b, d), _cross(c, d, a), _cross(c, d, b)
-    if (max(one, two) < 0.0 or min(one, two) > 0.0) or (max(three, four) < 0.0 or min(three, four) > 0.0):
-        return False
-    if one == two == 0.0:
-        low, high = np.maximum(np.minimum(a, b), np.minimum(c, d)), np.minimum(np.maximum(a, b), np.maximum(c, d))
-        return bool((low <= high).all())
-    return True
+def _meet(a: FloatArray, b: FloatArray, c: FloatArray, d: FloatArray) -> Any:
+    """Whether the segments from a to b and from c to d, (segment, 2), have a point in common."""
+    one, two, three, four = (_turns(q - p, r - q) for p, q, r in ((a, b, c), (a, b, d), (c, d, a), (c, d, b)))
+    on_one_side = (((np.maximum(one, two) < 0.0) | (np.minimum(one, two) > 0.0))
+                   | ((np.maximum(three, four) < 0.0) | (np.minimum(three, four) > 0.0)))
+    low, high = np.maximum(np.minimum(a, b), np.minimum(c, d)), np.minimum(np.maximum(a, b), np.maximum(c, d))
+    return ~on_one_side & (~((one == 0.0) & (two == 0.0)) | (low <= high).all(axis=1))
+
+
+def _turns(arriving: FloatArray, leaving: FloatArray) -> FloatArray:
+    """Cross products of edges, (edge, 2); positive: a turn to the left."""
+    turns: FloatArray = arriving[:, 0] * leaving[:, 1] - arriving[:, 1] * leaving[:, 0]
+    return turns

@@ -132,7 +132,8 @@ def _groups(text: str, place: str) -> list[str]:
 def _read_geojson(text: str, name: str) -> Iterator[Outline]:
     """Polygons and multipolygons; of the properties of a feature those of PROPERTIES. Coordinates are metres."""
     try:
-        content = json.loads(text)
+        # Python refuses integers of thousands of digits, and cannot convert those of hundreds.
+        content = json.loads(text, parse_int=lambda digits: int(digits) if len(digits) < 300 else float(digits))
     except json.JSONDecodeError as error:
         raise ResultError(f"{name}:{error.lineno}: is not JSON ({error.msg})") from error
     except RecursionError as error:

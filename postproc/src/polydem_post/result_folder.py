@@ -10,7 +10,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .manifest import MANIFEST, Manifest, ManifestError, check_bytes, check_hashes, read_manifest
+from .manifest import MANIFEST, Closed, Manifest, ManifestError, check_bytes, check_hashes, read_manifest
 from .result_file import OPEN_SUFFIX, ResultError, reading
 from .segments import SEGMENT_NAME, Segment, check_names, check_steps, find_segments, number_of, read_segment
 
@@ -33,7 +33,8 @@ class ResultFolder:
             path = path.parent
         self.folder = path if path.is_dir() else path.parent
         self.profile_path = self.folder / "profile.h5"
-        self.segments = find_segments(path) if path.is_dir() else [read_segment(path)]
+        self.segments = find_segments(path, _closed_files(path) if check else {}) if path.is_dir() else [
+            read_segment(path)]
         if not self.segments and not self.profile_path.exists():
             raise ResultError(f"{path}: holds no result (neither trajectory_0001.h5 nor profile.h5){_nearby(path)}")
         self._manifest: Manifest | None = None
@@ -133,6 +134,15 @@ class ResultFolder:
     def steps(self) -> np.ndarray:
         """Steps of all frames."""
         return np.concatenate([np.empty(0, dtype=np.int64)] + [segment.steps for segment in self.segments])
+
+
+def _closed_files(folder: Path) -> dict[str, Closed]:
+    """Files that the manifest of a result names as closed; none if it cannot be read, which its check tells."""
+    try:
+        manifest = read_manifest(folder)
+    except ManifestError:
+        return {}
+    return manifest.closed if manifest else {}
 
 
 def _nearby(folder: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import warnings
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import h5py
 import numpy as np
 
 from .former_names import balance_of
-from .manifest import MANIFEST, ManifestError
+from .manifest import MANIFEST, Closed, ManifestError
 from .result_file import OPEN_SUFFIX, ResultError, cannot_read, insist, present_path, reading
 
 #: Name of a segment: trajectory_0001.h5, or trajectory_0001.h5.open while it is written
@@ -32,8 +33,8 @@ class Segment:
         return self.path.name.removesuffix(OPEN_SUFFIX)
 
 
-def find_segments(folder: Path) -> list[Segment]:
-    """Segments of a folder in order; of an open segment what can be read."""
+def find_segments(folder: Path, closed: dict[str, Closed]) -> list[Segment]:
+    """Segments of a folder in order; of an open segment what can be read. `closed` are those of the manifest."""
     found = {}
     try:
         paths = sorted(folder.iterdir(), reverse=True)
@@ -46,13 +47,45 @@ def find_segments(folder: Path) -> list[Segment]:
     segments = []
     for _, path in sorted(found.items()):
         try:
-            segments.append(read_segment(path))
+            segments.append(_read_closed(path, closed.get(path.name)) or read_segment(path))
         except ResultError as error:
             if not present_path(path).name.endswith(OPEN_SUFFIX):
                 raise
             warnings.warn(f"left out: {error}", stacklevel=4)
     _check_order(folder, segments)
     return segments
+
+
+def _read_closed(path: Path, closed: Closed | None) -> Segment | None:
+    """Steps and times of a segment whose frames the manifest counts, in a millisecond; None if anything is unusual.
+
+    Its other data sets are looked at when the segment is used.
+    """
+    columns = []
+    try:
+        if closed is None or path.stat().st_size != closed.bytes:
+            return None
+        file = h5py.h5f.open(os.fsencode(path), h5py.h5f.ACC_RDONLY)
+        try:
+            for name in (b"frames", b"frames/step", b"frames/time"):
+                if file.links.get_info(name).type != h5py.h5l.TYPE_HARD:
+                    return None
+            for name in (b"frames/step", b"frames/time"):
+                dataset = h5py.h5d.open(file, name)
+                made = dataset.get_create_plist()
+                if made.get_layout() == h5py.h5d.VIRTUAL or made.get_external_count():
+                    return None
+                if dataset.shape != (closed.frames,):
+                    return None
+                columns.append(np.empty(dataset.shape, dataset.dtype))
+                dataset.read(h5py.h5s.ALL, h5py.h5s.ALL, columns[-1])
+        finally:
+            file.close()
+    except (OSError, KeyError, ValueError, RuntimeError, TypeError):
+        return None
+    steps, times = columns
+    usual = steps.dtype.kind in "iu" and times.dtype.kind == "f" and np.isfinite(times).all()
+    return Segment(path, steps, times) if usual else None
 
 
 def read_segment(path: Path) -> Segment:
