@@ -1,5 +1,5 @@
-!> Neighbour finders of a bench: those of a run, variants of them with other compiler options, and parallel sweeps as one
-!> would first write them (`obvious_sweeps.f90`).
+!> Neighbour finders of a bench: those of a run, variants of them with other compiler options, and parallel sweeps as
+!> one would first write them (`obvious_sweeps.f90`).
 !>
 !> `quadtree_called` is the quadtree compiled without inlining; `quadtree_o2` and `sort_and_sweep_o2` are compiled at
 !> -O2.
