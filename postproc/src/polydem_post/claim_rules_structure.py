@@ -11,7 +11,10 @@ from .claims import CONFIRMED, CONTRADICTED, Finding, Missing, Part, claim, in_p
 from .fine_grained import BLOCKS, MOST_THREADS, OBVIOUS, PARTITIONED, contests
 from .fine_grained_tables import error_told
 from .series import SWEEP, TREE
-from .statistics import every, number
+from .statistics import NOTHING, every, number
+
+#: Stands for a gain by threads on a machine that had more to do than it has processors
+TOO_BUSY = "the machine was too busy"
 
 #: Begins what claim C5 says of each fine-grained sweep
 FAILS = "it fails: "
@@ -47,7 +50,7 @@ def parallel(bench: Bench) -> Finding:
 
 def _told(finder: str, found: dict) -> str:
     """How much faster a finder is on each drum."""
-    return f"{finder} " + ", ".join(f"{boxes} boxes, {threads} threads: {gain.text()}"
+    return f"{finder} " + ", ".join(f"{boxes} boxes, {threads} threads: {gain.text() if gain else TOO_BUSY}"
                                     for boxes, (threads, gain) in found.items())
 
 
@@ -63,7 +66,7 @@ def _gains(bench: Bench, finder: str) -> dict:
                            finder=SWEEP if finder in (PARTITIONED, *OBVIOUS) else finder)
         usual = series.parameter(case, "scene.motion_rate") == paper.RATE
         if one and usual and 1 < case.threads <= min(most, int(case.provenance.get("processors", case.threads))):
-            gain = series.ratio(one[0], case, series.elapsed_time)
+            gain = NOTHING if case.is_disturbed else series.ratio(one[0], case, series.elapsed_time)
             found[case.boxes] = max(found.get(case.boxes, (0, gain)), (case.threads, gain), key=lambda each: each[0])
     return found
 

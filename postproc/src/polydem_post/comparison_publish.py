@@ -122,14 +122,14 @@ def which_finder(scenes: list[dict]) -> list[str]:
         times = [float(row[name].rstrip("*")) for name in names if name != best and row[name] != "-"]
         ratios += [float(row[best].rstrip("*")) / min(times)] if times else []
     largest = max(there, key=lambda row: int(row["boxes"]))
-    times = ", ".join(f"{name} {largest[name].rstrip('*')}" for name in (best, "verlet", SWEEP, TREE)
+    told = ", ".join(f"{name} {largest[name].rstrip('*')}" for name in (best, "verlet", SWEEP, TREE)
                       if largest.get(name, "-") != "-")
     lines = [f"* **Which finder**: `{best}`. On one thread it is the fastest on {len(wins[best])} of the {len(there)} "
              f"scenes on which it was measured{f'; {others}' if others else ''}."]
     if ratios:
         mean = exp(sum(map(log, ratios)) / len(ratios))
         lines.append(f"* **Why**: it takes {number(mean, 2)} of the time of the best other one (geometric mean of "
-                     f"these scenes); on the largest, {largest['scene']}, ns per box and step: {times}.")
+                     f"these scenes); on the largest, {largest['scene']}, ns per box and step: {told}.")
     return lines
 
 

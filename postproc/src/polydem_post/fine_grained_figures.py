@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 from functools import cache
 from pathlib import Path
 
@@ -39,14 +40,11 @@ def fine_grained_drawings(bench: Bench) -> list[Drawing]:
     drawn = []
     with matplotlib.rc_context(SETTINGS):
         if "fine_grained_gains" in tables:
-            drawn.append(what_fails(*(tables.get(name) for name in SOURCES)))
+            drawn.append(what_fails(tables["fine_grained_gains"], tables.get("fine_grained"),
+                                    tables.get("fine_grained_error")))
         if any(each.seen_to_lose_at() or (each.has_model and each.loses_at()) for each in found):
             drawn.append(limits(found))
     return drawn
-
-
-#: Tables that the figure is drawn from
-SOURCES = ("fine_grained_gains", "fine_grained", "fine_grained_error")
 
 
 def what_fails(gains: Table, contest: Table | None = None, error: Table | None = None) -> Drawing:
@@ -101,7 +99,7 @@ def draw_gains(axis, rows: list[dict]) -> None:
     axis.axhline(1.0, color="0.5", linewidth=0.8, zorder=0)
     axis.set(yscale="log", title=f"{rows[0]['scene']}: {moving(rows[0])}", xlabel="threads", xscale="log")
     axis.title.set_fontsize(8.5)
-    gains = [value_of(row["times as fast"]) for row in rows]
+    gains = [gain for row in rows if np.isfinite(gain := value_of(row["times as fast"]))]
     axis.set_ylim(min([0.5, *(0.7 * gain for gain in gains)]), max([2.0, *(1.4 * gain for gain in gains)]))
     readable_decades(axis.yaxis)
     threads_along(axis, {int(row["threads"]) for row in rows})
@@ -181,20 +179,33 @@ def error_in(error: Table | None) -> str:
 
 def message(figure: Figure, rows: list[dict]) -> None:
     """The title: which fine-grained sweeps fail, and which work, with the most threads that have a processor each."""
-    lines = {"Fails": [], "Works": [], "Loses or gains": []}
+    lines: dict[str, list[str]] = {"Fails": [], "Works": [], "Loses or gains": []}
     for finder, (low, high, most) in gains_by_finder(rows).items():
         verdict = "Fails" if high <= 1.0 else "Works" if low >= 1.0 else "Loses or gains"
         lines[verdict].append(f"{FINE_GRAINED[finder]} ({number(low, 2)} to {number(high, 2)} times as fast as one "
                               f"thread, on {most})")
-    figure.suptitle("\n".join(f"{verdict}: {line}" for verdict, found in lines.items() for line in found),
-                    fontsize=9.5)
+    said = [f"{verdict}: {line}" for verdict, found in lines.items() for line in found]
+    figure.suptitle("\n".join(said or [alone(rows)]), fontsize=9.5)
+
+
+def alone(rows: list[dict]) -> str:
+    """The title if no time on several threads is known: work on one thread, and barriers."""
+    told = []
+    for finder, what in FINE_GRAINED.items():
+        work = [1.0 / value_of(row["times as fast"]) for row in rows
+                if row["finder"] == finder and row["threads"] == "1"]
+        barriers = [value_of(row["barriers per step"]) for row in free_rows(rows) if row["finder"] == finder]
+        if work and barriers:
+            told.append(f"{what}: {number(min(work), 2)} to {number(max(work), 2)} times the work of the plain sweep, "
+                        f"{number(min(barriers), 2)} to {number(max(barriers), 2)} barriers per step")
+    return "\n".join(told)
 
 
 def gains_by_finder(rows: list[dict]) -> dict[str, tuple[float, float, int]]:
     """Fine-grained sweep -> least and greatest gain of all scenes with the most free threads, and their number."""
     free, found = free_rows(rows), {}
     for finder in FINE_GRAINED:
-        here = [row for row in free if row["finder"] == finder]
+        here = [row for row in free if row["finder"] == finder and np.isfinite(value_of(row["times as fast"]))]
         if here:
             most = max(int(row["threads"]) for row in here)
             gains = [value_of(row["times as fast"]) for row in here if int(row["threads"]) == most]
@@ -225,8 +236,8 @@ def sixteen() -> list[dict]:
 
 def estimate_of(text: str) -> Estimate:
     """The estimate that a cell holds, like 1.02 [0.99, 1.04]; NaN for -."""
-    numbers = [value_of(word) for word in text.replace("[", "").replace("]", "").replace(",", "").split()]
-    return Estimate(*numbers) if numbers else Estimate(np.nan)
+    value, low, high = ([value_of(word) for word in re.sub(r"[\[\],]", "", text).split()] + [np.nan] * 3)[:3]
+    return Estimate(value, low, high)
 
 
 def value_of(text: str) -> float:

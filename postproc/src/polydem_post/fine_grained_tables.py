@@ -35,14 +35,19 @@ def gains_table(bench: Bench) -> Table:
         if case.scene not in threaded & set(plain) or case.finder not in (*fine_grained, SWEEP, TREE):
             continue
         counts = [case.count(name) if case.finder in OBVIOUS else np.nan for name in ("locks", "lock_waits")]
+        time = series.total_time if case.threads == 1 else series.elapsed_time
+        timed = ["-"] * 3
+        if case.threads == 1 or not case.is_disturbed:
+            timed = [median(of_one_bench(time(case))).text(), series.ratio(plain[case.scene], case, time).text(),
+                     number(100.0 * waiting_share(case))]
         table.add(
             case.scene, case.boxes, number(way_of(case)), case.finder, case.threads,
-            case.provenance.get("processors", "-"), median(of_one_bench(series.elapsed_time(case))).text(),
-            series.ratio(plain[case.scene], case, series.elapsed_time).text(), number(barriers_of(case)),
-            *(number(count) for count in counts), number(100.0 * waiting_share(case)),
+            case.provenance.get("processors", "-"), *timed[:2], number(barriers_of(case)),
+            *(number(count) for count in counts), timed[2],
         )
     table.note = (
-        "Elapsed times, medians [95 % interval]. Way: mean displacement of the centres of free boxes in a step over "
+        "Medians [95 % interval]; one thread: processor time, more: elapsed time, and '-' if the machine had more to "
+        "do than it has processors. Way: mean displacement of the centres of free boxes in a step over "
         "their mean side, from the trace. Barriers, locks and waits for a lock that another thread held are counted. "
         "Waiting: part of the time of the finder in which a thread does not work, mean of the threads."
     )
