@@ -9,6 +9,7 @@ from pathlib import Path
 from .claim_rules_structure import FAILS
 from .claims import CONFIRMED, CONTRADICTED, OF_PARTS
 from .comparison_report import Contents
+from .fine_grained import OBVIOUS
 from .result_file import cannot_write
 from .series import SWEEP, TREE
 from .statistics import number
@@ -108,23 +109,24 @@ def answers(tables: list) -> list[str]:
 
 
 def which_finder(scenes: list[dict]) -> list[str]:
-    """Which finder was the fastest on most scenes, on one thread, and where another one was."""
-    names = [name for row in scenes[:1] for name in row if name not in ("scene", "boxes")]
-    wins = {name: [row["scene"] for row in scenes if row[name].endswith("*")] for name in names}
-    if not any(wins.values()):
+    """Which finder of runs was the fastest on most scenes, on one thread, and where another one was."""
+    names = [name for row in scenes[:1] for name in row
+             if name not in ("scene", "boxes", *OBVIOUS) and not name.endswith(("_o2", "_called"))]
+    times = {row["scene"]: {name: float(row[name].rstrip("*")) for name in names if row[name] != "-"}
+             for row in scenes}
+    fastest = {scene: min(here, key=lambda name: here[name]) for scene, here in times.items() if here}
+    if not fastest:
         return []
-    best = max(wins, key=lambda name: len(wins[name]))
-    there = [row for row in scenes if row[best] != "-"]
-    others = "; ".join(f"`{name}` on {', '.join(row['scene'] for row in there if row['scene'] in wins[name])}"
-                       for name in names if name != best and any(row["scene"] in wins[name] for row in there))
-    ratios = []
-    for row in there:
-        times = [float(row[name].rstrip("*")) for name in names if name != best and row[name] != "-"]
-        ratios += [float(row[best].rstrip("*")) / min(times)] if times else []
+    best = max(names, key=list(fastest.values()).count)
+    there = [row for row in scenes if best in times[row["scene"]]]
+    won = {name: [row["scene"] for row in there if fastest[row["scene"]] == name] for name in names}
+    others = "; ".join(f"`{name}` on {', '.join(found)}" for name, found in won.items() if found and name != best)
+    ratios = [here[best] / min(time for name, time in here.items() if name != best)
+              for here in times.values() if best in here and len(here) > 1]
     largest = max(there, key=lambda row: int(row["boxes"]))
     told = ", ".join(f"{name} {largest[name].rstrip('*')}" for name in (best, "verlet", SWEEP, TREE)
                       if largest.get(name, "-") != "-")
-    lines = [f"* **Which finder**: `{best}`. On one thread it is the fastest on {len(wins[best])} of the {len(there)} "
+    lines = [f"* **Which finder**: `{best}`. On one thread it is the fastest on {len(won[best])} of the {len(there)} "
              f"scenes on which it was measured{f'; {others}' if others else ''}."]
     if ratios:
         mean = exp(sum(map(log, ratios)) / len(ratios))
