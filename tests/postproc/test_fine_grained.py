@@ -336,3 +336,22 @@ def test_the_figure_shows_the_size_with_most_motions_and_needs_no_tree(fails):
     assert scenes_of(rows + other) == ["drum_0", "drum_1", "drum_2"]
     assert scenes_of(rows + other[:1]) == ["row_little", "row_much"]
     assert "above 1 the sweep loses" in what_fails(table).caption
+
+
+def test_times_of_several_threads_on_a_machine_with_more_to_do_than_processors_are_left_out(tmp_path):
+    truth = Truth(50.0, 1.0, gain=2.0, counts={"passes": 7.0 / ROW})
+    for finder, time in ((PLAIN, 50.0), ("odd_even_sweep", 100.0)):
+        for n in (1, 2):
+            for repeat in range(3):
+                write_sample(tmp_path, "row", finder, replace(truth, time=time), ROW, repeat=repeat, threads=n)
+    bench = read_bench([tmp_path])
+    for case in bench.cases:
+        assert not case.is_disturbed
+        for sample in case.samples:
+            sample.case["load"] = 4.5  # of 4 processors
+        assert case.is_disturbed
+    (table,) = fine_grained_tables(bench)
+    rows = {(row[3], row[4]): dict(zip(table.heading, row)) for row in table.rows}
+    assert float(rows["odd_even_sweep", "1"]["times as fast"].split()[0]) == pytest.approx(0.5, rel=0.05)
+    assert rows["odd_even_sweep", "2"]["times as fast"] == "-" != rows["odd_even_sweep", "2"]["barriers per step"]
+    assert "7.0 to 7.0 barriers per step" in what_fails(table).figure.get_suptitle()
