@@ -1,4 +1,5 @@
-!> Neighbour finders of a bench: those of a run, and variants of them with other compiler options.
+!> Neighbour finders of a bench: those of a run, variants of them with other compiler options, and parallel sweeps as
+!> one would first write them (`obvious_sweeps.f90`).
 !>
 !> `quadtree_called` is the quadtree compiled without inlining; `quadtree_o2` and `sort_and_sweep_o2` are compiled at
 !> -O2.
@@ -6,6 +7,7 @@ module polydem_finder_variants
    use polydem_errors, only: error_t
    use polydem_finder, only: finder_t
    use polydem_finder_factory, only: new_finder
+   use polydem_obvious_sweeps, only: locked_sweep_t, mended_sweep_t, odd_even_sweep_t
    use polydem_quadtree_called, only: quadtree_called_t => quadtree_t
    use polydem_quadtree_o2, only: quadtree_o2_t => quadtree_t
    use polydem_sort_and_sweep_o2, only: sort_and_sweep_o2_t => sort_and_sweep_t
@@ -31,6 +33,12 @@ contains
          allocate (quadtree_o2_t :: finder)
       case ('sort_and_sweep_o2')
          allocate (sort_and_sweep_o2_t :: finder)
+      case ('odd_even_sweep')
+         allocate (odd_even_sweep_t :: finder)
+      case ('locked_sweep')
+         allocate (locked_sweep_t :: finder)
+      case ('mended_sweep')
+         allocate (mended_sweep_t :: finder)
       case default
          call new_finder(finder, name, error)
       end select

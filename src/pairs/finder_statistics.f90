@@ -13,8 +13,8 @@ module polydem_finder_statistics
    public :: finder_statistics_t, n_phases, phase_names, n_counts, count_names, n_sums
    public :: phase_structure, phase_search, phase_filter, phase_order, phase_merge, phase_waiting
    public :: count_tests, count_swaps, count_idle_swaps, count_left_leaf, count_leaf_changes, count_searches
-   public :: count_visits, count_rebuilds, count_crossings, count_passes, count_candidates, count_nodes
-   public :: count_depth, count_bytes
+   public :: count_visits, count_rebuilds, count_crossings, count_passes, count_locks, count_lock_waits
+   public :: count_candidates, count_nodes, count_depth, count_bytes
 
    !> Update of the structure
    integer, parameter :: phase_structure = 1
@@ -55,22 +55,26 @@ module polydem_finder_statistics
    integer, parameter :: count_crossings = 9
    !> Passes over the ends
    integer, parameter :: count_passes = 10
+   !> How often threads took the lock of a list that they share
+   integer, parameter :: count_locks = 11
+   !> How often a thread had to wait for this lock
+   integer, parameter :: count_lock_waits = 12
    !> Number of counts that are sums over all steps; the counts below describe the present state
-   integer, parameter :: n_sums = 10
+   integer, parameter :: n_sums = 12
    !> Possible pairs that persist from step to step
-   integer, parameter :: count_candidates = 11
+   integer, parameter :: count_candidates = 13
    !> Nodes or cells in use
-   integer, parameter :: count_nodes = 12
+   integer, parameter :: count_nodes = 14
    !> Levels of the structure
-   integer, parameter :: count_depth = 13
+   integer, parameter :: count_depth = 15
    !> Memory that the finder holds [B]
-   integer, parameter :: count_bytes = 14
+   integer, parameter :: count_bytes = 16
    !> Number of counts
-   integer, parameter :: n_counts = 14
+   integer, parameter :: n_counts = 16
    !> Names of the counts, in the order of the constants above
    character(len=*), parameter :: count_names(n_counts) = &
       [character(len=12) :: 'tests', 'swaps', 'idle_swaps', 'left_leaf', 'leaf_changes', 'searches', 'visits', &
-       'rebuilds', 'crossings', 'passes', 'candidates', 'nodes', 'depth', 'bytes']
+       'rebuilds', 'crossings', 'passes', 'locks', 'lock_waits', 'candidates', 'nodes', 'depth', 'bytes']
 
    !> Counts and seconds since the finder began
    type :: finder_statistics_t
@@ -113,7 +117,7 @@ contains
    !> Add to a count.
    pure subroutine add(self, count, n)
       class(finder_statistics_t), intent(inout) :: self
-      !> count_tests, ..., count_passes
+      !> count_tests, ..., count_lock_waits
       integer, intent(in) :: count
       !> The increment
       integer(lp), intent(in) :: n

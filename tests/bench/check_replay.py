@@ -9,7 +9,8 @@ import subprocess
 import sys
 
 FINDERS = ("all_pairs", "sort_and_sweep", "unsorted_sweep", "partitioned_sweep", "quadtree", "quadtree_called",
-           "pruned_quadtree", "binary_tree", "linked_cells", "verlet", "hierarchical_grid")
+           "pruned_quadtree", "binary_tree", "linked_cells", "verlet", "hierarchical_grid", "odd_even_sweep",
+           "locked_sweep", "mended_sweep")
 # Counted and hashed by brute force in exact arithmetic when the trace was made.
 EXPECTED = {"boxes": "160", "walls": "5", "steps": "6", "pairs_total": "2128", "pair_hash": "0x37b90deb093a35a5",
             "checked_against": "npairs", "result": "ok"}

@@ -36,7 +36,7 @@ def rows_of(path):
 
 def claims_of(page):
     """Rows of the table of claims in a page."""
-    lines = [line for line in page.splitlines() if re.match(r"\| (claim|C\d+) \|", line)]
+    lines = [line for line in page.splitlines() if re.match(r"\| (claim|C\d+[a-z]?) \|", line)]
     heading, *rows = ([cell.strip() for cell in line.strip("|").split(" | ")] for line in lines)
     return [dict(zip(heading, row)) for row in rows]
 
@@ -48,6 +48,8 @@ def disagreements(folder):
     claims, reasons = rows_of(tables / "claims.csv"), {row["claim"]: row for row in rows_of(tables / "reasons.csv")}
     found = [f"row of {row['claim']}" for row, said in zip(claims, claims_of(page), strict=True) if row != said]
     for row in claims:
+        if row["claim"] not in reasons:  # a part of the claim above
+            continue
         reason = reasons[row["claim"]]["reason"]
         said = f"**{row['claim']}** {row['says']}. *Rule:* {reasons[row['claim']]['rule']}. " \
                f"*Verdict:* {row['verdict']}. {'' if reason == '-' else reason}".rstrip()

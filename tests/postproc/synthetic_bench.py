@@ -17,6 +17,8 @@ COUNTS = (
     "rebuilds",
     "crossings",
     "passes",
+    "locks",
+    "lock_waits",
     "candidates",
     "nodes",
     "depth",

@@ -15,9 +15,11 @@ from polydem_post.claims import (
     UNDECIDED,
     UNDECIDED_QUICK,
     claims_document,
+    counts_table,
     judge_all,
     of_parts,
     of_quick,
+    verdict_table,
 )
 from polydem_post.targets import targets
 from synthetic_bench import Machine, input_of, truths, write_drums, write_hard_scenes, write_sample
@@ -191,6 +193,23 @@ def test_a_parallel_sweep_that_gains_on_drums_larger_than_the_papers_does_not_co
                          threads=2)
     found = {c.id: f for c, f in judge_all(read_bench([folder]))}["C5"]
     assert found.verdict == CONFIRMED and "100000 boxes, 2 threads" in found.ours
+
+
+def test_every_fine_grained_sweep_that_was_measured_has_a_verdict_of_its_own(tmp_path):
+    finders = as_the_paper_says()
+    for name, gain in (("odd_even_sweep", 0.1), ("mended_sweep", 1.5)):
+        finders[name] = replace(finders["partitioned_sweep"], gain=gain * finders["partitioned_sweep"].time / 50.0)
+    write_drums(tmp_path, finders, sizes=SIZES, repeats=3)
+    judged = judge_all(read_bench([tmp_path]))
+    rows = {row[0]: row for row in verdict_table(judged).rows}
+    assert rows["C5"][3:5] == ("by part", IN_PART)
+    found = {rows[f"C5{letter}"][1].split("(")[-1].rstrip(")"): rows[f"C5{letter}"][4] for letter in "abc"}
+    assert found == {"partitioned_sweep": CONFIRMED, "odd_even_sweep": CONFIRMED, "mended_sweep": CONTRADICTED}
+    assert "C5e" in rows and "C5f" not in rows and "C2a" not in rows
+    counts = {row[0]: row[2].split(", ") for row in counts_table(judged).rows}
+    assert "C5c" in counts["parts contradicted"] and "C5" in counts[IN_PART]
+    quick = {row[0]: row[4] for row in verdict_table(of_quick(judged)).rows}
+    assert all(verdict != "undecided" for verdict in quick.values()) and quick["C5c"] == CONTRADICTED
 
 
 @pytest.mark.parametrize("deeper, steps, verdict", [(0, 1, CONFIRMED), (2, 1, IN_PART), (0, 0, IN_PART),

@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from polydem_post.bench import read_bench
 from polydem_post.fine_grained import MOVE_COST, PARTITIONED, SEARCH_COST, Waiting, contests, not_negative
+from polydem_post.fine_grained_figures import fine_grained_drawings, scenes_of, what_fails
 from polydem_post.fine_grained_tables import agreement, error_told, fine_grained_tables, span_of_error
+from polydem_post.series import SWEEP as PLAIN
 from polydem_post.series import TREE
-from polydem_post.sweep_parts import Exchanges, exchanges_down, exchanges_of, exchanges_up_to
+from polydem_post.sweep_parts import Exchanges, exchanges_down, exchanges_of, exchanges_up_to, way_of
 from synthetic_bench import Truth, write_sample
 
 BOXES = 10000
@@ -264,3 +266,92 @@ def test_least_squares_without_negative_numbers():
     assert not_negative(rows, rows @ [4.0, -1.0]) == pytest.approx([3.0, 0.0])
     assert not_negative(rows, -np.ones(3)) == pytest.approx([0.0, 0.0])
     assert not_negative(np.ones((1, 2)), np.ones(1)) == pytest.approx([1.0, 0.0])
+
+
+# --- What fails -------------------------------------------------------------------------------------------------------
+
+#: Finder -> how many times as fast as one thread of the plain sweep it is on 2 threads
+GAINS = {"odd_even_sweep": 0.25, "locked_sweep": 0.8, "mended_sweep": 1.0, PARTITIONED: 1.6, PLAIN: 1.3, TREE: 0.9}
+
+
+@pytest.fixture(scope="module")
+def fails(tmp_path_factory):
+    """Rows that move little and much, on 1 and 2 threads, with given gains; those of mended_sweep differ."""
+    folder = tmp_path_factory.mktemp("fails")
+    for name, movers, change in (("row_much", 16, 1.3), ("row_little", 4, 0.7)):
+        (folder / "traces" / name).mkdir(parents=True)
+        with h5py.File(folder / "traces" / name / "trace.h5", "w") as file:
+            file["aabb"] = row_of(movers)
+            file["is_wall"] = np.arange(ROW) >= ROW // 2
+        for finder, gain in GAINS.items():
+            gain *= change if finder == "mended_sweep" else 1.0
+            counts = {"passes": 9.0 / ROW, "locks": 3.0 / ROW, "lock_waits": 2.0 / ROW}
+            truth = Truth(50.0, 1.0, gain=gain, counts=counts)
+            for n in (1, 2):
+                for repeat in range(4):
+                    write_sample(folder, name, finder, truth, ROW, repeat=repeat, threads=n, noise=0.001)
+    return read_bench([folder])
+
+
+def test_gains_barriers_and_locks_of_every_parallel_sweep_stand_in_a_table(fails):
+    (table,) = [each for each in fine_grained_tables(fails) if each.name == "fine_grained_gains"]
+    rows = [dict(zip(table.heading, row)) for row in table.rows]
+    assert len(rows) == 2 * 2 * len(GAINS)
+    for row in rows:
+        if row["threads"] == "2" and row["finder"] != "mended_sweep":
+            assert float(row["times as fast"].split()[0]) == pytest.approx(GAINS[row["finder"]], rel=0.01)
+        barriers = {PLAIN: 0.0, TREE: 3.0}.get(row["finder"], 9.0)
+        assert float(row["barriers per step"]) == (barriers if row["threads"] == "2" else 0.0)
+        locks = "-" if row["finder"] in (PARTITIONED, PLAIN, TREE) else "3.00"
+        assert row["locks per step"] == locks
+
+
+def test_the_way_of_free_boxes_follows_from_the_trace(fails):
+    for case in fails.select(finder=PLAIN, threads=1):
+        movers = 16 if case.scene == "row_much" else 4
+        # Of the free half of the row so many boxes move by one place in a step; their mean side is half a place
+        assert way_of(case) == pytest.approx(movers / (ROW // 2) / 0.5)
+
+
+def test_the_title_of_the_figure_says_what_fails_and_what_works(fails):
+    (drawing,) = [each for each in fine_grained_drawings(fails) if each.name == "fine_grained"]
+    title = drawing.figure.get_suptitle().splitlines()
+    assert [line.split(":")[0] for line in title] == ["Fails", "Fails", "Works", "Loses or gains"]
+    assert "single ends" in title[0] and "0.25 to 0.25 times as fast" in title[0] and "blocks, changes kept" in title[2]
+    above = [axis for axis in drawing.figure.axes if axis.get_title().startswith("row_")]
+    assert [axis.get_title().split(":")[0] for axis in above] == ["row_little", "row_much"]
+    assert "25 % of their side per step" in above[0].get_title()
+    for axis in above:
+        assert axis.get_ylim()[0] < 0.25 and axis.get_ylim()[1] > 1.6
+    (ratio,) = [axis for axis in drawing.figure.axes if axis.get_ylabel() == "sweep / tree"]
+    assert ratio.get_ylim()[0] == 0.0 and ratio.get_ylim()[1] > 1.0
+    assert max(max(line.get_xdata()) for line in ratio.lines if "other machine" in line.get_label()) == 16
+
+
+def test_the_figure_shows_the_size_with_most_motions_and_needs_no_tree(fails):
+    (table,) = [each for each in fine_grained_tables(fails) if each.name == "fine_grained_gains"]
+    rows = [dict(zip(table.heading, row)) for row in table.rows]
+    drum = {**rows[0], "boxes": "12651", "way per step over side of a box": "-"}
+    other = [{**drum, "scene": f"drum_{k}"} for k in range(3)]
+    assert scenes_of(rows + other) == ["drum_0", "drum_1", "drum_2"]
+    assert scenes_of(rows + other[:1]) == ["row_little", "row_much"]
+    assert "above 1 the sweep loses" in what_fails(table).caption
+
+
+def test_times_of_several_threads_on_a_machine_with_more_to_do_than_processors_are_left_out(tmp_path):
+    truth = Truth(50.0, 1.0, gain=2.0, counts={"passes": 7.0 / ROW})
+    for finder, time in ((PLAIN, 50.0), ("odd_even_sweep", 100.0)):
+        for n in (1, 2):
+            for repeat in range(3):
+                write_sample(tmp_path, "row", finder, replace(truth, time=time), ROW, repeat=repeat, threads=n)
+    bench = read_bench([tmp_path])
+    for case in bench.cases:
+        assert not case.is_disturbed
+        for sample in case.samples:
+            sample.case["load"] = 4.5  # of 4 processors
+        assert case.is_disturbed
+    (table,) = fine_grained_tables(bench)
+    rows = {(row[3], row[4]): dict(zip(table.heading, row)) for row in table.rows}
+    assert float(rows["odd_even_sweep", "1"]["times as fast"].split()[0]) == pytest.approx(0.5, rel=0.05)
+    assert rows["odd_even_sweep", "2"]["times as fast"] == "-" != rows["odd_even_sweep", "2"]["barriers per step"]
+    assert "7.0 to 7.0 barriers per step" in what_fails(table).figure.get_suptitle()

@@ -7,6 +7,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from polydem_post.comparison_publish import TITLE, answers
+from polydem_post.emit import Table
+from polydem_post.fine_grained_figures import sixteen
 from published_numbers import REVISION, disagreements, rows_of
 
 ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])
@@ -87,6 +90,41 @@ def test_a_page_that_its_tables_contradict_is_found(tmp_path, name, old, new):
     assert old in text
     path.write_text(text.replace(old, new, 1), encoding="utf-8")
     assert disagreements(tmp_path / "verdicts") != []
+
+
+def test_the_page_of_verdicts_begins_with_the_answers_that_follow_from_its_tables():
+    tables = []
+    for name in ("claims", "verdicts", "scenes"):
+        rows = rows_of(VERDICTS / "tables" / f"{name}.csv")
+        tables.append(Table(name, "", tuple(rows[0]), [tuple(row.values()) for row in rows]))
+    found = answers(tables)
+    page = (VERDICTS / "README.md").read_text(encoding="utf-8")
+    assert page.splitlines()[: 2 + len(found)] == [TITLE, "", *found] and len(found) <= 8
+    assert found[0].startswith("* **Which finder**: `two_level`")
+    after = page.splitlines()[3 + len(found):]
+    assert after[0] == "![finders_over_size](finders_over_size.png)" and after[4].startswith("| claim |")
+
+
+def test_claims_of_several_parts_follow_from_the_verdicts_on_them():
+    rows = rows_of(VERDICTS / "tables" / "claims.csv")
+    for row in rows:
+        parts = [part["verdict"] for part in rows if re.fullmatch(row["claim"] + "[a-z]", part["claim"])]
+        if parts:
+            assert row["ours"] == "by part"
+            both = {"confirmed", "contradicted"} <= set(parts)
+            one = parts[0] if len(set(parts)) == 1 else "undecided"
+            assert row["verdict"] == ("confirmed in part" if both else one), row["claim"]
+    assert sum(len(row["claim"]) > 3 or row["claim"][-1].isalpha() for row in rows) >= 25
+
+
+def test_times_on_sixteen_threads_are_those_of_the_page_that_they_name():
+    text = (ROOT / "inputs" / "performance.md").read_text(encoding="utf-8")
+    assert len(sixteen()) == 20
+    for boxes in ("12 651", "100 000"):
+        for finder in ("quadtree", "partitioned_sweep"):
+            drum = (boxes.replace(" ", ""), finder)
+            times = [row["ns"] for row in sixteen() if (row["boxes"], row["finder"]) == drum]
+            assert f"| {boxes}, `{finder}` | {' | '.join(times)} |" in text
 
 
 def test_the_exponents_in_the_text_on_performance_are_those_of_the_published_table():

@@ -96,6 +96,12 @@ class Case:
         """Number of boxes."""
         return int(self.facts["boxes"])
 
+    @property
+    def is_disturbed(self) -> bool:
+        """Whether the machine had more to do than it has processors: times of several threads then mean nothing."""
+        loads = [float(sample.case["load"]) for sample in self.samples if "load" in sample.case]
+        return bool(loads) and float(np.median(loads)) > int(self.provenance.get("processors", len(loads)))
+
     def values(self, quantity) -> dict:
         """(folder, repeat) -> value of a quantity of a sample, without the warm-up and without what is not finite."""
         pairs = {(str(s.path.parent), s.repeat): quantity(s) for s in self.samples if s.repeat >= 1}

@@ -6,7 +6,7 @@ import numpy as np
 
 from . import paper, series
 from .bench import Bench
-from .claims import NOT_TESTABLE, Finding, Missing, claim, needed, of_parts, said
+from .claims import NOT_TESTABLE, Finding, Missing, Part, claim, in_parts, needed, of_parts, said
 from .series import OTHERS, SWEEP, TREE
 from .statistics import every, median, number, of_one_bench, some, typical
 
@@ -112,18 +112,24 @@ def kinds(bench: Bench) -> Finding:
         ratio[of_kind] = series.pooled_ratio(both)
     worse, soft = _others_win(here, "soft")
     bed, gas, drum = ratio["bed"], ratio["gas"], ratio["drum"]
-    parts = [bed.above_that(drum), drum.above_that(gas), *worse.values()]
-    ours = f"tree / sweep: drum {drum.text()}, bed {bed.text()}, gas {gas.text()}; {soft}"
-    told = said(bed=parts[0], gas=parts[1], overlaps_tree=parts[2], overlaps_sweep=parts[3])
-    return Finding(of_parts(parts), ours, f"As said: {told}.")
+    parts = [
+        Part("beds shrink the edge of the tree", bed.above_that(drum),
+             f"tree / sweep: drum {drum.text()}, bed {bed.text()}"),
+        Part("gases widen it", drum.above_that(gas), f"tree / sweep: drum {drum.text()}, gas {gas.text()}"),
+        Part("strong overlaps do not suit the tree", worse[TREE], soft[TREE]),
+        Part("strong overlaps do not suit the sweep", worse[SWEEP], soft[SWEEP]),
+    ]
+    bed_holds, gas_holds, tree, sweep = (part.holds for part in parts)
+    told = said(bed=bed_holds, gas=gas_holds, overlaps_tree=tree, overlaps_sweep=sweep)
+    return in_parts(parts, f"As said: {told}.")
 
 
 def _others_win(bench: Bench, of_kind: str) -> tuple:
-    """Finder of the paper -> whether another one beats it on every scene of a kind; and the numbers of the best."""
+    """Finder of the paper -> whether another one beats it on every scene of a kind; and its times over the best."""
     cases = series.cases_of(bench, of_kind, threads=1, mode="replay")
     what = f"./polydem bench on {WHAT_TO_RUN[of_kind]}, finders 'quadtree', 'sort_and_sweep', 'linked_cells'"
     won: dict = {TREE: [], SWEEP: []}
-    found = []
+    found: dict = {TREE: [], SWEEP: []}
     for scene in dict.fromkeys(case.scene for case in needed(cases, what)):
         here = {case.finder: case for case in cases if case.scene == scene and case.time()}
         others = [here[name] for name in OTHERS if name in here]
@@ -132,9 +138,10 @@ def _others_win(bench: Bench, of_kind: str) -> tuple:
         best = min(others, key=_middle)
         for name, parts in won.items():
             parts.append(some(series.ratio(here[name], other).above(1.0) for other in others))
-        ratios = ", ".join(f"{name} {series.ratio(here[name], best).text()}" for name in won)
-        found.append(f"{scene}, over {best.finder}: {ratios}")
-    return {name: every(parts) for name, parts in won.items()}, "; ".join(found)
+        for name, told in found.items():
+            told.append(f"{scene}: over {best.finder} {series.ratio(here[name], best).text()}")
+    return ({name: every(parts) for name, parts in won.items()},
+            {name: f"{name}, {'; '.join(told)}" for name, told in found.items()})
 
 
 def _middle(case) -> float:
@@ -177,4 +184,6 @@ def week(bench: Bench) -> Finding:
 )
 def long_range(bench: Bench) -> Finding:
     worse, found = _others_win(bench.on(), "range")
-    return Finding(of_parts(list(worse.values())), found, f"As said: {said(tree=worse[TREE], sweep=worse[SWEEP])}.")
+    parts = [Part("the tree does not pay", worse[TREE], found[TREE]),
+             Part("the sweep does not pay", worse[SWEEP], found[SWEEP])]
+    return in_parts(parts, f"As said: {said(tree=worse[TREE], sweep=worse[SWEEP])}.")

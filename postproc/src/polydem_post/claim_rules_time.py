@@ -7,7 +7,7 @@ import numpy as np
 from . import paper, series
 from .bench import Bench
 from .cache import read_records
-from .claims import NOT_TESTABLE, Elsewhere, Finding, Missing, claim, needed, of_parts, word
+from .claims import NOT_TESTABLE, Elsewhere, Finding, Missing, Part, claim, in_parts, needed, of_parts, word
 from .paper_tables import clock_of
 from .series import SWEEP, TREE
 from .statistics import median, number, of_one_bench, pooled, ratio_of_means, ratio_of_medians, some
@@ -44,23 +44,22 @@ def _pairs(bench: Bench, upper: str = TREE, lower: str = SWEEP, mode: str = "rep
     "figure_09_total, finders_over_size, local_exponents, slopes",
 )
 def linear(bench: Bench) -> Finding:
-    found, parts, reasons = [], [], []
-    for finder in (SWEEP, TREE):
+    parts, reasons = [], []
+    for finder, name in ((SWEEP, "sweep"), (TREE, "tree")):
         replayed, whole = _series(bench, finder), series.whole_steps(bench.on(), finder)
         law = needed(series.law_of_paper(whole or replayed), DRUMS + f"'{finder}', sizes between those of the paper")
-        parts.append(law.exponent.within(0.95, 1.05))
         told = [f"{finder} {law.exponent.text()}"]
         without, beyond = series.law_of_paper(replayed), series.law_beyond(replayed)
         if whole and without:
             told.append(f"without the boxes {without.exponent.text()}")
         if beyond:
             told.append(f"{beyond.sizes[0]:.0f} to {beyond.sizes[-1]:.0f} boxes {beyond.exponent.text()}")
-        found.append(", ".join(told))
-        if parts[-1] is not True:
+        parts.append(Part(f"the {name} is O(N)", law.exponent.within(0.95, 1.05), ", ".join(told)))
+        if parts[-1].holds is not True:
             reasons.append(_growth_of_work(bench, finder))
     if reasons:
         reasons.insert(0, GROWTH)
-    return Finding(of_parts(parts), "; ".join(found), " ".join(reasons))
+    return in_parts(parts, " ".join(reasons))
 
 
 #: Why times of a drum grow faster than its size
@@ -112,20 +111,17 @@ def total_ratio(bench: Bench) -> Finding:
 def update_ratio(bench: Bench) -> Finding:
     both = needed([pair for pair in _pairs(bench) if all(map(series.structure_time, pair))], DRUMS + "with phases")
     ratio = series.pooled_ratio(both, series.structure_time)
-    parts, slopes = [ratio.within(0.05, 0.2)], []
-    for finder in (SWEEP, TREE):
+    parts = [Part("the tree takes 0.1 of the time of the sweep", ratio.within(0.05, 0.2), ratio.text())]
+    for finder, name in ((SWEEP, "sweep"), (TREE, "tree")):
         law = series.law_of_paper(_series(bench, finder), series.structure_time)
         whole = _law(bench, finder, series.structure_time)
         if law is None:
             raise Missing(DRUMS + f"'{finder}', sizes between those of the paper")
-        slopes.append(f"{finder} {law.exponent.text()} (all sizes {whole.exponent.text()})")
         said = paper.UPDATE_SLOPE[finder]
-        parts.append(law.exponent.within(said - 0.1, said + 0.1))
-    return Finding(
-        of_parts(parts),
-        f"{ratio.text()}; slopes: {'; '.join(slopes)}",
-        f"As said: ratio {word(parts[0])}, slope of the sweep {word(parts[1])}, of the tree {word(parts[2])}.",
-    )
+        parts.append(Part(f"slope of the {name} {said:g}", law.exponent.within(said - 0.1, said + 0.1),
+                          f"{law.exponent.text()} (all sizes {whole.exponent.text()})"))
+    told = [word(part.holds) for part in parts]
+    return in_parts(parts, f"As said: ratio {told[0]}, slope of the sweep {told[1]}, of the tree {told[2]}.")
 
 
 @claim(
@@ -162,15 +158,15 @@ def inlining(bench: Bench) -> Finding:
     large = series.pooled_ratio([pair for pair in both if pair[0].boxes > paper.INLINING_HELPS_BEYOND])
     if not small or not large:
         raise Missing(DRUMS + "'quadtree', 'quadtree_called' with sizes below 5000 and beyond 10000")
-    parts = [small.at_least(0.97), large.below(1.0)]
+    parts = [Part("below 5000 boxes it brings nothing, or harm", small.at_least(0.97), small.text()),
+             Part("beyond 10000 boxes it helps", large.below(1.0), large.text())]
+    told = [word(part.holds) for part in parts]
     slopes = [series.law_of_paper(_series(bench, finder)) for finder in (TREE, "quadtree_called")]
     fitted = "; ".join(f"slope {law.exponent.text()} ({name})" for law, name in zip(slopes, ("inlined", "not")) if law)
     ratios = ", ".join(f"{a.boxes}: {series.ratio(a, b).text()}" for a, b in both)
-    return Finding(
-        of_parts(parts),
-        f"below 5000 boxes {small.text()}, beyond 10000 {large.text()}; {fitted}",
-        f"As said: no gain below 5000 {word(parts[0])}, gain beyond 10000 {word(parts[1])}. By size: {ratios}.",
-    )
+    return in_parts(
+        parts, f"As said: no gain below 5000 {told[0]}, gain beyond 10000 {told[1]}. {fitted[:1].upper()}{fitted[1:]}. "
+        f"By size: {ratios}.")
 
 
 @claim(
@@ -274,12 +270,11 @@ def _time_per_test(case) -> dict:
     "times",
 )
 def optimisation(bench: Bench) -> Finding:
-    parts, found = [], []
-    for finder in (SWEEP, TREE):
+    parts = []
+    for finder, name in ((SWEEP, "sweep"), (TREE, "tree")):
         both = series.pairs_of(series.over_size(bench, finder), series.over_size(bench, f"{finder}_o2"))
         needed(both, DRUMS + f"'{finder}' and '{finder}_o2'")
         mean = series.pooled_ratio(both)
-        parts.append(mean.within(0.9, 1.1))
-        found.append(f"{finder} {mean.text()}")
+        parts.append(Part(f"nothing for the {name}", mean.within(0.9, 1.1), mean.text()))
     reason = "-O3 over -O2 of the sources of the finder alone; the paper compares whole runs, of which this is a part."
-    return Finding(of_parts(parts), "; ".join(found), reason)
+    return in_parts(parts, reason)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from string import ascii_lowercase
 
 from .bench import Bench
 from .emit import Table
@@ -18,6 +19,12 @@ CONTRADICTED = "contradicted"
 UNDECIDED = "undecided"
 NOT_TESTABLE = "not testable here"
 NOT_MEASURED = "not measured"
+
+#: Stands for our value of a claim whose parts have values of their own
+PARTS_BELOW = "by part"
+
+#: Begins the verdict in the table that counts verdicts on parts
+OF_PARTS = "parts "
 
 #: Undecided by the quick comparison; the full one measures more
 UNDECIDED_QUICK = "undecided (quick)"
@@ -32,6 +39,25 @@ class Elsewhere(Missing):
 
 
 @dataclass(frozen=True)
+class Part:
+    """What a rule found of one part of a claim."""
+
+    #: What the paper says
+    says: str
+    #: Whether that holds; None: undecided
+    holds: bool | None
+    #: Our value with its interval
+    ours: str
+    #: The verdict if it is undecided
+    left_open: str = UNDECIDED
+
+    @property
+    def verdict(self) -> str:
+        """The verdict on this part."""
+        return self.left_open if self.holds is None else CONFIRMED if self.holds else CONTRADICTED
+
+
+@dataclass(frozen=True)
 class Finding:
     """What a rule found."""
 
@@ -42,6 +68,8 @@ class Finding:
     reason: str = ""
     #: Whether more samples on this machine could decide it, if it is undecided or not measured
     open_here: bool = True
+    #: What it found of each part of the claim, if it has several
+    parts: tuple[Part, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -94,6 +122,13 @@ def of_parts(parts: list) -> str:
     return CONFIRMED if all(parts) else CONTRADICTED
 
 
+def in_parts(parts: list[Part], reason: str = "", more: str = "") -> Finding:
+    """What a rule found of a claim of several parts; `more` stands behind our values of the parts."""
+    values = list(dict.fromkeys(part.ours for part in parts))
+    return Finding(of_parts([part.holds for part in parts]), "; ".join([*values, *filter(None, [more])]), reason,
+                   parts=tuple(parts))
+
+
 def word(part: bool | None) -> str:
     """yes, no or undecided."""
     return "undecided" if part is None else "yes" if part else "no"
@@ -119,10 +154,13 @@ def judge_all(bench: Bench) -> list:
 
 
 def verdict_table(judged: list) -> Table:
-    """The verdicts as a table."""
+    """The verdicts as a table: of each claim, and below it of each of its parts."""
     table = Table("claims", "Claims of the paper", ("claim", "says", "paper", "ours", "verdict", "look at"), texts=6)
     for each, finding in judged:
-        table.add(each.id, each.text, each.paper, finding.ours, finding.verdict, each.where)
+        table.add(each.id, each.text, each.paper, PARTS_BELOW if finding.parts else finding.ours, finding.verdict,
+                  each.where)
+        for letter, part in zip(ascii_lowercase, finding.parts):
+            table.add(each.id + letter, part.says, "-", part.ours, part.verdict, "-")
     return table
 
 
@@ -135,22 +173,26 @@ def reasons_table(judged: list) -> Table:
 
 
 def counts_table(judged: list) -> Table:
-    """How many claims have each verdict."""
+    """How many claims have each verdict, and how many parts of claims."""
     table = Table("verdicts", "Claims by verdict", ("verdict", "number", "claims"), texts=1)
-    for verdict in dict.fromkeys(finding.verdict for _, finding in judged):
-        named = [each.id for each, finding in judged if finding.verdict == verdict]
-        table.add(verdict, len(named), ", ".join(named))
+    claims = [(each.id, finding.verdict) for each, finding in judged]
+    parts = [(each.id + letter, part.verdict) for each, finding in judged
+             for letter, part in zip(ascii_lowercase, finding.parts)]
+    for what, found in (("", claims), (OF_PARTS, parts)):
+        for verdict in dict.fromkeys(verdict for _, verdict in found):
+            named = [name for name, each in found if each == verdict]
+            table.add(what + verdict, len(named), ", ".join(named))
     return table
 
 
 def of_quick(judged: list) -> list:
     """The same verdicts where few repeats were taken: what they leave open is undecided for now."""
-    left_open = (UNDECIDED, NOT_MEASURED)
-    return [
-        (each, replace(finding, verdict=UNDECIDED_QUICK) if finding.open_here and finding.verdict in left_open
-         else finding)
-        for each, finding in judged
-    ]
+    left_open, quick = (UNDECIDED, NOT_MEASURED), []
+    for each, finding in judged:
+        parts = tuple(replace(part, left_open=UNDECIDED_QUICK) for part in finding.parts)
+        is_open = finding.open_here and finding.verdict in left_open
+        quick.append((each, replace(finding, verdict=UNDECIDED_QUICK if is_open else finding.verdict, parts=parts)))
+    return quick
 
 
 def _left_out(bench: Bench) -> str:

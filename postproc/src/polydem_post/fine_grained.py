@@ -37,6 +37,16 @@ from .sweep_parts import Exchanges, exchanges_of
 #: The sweep that all threads sort together
 PARTITIONED = "partitioned_sweep"
 
+#: How it sorts, for readers
+BLOCKS = "blocks, changes kept by each thread"
+
+#: Sweeps as one would first write them (`src/bench/obvious_sweeps.f90`) -> how they sort
+OBVIOUS = {
+    "odd_even_sweep": "single ends, a barrier per pass",
+    "locked_sweep": "blocks, a lock on the shared list",
+    "mended_sweep": "blocks, one thread repairs the borders",
+}
+
 #: Finder -> phases whose work threads share
 SHARED = {PARTITIONED: ("structure",), TREE: ("structure", "search", "filter")}
 

@@ -4,19 +4,68 @@ from __future__ import annotations
 
 import numpy as np
 
-from .bench import Bench
+from . import series
+from .bench import Bench, Case
 from .emit import Table
-from .fine_grained import FETCHED, MOST_THREADS, PARTITIONED, Contest, contests, waiting_of
-from .series import TREE
-from .statistics import Estimate, number
+from .fine_grained import FETCHED, MOST_THREADS, OBVIOUS, PARTITIONED, TREE_BARRIERS, Contest, contests, waiting_of
+from .series import SWEEP, TREE
+from .statistics import Estimate, median, number, of_one_bench
+from .sweep_parts import way_of
 
 
 def fine_grained_tables(bench: Bench) -> list[Table]:
-    """The model beside the measurement, and where the sweep loses."""
-    found = contests(bench)
-    if not found:
-        return []
-    return [times_table(found), limits_table(found), error_table(found), waiting_table(bench)]
+    """The model beside the measurement, where the sweep loses, and what threads gain."""
+    found, gains = contests(bench), gains_table(bench)
+    tables = [times_table(found), limits_table(found), error_table(found), waiting_table(bench)] if found else []
+    return [*tables, *([gains] if gains.rows else [])]
+
+
+def gains_table(bench: Bench) -> Table:
+    """All parallel sweeps and the tree against the plain sweep on one thread, and what they waited for."""
+    table = Table(
+        "fine_grained_gains", "Parallel sweeps and the tree against one thread of sort_and_sweep",
+        ("scene", "boxes", "way per step over side of a box", "finder", "threads", "processors", "time per box [ns]",
+         "times as fast", "barriers per step", "locks per step", "waits for the lock per step", "waiting [%]"),
+    )
+    fine_grained = (PARTITIONED, *OBVIOUS)
+    cases = [case for case in bench.select(mode="replay") if series.elapsed_time(case)]
+    threaded = {case.scene for case in cases if case.finder in fine_grained and case.threads > 1}
+    plain = {case.scene: case for case in cases if case.finder == SWEEP and case.threads == 1}
+    for case in cases:
+        if case.scene not in threaded & set(plain) or case.finder not in (*fine_grained, SWEEP, TREE):
+            continue
+        counts = [case.count(name) if case.finder in OBVIOUS else np.nan for name in ("locks", "lock_waits")]
+        time = series.total_time if case.threads == 1 else series.elapsed_time
+        timed = ["-"] * 3
+        if case.threads == 1 or not case.is_disturbed:
+            timed = [median(of_one_bench(time(case))).text(), series.ratio(plain[case.scene], case, time).text(),
+                     number(100.0 * waiting_share(case))]
+        table.add(
+            case.scene, case.boxes, number(way_of(case)), case.finder, case.threads,
+            case.provenance.get("processors", "-"), *timed[:2], number(barriers_of(case)),
+            *(number(count) for count in counts), timed[2],
+        )
+    table.note = (
+        "Medians [95 % interval]; one thread: processor time, more: elapsed time, and '-' if the machine had more to "
+        "do than it has processors. Way: mean displacement of the centres of free boxes in a step over "
+        "their mean side, from the trace. Barriers, locks and waits for a lock that another thread held are counted. "
+        "Waiting: part of the time of the finder in which a thread does not work, mean of the threads."
+    )
+    return table
+
+
+def barriers_of(case: Case) -> float:
+    """Barriers in a step of a finder with several threads: one after each pass of a fine-grained sweep."""
+    if case.threads == 1 or case.finder == SWEEP:
+        return 0.0
+    return float(TREE_BARRIERS) if case.finder == TREE else case.count("passes")
+
+
+def waiting_share(case: Case) -> float:
+    """Part of the time of a finder in which its threads wait for one another; NaN if it was not recorded."""
+    waiting = case.phase("waiting")
+    whole = case.phase("structure", "search", "filter", "order", "merge")
+    return median([waiting[key] / whole[key] for key in waiting if whole.get(key, 0.0) > 0.0]).value
 
 
 def _micro(seconds: float) -> str:

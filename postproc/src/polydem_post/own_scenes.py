@@ -23,7 +23,7 @@ NEEDED = {
     "speed_up": "a finder on several threads and on one",
     "cache_misses": "counts of ./polydem cache",
     "work_over_size": "counts of rotating drums, one thread",
-    "fine_grained": "quadtree and partitioned_sweep on one scene with one thread and with several",
+    "fine_grained": "sort_and_sweep on one thread and a fine-grained sweep on several, on one scene",
     "fine_grained_limits": "a scene on which partitioned_sweep loses to quadtree, measured or by the model",
     "own_over_size": "scenes that are no rotating drums, or samples that are not of a replay on one thread",
     "all_scenes": "samples of two steps or more",

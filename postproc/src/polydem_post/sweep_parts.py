@@ -93,6 +93,33 @@ def exchanges_of(case: Case, most_parts: int) -> Exchanges | None:
     return None
 
 
+def way_of(case: Case) -> float:
+    """How far free boxes move in a step, as a part of their side, in the mean; NaN without the trace of the scene."""
+    for trace in traces_of(case):
+        try:
+            return way_in(trace.resolve())
+        except UNREADABLE:
+            continue
+    return float("nan")
+
+
+@cache
+def way_in(trace: Path) -> float:
+    """Mean displacement of the centres of free boxes from step to step over the mean side of these boxes."""
+    with h5py.File(trace, "r") as file:
+        steps = len(file["aabb"])
+        free = np.ones(file["aabb"].shape[1], dtype=bool)
+        if "is_wall" in file:
+            free = np.asarray(file["is_wall"]) == 0
+        ways, sides = [], []
+        for step in np.unique(np.linspace(1, steps - 1, min(STEPS, steps - 1)).round().astype(int)):
+            before, after = (np.asarray(file["aabb"][k])[free] for k in (step - 1, step))
+            moved = 0.5 * (after[:, :2] + after[:, 2:] - before[:, :2] - before[:, 2:])
+            ways.append(np.hypot(*moved.T).mean())
+            sides.append((after[:, 2:] - after[:, :2]).mean())
+    return float(np.mean(ways) / np.mean(sides))
+
+
 def traces_of(case: Case) -> list[Path]:
     """Where the trace of a case may lie: in its bench, in a bench beside it, where its sample says."""
     bench, recorded = case.samples[0].path.parent.parent, Path(str(case.facts.get("trace", "")))
