@@ -13,8 +13,8 @@ call
 * all files that were there are as before, except those of a result that is continued or replaced;
 * a run can be continued, and ends with the hash of an undisturbed one; an old result is complete until then.
 
-Half of the data (--how short) must change nothing. By default a sample is tried, some calls of one verb after the
-other, until S seconds are over (10); it depends on the programs only. --full and the others are those of
+Half of the data (--how short) must change nothing. By default a sample is tried, some calls of --continue and of other
+verbs, until S seconds are over (15); it depends on the programs only. --full and the others are those of
 check_writes.py.
 """
 
@@ -37,7 +37,9 @@ from check_writes import SKIPPED, WAITING, Broken, Call, Memory, hash_of, in_ord
 
 ROOT = Path(__file__).resolve().parents[2]
 #: Calls of a verb in a sample
-SAMPLE = 10
+SAMPLE = 6
+#: When the test began [s]
+BEGAN = time.monotonic()
 #: Time within which a verb must have ended [s]
 PATIENCE = 300.0
 OUTLINES = "".join(f"POLYGON ((0 {y}, 0.01 {y}, 0.01 {y + 0.01:.2f}, 0 {y + 0.01:.2f}, 0 {y}))\n"
@@ -286,13 +288,20 @@ def try_calls(case, options, memory):
     part, parts = (int(word) for word in options.part.split("/"))
     if not options.full:
         random.Random(memory.key).shuffle(verbs)
-    all_calls, broken, outcomes, tried, began = Counter(), [], Counter(), Counter(), time.monotonic()
+        verbs.sort(key=lambda verb: verb != "continue")
+    all_calls, broken, outcomes, tried = Counter(), [], Counter(), Counter()
+
+    def is_over():
+        return not options.full and tried and time.monotonic() - BEGAN > options.seconds
+
     for verb in verbs:
-        if not options.full and time.monotonic() - began > options.seconds:
+        if is_over():
             break
         calls = [call for rank in range(options.ranks or 1) for call in case.count(verb, rank)]
         all_calls[verb] = len(calls)
         for call in in_order(calls, memory.key)[part - 1:None if options.full else SAMPLE:parts]:
+            if is_over():
+                break
             point = (options.ranks, options.how, options.error, verb, call.rank, call.number)
             tried[verb] += 1
             try:
@@ -318,7 +327,7 @@ def parse(words):
     parser.add_argument("--part", default="1/1")
     parser.add_argument("--how", choices=("once", "on", "short", "cut"), default="once")
     parser.add_argument("--error", type=int, default=5)
-    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--seconds", type=float, default=15.0)
     parser.add_argument("--memory", type=os.path.abspath)
     return parser.parse_args(words)
 
