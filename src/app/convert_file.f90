@@ -60,11 +60,11 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: ignored
 
-      if (exists(file//'.old')) then
+      if (exists(file//'.old', error)) then
          call raise(error, input_error, file//'.old exists already; remove it, or write to another file with -o OUT')
          return
       end if
-      call write_new(file//'.new', text, error)
+      if (.not. allocated(error)) call write_new(file//'.new', text, error)
       if (.not. allocated(error)) call rename_file(file, file//'.old', error)
       if (.not. allocated(error)) then
          call rename_file(file//'.new', file, error)
@@ -79,11 +79,11 @@ contains
       type(error_t), allocatable :: ignored
       type(line_writer_t) :: writer
 
-      if (exists(file)) then
+      if (exists(file, error)) then
          call raise(error, input_error, file//' exists already; remove it, or choose another file with -o OUT')
          return
       end if
-      call writer%open(file, error)
+      if (.not. allocated(error)) call writer%open(file, error)
       if (allocated(error)) return
       call writer%put(text)
       call writer%close(error)

@@ -6,7 +6,7 @@ module polydem_errors
    use polydem_kinds, only: lp
    implicit none
    private
-   public :: error_t, raise, run_error, input_error, io_error, stopped_early
+   public :: error_t, raise, raise_unread, run_error, input_error, io_error, stopped_early
 
    !> Exit code of a run that failed numerically or at run time
    integer, parameter :: run_error = 1
@@ -26,6 +26,8 @@ module polydem_errors
       !> Priority among ranks that fail in the same step: the error with the smallest place is reported. If the place is
       !> the global index of the body or pair, a parallel run reports the same error as a serial run.
       integer(lp) :: place = huge(0_lp)
+      !> Whether the system refused to read a file: nothing is known of its contents, which may be good
+      logical :: is_unread = .false.
    end type error_t
 
 contains
@@ -43,5 +45,18 @@ contains
       error%code = code
       error%message = message
    end subroutine raise
+
+   !> Report that the system refused to read a file. An error that is already allocated is kept.
+   pure subroutine raise_unread(error, path, cause)
+      type(error_t), allocatable, intent(inout) :: error
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Error message of the system
+      character(len=*), intent(in) :: cause
+
+      if (allocated(error)) return
+      call raise(error, io_error, path//': cannot be read: '//trim(cause))
+      error%is_unread = .true.
+   end subroutine raise_unread
 
 end module polydem_errors

@@ -93,9 +93,10 @@ contains
       character(len=:), allocatable :: path
 
       path = bench%folder//'/oracle/'//subject%case%scene//'.h5'
-      if (exists(path)) then
+      if (exists(path, error)) then
          call read_reference(path, subject%reference, error)
       else
+         if (allocated(error)) return
          call bench%log%show_line(subject%case%scene//': '//to_text(subject%case%boxes)//' boxes, '// &
             to_text(subject%case%steps)//' steps; comparing all pairs')
          call find_reference(subject, bench%settings%finders(1)%text, error)
@@ -120,11 +121,12 @@ contains
       call omp_set_num_threads(int(sample%case%threads))
       call collect(bench, provenance)
       path = sample_path(bench%folder//'/samples', sample%case)
-      if (exists(path)) then
+      if (exists(path, error)) then
          call check_sample(path, sample%case, provenance, error)
          bench%n_found = bench%n_found + 1
          return
       end if
+      if (allocated(error)) return
       if (sample%case%threads > 1_ip) call measure_waiting(sample%barrier_cost, sample%region_cost)
       call take_sample(subject, sample, error)
       call bench%lock%check(is_lost, error)

@@ -51,7 +51,7 @@ contains
       scene%path = trim(words(1))
       scene%name = ''
       if (present(name)) scene%name = name
-      if (.not. exists(scene%path)) then
+      if (.not. exists(scene%path, error)) then
          call raise(error, input_error, place//': there is no file '//quoted(scene%path))
          return
       end if
@@ -86,8 +86,7 @@ contains
       character(len=:), allocatable :: folder
 
       folder = result_folder(settings)
-      if (.not. exists(folder//'/'//profile_name)) call run_simulation(settings, &
-         holds_result(folder), error, attempt_t(is_brief=.true.))
+      if (.not. exists(folder//'/'//profile_name, error)) call begin_run(settings, error)
       if (.not. allocated(error)) call check_origin(folder//'/'//profile_name, settings, error)
       if (.not. allocated(error)) call check_end(folder//'/'//profile_name, error)
    end subroutine provide_result
@@ -100,10 +99,8 @@ contains
 
       if (scene%is_trace) return
       associate (settings => scene%settings)
-         if (.not. exists(scene%path)) call run_simulation(settings, holds_result(result_folder(settings)), error, &
-            attempt_t(is_brief=.true.))
-         if (allocated(error)) return
-         if (.not. exists(scene%path)) then
+         if (.not. exists(scene%path, error)) call begin_run(settings, error)
+         if (.not. exists(scene%path, error)) then
             call raise(error, input_error, quoted(scene%text)//': the run ended before its trace began; reduce '// &
                        'output.trace_start or increase integrate.duration')
             return
@@ -111,6 +108,17 @@ contains
          call check_origin(scene%path, settings, error)
       end associate
    end subroutine provide_trace
+
+   !> Run a namelist, and replace a result without an end.
+   subroutine begin_run(settings, error)
+      type(settings_t), intent(in) :: settings
+      type(error_t), allocatable, intent(inout) :: error
+      logical :: is_old
+
+      if (allocated(error)) return
+      is_old = holds_result(result_folder(settings), error)
+      if (.not. allocated(error)) call run_simulation(settings, is_old, error, attempt_t(is_brief=.true.))
+   end subroutine begin_run
 
    !> Check that an existing result has the same settings.
    subroutine check_origin(path, settings, error)

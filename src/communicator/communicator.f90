@@ -205,7 +205,7 @@ contains
       if (is_source) is_source = -error%place == values(1)
       values = [0_lp]
       if (is_source) then
-         values(1) = int(error%code, lp)
+         values(1) = 2_lp*int(error%code, lp) + merge(1_lp, 0_lp, error%is_unread)
          text = error%message
       end if
       call self%all_reduce_text(text)
@@ -214,7 +214,8 @@ contains
          if (error%message /= text) values(1) = 0_lp
       end if
       call self%all_reduce_max(values)
-      error%code = int(values(1))
+      error%code = int(values(1)/2_lp)
+      error%is_unread = modulo(values(1), 2_lp) == 1_lp
       error%message = text
    end subroutine all_reduce_error
 

@@ -1,6 +1,7 @@
 !> Reads a text file into one string.
 module polydem_text_file
-   use polydem_errors, only: error_t, input_error, io_error, raise
+   use polydem_errors, only: error_t, input_error, raise, raise_unread
+   use polydem_file_system, only: exists, is_folder, last_failure
    implicit none
    private
    public :: read_text_file
@@ -20,17 +21,15 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=256) :: reason
       integer :: bytes, status, unit
-      logical :: there
 
-      inquire (file=trim(file)//'/.', exist=there)
-      if (there .or. len_trim(file) == 0) then
+      if (is_folder(trim(file), error) .or. len_trim(file) == 0) &
          call raise(error, input_error, trim(file)//': is a folder, not a namelist file')
-         return
-      end if
-      inquire (file=trim(file), exist=there, size=bytes)
-      if (.not. there) then
-         call raise(error, input_error, trim(file)//': no such file')
-      else if (bytes < 0 .or. bytes > greatest_size) then
+      if (.not. exists(trim(file), error)) call raise(error, input_error, trim(file)//': no such file')
+      if (allocated(error)) return
+      inquire (file=trim(file), size=bytes)
+      if (bytes < 0) then
+         call raise_unread(error, trim(file), last_failure())
+      else if (bytes > greatest_size) then
          call raise(error, input_error, &
             trim(file)//': is not a namelist file (longer than 1 MiB, or not a regular file)')
       else if (bytes == 0) then
@@ -47,7 +46,7 @@ contains
          read (unit, iostat=status, iomsg=reason) text
          close (unit)
       end if
-      if (status /= 0) call raise(error, io_error, trim(file)//': cannot be read ('//trim(reason)//')')
+      if (status /= 0) call raise_unread(error, trim(file), reason)
    end subroutine read_text_file
 
 end module polydem_text_file

@@ -15,7 +15,7 @@ module polydem_hdf5_dataset
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_hyperslab, only: read_slab, slab_t, write_slab
    use polydem_hdf5_links, only: check_storage, disable_external_links, raise_external, is_external_link
-   use polydem_hdf5_location, only: check_status, dataset_location_t, reject
+   use polydem_hdf5_location, only: check_status, dataset_location_t, reject, system_error
    use polydem_kinds, only: dp, ip, lp
    use polydem_strings, only: to_text
    implicit none
@@ -70,8 +70,10 @@ contains
 
    !> Whether a name exists. Every group of the path is tested, as HDF5 requires. A name that leads to another file
    !> exists; an attempt to read it gives an error.
-   logical function has_link(location)
+   logical function has_link(location, error)
       type(dataset_location_t), intent(in) :: location
+      !> Allocated if the system refuses to read the file
+      type(error_t), allocatable, intent(inout) :: error
       integer :: k, status
 
       has_link = .false.
@@ -81,6 +83,10 @@ contains
          end if
          call h5lexists_f(location%file, location%name(:k - 1), has_link, status)
          if (status /= 0) has_link = .false.
+         if (status < 0) then
+            if (system_error() /= 0) call check_status(status, 'look for', location, error)
+            if (allocated(error)) return
+         end if
          if (.not. has_link) exit
       end do
       if (.not. has_link) has_link = is_external_link(location)
@@ -155,9 +161,11 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: dataset
       integer :: status
+      logical :: there
 
-      if (.not. has_link(location)) call create_growing(location, kind_in_file, rows%whole(:size(rows%whole) - 1), &
-                                                        error)
+      there = has_link(location, error)
+      if (allocated(error)) return
+      if (.not. there) call create_growing(location, kind_in_file, rows%whole(:size(rows%whole) - 1), error)
       if (allocated(error)) return
       call h5dopen_f(location%file, location%name, dataset, status)
       call check_status(status, 'open', location, error)
@@ -255,7 +263,7 @@ contains
       integer(hid_t) :: dataset, space
       integer :: n, status, ignored
 
-      if (.not. has_link(location)) then
+      if (.not. has_link(location, error)) then
          call raise(error, input_error, location%path//': the data set '//location%name//' is missing')
          return
       else if (is_external_link(location)) then

@@ -5,11 +5,11 @@ module polydem_hdf5_handle
       h5fflush_f, h5fis_hdf5_f, h5fopen_f, h5f_libver_v18_f, h5p_file_access_f, h5p_file_create_f, h5pclose_f, &
       h5pcreate_f, h5pset_istore_k_f, h5pset_libver_bounds_f, h5pset_link_phase_change_f, h5pset_userblock_f, hid_t, &
       hsize_t
-   use polydem_errors, only: error_t, input_error, io_error, raise
-   use polydem_file_system, only: check_access, disk_hint, exists, is_folder
+   use polydem_errors, only: error_t, input_error, io_error, raise, raise_unread
+   use polydem_file_system, only: check_access, disk_hint, errno_message, exists, is_folder
    use polydem_hdf5_access, only: enable_parallel_access, barrier, abort_all
    use polydem_hdf5_dataset, only: has_link, start_library
-   use polydem_hdf5_location, only: dataset_location_t
+   use polydem_hdf5_location, only: dataset_location_t, system_error
    use polydem_hdf5_shape_check, only: checked_shape
    use polydem_kinds, only: ip, lp
    implicit none
@@ -57,6 +57,8 @@ module polydem_hdf5_handle
       end function set_small_headers
    end interface
 
+   !> EAGAIN, ENOLCK, ENOSYS and EOPNOTSUPP of errno on Linux: another program has the lock, or there are no locks
+   integer(c_int), parameter :: no_locks(4) = [11_c_int, 37_c_int, 38_c_int, 95_c_int]
    !> Hint for messages about existing files that cannot be opened
    character(len=*), parameter :: locking_hint = &
       '; another program may be writing it; on a network file system try HDF5_USE_FILE_LOCKING=FALSE'
@@ -75,6 +77,7 @@ contains
       !> 2; 0 if absent
       integer(ip), intent(in), optional :: user_block
       integer(hid_t) :: properties, access
+      integer(c_int) :: cause
       integer :: status, ignored
 
       call start_library(error)
@@ -90,11 +93,20 @@ contains
       if (status >= 0) call h5pcreate_f(h5p_file_access_f, access, status)
       if (status >= 0) call h5pset_libver_bounds_f(access, h5f_libver_v18_f, h5f_libver_v18_f, status)
       if (status >= 0) call h5fcreate_f(path, h5f_acc_trunc_f, self%id, status, properties, access)
+      cause = 0_c_int
+      if (status < 0) cause = system_error()
+      ! As in `open_file`, HDF5 may not tell why.
+      if (status < 0 .and. cause == 0_c_int) then
+         call h5fcreate_f(path, h5f_acc_trunc_f, self%id, status, properties, access)
+         if (status < 0) cause = system_error()
+      end if
       call h5pclose_f(properties, ignored)
       call h5pclose_f(access, ignored)
       if (status >= 0) status = int(set_small_headers(int(self%id, c_int64_t), .true._c_bool))
       if (status >= 0) return
       self%id = -1_hid_t
+      if (cause /= 0_c_int .and. .not. any(cause == no_locks)) call raise(error, io_error, path// &
+         ': cannot be created: '//errno_message(cause)//disk_hint)
       call raise(error, io_error, path//': cannot be created; check that the folder exists, '// &
                  'that you may write there and that the disk is not full'//locking_hint)
    end subroutine create
@@ -132,23 +144,27 @@ contains
       character(len=*), intent(in) :: path
       type(error_t), allocatable, intent(inout) :: error
       logical :: is_hdf5
+      integer(c_int) :: cause
       integer :: status
 
-      if (.not. exists(path)) then
-         call raise(error, input_error, path//': there is no such file')
-         return
-      end if
-      if (is_folder(path)) then
-         call raise(error, input_error, path//': is a folder, not a file')
-         return
-      end if
-      call start_library(error)
+      if (.not. exists(path, error)) call raise(error, input_error, path//': there is no such file')
+      if (is_folder(path, error)) call raise(error, input_error, path//': is a folder, not a file')
+      if (.not. allocated(error)) call start_library(error)
       if (allocated(error)) return
       self%path = path
       self%together = .false.
       call h5fopen_f(path, h5f_acc_rdonly_f, self%id, status)
       if (status >= 0) return
+      cause = system_error()
+      ! HDF5 does not tell why it cannot look for a file, the first thing that it does.
+      if (cause == 0_c_int) call h5fopen_f(path, h5f_acc_rdonly_f, self%id, status)
+      if (status >= 0) return
+      if (cause == 0_c_int) cause = system_error()
       self%id = -1_hid_t
+      if (cause /= 0_c_int .and. .not. any(cause == no_locks)) then
+         call raise_unread(error, path, errno_message(cause))
+         return
+      end if
       call h5fis_hdf5_f(path, is_hdf5, status)
       if (status >= 0 .and. .not. is_hdf5) then
          call raise(error, io_error, path//': is not an HDF5 file')
@@ -215,12 +231,15 @@ contains
    end subroutine abandon
 
    !> Whether the file contains a group or data set of this name
-   logical function has(self, name)
+   logical function has(self, name, error)
       class(hdf5_handle_t), intent(in) :: self
       !> Name like /frames/position
       character(len=*), intent(in) :: name
+      !> Allocated if the file cannot be read; false if it is allocated before
+      type(error_t), allocatable, intent(inout) :: error
 
-      has = has_link(self%location_of(name))
+      has = .false.
+      if (.not. allocated(error)) has = has_link(self%location_of(name), error)
    end function has
 
    !> Read the shape of a data set in the order of h5py, with the slowest dimension first.

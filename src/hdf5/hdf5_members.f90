@@ -6,7 +6,7 @@ module polydem_hdf5_members
       h5lget_name_by_idx_f, h5oclose_f, h5oopen_f, hid_t, hsize_t, size_t
    use polydem_errors, only: error_t
    use polydem_hdf5_links, only: is_external_link
-   use polydem_hdf5_location, only: check_status, dataset_location_t
+   use polydem_hdf5_location, only: check_status, dataset_location_t, system_error
    implicit none
    private
    public :: count_names, read_name, is_dataset
@@ -59,15 +59,20 @@ contains
 
    !> Whether a name is that of a data set, not of a group, a type or a dangling link. The result is true for a name in
    !> another file; an attempt to read it gives an error
-   logical function is_dataset(location)
+   logical function is_dataset(location, error)
       type(dataset_location_t), intent(in) :: location
+      !> Allocated if the system refuses to read the file
+      type(error_t), allocatable, intent(inout) :: error
       integer(hid_t) :: object
       integer :: kind_of_object, status
 
       is_dataset = is_external_link(location)
       if (is_dataset) return
       call h5oopen_f(location%file, location%name, object, status)
-      if (status < 0) return
+      if (status < 0) then
+         if (system_error() /= 0) call check_status(status, 'open', location, error)
+         return
+      end if
       call h5iget_type_f(object, kind_of_object, status)
       if (status >= 0) is_dataset = kind_of_object == h5i_dataset_f
       call h5oclose_f(object, status)

@@ -4,7 +4,7 @@ module polydem_hdf5_shape_check
       h5tget_size_f, hid_t, hsize_t, size_t
    use polydem_errors, only: error_t
    use polydem_hdf5_dataset, only: dataset_shape
-   use polydem_hdf5_location, only: check_status, dataset_location_t, reject
+   use polydem_hdf5_location, only: check_status, dataset_location_t, reject, system_error
    use polydem_kinds, only: dp, lp
    use polydem_strings, only: join, to_text
    implicit none
@@ -38,7 +38,10 @@ contains
       if (allocated(error)) return
       ! HDF5 1.10 returns a failure if no bytes are stored.
       call h5dget_storage_size_f(dataset, stored, status)
-      if (status < 0) stored = 0_hsize_t
+      if (status < 0) then
+         stored = 0_hsize_t
+         if (system_error() /= 0) call check_status(status, 'read the size of', location, error)
+      end if
       ! The claimed number of stored bytes may be wrong too.
       call h5fget_filesize_f(location%file, file_size, status)
       if (status >= 0) stored = min(stored, file_size)

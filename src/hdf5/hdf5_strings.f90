@@ -202,6 +202,7 @@ contains
             ! The memory at `address` holds only one number.
             is_number = holds_one_number(attribute)
             if (is_number) call h5aread_f(attribute, kind_in_memory, buffer, status)
+            call check_status(status, "read the attribute '"//name//"' of", location, error)
             if (.not. is_number) call raise(error, input_error, location%path//": the attribute '"//name//"' of "// &
                                             location%name//' must be one number')
             call h5aclose_f(attribute, ignored)

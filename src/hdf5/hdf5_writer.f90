@@ -82,7 +82,8 @@ contains
       extent = int(max(0, shape(values)), hsize_t)
       n_dimensions = size(extent)
       is_new = .true.
-      if (present(rows) .or. present(part)) is_new = .not. self%has(name)
+      if (present(rows) .or. present(part)) is_new = .not. self%has(name, error)
+      if (allocated(error)) return
       if (present(rows)) then
          if (rows == one_row) extent = [extent, 1_hsize_t]
          location%expected_rows = self%expected(rows)

@@ -63,13 +63,16 @@ contains
       type(hdf5_file_t), intent(in) :: file
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: name
+      logical :: holds_values
       integer :: k, n
 
       call count_names(file%location_of('/'), n, error)
       do k = 1, n
          call read_name(file%location_of('/'), k, name, error)
          if (allocated(error)) return
-         if (any(known_names == name) .eqv. is_dataset(file%location_of(name))) cycle
+         holds_values = is_dataset(file%location_of(name), error)
+         if (allocated(error)) return
+         if (any(known_names == name) .eqv. holds_values) cycle
          if (any(known_names == name)) then
             call file%reject(name//' must be a data set, but is a group or a link', error)
          else
@@ -159,7 +162,7 @@ contains
       integer(lp) :: n_rows
 
       if (allocated(error)) return
-      if (.not. file%has(name)) return
+      if (.not. file%has(name, error)) return
       if (name == 'velocity') then
          call count_points(file, name, n_rows, error)
       else
@@ -196,7 +199,7 @@ contains
       integer(ip), allocatable :: order(:)
       integer(ip) :: k
 
-      if (.not. file%has('id')) then
+      if (.not. file%has('id', error)) then
          table%id = [(k, k=1_ip, table%n)]
          return
       end if

@@ -160,7 +160,7 @@ contains
       integer(ip) :: k
 
       if (allocated(error)) return
-      if (.not. file%has('velocity')) then
+      if (.not. file%has('velocity', error)) then
          velocity = spread([0.0_dp, 0.0_dp], 2, int(rows(2)))
          return
       end if
@@ -185,7 +185,7 @@ contains
       integer(ip) :: k, s
 
       if (allocated(error)) return
-      if (.not. file%has(name)) then
+      if (.not. file%has(name, error)) then
          values = spread(default, 1, int(rows(2)))
          return
       end if

@@ -127,7 +127,7 @@ contains
       self%path = path
       self%is_reading = .true.
       call choose_communicator(self%comm, comm)
-      if (self%comm%is_root()) call verify_checksum(path, problem)
+      if (self%comm%is_root()) call verify_checksum(path, problem, error)
       if (allocated(problem)) call raise(error, io_error, path//': is damaged: '//problem)
       call self%comm%all_reduce_error(error)
       if (.not. allocated(error)) then
@@ -227,8 +227,8 @@ contains
       if (self%has_failed()) return
       if (width == 1) call self%file%read(name, list, self%error, rows)
       if (width > 1) call self%file%read(name, table, self%error, rows)
-      if (width > 1 .and. .not. allocated(self%error)) list = reshape(table, [size(table)])
-      if (allocated(self%error)) list = spread(0.0_dp, 1, width*int(rows(2)))
+      if (self%has_failed()) return
+      if (width > 1) list = reshape(table, [size(table)])
       words = transfer(list, 0_lp, size(list))
       call receive_rows(self, name, width, transfer(values, 0_lp, size(values)), words)
       if (.not. allocated(self%error)) values = transfer(words, values, size(words))
@@ -251,13 +251,13 @@ contains
       call find_rows(self, name, int(width, lp), rows)
       if (self%has_failed()) return
       call self%file%read(name, list, self%error, rows)
-      if (allocated(self%error)) list = spread(0_lp, 1, int(rows(2)))
+      if (self%has_failed()) return
       call receive_rows(self, name, width, values, list)
       if (.not. allocated(self%error)) values = list
    end subroutine transfer_longs
 
    !> Send the rows that this rank has read to the ranks that need them, and check their number. Collective for rows
-   !> that are distributed, also after an error.
+   !> that are distributed.
    subroutine receive_rows(self, name, width, mine, words)
       class(checkpoint_file_t), intent(inout) :: self
       character(len=*), intent(in) :: name

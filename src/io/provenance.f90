@@ -207,15 +207,17 @@ contains
       end do
    end function is_irrelevant
 
-   !> Entry of the provenance of a file; empty if it cannot be read
-   function origin_of(path, entry) result(text)
+   !> Entry of the provenance of a file; empty after an error
+   function origin_of(path, entry, error) result(text)
       !> Path of an HDF5 file, and name of a data set in its group /provenance
       character(len=*), intent(in) :: path, entry
+      !> Allocated if the entry is missing or cannot be read
+      type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
       type(hdf5_file_t) :: file
-      type(error_t), allocatable :: error
 
       text = ''
+      if (allocated(error)) return
       call file%open(path, error)
       call file%read('/provenance/'//entry, text, error)
       call file%close(error)

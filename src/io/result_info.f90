@@ -54,11 +54,10 @@ contains
       type(log_t) :: log
 
       call log%open('', error)
-      if (.not. exists(path)) then
-         call raise(error, input_error, path//': no such file or folder')
-      else if (is_folder(path)) then
+      if (.not. exists(path, error)) call raise(error, input_error, path//': no such file or folder')
+      if (is_folder(path, error)) then
          call describe_folder(path, log, error)
-      else
+      else if (.not. allocated(error)) then
          call describe_file(path, log, error)
       end if
       call log%close(error)
@@ -72,19 +71,20 @@ contains
       integer(ip) :: number
       logical :: is_empty, has_summary
 
-      is_empty = .not. exists(path//'/'//profile_name)
-      has_summary = exists(segment_path(path, 1_ip))
+      is_empty = .not. exists(path//'/'//profile_name, error)
+      has_summary = exists(segment_path(path, 1_ip), error)
+      if (allocated(error)) return
       if (has_summary .or. .not. is_empty) call write_summary(path, log, error)
       if (allocated(error)) return
       if (.not. is_empty) call describe_file(path//'/'//profile_name, log, error)
       number = 1_ip
       do
-         if (allocated(error)) return
-         if (.not. exists(segment_path(path, number))) exit
+         if (.not. exists(segment_path(path, number), error)) exit
          call describe_file(segment_path(path, number), log, error)
+         if (allocated(error)) return
          number = number + 1_ip
       end do
-      if (exists(segment_path(path, number)//open_suffix)) then
+      if (exists(segment_path(path, number)//open_suffix, error)) then
          call describe_open_segment(path, segment_path(path, number)//open_suffix, log, error)
       else if (is_empty .and. number == 1_ip) then
          call raise(error, input_error, path//': this folder contains no result, neither profile.h5 nor a trajectory')
@@ -103,10 +103,12 @@ contains
       if (.not. allocated(unread)) then
          call file%close(error)
          if (.not. allocated(error)) call describe_file(path, log, error)
-      else if (exists(folder//'/'//lock_name)) then
+      else if (unread%is_unread) then
+         if (exists(path)) call move_alloc(unread, error)
+      else if (exists(folder//'/'//lock_name, error)) then
          call log%write_line(path)
          call log%write_line('   is being written by a run')
-      else if (exists(path)) then
+      else if (.not. allocated(error)) then
          call move_alloc(unread, error)
       end if
    end subroutine describe_open_segment
@@ -122,8 +124,8 @@ contains
       call file%open(path, error)
       if (allocated(error)) return
       call log%write_line(path)
-      is_profile = file%has('/state_hash')
-      call describe_origin(file, is_profile, log, error)
+      is_profile = file%has('/state_hash', error)
+      if (.not. allocated(error)) call describe_origin(file, is_profile, log, error)
       if (.not. allocated(error)) call describe_frames(file, log, error)
       if (.not. allocated(error)) call describe_checkpoint(path, file, log, error)
       if (.not. allocated(error) .and. is_profile) call describe_end(file, log, error)
@@ -141,7 +143,7 @@ contains
 
       do k = 1, size(facts)
          if (k > 2 .and. .not. is_profile) return
-         if (.not. file%has('/provenance/'//trim(facts(k)))) cycle
+         if (.not. file%has('/provenance/'//trim(facts(k)), error)) cycle
          call file%read('/provenance/'//trim(facts(k)), text, error)
          if (allocated(error)) return
          call log%write_line('   '//facts(k)//printable(text))
@@ -156,7 +158,7 @@ contains
       real(dp), allocatable :: times(:)
       integer(lp), allocatable :: shape(:)
 
-      if (.not. file%has('/frames/time')) return
+      if (.not. file%has('/frames/time', error)) return
       call file%read('/frames/time', times, error)
       call file%shape_of('/frames/position', shape, error)
       if (allocated(error)) return
@@ -175,11 +177,11 @@ contains
       integer(lp), allocatable :: step(:)
       character(len=:), allocatable :: problem
 
-      if (.not. file%has('/run/step')) return
+      if (.not. file%has('/run/step', error)) return
       call file%read('/run/step', step, error)
       if (allocated(error)) return
       call log%write_line('   checkpoint      of step '//to_text(step(1)))
-      call verify_checksum(path, problem)
+      call verify_checksum(path, problem, error)
       if (allocated(problem)) call raise(error, io_error, path//': is damaged: '//problem)
    end subroutine describe_checkpoint
 

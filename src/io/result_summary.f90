@@ -1,7 +1,7 @@
 !> Summary of a result folder in a few lines: scene, frames, time span, size, and how the run ended.
 module polydem_result_summary
-   use polydem_errors, only: error_t
-   use polydem_file_system, only: exists
+   use polydem_errors, only: error_t, raise_unread
+   use polydem_file_system, only: exists, last_failure
    use polydem_folder_lock, only: lock_path
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: dp, ip, lp, wp
@@ -37,9 +37,11 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(frames_t) :: frames
       character(len=:), allocatable :: state
+      integer(lp) :: size_of_all
 
       call read_frames(folder, frames, error)
       if (.not. allocated(error)) call read_state(folder, state, error)
+      if (.not. allocated(error)) call count_bytes(folder, size_of_all, error)
       if (allocated(error)) return
       call log%write_line(folder)
       if (frames%scene /= '') call log%write_line('   scene           '//printable(frames%scene))
@@ -50,7 +52,7 @@ contains
          call log%write_line('   time span       '//to_text(real(frames%first, wp))//' s to '// &
                              to_text(real(frames%last, wp))//' s')
       end if
-      call log%write_line('   size            '//size_text(folder))
+      call log%write_line('   size            '//to_text(size_of_all/1024_lp + 1_lp)//' KiB')
       call log%write_line('   state           '//printable(state))
    end subroutine write_summary
 
@@ -67,12 +69,12 @@ contains
 
       frames%scene = ''
       number = 1_ip
-      do while (exists(segment_path(folder, number)))
+      do while (exists(segment_path(folder, number), error))
          call file%open(segment_path(folder, number), error)
          call file%read('/frames/time', times, error)
          call file%shape_of('/bodies/id', shape, error)
          if (.not. allocated(error) .and. number == 1_ip) then
-            if (file%has('/provenance/resolved_input')) call file%read('/provenance/resolved_input', text, error)
+            if (file%has('/provenance/resolved_input', error)) call file%read('/provenance/resolved_input', text, error)
             if (allocated(text)) frames%scene = scene_of(text)
          end if
          call file%close(error)
@@ -96,16 +98,16 @@ contains
       character(len=:), allocatable :: hash
       integer(ip) :: k
 
-      if (exists(lock_path(folder))) then
+      if (exists(lock_path(folder), error)) then
          state = 'running, or killed: running.lock exists'
-      else if (exists(folder//'/'//profile_name)) then
+      else if (exists(folder//'/'//profile_name, error)) then
          call read_final_status(folder//'/'//profile_name, state, hash, error)
          return
       else
          state = 'not finished'
       end if
       do k = 1_ip, n_checkpoints
-         if (.not. exists(checkpoint_path(folder, k))) cycle
+         if (.not. exists(checkpoint_path(folder, k), error)) cycle
          state = state//'; a run with --continue resumes from the last checkpoint'
          return
       end do
@@ -127,38 +129,39 @@ contains
       if (length > 0) name = text(first:first + length - 1)
    end function scene_of
 
-   !> Size of all files of a result
-   function size_text(folder) result(text)
+   !> Size of all files of a result [B]
+   subroutine count_bytes(folder, bytes, error)
       character(len=*), intent(in) :: folder
-      character(len=:), allocatable :: text
+      integer(lp), intent(out) :: bytes
+      type(error_t), allocatable, intent(inout) :: error
       character(len=*), parameter :: names(*) = [character(len=12) :: manifest_name, log_name, profile_name, &
                                                  trace_name, steps_name, overlaps_name]
-      integer(lp) :: bytes
       integer(ip) :: k
 
       bytes = 0_lp
       do k = 1_ip, size(names, kind=ip)
-         bytes = bytes + bytes_of(folder//'/'//trim(names(k)))
+         bytes = bytes + bytes_of(folder//'/'//trim(names(k)), error)
       end do
       do k = 1_ip, n_checkpoints
-         bytes = bytes + bytes_of(checkpoint_path(folder, k))
+         bytes = bytes + bytes_of(checkpoint_path(folder, k), error)
       end do
       k = 1_ip
-      do while (exists(segment_path(folder, k)))
-         bytes = bytes + bytes_of(segment_path(folder, k))
+      do while (exists(segment_path(folder, k), error))
+         bytes = bytes + bytes_of(segment_path(folder, k), error)
          k = k + 1_ip
       end do
-      bytes = bytes + bytes_of(segment_path(folder, k)//open_suffix)
-      text = to_text(bytes/1024_lp + 1_lp)//' KiB'
-   end function size_text
+      bytes = bytes + bytes_of(segment_path(folder, k)//open_suffix, error)
+   end subroutine count_bytes
 
    !> Size of a file [B]; 0 if it does not exist
-   integer(lp) function bytes_of(path)
+   integer(lp) function bytes_of(path, error)
       character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(inout) :: error
 
       bytes_of = 0_lp
-      if (exists(path)) inquire (file=path, size=bytes_of)
-      bytes_of = max(0_lp, bytes_of)
+      if (.not. exists(path, error)) return
+      inquire (file=path, size=bytes_of)
+      if (bytes_of < 0_lp) call raise_unread(error, path, last_failure())
    end function bytes_of
 
 end module polydem_result_summary

@@ -64,8 +64,8 @@ contains
       call file%open(path, error)
       if (allocated(error)) return
       if (present(most_steps)) trace%n_steps = most_steps
-      if (.not. file%has('/aabb')) call file%reject('the file is not a trace: it has no data set /aabb with the '// &
-         'boxes of each step. A run with trace_steps in &output writes one, trace.h5', error)
+      if (.not. file%has('/aabb', error)) call file%reject('the file is not a trace: it has no data set /aabb with '// &
+         'the boxes of each step. A run with trace_steps in &output writes one, trace.h5', error)
       if (.not. allocated(error)) call read_boxes(file, trace, error)
       if (.not. allocated(error)) call read_bodies(file, trace, error)
       if (.not. allocated(error)) call read_numbers(file, trace, error)
@@ -73,7 +73,8 @@ contains
       if (.not. allocated(error)) call read_polygons(file, trace, error)
       call file%read_real_attribute('/', 'dt', trace%dt, error)
       trace%input = ''
-      if (file%has('/provenance/resolved_input')) call file%read('/provenance/resolved_input', trace%input, error)
+      if (file%has('/provenance/resolved_input', error)) &
+         call file%read('/provenance/resolved_input', trace%input, error)
       if (.not. ieee_is_finite(trace%dt) .or. trace%dt < 0.0_dp) &
          call file%reject('the attribute dt must be finite and not negative', error)
       call file%close(error)
@@ -146,7 +147,7 @@ contains
       logical :: sound
 
       n = size(trace%fixed, kind=ip)
-      if (.not. file%has('/body')) then
+      if (.not. file%has('/body', error)) then
          trace%body = [(k, k=1_ip, n)]
          return
       end if
@@ -179,7 +180,7 @@ contains
       real(dp), allocatable :: reach(:)
       logical :: good
 
-      if (.not. file%has('/reach')) return
+      if (.not. file%has('/reach', error)) return
       call file%read('/reach', reach, error)
       if (allocated(error)) return
       call check_size(file, 'reach', size(reach, kind=lp), size(trace%fixed, kind=lp), 'boxes', error)
@@ -229,12 +230,12 @@ contains
 
       call file%shape_of('/aabb', extent, error)
       if (allocated(error)) return
-      if (file%has('/npairs')) then
+      if (file%has('/npairs', error)) then
          call file%read('/npairs', trace%n_pairs, error)
          if (allocated(error)) return
          call check_size(file, 'npairs', size(trace%n_pairs, kind=lp), extent(1), 'steps', error)
       end if
-      if (file%has('/pair_hash')) then
+      if (file%has('/pair_hash', error)) then
          call file%read('/pair_hash', trace%pair_hash, error)
          if (allocated(error)) return
          call check_size(file, 'pair_hash', size(trace%pair_hash, kind=lp), extent(1), 'steps', error)
@@ -250,7 +251,7 @@ contains
       integer(ip), allocatable :: offset(:)
       integer(ip) :: b, n
 
-      if (.not. file%has('/vertices')) return
+      if (.not. file%has('/vertices', error)) return
       call file%read('/vertices', vertices, error)
       call file%read('/vertex_offset', offset, error)
       if (.not. allocated(error)) call check_polygons(file, vertices, offset, size(trace%fixed, kind=ip), error)

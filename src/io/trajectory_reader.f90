@@ -29,7 +29,8 @@ contains
       logical :: is_segment
 
       file_path = path
-      if (is_folder(path)) file_path = last_segment(path)
+      if (is_folder(path, error)) file_path = last_segment(path, error)
+      if (allocated(error)) return
       if (file_path == '') then
          call raise(error, input_error, path//' contains no closed segment of a trajectory. Check that its run has '// &
                     'ended')
@@ -37,10 +38,10 @@ contains
       end if
       call file%open(file_path, error)
       if (allocated(error)) return
-      is_segment = file%has('frames')
+      is_segment = file%has('frames', error)
       if (is_segment) call list_last_frame(file, list, error)
       call file%close(error)
-      if (.not. is_segment) call read_bodies_file(file_path, 1.0_wp, list, error)
+      if (.not. is_segment .and. .not. allocated(error)) call read_bodies_file(file_path, 1.0_wp, list, error)
       if (.not. allocated(error)) call new_bodies(list, bodies, error)
    end subroutine read_packing
 

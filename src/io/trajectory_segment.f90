@@ -226,7 +226,7 @@ contains
       call blocks%to_blocks(comm, ids, pairs)
       call blocks%to_blocks(comm, values, block)
       part = part_t(blocks%first, blocks%total)
-      if (.not. file%has('/contacts/start')) then
+      if (.not. file%has('/contacts/start', error)) then
          call file%write('/contacts/start', 0_lp, error, '1', 'frame k owns the rows start[k] to start[k + 1] - 1', &
                          rows=one_row)
       end if

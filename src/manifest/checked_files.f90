@@ -24,7 +24,10 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       if (.not. allocated(manifest%problem)) return
-      if (manifest%is_foreign) then
+      if (manifest%is_unread) then
+         call raise(error, io_error, manifest%problem)
+         error%is_unread = .true.
+      else if (manifest%is_foreign) then
          call raise(error, input_error, manifest%problem//', and blocks its name. Move the file away, or choose '// &
                     'another folder with --set output.folder=NAME')
       else
@@ -77,7 +80,8 @@ contains
          if (present(only)) then
             if (manifest%entry(k)%name /= only) cycle
          end if
-         call find_problem(folder, manifest%entry(k), problem)
+         call find_problem(folder, manifest%entry(k), problem, error)
+         if (allocated(error)) return
          if (allocated(problem)) problem = folder//'/'//trim(manifest%entry(k)%name)//' '//problem
       end do
       if (allocated(problem)) call raise(error, io_error, problem//'. Restore the file from a copy, or start the '// &
@@ -117,24 +121,24 @@ contains
    end subroutine find_segments
 
    !> Compare a closed file with its entry in the manifest.
-   subroutine find_problem(folder, entry, problem)
+   subroutine find_problem(folder, entry, problem, error)
       !> Folder of the result
       character(len=*), intent(in) :: folder
       !> Entry of the file in the manifest
       type(entry_t), intent(in) :: entry
       !> Defect of the file, as the end of a sentence; unallocated if every bit of the file is unchanged
       character(len=:), allocatable, intent(out) :: problem
+      !> Allocated if the file cannot be read, which is no defect
+      type(error_t), allocatable, intent(inout) :: error
       integer(lp) :: bytes, hash, frames(3)
-      type(error_t), allocatable :: error
 
-      if (.not. link_exists(folder//'/'//trim(entry%name))) then
-         problem = 'is missing'
+      if (.not. link_exists(folder//'/'//trim(entry%name), error)) then
+         if (.not. allocated(error)) problem = 'is missing'
          return
       end if
-      call hash_file(folder//'/'//trim(entry%name), bytes, hash, problem)
-      if (allocated(problem)) then
-         problem = 'is damaged: '//problem
-      else if (bytes /= entry%bytes) then
+      call hash_file(folder//'/'//trim(entry%name), bytes, hash, error)
+      if (allocated(error)) return
+      if (bytes /= entry%bytes) then
          problem = 'is damaged: it has '//to_text(bytes)//' bytes, but '//to_text(entry%bytes)//' were written'
       else if (hash /= entry%hash) then
          problem = 'is damaged: its checksum differs from that in '//manifest_name
@@ -142,7 +146,9 @@ contains
       if (allocated(problem) .or. segment_number(entry%name) == 0_ip) return
       call read_frames(folder//'/'//trim(entry%name), frames, error)
       if (allocated(error)) then
+         if (error%is_unread) return
          problem = 'cannot be read: '//error%message
+         deallocate (error)
       else if (any(frames /= entry%frames)) then
          problem = 'is not the file that '//manifest_name//' lists: its frames differ'
       end if

@@ -47,6 +47,8 @@ module polydem_manifest
       character(len=:), allocatable :: problem
       !> Whether the file is not a polydem manifest at all
       logical :: is_foreign = .false.
+      !> Whether the system refused to read it: nothing is known of its contents
+      logical :: is_unread = .false.
       !> Whether its last line is incomplete
       logical :: is_truncated = .false.
       !> Number of files of the result
@@ -86,16 +88,21 @@ contains
       !> Name of the file; default: manifest.txt
       character(len=*), intent(in), optional :: name
       character(len=:), allocatable :: path, text, problem
+      type(error_t), allocatable :: error
 
       path = folder//'/'//manifest_name
       if (present(name)) path = folder//'/'//name
       call clear(self, folder)
-      self%is_found = link_exists(path)
-      if (.not. self%is_found) return
-      call read_bytes(path, text, problem)
-      if (.not. allocated(problem)) call read_lines(self, text, problem)
-      if (.not. allocated(problem)) return
-      self%problem = path//': '//problem
+      self%is_found = link_exists(path, error)
+      if (self%is_found) call read_bytes(path, text, error)
+      self%is_unread = allocated(error)
+      if (self%is_unread) then
+         self%is_found = .true.
+         self%problem = error%message
+      else if (self%is_found) then
+         call read_lines(self, text, problem)
+         if (allocated(problem)) self%problem = path//': '//problem
+      end if
    end subroutine read_manifest
 
    !> Forget everything: the manifest of a folder without files.
@@ -227,16 +234,16 @@ contains
       type(manifest_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
       type(line_writer_t) :: file
-      character(len=:), allocatable :: draft, problem, path
+      character(len=:), allocatable :: draft, path
       integer :: n
 
       path = self%folder//'/'//manifest_name
-      if (link_exists(path//unfinished)) then
-         call read_bytes(path//unfinished, draft, problem)
+      if (link_exists(path//unfinished, error)) then
+         call read_bytes(path//unfinished, draft, error)
          n = min(len(beginning), len(draft))
          if (draft(:n) /= beginning(:n)) call raise(error, input_error, conflict_text(path//unfinished))
-         if (allocated(error)) return
       end if
+      if (allocated(error)) return
       call file%open(path//unfinished, error)
       call file%put(self%text)
       call file%close(error)
@@ -311,7 +318,7 @@ contains
       if (self%owns(name_in(path))) return
       forms = forms_of(name_in(path))
       do k = 1, size(forms)
-         if (link_exists(self%folder//'/'//trim(forms(k)))) call raise(error, input_error, &
+         if (link_exists(self%folder//'/'//trim(forms(k)), error)) call raise(error, input_error, &
             conflict_text(self%folder//'/'//trim(forms(k))))
       end do
       if (.not. allocated(error)) call append(self, 'owns '//name_in(path), error)
@@ -341,16 +348,14 @@ contains
       !> For a segment: number of frames, step of the first frame, step of the last frame
       integer(lp), intent(in), optional :: frames(3)
       type(entry_t) :: entry
-      character(len=:), allocatable :: problem
       integer :: k
 
       k = writable_entry(self, path, error)
       if (k == 0) return
       entry = entry_t(name=name_in(path), is_closed=.true.)
-      if (.not. link_exists(self%folder//'/'//trim(entry%name))) return
+      if (.not. link_exists(self%folder//'/'//trim(entry%name), error)) return
       if (present(frames)) entry%frames = frames
-      call hash_file(self%folder//'/'//trim(entry%name), entry%bytes, entry%hash, problem)
-      if (allocated(problem)) call raise(error, io_error, self%folder//'/'//trim(entry%name)//': '//problem)
+      call hash_file(self%folder//'/'//trim(entry%name), entry%bytes, entry%hash, error)
       if (.not. allocated(error)) call append(self, closing_text(entry), error)
       if (.not. allocated(error)) self%entry(k) = entry
    end subroutine close_file
@@ -373,7 +378,8 @@ contains
       forms = forms_of(name_in(path))
       do k = first, size(forms)
          if (allocated(error)) return
-         if (link_exists(self%folder//'/'//trim(forms(k)))) call remove_file(self%folder//'/'//trim(forms(k)), error)
+         if (.not. link_exists(self%folder//'/'//trim(forms(k)), error)) cycle
+         call remove_file(self%folder//'/'//trim(forms(k)), error)
       end do
    end subroutine remove_forms
 

@@ -11,6 +11,7 @@
 !> Each transition from one row to the next is one atomic rename of a manifest. Only files that are listed in a manifest
 !> are moved or removed.
 module polydem_replaced_result
+   use polydem_checked_files, only: check_manifest
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_system, only: make_folder, remove_file, rename_file, sync_file
    use polydem_folders, only: link_exists, remove_folder, canonical_path
@@ -29,12 +30,14 @@ module polydem_replaced_result
 contains
 
    !> Whether a folder contains a result or a replaced result
-   logical function holds_result(folder)
+   logical function holds_result(folder, error)
       !> Folder of the result
       character(len=*), intent(in) :: folder
+      !> Allocated if the system does not tell
+      type(error_t), allocatable, intent(inout) :: error
 
-      holds_result = link_exists(folder//'/'//manifest_name)
-      if (.not. holds_result) holds_result = link_exists(replaced_path(folder)//'/'//manifest_name)
+      holds_result = link_exists(folder//'/'//manifest_name, error)
+      if (.not. holds_result) holds_result = link_exists(replaced_path(folder)//'/'//manifest_name, error)
    end function holds_result
 
    !> Reject the replacement of a result that contains an input file of the new run.
@@ -53,13 +56,13 @@ contains
 
       do i = 1, size(inputs)
          if (inputs(i) == '') cycle
-         input = canonical_path(trim(inputs(i)))
+         input = canonical_path(trim(inputs(i)), error)
          if (input == '') cycle
-         is_own = input == canonical_path(folder)
+         is_own = input == canonical_path(folder, error)
          do k = 1, manifest%n
             forms = forms_of(trim(manifest%entry(k)%name))
             do j = 1, size(forms)
-               if (.not. is_own) is_own = input == canonical_path(folder//'/'//trim(forms(j)))
+               if (.not. is_own) is_own = input == canonical_path(folder//'/'//trim(forms(j)), error)
             end do
          end do
          if (is_own) call raise(error, input_error, '--force would replace '//trim(inputs(i))// &
@@ -113,17 +116,19 @@ contains
       integer :: k
 
       call manifest%read(folder)
+      if (manifest%is_unread) call check_manifest(manifest, error)
       if (allocated(manifest%problem)) return
       if (manifest%is_found .and. .not. manifest%owns(replaced_name)) return
       call manifest%continue_writing()
-      if (link_exists(replaced_path(folder)//'/'//obsolete_name)) then
+      if (link_exists(replaced_path(folder)//'/'//obsolete_name, error)) then
          if (manifest%is_found) call clear_obsolete(manifest, folder, error)
          return
       end if
-      call former%read(replaced_path(folder))
+      if (.not. allocated(error)) call former%read(replaced_path(folder))
       if (former%is_found) then
          if (.not. manifest%is_found .and. .not. former%owns(replaced_name)) return
          if (allocated(former%problem)) then
+            if (former%is_unread) call check_manifest(former, error)
             call raise(error, io_error, former%problem//'. This folder contains the result that a run with --force '// &
                        'was about to replace. Restore the file from a copy, or move the folder away')
             return
@@ -135,9 +140,10 @@ contains
          call move_manifest(replaced_path(folder)//'/'//manifest_name, folder//'/'//manifest_name, folder, error)
          if (allocated(error)) return
          call manifest%read(folder)
+         if (manifest%is_unread) call check_manifest(manifest, error)
          call manifest%continue_writing()
       end if
-      if (.not. manifest%is_found) return
+      if (.not. manifest%is_found .or. allocated(error)) return
       call put_back(manifest, folder, was_moved, error)
       if (was_moved .and. .not. allocated(error)) note = 'restored the old result in '//folder//': the run with '// &
          '--force that was to replace it wrote no frame'
@@ -156,7 +162,7 @@ contains
       was_moved = .false.
       do k = 1, manifest%n
          name = trim(manifest%entry(k)%name)
-         if (.not. was_moved) was_moved = link_exists(replaced_path(folder)//'/'//name)
+         if (.not. was_moved) was_moved = link_exists(replaced_path(folder)//'/'//name, error)
          call move(name, replaced_path(folder), folder, error)
       end do
       if (.not. allocated(error)) call sync_file(folder, error)
@@ -176,6 +182,7 @@ contains
       integer :: k, j
 
       call former%read(replaced_path(folder), obsolete_name)
+      if (former%is_unread) call check_manifest(former, error)
       if (allocated(former%problem)) call raise(error, io_error, former%problem//'. This folder contains the rest '// &
          'of a result that --force has replaced. Remove the folder if it is not needed')
       if (allocated(error)) return
@@ -184,7 +191,8 @@ contains
          forms = forms_of(trim(former%entry(k)%name))
          do j = 1, size(forms)
             path = replaced_path(folder)//'/'//trim(forms(j))
-            if (link_exists(path) .and. .not. allocated(error)) call remove_file(path, error)
+            if (allocated(error)) return
+            if (link_exists(path, error)) call remove_file(path, error)
          end do
       end do
       if (allocated(error)) return
@@ -204,10 +212,10 @@ contains
       forms = forms_of(name)
       do k = 1, size(forms)
          if (allocated(error)) return
-         if (.not. link_exists(from//'/'//trim(forms(k)))) cycle
-         if (link_exists(to//'/'//trim(forms(k)))) then
+         if (.not. link_exists(from//'/'//trim(forms(k)), error)) cycle
+         if (link_exists(to//'/'//trim(forms(k)), error)) then
             call raise(error, input_error, conflict_text(to//'/'//trim(forms(k))))
-         else
+         else if (.not. allocated(error)) then
             call rename_file(from//'/'//trim(forms(k)), to//'/'//trim(forms(k)), error)
          end if
       end do

@@ -13,6 +13,7 @@
 !>     replaced                   old result that `--force` replaces, until the new result has a frame
 !>                                (polydem_replaced_result)
 module polydem_result_files
+   use polydem_errors, only: error_t
    use polydem_file_system, only: exists
    use polydem_kinds, only: ip
    use polydem_strings, only: to_text
@@ -108,22 +109,28 @@ contains
    end function segment_number
 
    !> Path of the last closed segment of a result; empty if there is none
-   function last_segment(folder) result(path)
+   function last_segment(folder, error) result(path)
       !> Folder of the result
       character(len=*), intent(in) :: folder
+      !> Allocated if the system does not tell
+      type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path
+      integer(ip) :: number
 
       path = ''
-      if (last_number(folder) > 0_ip) path = segment_path(folder, last_number(folder))
+      number = last_number(folder, error)
+      if (number > 0_ip) path = segment_path(folder, number)
    end function last_segment
 
    !> Number of the last closed segment of a result; 0 if there is none
-   integer(ip) function last_number(folder)
+   integer(ip) function last_number(folder, error)
       !> Folder of the result
       character(len=*), intent(in) :: folder
+      !> Allocated if the system does not tell
+      type(error_t), allocatable, intent(inout) :: error
 
       last_number = 0_ip
-      do while (exists(segment_path(folder, last_number + 1_ip)))
+      do while (exists(segment_path(folder, last_number + 1_ip), error))
          last_number = last_number + 1_ip
       end do
    end function last_number

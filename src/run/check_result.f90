@@ -1,6 +1,6 @@
 !> The verb `info --check`: compares every file of a result with the manifest of its folder.
 module polydem_check_result
-   use polydem_checked_files, only: find_problem, find_segments
+   use polydem_checked_files, only: check_manifest, find_problem, find_segments
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_checksum, only: verify_checksum
    use polydem_file_system, only: is_folder
@@ -37,11 +37,15 @@ contains
       type(findings_t) :: findings
       integer :: k
 
-      if (.not. is_folder(folder)) then
+      if (.not. is_folder(folder, error)) then
          call raise(error, input_error, folder//': there is no such result folder')
          return
       end if
       call manifest%read(folder)
+      if (manifest%is_unread) then
+         call check_manifest(manifest, error)
+         return
+      end if
       if (.not. manifest%is_found) then
          call raise(error, io_error, folder//': has no '//manifest_name//', so no file can be checked. The folder '// &
                     'holds no result, or one of an older version of this program')
@@ -51,14 +55,14 @@ contains
       call report_file(findings, manifest_name, manifest%problem, manifest_text(manifest))
       if (.not. allocated(manifest%problem)) then
          do k = 1, manifest%n
-            call check_entry(folder, manifest%entry(k), findings)
+            call check_entry(folder, manifest%entry(k), findings, error)
          end do
          call check_order(folder, manifest, findings)
          call check_others(folder, manifest, findings, error)
       end if
       if (findings%n_wrong > 0_ip) call raise(error, io_error, folder//': '//to_text(findings%n_wrong)//' of '// &
          to_text(findings%n_files)//' files are wrong; see the lines marked WRONG')
-      if (findings%n_wrong == 0_ip) call findings%log%write_line(folder//': all '//to_text(findings%n_files)// &
+      if (.not. allocated(error)) call findings%log%write_line(folder//': all '//to_text(findings%n_files)// &
          ' files are intact')
       call findings%log%close(error)
    end subroutine check_result
@@ -73,10 +77,13 @@ contains
    end function manifest_text
 
    !> Check one file that the manifest lists.
-   subroutine check_entry(folder, entry, findings)
+   subroutine check_entry(folder, entry, findings, error)
       character(len=*), intent(in) :: folder
       type(entry_t), intent(in) :: entry
       type(findings_t), intent(inout) :: findings
+      !> First file that cannot be read, which is not counted as wrong
+      type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: failure
       character(len=:), allocatable :: name, problem, remark
       integer(ip) :: k
 
@@ -87,38 +94,50 @@ contains
          call report_file(findings, name, problem, '')
          return
       end if
-      call check_unfinished(folder, name, findings)
+      call check_unfinished(folder, name, findings, error)
       if (entry%is_closed) then
-         call find_problem(folder, entry, problem)
+         call find_problem(folder, entry, problem, failure)
          remark = to_text(entry%bytes)//' bytes'
          if (segment_number(name) > 0_ip) remark = remark//', '//counted(entry%frames(1), 'frame')//', steps '// &
             to_text(entry%frames(2))//' to '//to_text(entry%frames(3))
-         call report_file(findings, name, problem, remark)
+         call report_entry()
          return
       end if
-      if (.not. link_exists(folder//'/'//name)) return
+      if (.not. link_exists(folder//'/'//name, error)) return
       remark = 'present, has no checksum'
       if (gets_closed(name)) problem = 'has no checksum: the run was killed before it recorded one, or is about '// &
          'to record it; --continue repairs this'
       do k = 1_ip, n_checkpoints
          if (name /= name_in(checkpoint_path('', k))) cycle
-         call verify_checksum(folder//'/'//name, problem)
+         call verify_checksum(folder//'/'//name, problem, failure)
          remark = 'its checksum is correct'
       end do
-      call report_file(findings, name, problem, remark)
+      call report_entry()
+
+   contains
+
+      subroutine report_entry()
+         if (.not. allocated(failure)) then
+            call report_file(findings, name, problem, remark)
+         else if (.not. allocated(error)) then
+            call move_alloc(failure, error)
+         end if
+      end subroutine report_entry
+
    end subroutine check_entry
 
    !> Report the incomplete forms of a file, which a running or killed run has.
-   subroutine check_unfinished(folder, name, findings)
+   subroutine check_unfinished(folder, name, findings, error)
       character(len=*), intent(in) :: folder, name
       type(findings_t), intent(inout) :: findings
+      type(error_t), allocatable, intent(inout) :: error
       character(len=len(name) + 16) :: forms(3)
       character(len=:), allocatable :: problem
       integer :: k
 
       forms = forms_of(name)
       do k = 2, size(forms)
-         if (link_exists(folder//'/'//trim(forms(k)))) call report_file(findings, trim(forms(k)), problem, &
+         if (link_exists(folder//'/'//trim(forms(k)), error)) call report_file(findings, trim(forms(k)), problem, &
             'is incomplete')
       end do
    end subroutine check_unfinished

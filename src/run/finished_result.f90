@@ -70,15 +70,17 @@ contains
       character(len=:), allocatable, intent(out) :: last_state
       !> Allocated if the result is finished but damaged
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: path, status, text
+      character(len=:), allocatable :: path, status, text, former, former_settings
 
       path = folder//'/'//profile_name
       call check_closed(manifest, folder, error, only=name_in(path))
       if (.not. allocated(error)) call read_final_status(path, status, text, error)
       if (allocated(error)) return
       if (status /= 'finished') return
-      if (origin_of(path, 'scene') /= scene) return
-      if (changed_entries(origin_of(path, 'resolved_input'), settings%resolved) /= '') return
+      former = origin_of(path, 'scene', error)
+      former_settings = origin_of(path, 'resolved_input', error)
+      if (allocated(error) .or. former /= scene) return
+      if (changed_entries(former_settings, settings%resolved) /= '') return
       call check_closed(manifest, folder, error)
       if (.not. allocated(error)) call move_alloc(text, last_state)
    end subroutine find_finished

@@ -100,7 +100,7 @@ contains
          first = first_trace_step(output%trace_start, simulation%dt)
          if (output%trace_steps == 0_ip .or. first > step) return
          is_whole = first + int(output%trace_steps, lp) - 1_lp <= step
-         if (is_whole) is_whole = exists(folder//'/'//trace_name)
+         if (is_whole) is_whole = exists(folder//'/'//trace_name, error)
          if (.not. is_whole) call raise(error, input_error, 'the run was interrupted while it recorded a trace '// &
             '(trace_steps in &output), and a trace cannot resume; start again with --force instead of --continue')
       end associate

@@ -67,7 +67,7 @@ contains
       type(earlier_attempts_t), intent(out) :: earlier
       !> Allocated if the run cannot restart
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: changes
+      character(len=:), allocatable :: changes, former
 
       call check_closed(manifest, folder, error)
       if (.not. allocated(error)) call choose_checkpoint(folder, earlier, error)
@@ -77,11 +77,13 @@ contains
          return
       end if
       changes = changed_entries(earlier%former_settings, settings%resolved)
+      former = origin_of(checkpoint_path(folder, earlier%checkpoint), 'scene', error)
+      if (allocated(error)) return
       if (changes /= '' .and. .not. may_change) then
          call raise(error, input_error, 'the settings differ from those of the run in '//folder//': '//changes// &
                     '. Restore them, or add --changed to resume with the new settings from step '// &
                     to_text(earlier%step))
-      else if (origin_of(checkpoint_path(folder, earlier%checkpoint), 'scene') /= scene) then
+      else if (former /= scene) then
          call raise(error, input_error, folder//' holds the result of another run: '// &
                     why_other(settings, changes)//'. Restore it, or use --force instead of --continue to overwrite '// &
                     'the result')
@@ -120,14 +122,16 @@ contains
       type(settings_t), intent(in) :: settings
       type(earlier_attempts_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: path, changes, former
+      character(len=:), allocatable :: path, changes, former, former_settings
 
       earlier%remark = 'there is no checkpoint in '//folder//': the run starts at step 0'
       path = segment_path(folder, 1_ip)
-      if (.not. exists(path)) path = folder//'/'//profile_name
-      if (.not. exists(path)) return
-      changes = changed_entries(origin_of(path, 'resolved_input'), settings%resolved)
-      former = origin_of(path, 'scene')
+      if (.not. exists(path, error)) path = folder//'/'//profile_name
+      if (.not. exists(path, error)) return
+      former_settings = origin_of(path, 'resolved_input', error)
+      former = origin_of(path, 'scene', error)
+      if (allocated(error)) return
+      changes = changed_entries(former_settings, settings%resolved)
       if (changes == '' .and. former /= scene) changes = why_other(settings, changes)
       if (changes == '') then
          call count_segments(folder, manifest, scene, .false., earlier, error)
@@ -138,7 +142,8 @@ contains
       end if
    end subroutine restart_without_checkpoint
 
-   !> Read all checkpoints and choose the valid one with the greatest step.
+   !> Read all checkpoints and choose the valid one with the greatest step. One that the system refuses to read may be
+   !> good and newer, so it is an error.
    subroutine choose_checkpoint(folder, earlier, error)
       character(len=*), intent(in) :: folder
       type(earlier_attempts_t), intent(inout) :: earlier
@@ -150,16 +155,23 @@ contains
 
       damage = ''
       do k = 1_ip, n_checkpoints
-         if (.not. exists(checkpoint_path(folder, k))) cycle
+         if (.not. exists(checkpoint_path(folder, k), error)) cycle
          candidate = earlier_attempts_t(checkpoint=k)
          call read_progress(checkpoint_path(folder, k), candidate, problem)
          if (allocated(problem)) then
+            if (problem%is_unread) then
+               problem%message = problem%message//'. Try again; if this remains, move the file away, and the run '// &
+                  'continues from an earlier step'
+               call move_alloc(problem, error)
+               return
+            end if
             damage = damage//problem%message//new_line('a')
             deallocate (problem)
          else if (earlier%checkpoint == 0_ip .or. candidate%step > earlier%step) then
             earlier = candidate
          end if
       end do
+      if (allocated(error)) return
       if (earlier%checkpoint > 0_ip) then
          earlier%remark = 'continued  from '//checkpoint_path(folder, &
             earlier%checkpoint)//', step '//to_text(earlier%step)
@@ -182,7 +194,7 @@ contains
       if (allocated(error)) return
       call serialize_progress(file, earlier%step, attempts)
       earlier%segments_at_checkpoint = attempts%segments
-      call file%read_origin(earlier%revision, earlier%former_settings, error)
+      if (.not. allocated(file%error)) call file%read_origin(earlier%revision, earlier%former_settings, error)
       call file%close(error)
    end subroutine read_progress
 
@@ -200,6 +212,7 @@ contains
       call find_segments(manifest, folder, places, problem)
       earlier%segments = size(places, kind=ip)
       call find_unlisted(folder, manifest, scene, places, earlier, error)
+      if (allocated(error)) return
       if (int(earlier%segments, lp) < earlier%segments_at_checkpoint) then
          call raise(error, io_error, segment_path(folder, earlier%segments + 1_ip)//' is missing, but it existed '// &
                     'at the checkpoint of step '//to_text(earlier%step)//'. Put the file back, or start the run '// &
@@ -233,19 +246,20 @@ contains
       integer, intent(in) :: places(:)
       type(earlier_attempts_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: path
+      character(len=:), allocatable :: path, former
       integer(lp) :: last
 
       path = segment_path(folder, earlier%segments + 1_ip)
       if (.not. manifest%owns(name_in(path))) return
-      if (.not. exists(path)) return
+      if (.not. exists(path, error)) return
       call read_frames(path, earlier%unlisted, error)
       if (allocated(error)) return
       last = -1_lp
       if (size(places) > 0) last = manifest%entry(places(size(places)))%frames(3)
       if (earlier%unlisted(2) <= last) call raise(error, io_error, path//' does not follow the previous segment, '// &
          'which ends at step '//to_text(last)//'. Move the file away; the run writes its frames again')
-      if (origin_of(path, 'scene') /= scene) call raise(error, io_error, path//' is a segment of another run: '// &
+      former = origin_of(path, 'scene', error)
+      if (former /= scene) call raise(error, io_error, path//' is a segment of another run: '// &
          other_bodies//'. Move the file away; the run writes its frames again')
       earlier%segments = earlier%segments + 1_ip
    end subroutine find_unlisted
@@ -320,6 +334,7 @@ contains
       call serialize_run(file, simulation, attempts, monitor)
       call file%close(error)
       if (allocated(error)) then
+         if (error%is_unread) return
          error%message = checkpoint_path(folder, earlier%checkpoint)//' does not fit this run: '//error%message
          if (index(error%message, '/run/time_step') > 0) error%message = error%message// &
             '. Set dt in &integrate to the saved value; a dt that polydem chooses depends on the duration'

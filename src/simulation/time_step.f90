@@ -87,9 +87,13 @@ contains
    subroutine tabulate_contacts(self)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable :: known_error
+      integer(lp) :: has_none(1)
       integer(ip) :: k
 
-      if (self%walk%step /= self%step) then
+      ! The finder of one rank may have failed, after which the others found their contacts.
+      has_none = merge(1_lp, 0_lp, self%walk%step /= self%step)
+      call self%comm%all_reduce_max(has_none)
+      if (has_none(1) == 1_lp) then
          self%contacts%n = 0_ip
          return
       end if

@@ -7,9 +7,9 @@
 !> The hash combines the hashes of slices of the file, which threads compute in parallel. `hash_file` hashes all bytes
 !> of a file without such a line, for callers that store the hash elsewhere.
 module polydem_file_checksum
-   use, intrinsic :: iso_fortran_env, only: file_storage_size
-   use polydem_errors, only: error_t, io_error, raise
-   use polydem_file_system, only: overwrite_start
+   use, intrinsic :: iso_fortran_env, only: iostat_end
+   use polydem_errors, only: error_t, io_error, raise, raise_unread
+   use polydem_file_system, only: find_length, overwrite_start
    use polydem_hash, only: hexadecimal, mix_word
    use polydem_kinds, only: bp, ip, lp
    use polydem_strings, only: to_text
@@ -48,46 +48,48 @@ contains
       end if
       call overwrite_start(path, checksum_line, error)
       if (allocated(error)) return
-      call verify_checksum(path, problem)
+      call verify_checksum(path, problem, error)
       if (allocated(problem)) call raise(error, io_error, path//': read back after its checksum was written: '//problem)
    end subroutine append_checksum
 
    !> Verify the checksum of a file.
-   subroutine verify_checksum(path, problem)
+   subroutine verify_checksum(path, problem, error)
       !> Path of the file
       character(len=*), intent(in) :: path
       !> Description of the damage; not allocated if the checksum matches
       character(len=:), allocatable, intent(out) :: problem
+      !> Allocated if the file cannot be read, which is no damage
+      type(error_t), allocatable, intent(inout) :: error
       character(len=256) :: reason
       character(len=checksum_length) :: checksum_line, expected
       integer :: unit, status
 
       open (newunit=unit, file=path, access='stream', form='unformatted', action='read', status='old', &
             iostat=status, iomsg=reason)
-      if (status /= 0) then
-         problem = 'it cannot be opened: '//trim(reason)
-         return
+      if (status == 0) then
+         read (unit, iostat=status, iomsg=reason) checksum_line
+         if (status == 0) call make_checksum(unit, expected, status, reason)
+         close (unit)
       end if
-      read (unit, iostat=status, iomsg=reason) checksum_line
-      if (status == 0) call make_checksum(unit, expected, status, reason)
-      close (unit)
-      if (status /= 0) then
-         problem = 'it cannot be read: '//trim(reason)
+      if (status == iostat_end) then
+         problem = 'it is truncated'
+      else if (status /= 0) then
+         call raise_unread(error, path, reason)
       else if (checksum_line /= expected) then
          problem = 'its checksum does not match: it was truncated or changed after it was written'
       end if
    end subroutine verify_checksum
 
    !> Length and hash of a whole file.
-   subroutine hash_file(path, bytes, hash, problem)
+   subroutine hash_file(path, bytes, hash, error)
       !> Path of the file
       character(len=*), intent(in) :: path
       !> Length of the file [B]
       integer(lp), intent(out) :: bytes
       !> Hash of all bytes
       integer(lp), intent(out) :: hash
-      !> Reason why the file cannot be read; not allocated on success
-      character(len=:), allocatable, intent(out) :: problem
+      !> Allocated if the file cannot be read
+      type(error_t), allocatable, intent(inout) :: error
       character(len=256) :: reason
       integer :: unit, status
 
@@ -96,12 +98,11 @@ contains
       open (newunit=unit, file=path, access='stream', form='unformatted', action='read', status='old', &
             iostat=status, iomsg=reason)
       if (status == 0) then
-         inquire (unit=unit, size=bytes, iostat=status, iomsg=reason)
-         bytes = max(0_lp, bytes*int(file_storage_size/8, lp))
+         call find_length(unit, bytes, status, reason)
          if (status == 0) call hash_bytes(unit, 0_ip, bytes, hash, status, reason)
          close (unit)
       end if
-      if (status /= 0) problem = 'it cannot be read: '//trim(reason)
+      if (status /= 0) call raise_unread(error, path, reason)
    end subroutine hash_file
 
    !> Checksum line of the bytes that follow it.
@@ -112,8 +113,8 @@ contains
       character(len=*), intent(inout) :: reason
       integer(lp) :: bytes, hash
 
-      inquire (unit=unit, size=bytes, iostat=status, iomsg=reason)
-      bytes = bytes*int(file_storage_size/8, lp) - int(checksum_length, lp)
+      call find_length(unit, bytes, status, reason)
+      bytes = bytes - int(checksum_length, lp)
       if (status == 0) call hash_bytes(unit, checksum_length, max(0_lp, bytes), hash, status, reason)
       if (status /= 0) return
       checksum_line = 'polydem: '//to_text(bytes)//' bytes follow, hash '//hexadecimal(hash)

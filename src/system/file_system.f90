@@ -1,7 +1,8 @@
 !> Operations on files and folders (POSIX): create, rename, remove, reserve disk space, flush to disk.
 module polydem_file_system
    use, intrinsic :: iso_c_binding, only: c_int, c_int64_t, c_null_char
-   use polydem_errors, only: error_t, io_error, raise
+   use, intrinsic :: iso_fortran_env, only: file_storage_size
+   use polydem_errors, only: error_t, io_error, raise, raise_unread
    use polydem_kinds, only: lp
    use polydem_posix, only: c_access, c_close, c_fallocate, c_fsync, c_lseek, c_mkdir, c_open, c_rename, c_strerror, &
       c_unlink, error_number, existence, is_written, read_and_write, read_only, text_at, write_only
@@ -9,7 +10,7 @@ module polydem_file_system
    implicit none
    private
    public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_space, sync_file, overwrite_start
-   public :: check_access, folder_of, last_failure, errno_message, disk_hint
+   public :: check_access, decide_existence, find_length, folder_of, last_failure, errno_message, disk_hint
 
    !> Hint for messages about files that cannot be written
    character(len=*), parameter :: disk_hint = &
@@ -24,6 +25,8 @@ module polydem_file_system
    integer(c_int), parameter :: to_end = 2_c_int
    !> EIO, ENOSPC and EDQUOT of errno on Linux: disk fault, disk full, quota of the user exceeded
    integer(c_int), parameter :: no_space(3) = [5_c_int, 28_c_int, 122_c_int]
+   !> ENOENT, ENOTDIR, ENAMETOOLONG and ELOOP of errno on Linux: there is no file of this path
+   integer(c_int), parameter :: nothing_there(4) = [2_c_int, 20_c_int, 36_c_int, 40_c_int]
    !> Permissions of a new folder before umask: rwxrwxrwx
    integer(c_int), parameter :: all_permissions = int(o'777', c_int)
    !> Permissions of the owner: rwx------
@@ -34,20 +37,43 @@ module polydem_file_system
 contains
 
    !> Whether a file or folder exists
-   logical function exists(path)
+   logical function exists(path, error)
       !> Path of the file or folder
       character(len=*), intent(in) :: path
+      !> Allocated if the system does not tell; absent: such a file counts as existing, and whoever opens it learns why
+      type(error_t), allocatable, intent(inout), optional :: error
 
-      exists = c_access(path//c_null_char, existence) == 0_c_int
+      call decide_existence(path, c_access(path//c_null_char, existence), exists, error)
    end function exists
 
    !> Whether a folder exists
-   logical function is_folder(path)
+   logical function is_folder(path, error)
       !> Path of the folder
       character(len=*), intent(in) :: path
+      !> Allocated if the system does not tell
+      type(error_t), allocatable, intent(inout) :: error
 
-      is_folder = exists(path//'/.')
+      call decide_existence(path, c_access(path//'/.'//c_null_char, existence), is_folder, error)
    end function is_folder
+
+   !> Find out from the status of a call of the system whether a file exists.
+   subroutine decide_existence(path, status, there, error)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Status of the call, which was the last one; 0 on success
+      integer(c_int), intent(in) :: status
+      !> Whether the file exists
+      logical, intent(out) :: there
+      !> Allocated if the call failed for another reason than that there is no file; absent: the file then counts as
+      !> existing
+      type(error_t), allocatable, intent(inout), optional :: error
+
+      there = status == 0_c_int
+      if (there) return
+      if (any(nothing_there == error_number())) return
+      there = .not. present(error)
+      if (present(error)) call raise_unread(error, path, last_failure())
+   end subroutine decide_existence
 
    !> Create a folder and its missing parents, and flush their names to disk. An existing folder is not changed. If the
    !> umask removes any permission of the owner from new files and folders, nothing is created and the call fails.
@@ -56,6 +82,7 @@ contains
       character(len=*), intent(in) :: path
       !> Allocated if the folder does not exist afterwards
       type(error_t), allocatable, intent(inout) :: error
+      type(error_t), allocatable :: failure
       character(len=:), allocatable :: reason
       integer :: k
 
@@ -66,7 +93,8 @@ contains
          if (k <= len(path)) then
             if (path(k:k) /= '/') cycle
          end if
-         if (exists(path(:k - 1))) cycle
+         if (exists(path(:k - 1), failure)) cycle
+         if (allocated(failure)) exit
          if (c_mkdir(path(:k - 1)//c_null_char, all_permissions) /= 0_c_int) then
             reason = last_failure()
             if (.not. exists(path(:k - 1))) exit
@@ -75,8 +103,11 @@ contains
          end if
       end do
       if (allocated(error)) return
-      if (is_folder(path)) return
-      if (exists(path)) reason = 'it is a file'
+      if (.not. allocated(failure)) then
+         if (is_folder(path, failure)) return
+         if (exists(path, failure)) reason = 'it is a file'
+      end if
+      if (allocated(failure)) reason = failure%message
       call raise(error, io_error, "cannot make the folder '"//path//"': "//reason)
    end subroutine make_folder
 
@@ -177,6 +208,24 @@ contains
       end if
       call raise(error, io_error, path//': cannot be opened: '//last_failure())
    end subroutine check_access
+
+   !> Find the length of an open file. (INQUIRE gives -1 without a status if the system does not tell.)
+   subroutine find_length(unit, bytes, status, reason)
+      !> Unit of the file
+      integer, intent(in) :: unit
+      !> Length [B]
+      integer(lp), intent(out) :: bytes
+      !> 0 on success
+      integer, intent(out) :: status
+      !> Reason of a failure
+      character(len=*), intent(inout) :: reason
+
+      inquire (unit=unit, size=bytes, iostat=status, iomsg=reason)
+      bytes = bytes*int(file_storage_size/8, lp)
+      if (status /= 0 .or. bytes >= 0_lp) return
+      status = 1
+      reason = last_failure()
+   end subroutine find_length
 
    !> Overwrite the first bytes of a file with a text, and wait until it is on the disk. Every call is checked. Fortran
    !> input/output does not report a failed flush.

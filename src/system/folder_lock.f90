@@ -139,7 +139,11 @@ contains
          if (allocated(error)) return
          if (self%file%descriptor < 0) cycle
          answer = self%file%lock(is_shared=.false.)
-         call observed%record(owner_of(lock_path(folder)), is_new)
+         call observed%record(owner_of(lock_path(folder), error), is_new)
+         if (allocated(error)) then
+            call self%file%close()
+            return
+         end if
          decision = take
          if (answer == is_busy) decision = observed%decide_if_busy()
          if (answer /= is_busy .and. .not. observed%is_creator) decision = observed%decide_if_free(answer == is_granted)
@@ -199,7 +203,7 @@ contains
 
       call self%heartbeat%stop()
       if (allocated(self%path)) then
-         owner = owner_of(self%path)
+         owner = owner_of(self%path, ignored)
          if (owner%key == self%key) call remove_file(self%path, ignored)
          deallocate (self%path)
       end if
@@ -233,22 +237,24 @@ contains
       end if
       if (answer == is_unsupported .or. (observed%is_watched .and. .not. observed%is_creator)) &
          call wait_for(observed%times%settle)
-      is_held = has_key(self, folder)
+      is_held = has_key(self, folder, error)
       if (is_held .and. shares .and. answer == is_granted) then
          is_held = self%file%lock(is_shared=.true.) == is_granted
-         if (is_held) is_held = has_key(self, folder)
+         if (is_held) is_held = has_key(self, folder, error)
       end if
+      if (allocated(error)) call self%file%close()
       if (is_held) call self%heartbeat%start(self%file, lock_path(folder), self%key, key_offset, count_offset, &
                                              observed%times%beat)
    end subroutine write_key
 
    !> Whether the lock file of a folder contains the key of this process
-   logical function has_key(self, folder)
+   logical function has_key(self, folder, error)
       class(folder_lock_t), intent(in) :: self
       character(len=*), intent(in) :: folder
+      type(error_t), allocatable, intent(inout) :: error
       type(owner_t) :: owner
 
-      owner = owner_of(lock_path(folder))
+      owner = owner_of(lock_path(folder), error)
       has_key = owner%key == self%key
    end function has_key
 

@@ -3,9 +3,11 @@
 module polydem_folders
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_loc, c_null_char, c_null_ptr, &
       c_ptr
-   use polydem_errors, only: error_t, io_error, raise
-   use polydem_file_system, only: last_failure
-   use polydem_posix, only: c_closedir, c_faccessat, c_opendir, c_readdir, c_realpath, c_rmdir, existence, text_at
+   use polydem_errors, only: error_t, raise_unread
+   use polydem_file_system, only: decide_existence, find_length, last_failure
+   use polydem_kinds, only: lp
+   use polydem_posix, only: c_closedir, c_faccessat, c_opendir, c_readdir, c_realpath, c_rmdir, clear_error_number, &
+      error_number, existence, text_at
    use polydem_posix_processes, only: c_free
    implicit none
    private
@@ -23,11 +25,14 @@ module polydem_folders
 contains
 
    !> Whether a file, folder or link exists, including a link without a target
-   logical function link_exists(path)
+   logical function link_exists(path, error)
       !> Path of a file, folder or link
       character(len=*), intent(in) :: path
+      !> Allocated if the system does not tell; absent: such a file counts as existing
+      type(error_t), allocatable, intent(inout), optional :: error
 
-      link_exists = c_faccessat(working_directory, path//c_null_char, existence, link_itself) == 0_c_int
+      call decide_existence(path, c_faccessat(working_directory, path//c_null_char, existence, link_itself), &
+                            link_exists, error)
    end function link_exists
 
    !> List the names in a folder, in no particular order. The list is empty if the folder does not exist.
@@ -43,18 +48,20 @@ contains
       character(len=max_name_length) :: name
 
       allocate (names(0))
-      if (.not. link_exists(folder)) return
+      if (.not. link_exists(folder, error)) return
       stream = c_opendir(folder//c_null_char)
       if (.not. c_associated(stream)) then
-         call raise(error, io_error, "cannot list the folder '"//folder//"': "//last_failure())
+         call raise_unread(error, folder, last_failure())
          return
       end if
       do
+         call clear_error_number()
          entry = c_readdir(stream)
          if (.not. c_associated(entry)) exit
          name = name_of(entry)
          if (name /= '.' .and. name /= '..') names = [names, name]
       end do
+      if (error_number() /= 0_c_int) call raise_unread(error, folder, last_failure())
       ignored = c_closedir(stream)
    end subroutine list_names
 
@@ -69,27 +76,28 @@ contains
    end function name_of
 
    !> Read all bytes of a small file.
-   subroutine read_bytes(path, text, problem)
+   subroutine read_bytes(path, text, error)
       !> Path of the file
       character(len=*), intent(in) :: path
       !> Bytes of the file
       character(len=:), allocatable, intent(out) :: text
-      !> Reason why the file cannot be read; not allocated on success
-      character(len=:), allocatable, intent(out) :: problem
+      !> Allocated if the file cannot be read
+      type(error_t), allocatable, intent(inout) :: error
       character(len=256) :: reason
-      integer :: bytes, status, unit
+      integer(lp) :: bytes
+      integer :: status, unit
 
       text = ''
       open (newunit=unit, file=path, access='stream', form='unformatted', action='read', status='old', &
             iostat=status, iomsg=reason)
       if (status == 0) then
-         inquire (unit=unit, size=bytes)
+         call find_length(unit, bytes, status, reason)
          deallocate (text)
-         allocate (character(len=max(0, bytes)) :: text)
-         if (bytes > 0) read (unit, iostat=status, iomsg=reason) text
+         allocate (character(len=max(0_lp, bytes)) :: text)
+         if (bytes > 0_lp .and. status == 0) read (unit, iostat=status, iomsg=reason) text
          close (unit)
       end if
-      if (status /= 0) problem = 'cannot be read: '//trim(reason)
+      if (status /= 0) call raise_unread(error, path, reason)
    end subroutine read_bytes
 
    !> Remove an empty folder. A folder that is not empty is kept.
@@ -102,13 +110,17 @@ contains
    end subroutine remove_folder
 
    !> Canonical path of a file or folder, without links, '.' and '..'; empty if it does not exist
-   function canonical_path(path) result(resolved)
+   function canonical_path(path, error) result(resolved)
       !> Any path of the file or folder
       character(len=*), intent(in) :: path
+      !> Allocated if the system does not tell
+      type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: resolved
       type(c_ptr) :: text
+      logical :: ignored
 
       text = c_realpath(path//c_null_char, c_null_ptr)
+      if (.not. c_associated(text)) call decide_existence(path, -1_c_int, ignored, error)
       resolved = text_at(text)
       call c_free(text)
    end function canonical_path

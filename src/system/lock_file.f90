@@ -113,7 +113,7 @@ contains
    end subroutine close_file
 
    !> Read the text of a file through its path, as another process would.
-   subroutine read_record(path, text, length, is_gone)
+   subroutine read_record(path, text, length, is_gone, number)
       !> Path of the file, terminated by a null character
       character(len=*, kind=c_char), intent(in) :: path
       !> The text, padded with blanks
@@ -122,17 +122,22 @@ contains
       integer, intent(out) :: length
       !> Whether the file does not exist
       logical, intent(out) :: is_gone
+      !> Number of the error of the system if the file exists and cannot be read; else 0
+      integer(c_int), intent(out), optional :: number
       integer(c_int) :: descriptor, ignored
 
       text = ''
       length = -1
       is_gone = .false.
+      if (present(number)) number = 0_c_int
       descriptor = c_open(path, ior(read_only, close_on_exec), 0_c_int)
       if (descriptor < 0_c_int) then
          is_gone = any(error_number() == [no_entry, no_folder, stale])
+         if (present(number) .and. .not. is_gone) number = error_number()
          return
       end if
       length = int(c_pread(descriptor, text, int(record_length, c_size_t), 0_c_int64_t))
+      if (present(number) .and. length < 0) number = error_number()
       ignored = c_close(descriptor)
    end subroutine read_record
 

@@ -11,6 +11,8 @@
 !> changes the key of another process. Older versions wrote only the first line, and can read it.
 module polydem_lock_owner
    use, intrinsic :: iso_c_binding, only: c_char, c_int, c_int64_t, c_new_line, c_null_char, c_size_t
+   use polydem_errors, only: error_t, raise_unread
+   use polydem_file_system, only: errno_message
    use polydem_hash, only: hexadecimal, mix_word
    use polydem_heartbeat, only: n_digits
    use polydem_host, only: boot_identity, host_name, utc_now
@@ -90,16 +92,20 @@ contains
    end function new_key
 
    !> Read the owner of a lock.
-   function owner_of(path) result(owner)
+   function owner_of(path, error) result(owner)
       !> Path of the lock file
       character(len=*), intent(in) :: path
+      !> Allocated if the file exists but cannot be read
+      type(error_t), allocatable, intent(inout) :: error
       type(owner_t) :: owner
       character(len=record_length, kind=c_char) :: text
       character(len=record_length) :: line
+      integer(c_int) :: number
       integer :: length, first, last, status
       logical :: is_gone
 
-      call read_record(path//c_null_char, text, length, is_gone)
+      call read_record(path//c_null_char, text, length, is_gone, number)
+      if (number /= 0_c_int) call raise_unread(error, path, errno_message(number))
       owner%link_exists = .not. is_gone
       owner%is_empty = length == 0
       first = 1

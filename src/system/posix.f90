@@ -5,7 +5,7 @@ module polydem_posix
    private
    public :: c_access, c_close, c_closedir, c_creat, c_faccessat, c_fallocate, c_flock, c_fsync, c_lseek, c_mkdir, &
       c_open, c_opendir, c_pread, c_pwrite, c_readdir, c_realpath, c_rename, c_rmdir, c_strerror, c_strlen, &
-      c_unlink, c_write, error_number, is_written, text_at
+      c_unlink, c_write, clear_error_number, error_number, is_written, text_at
    public :: close_on_exec, existence, read_and_write, read_only, standard_error, standard_output, write_only
 
    !> Descriptors of standard output and standard error
@@ -186,6 +186,14 @@ contains
       call c_f_pointer(errno_location(), number)
       error_number = number
    end function error_number
+
+   !> Set errno to 0, before a call that sets it only on failure
+   subroutine clear_error_number()
+      integer(c_int), pointer :: number
+
+      call c_f_pointer(errno_location(), number)
+      number = 0_c_int
+   end subroutine clear_error_number
 
    !> Text at an address; empty if the address is null
    function text_at(address) result(text)

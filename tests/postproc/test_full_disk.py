@@ -19,7 +19,7 @@ def test_a_failed_write_ends_with_one_message_and_keeps_closed_segments(tmp_path
     assert end.returncode == 3
     lines = end.stderr.splitlines()
     assert len(lines) == 1
-    assert "trajectory_0003.h5.open: cannot be created; check that the folder exists" in lines[0]
+    assert "trajectory_0003.h5.open: cannot be created: No space left on device" in lines[0]
     with pytest.warns(UserWarning, match="left out: .*trajectory_0003.h5.open"):
         run = Trajectory(folder)
     assert_array_equal(run.steps, [1, 2, 3, 4, 5, 6, 7, 8])
@@ -51,7 +51,7 @@ def test_a_verb_without_room_leaves_nothing_but_a_sentence(small_drum, tmp_path,
 
     call = [sys.executable, "-m", "polydem_post", verb[0], str(small_drum), *verb[1:], "-o", str(tmp_path / name)]
     done = subprocess.run(call, preexec_fn=small_files, capture_output=True, text=True, check=False)
-    assert done.returncode == 2, done.stderr
+    assert done.returncode == 3, done.stderr
     assert done.stderr.startswith(f"error: {tmp_path / name}: cannot be written (")
     assert done.stderr.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
@@ -61,5 +61,5 @@ def test_an_output_that_takes_no_more_is_named(finished):
     with open("/dev/full", "w", encoding="utf-8") as full:
         end = subprocess.run([sys.executable, "-m", "polydem_post", "table", str(finished)], stdout=full, check=False,
                              stderr=subprocess.PIPE, text=True)
-    assert end.returncode == 2
+    assert end.returncode == 3
     assert end.stderr.endswith("\nerror: standard output: cannot be written (No space left on device)\n")

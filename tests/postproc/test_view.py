@@ -69,11 +69,13 @@ def test_wrong_options_are_explained(small_drum, capsys, arguments, message):
     assert message in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("path, why", [("/dev/full", "No space left on device"), ("/no/folder", "No such file")])
-def test_without_room_for_temporary_files_the_error_is_explained(small_drum, tmp_path, capsys, monkeypatch, path, why):
+@pytest.mark.parametrize("path, why, code", [("/dev/full", "No space left on device", 3),
+                                             ("/no/folder", "No such file", 2)])
+def test_without_room_for_temporary_files_the_error_is_explained(small_drum, tmp_path, capsys, monkeypatch, path, why,
+                                                                 code):
     monkeypatch.setattr(tempfile, "TemporaryFile", lambda **_: open(path, "r+b"))  # noqa: SIM115  the real one is, too
     monkeypatch.setattr(view_data, "MOST_KEPT", 1000)
-    assert main(["view", str(small_drum), "-o", str(tmp_path / "v.html")]) == 2
+    assert main(["view", str(small_drum), "-o", str(tmp_path / "v.html")]) == code
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and f"temporary files, in TMPDIR or /tmp: cannot be written ({why}" in said
     assert not list(tmp_path.iterdir())

@@ -1,8 +1,8 @@
 """The environment of the program: threads, stacks, file size limits, pipes, closed streams, umasks, new folders.
 
-usage: check_outside.py PROGRAM TRACE FAILING_WRITES
+usage: check_outside.py PROGRAM TRACE FAILING_CALLS
 
-FAILING_WRITES is the library of failing_writes.c, which here only logs calls. The program must never end by a signal or
+FAILING_CALLS is the library of failing_calls.c, which here only logs calls. The program must never end by a signal or
 with a message of a library: it reports each problem in one line of its own, and a reported success is one.
 tests/faults.md lists all faults.
 """

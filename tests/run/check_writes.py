@@ -3,7 +3,7 @@
 usage: check_writes.py PROGRAM LIBRARY [--ranks R] [--full] [--part K/N] [--how HOW] [--error NUMBER] [--seconds S]
                        [--memory FILE]
 
-PROGRAM is the one without MPI, LIBRARY that of failing_writes.c. With --ranks, the run in which a call fails is one of
+PROGRAM is the one without MPI, LIBRARY that of failing_calls.c. With --ranks, the run in which a call fails is one of
 R processes of the program that POLYDEM_MPI_PROGRAM names, and it happens to each rank in turn; without that variable
 the test is skipped (code 77). A run without a failure counts the calls. After a failed call
 
@@ -14,7 +14,7 @@ the test is skipped (code 77). A run without a failure counts the calls. After a
 
 By default a sample is tried, of all kinds of calls and files in turn, until S seconds are over (15; 50 with ranks); it
 depends on the programs only. --full tries all calls, with --part the K-th of N parts of them. HOW is that of
-failing_writes.c, once by default. --memory names a file of calls that passed, which are not tried again by the same
+failing_calls.c, once by default. --memory names a file of calls that passed, which are not tried again by the same
 programs.
 """
 

@@ -19,12 +19,12 @@ from .comparison_verb import add_paper
 from .data_verbs import add_data_verbs
 from .emit import printable
 from .picture_verbs import add_picture_verbs
-from .result_file import reason
+from .result_file import is_refused, reason
 from .table import FORMATS, timing_table
 from .trajectory import ResultError, Trajectory
 
-#: Exit code of a result that cannot be used, as in the program itself
-INPUT_ERROR = 2
+#: Exit codes of a result that cannot be used, and of a file that the system does not read or write, as in the program
+INPUT_ERROR, NO_FILE = 2, 3
 
 #: Exit code of an error that no reader foresaw; after Ctrl-C; if nobody reads the output any more, as in shells
 UNFORESEEN, INTERRUPTED, CLOSED_PIPE = 1, 130, 141
@@ -57,7 +57,7 @@ def main(arguments: list[str] | None = None) -> int:
         return code
     except ResultError as error:
         print(f"error: {printable(str(error))}", file=sys.stderr)
-        return INPUT_ERROR
+        return NO_FILE if is_refused(error) else INPUT_ERROR
     except BrokenPipeError:
         return _end_quietly()
     except KeyboardInterrupt:
@@ -69,7 +69,10 @@ def main(arguments: list[str] | None = None) -> int:
         if isinstance(error, OSError) and error.errno in NO_ROOM and error.filename is None:
             _end_quietly()
             print(f"error: standard output: cannot be written ({reason(error)})", file=sys.stderr)
-            return INPUT_ERROR
+            return NO_FILE
+        if isinstance(error, OSError) and error.filename is not None and is_refused(error):
+            print(f"error: {printable(str(error.filename))}: {reason(error)}", file=sys.stderr)
+            return NO_FILE
         words = " ".join(str(error).split())
         print(f"error: {options.verb} cannot go on: {type(error).__name__}: {printable(words)[:300]}. A file may be "
               f"damaged; {TRACEBACK}=1 shows where", file=sys.stderr)

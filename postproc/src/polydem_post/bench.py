@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from .former_names import COUNTERS, STAGES, present
-from .result_file import cannot_read
+from .result_file import cannot_read, entries_of
 from .scene_kinds import making_of, settings_of
 from .trajectory import UNREADABLE, ResultError, open_file
 
@@ -349,7 +349,7 @@ def _columns(steps: h5py.Group, what: str) -> dict:
 def _facts(group: h5py.Group) -> dict:
     """Name -> text or number."""
     facts = {}
-    for name, entry in group.items():
+    for name, entry in entries_of(group):
         if not isinstance(entry, h5py.Dataset):
             continue
         value = entry[()]

@@ -106,8 +106,10 @@ def check_bytes(folder: Path, names: list, manifest: Manifest) -> None:
     for name in names:
         try:
             size = (folder / name).stat().st_size
-        except OSError as error:
+        except FileNotFoundError as error:
             raise ManifestError(f"{name} is missing, but {MANIFEST} has it ({error.strerror})") from error
+        except OSError as error:
+            raise ManifestError(f"{name} cannot be read ({error.strerror})") from error
         expected = manifest.closed[name].bytes
         if size != expected:
             raise ManifestError(f"{name} has {size} bytes, but had {expected} when it was closed: it was cut, "
@@ -117,13 +119,19 @@ def check_bytes(folder: Path, names: list, manifest: Manifest) -> None:
 
 def check_hashes(folder: Path, names: list, manifest: Manifest) -> None:
     """Compare all bytes of closed files with the manifest; ManifestError if a bit of one is not as it was."""
-    try:
-        found = file_hashes([folder / name for name in names])
-    except OSError as error:
-        raise ManifestError(f"{error.filename or folder} cannot be read ({error.strerror})") from error
-    for name, each in zip(names, found):
+    for name, each in zip(names, _read_hashes(folder, names)):
         if each != manifest.closed[name].hash:
             raise ManifestError(f"{name} is not what was written: bytes were changed, or it was exchanged")
+
+
+def _read_hashes(folder: Path, names: list) -> list[str]:
+    """Hashes of files; ManifestError names the first that cannot be read."""
+    try:
+        return file_hashes([folder / name for name in names])
+    except OSError as error:
+        if len(names) > 1 and error.filename is None:
+            return [each for name in names for each in _read_hashes(folder, [name])]
+        raise ManifestError(f"{Path(error.filename or names[0]).name} cannot be read ({error.strerror})") from error
 
 
 # --- hashes ------------------------------------------------------------------------------------------------------

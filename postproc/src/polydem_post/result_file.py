@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
 import re
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -28,9 +31,16 @@ UNREADABLE = (
     MemoryError,
 )
 
+#: Message of the HDF5 library if the system does not tell the state of a file
+NO_STATE = "can't retrieve stat info"
+
 #: Parts of messages of the HDF5 library, and what they mean
 HDF5_REASONS = {"file signature not found": "it is not an HDF5 file",
-                "truncated file": "it is truncated: its end is missing"}
+                "truncated file": "it is truncated: its end is missing",
+                NO_STATE: "the system tells nothing about it"}
+
+#: Errors of the system that tell that there is no file of this name, or that another program has locked it
+ANSWERS = errno.ENOENT, errno.ENOTDIR, errno.EISDIR, errno.EEXIST, errno.ELOOP, errno.ENAMETOOLONG, errno.EAGAIN
 
 #: Bytes that one byte of a file can stand for at most: deflate makes a thousand zeros one byte
 MOST_COMPRESSED = 1100
@@ -66,6 +76,23 @@ def reason(error: Exception) -> str:
             return meaning
     inner = re.search(r"error message = '([^']+)'", words)
     return inner.group(1) if inner else words or type(error).__name__
+
+
+def is_refused(error: BaseException | None) -> bool:
+    """Whether the system refused to read or write a file, which tells nothing of what the file holds."""
+    while error is not None:
+        number = getattr(error, "errno", None)
+        said = re.search(r"errno = (\d+)", str(error))
+        number = int(said.group(1)) if said else number
+        if (number and number not in ANSWERS) or NO_STATE in str(error):
+            return True
+        error = error.__cause__
+    return False
+
+
+def entries_of(group) -> Iterator[tuple[str, Any]]:
+    """Names and entries of a group. (h5py's `items` gives None for an entry that cannot be read.)"""
+    return ((name, group[name]) for name in group)
 
 
 def open_file(path: Path, known: dict[Path, tuple[int, ...]] | None = None) -> h5py.File:
@@ -179,6 +206,11 @@ def _identity(path: Path) -> tuple[int, ...] | None:
 
 def _open_hdf5(path: Path) -> h5py.File:
     try:
-        return h5py.File(path, "r", locking=False)
+        try:
+            return h5py.File(path, "r", locking=False)
+        except OSError as error:
+            if NO_STATE not in str(error):
+                raise
+            return h5py.File(path, "r", locking=False)  # HDF5 does not tell why; this call may
     except (TypeError, ValueError):
         return h5py.File(path, "r")

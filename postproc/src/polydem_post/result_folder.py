@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 
 from .manifest import MANIFEST, Closed, Manifest, ManifestError, check_bytes, check_hashes, read_manifest
-from .result_file import OPEN_SUFFIX, ResultError, reading
+from .result_file import OPEN_SUFFIX, ResultError, is_refused, reading
 from .segments import SEGMENT_NAME, Segment, check_names, check_steps, find_segments, number_of, read_segment
 
 #: Segments are compared with their hashes as they are needed, with those that follow up to so many bytes: many at once
@@ -60,6 +60,8 @@ class ResultFolder:
             for segment in self.segments:
                 check_steps(segment, manifest.closed.get(segment.name))
         except ManifestError as error:
+            if is_refused(error):
+                raise ResultError(f"{self.folder}: {error}") from error
             raise ResultError(f"{self.folder}: {error}. The result is not what the run wrote: take it from a copy "
                               "or run it again; Trajectory(..., check=False) reads it as it is") from error
         self._manifest = manifest

@@ -13,7 +13,7 @@ import numpy as np
 
 from .former_names import balance_of
 from .manifest import MANIFEST, Closed, ManifestError
-from .result_file import OPEN_SUFFIX, ResultError, cannot_read, insist, present_path, reading
+from .result_file import OPEN_SUFFIX, ResultError, cannot_read, entries_of, insist, is_refused, present_path, reading
 
 #: Name of a segment: trajectory_0001.h5, or trajectory_0001.h5.open while it is written
 SEGMENT_NAME = re.compile(r"trajectory_(\d{4,})\.h5(\.open)?")
@@ -106,19 +106,22 @@ def _complete_frames(file: h5py.File) -> int:
 
     A program that dies while it writes a frame may leave some data sets one row longer than others.
     """
-    growing = list(file["frames"].values()) + list(balance_of(file).values())
-    growing += [values for name, values in file.get("walls", {}).items() if name != "id"]
+    growing = [values for group in (file["frames"], balance_of(file)) for _, values in entries_of(group)]
+    if "walls" in file:
+        growing += [values for name, values in entries_of(file["walls"]) if name != "id"]
     n = min(len(values) for values in growing)
     if "contacts" in file:
         start = file["contacts/start"][:]
-        rows = min(len(values) for name, values in file["contacts"].items() if name != "start")
+        rows = min(len(values) for name, values in entries_of(file["contacts"]) if name != "start")
         n = min(n, int(np.searchsorted(start, rows, side="right")) - 1)
     while n > 0:
         try:
             for values in growing:
                 values[n - 1]
             return n
-        except OSError:
+        except OSError as error:
+            if is_refused(error):
+                raise
             n -= 1
     return n
 

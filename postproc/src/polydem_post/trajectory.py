@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from .former_names import COUNTERS, STAGES, balance_of, present
 from .frames import CONTACT_FIELDS, Contacts, Frame, Walls, find_contacts, sound_frame
-from .result_file import UNREADABLE, ResultError, insist, insist_on_own_data, open_file, plain, reading
+from .result_file import UNREADABLE, ResultError, entries_of, insist, insist_on_own_data, open_file, plain, reading
 from .result_folder import NoManifest, ResultFolder
 from .segments import Segment
 from .settings import Settings
@@ -204,7 +204,7 @@ class Trajectory:
         columns: dict[str, list[npt.NDArray[Any]]] = {}
         for segment in self._files.segments:
             with self._files.open_segment(segment) as file:
-                for name, values in balance_of(file).items():
+                for name, values in entries_of(balance_of(file)):
                     part = values[: len(segment.times)]
                     insist(segment.path, "energy_balance", {name: part}, {name: (len(segment.times),)}, finite=False)
                     columns.setdefault(name, []).append(part)
@@ -219,7 +219,7 @@ class Trajectory:
         units: dict[str, str] = {}
         for segment in self._files.segments:
             with reading(segment.path) as file:
-                for name, values in balance_of(file).items():
+                for name, values in entries_of(balance_of(file)):
                     units[name] = str(values.attrs.get("unit", ""))
         return units
 
@@ -256,7 +256,7 @@ class Trajectory:
     def provenance(self) -> dict[str, Any]:
         """Where the result comes from, by name: program, revision, compiler, machine, input and others."""
         with self._files.open_any() as file:
-            return {name: plain(entry) for name, entry in file["provenance"].items()}
+            return {name: plain(entry) for name, entry in entries_of(file["provenance"])}
 
     @cached_property
     def origin(self) -> tuple[float, float]:

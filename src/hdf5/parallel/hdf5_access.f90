@@ -20,6 +20,7 @@ module polydem_hdf5_access
    use polydem_errors, only: io_error
    use polydem_file_system, only: disk_hint, last_failure
    use polydem_kinds, only: ip
+   use polydem_posix, only: clear_error_number, error_number
    use polydem_strings, only: to_text
    implicit none
    private
@@ -29,6 +30,8 @@ module polydem_hdf5_access
    integer(c_int), parameter :: individual_io = 1_c_int
    !> Key of the MPI info object that stores the path of a file; MPI keeps keys that it does not know
    character(len=*), parameter :: path_key = 'polydem_path'
+   !> EIO of errno on Linux
+   integer(c_int), parameter :: disk_fault = 5_c_int
    !> Maximum length of a path in a message
    integer, parameter :: path_length = 255
 
@@ -59,7 +62,24 @@ module polydem_hdf5_access
          integer(c_int), value :: count
       end function pmpi_write_at_all
 
-      !> Number of elements of a type that a call has written
+      !> MPI function that reads
+      integer(c_int) function pmpi_read_at(file, offset, bytes, count, kind, status) bind(C, name='PMPI_File_read_at')
+         import :: c_int, c_int64_t, c_ptr
+         type(c_ptr), value :: file, bytes, kind, status
+         integer(c_int64_t), value :: offset
+         integer(c_int), value :: count
+      end function pmpi_read_at
+
+      !> Collective form of PMPI_File_read_at
+      integer(c_int) function pmpi_read_at_all(file, offset, bytes, count, kind, status) &
+         bind(C, name='PMPI_File_read_at_all')
+         import :: c_int, c_int64_t, c_ptr
+         type(c_ptr), value :: file, bytes, kind, status
+         integer(c_int64_t), value :: offset
+         integer(c_int), value :: count
+      end function pmpi_read_at_all
+
+      !> Number of elements of a type that a call has written or read
       integer(c_int) function pmpi_get_count(status, kind, count) bind(C, name='PMPI_Get_count')
          import :: c_int, c_ptr
          type(c_ptr), value :: status, kind
@@ -188,6 +208,37 @@ contains
       write_at_all = pmpi_write_at_all(file, offset, bytes, count, kind, status)
       call check_count(file, count, kind, status)
    end function write_at_all
+
+   !> Replaces the MPI function of this name: it calls the original function and checks for a fault of the disk.
+   integer(c_int) function read_at(file, offset, bytes, count, kind, status) bind(C, name='MPI_File_read_at')
+      type(c_ptr), value :: file, bytes, kind, status
+      integer(c_int64_t), value :: offset
+      integer(c_int), value :: count
+
+      call clear_error_number()
+      read_at = pmpi_read_at(file, offset, bytes, count, kind, status)
+      call check_reading(file)
+   end function read_at
+
+   !> Replaces the MPI function of this name: it calls the original function and checks for a fault of the disk.
+   integer(c_int) function read_at_all(file, offset, bytes, count, kind, status) bind(C, name='MPI_File_read_at_all')
+      type(c_ptr), value :: file, bytes, kind, status
+      integer(c_int64_t), value :: offset
+      integer(c_int), value :: count
+
+      call clear_error_number()
+      read_at_all = pmpi_read_at_all(file, offset, bytes, count, kind, status)
+      call check_reading(file)
+   end function read_at_all
+
+   !> Abort all ranks if the disk could not be read. Open MPI then gives no data, like behind the end of the file, where
+   !> HDF5 may read.
+   subroutine check_reading(file)
+      type(c_ptr), intent(in) :: file
+
+      if (error_number() == disk_fault) call abort_all(path_of(mpi_file(pmpi_file_c2f(file)))//': cannot be read: '// &
+                                                       last_failure())
+   end subroutine check_reading
 
    !> Abort all ranks if fewer elements were written than requested.
    subroutine check_count(file, count, kind, status)

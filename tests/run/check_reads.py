@@ -1,0 +1,363 @@
+"""Each call of a verb that reads, lists or looks for something fails once, or gives half of the data.
+
+usage: check_reads.py PROGRAM LIBRARY [--ranks R] [--full] [--verbs A,B] [--part K/N] [--how HOW] [--error NUMBER]
+                      [--seconds S] [--memory FILE]
+
+PROGRAM is the one without MPI, LIBRARY that of failing_calls.c. The verbs are those of VERBS; with --ranks those that
+several processes can do are tried, with R processes of the program that POLYDEM_MPI_PROGRAM names, and calls of each
+rank in turn; without that variable the test is skipped (code 77). An undisturbed verb counts the calls. After a failed
+call
+
+* the verb ends with code 3 and a message with the file and the cause that the system gives, and without a word of
+  damage, difference or absence, or the advice to replace a result; or the outcome is that of an undisturbed call;
+* all files that were there are as before, except those of a result that is continued or replaced;
+* a run can be continued, and ends with the hash of an undisturbed one; an old result is complete until then.
+
+Half of the data (--how short) must change nothing. By default a sample is tried, some calls of --continue and of other
+verbs, until S seconds are over (15); it depends on the programs only. --full and the others are those of
+check_writes.py.
+"""
+
+import argparse
+import contextlib
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from collections import Counter
+from pathlib import Path
+
+from check_writes import SKIPPED, WAITING, Broken, Call, Memory, hash_of, in_order
+
+ROOT = Path(__file__).resolve().parents[2]
+#: Calls of a verb in a sample
+SAMPLE = 6
+#: When the test began [s]
+BEGAN = time.monotonic()
+#: Time within which a verb must have ended [s]
+PATIENCE = 300.0
+OUTLINES = "".join(f"POLYGON ((0 {y}, 0.01 {y}, 0.01 {y + 0.01:.2f}, 0 {y + 0.01:.2f}, 0 {y}))\n"
+                   for y in (0.0, 0.009, 0.018))
+#: What both scenes have: frames with contacts in several segments, a checkpoint after each step
+RUN = """\
+&forces stiffness = 1e5 tilt_damping = 0.5 /
+&integrate dt = 1e-5 duration = 4e-5 /
+&output frame_interval = 1e-5 frames_per_segment = 2 contacts = .true. /
+&checkpoint steps = 1 /
+"""
+FILES = {
+    "outlines.wkt": OUTLINES,
+    "scene.nml": "&scene name = 'file' bodies_file = 'data/bodies.h5' /\n" + RUN,
+    "patch.nml": "&scene name = 'bed' bodies = 4 packing = 'data/grains' /\n" + RUN,
+    "bed.nml": "&scene name = 'bed' bodies = 800 /\n" + RUN,
+    "former.nml": "&scene name = 'stack' /\n&neighbors finder = 'quadtree' /\n",
+    "bench.nml": "&bench scenes = 'data/boxes/trace.h5' names = 'pile' finders = 'quadtree', 'verlet' steps = 2 "
+                 "repeats = 1 folder = 'data/bench' /\n",
+}
+SCENE = "run data/scene.nml --threads 1 --set output.folder=data/"
+OTHER = " --set forces.tilt_damping=0.25"
+BOXES = "boxes --set output.trace_steps=3"
+#: Verbs of the program and of Python
+VERBS = {
+    "check": "check data/scene.nml",
+    "check packing": "check data/patch.nml",
+    "run": SCENE + "new",
+    "run packing": "run data/patch.nml --threads 1 --set output.folder=data/new",
+    "continue": SCENE + "begun --continue",
+    "finished": SCENE + "whole --continue",
+    "force": SCENE + "whole --force" + OTHER,
+    "changed": SCENE + "begun --continue --changed" + OTHER,
+    "info": "info data/whole",
+    "info checkpoint": "info data/begun/checkpoint_1.h5",
+    "info --check": "info data/begun --check",
+    "replay": "replay data/boxes/trace.h5",
+    "bench": "bench data/bench.nml",
+    "convert": "convert data/former.nml",
+}
+PYTHON_VERBS = {
+    "import": "import data/outlines.wkt -o data/made.h5",
+    "export": "export data/whole --to csv -o data/made.csv",
+    "plot": "plot data/whole -o data/made.svg",
+    "movie": "movie data/whole -o data/made.gif --processes 1",
+    "view": "view data/whole -o data/made.html",
+    "table": "table data/whole",
+    "tables": "tables data/measured --no-figures --output data/report",
+}
+#: Verbs that several ranks do
+OF_RANKS = ("run", "run packing", "continue", "finished", "force", "changed")
+#: Words that blame the contents of a file for a failed call, or advise to destroy a result
+BLAME = re.compile(r"differ|damage|missing|--force|[Nn]o such|there is no|truncated|is not an?\b|changed|WRONG|empty|"
+                   r"contains no|has no\b|another run|invalid|Traceback|unknown|cannot go on")
+
+
+class Case:
+    """The programs, and what undisturbed calls give."""
+
+    def __init__(self, program, library, ranks, how, error):
+        self.program, self.library, self.ranks, self.how, self.error = program, library, ranks, how, error
+        self.data, self.whole = Path.cwd() / "data", {}
+        self.data.mkdir()
+        for name, text in FILES.items():
+            (self.data / name).write_text(text, encoding="utf-8")
+        for words in (PYTHON_VERBS["import"].replace("made", "bodies"), SCENE + "whole", SCENE + BOXES, VERBS["bench"],
+                      VERBS["run packing"].replace("patch", "bed").replace("new", "grains")):
+            self.insist(words)
+        (self.data / "bench").rename(self.data / "measured")
+        self.begin()
+        shutil.copytree(self.data, "template", symlinks=True)
+        self.before = bytes_of(Path("template"))
+
+    def begin(self):
+        """An interrupted run: writing the last checkpoint failed."""
+        log = Path.cwd() / "calls"
+        places = {"LD_PRELOAD": self.library, "POLYDEM_FAIL_FOLDER": str(self.data), "POLYDEM_FAIL_LOG": str(log)}
+        self.insist(SCENE + "begun", **places)
+        calls = [Call(0, *line.split(" ", 2)) for line in log.read_text(encoding="utf-8").splitlines()]
+        last = [call for call in calls if call.name == "pwrite" and call.path.startswith("checkpoint")][-1]
+        shutil.rmtree(self.data / "begun")
+        self.insist(SCENE + "begun", code=3, **places, POLYDEM_FAIL_CALL=str(last.number))
+        log.unlink()
+
+    def call(self, words, ranks=None, **environment):
+        """Do a verb; return exit code, standard output, standard error."""
+        if words.split()[0] in PYTHON_VERBS:
+            return in_python(words.split(), environment)
+        command = ["mpirun", "-n", str(ranks), os.environ["POLYDEM_MPI_PROGRAM"]] if ranks else [self.program]
+        with subprocess.Popen([*command, *words.split()], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                              stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True,
+                              env={**SURROUNDINGS, "OMP_NUM_THREADS": "1", **environment}) as process:
+            try:
+                output, message = process.communicate(timeout=PATIENCE)
+            except subprocess.TimeoutExpired as late:
+                with contextlib.suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
+                raise Broken(f"nothing happens for {PATIENCE:.0f} s") from late
+        return process.returncode, output, message
+
+    def insist(self, words, code=0, **environment):
+        found, output, message = self.call(words, **environment)
+        if found != code:
+            raise Broken(f"{words}: code {found}\n{output}{message}")
+        return output
+
+    def watched(self, verb, rank, **environment):
+        """Do a verb in fresh files with the library in front; return what `call` does, and its calls."""
+        shutil.rmtree(self.data)
+        shutil.copytree("template", self.data, symlinks=True)
+        log = Path.cwd() / "calls"
+        log.unlink(missing_ok=True)
+        told = self.call({**VERBS, **PYTHON_VERBS}[verb], self.ranks, LD_PRELOAD=self.library, POLYDEM_PATIENCE=WAITING,
+                         POLYDEM_FAIL_KIND="reads", POLYDEM_FAIL_FOLDER=str(self.data), POLYDEM_FAIL_RANK=str(rank),
+                         POLYDEM_FAIL_LOG=str(log), **environment)
+        lines = log.read_text(encoding="utf-8").splitlines() if log.exists() else []
+        calls = [Call(rank, *line.rstrip("/.").split(" ", 2)) for line in lines]
+        for call in calls:
+            call.verb = verb
+        return told, calls
+
+    def count(self, verb, rank):
+        """All calls of a verb in which none fails."""
+        outcomes = []
+        for _ in range(2):
+            (code, output, message), calls = self.watched(verb, rank)
+            if code != 0 or not calls:
+                raise Broken(f"{verb}: code {code}, {len(calls)} calls\n{output}{message}")
+            outcomes.append((outcome(output), made(self.data, self.before)))
+        (said, files), (again, others) = outcomes
+        self.whole[verb] = said if said == again else None, {name: text if others.get(name) == text else None
+                                                             for name, text in files.items()}
+        seen = Counter()
+        for call in calls:
+            call.before = seen[call.name, call.path]
+            seen[call.name, call.path] += 1
+        return calls
+
+    def attempt(self, call):
+        """Let a call fail; give what happened, in a word, and the seconds it took to end."""
+        began = time.monotonic()
+        (code, output, message), calls = self.watched(call.verb, call.rank, POLYDEM_FAIL_CALL=str(call.number),
+                                                      POLYDEM_FAIL_HOW=self.how, POLYDEM_FAIL_ERROR=str(self.error))
+        seconds = time.monotonic() - began
+        met = [other for other in calls if other.number == call.number]
+        said = f"code {code}\n{output[-600:] if code else ''}{message}"
+        if code == 0:
+            text, files = self.whole[call.verb]
+            now = made(self.data, self.before)
+            if text is not None and outcome(output) != text:
+                raise Broken(f"other output, without a word: {said}\n{output}")
+            if now.keys() != files.keys() or any(files[name] not in (None, now[name]) for name in files):
+                raise Broken(f"other files, without a word: {said}")
+        else:
+            self.check_message(code, output, message, [other for other in calls if other.number >= call.number])
+        self.check_files(call.verb, said, code)
+        return ("told" if code != 0 else "harmless" if met else "not reached"), seconds
+
+    def check_message(self, code, output, message, failed):
+        """The verb has said which file failed, and why."""
+        lines = [line for line in f"{output}\n{message}".splitlines() if os.strerror(self.error) in line]
+        said = f"code {code}\n{output[-600:]}{message}"
+        if code != 3:
+            raise Broken(f"another code: {said}")
+        if not any(call.path in line for line in lines for call in failed):
+            raise Broken(f"no word of file and cause: {said}")
+        found = BLAME.search("\n".join([*lines, message]))
+        if found:
+            raise Broken(f"'{found.group()}' is not what happened: {said}")
+
+    def check_files(self, verb, said, code):
+        """Nothing is lost."""
+        words = VERBS.get(verb, "")
+        result = re.search(r"output\.folder=data/(\w+)", words)
+        folder = self.data / result.group(1) if result else None
+        now = bytes_of(self.data)
+        lost = [name for name, text in self.before.items()
+                if now.get(name) != text and not (folder and (self.data / name).is_relative_to(folder))]
+        if lost and (verb != "convert" or code):
+            raise Broken(f"{lost} changed: {said}")
+        if not folder or code == 0:
+            return
+        again = words.replace(" --force", " --continue")
+        if "--continue" not in again:
+            again += " --continue"
+        found, output, message = self.call(again)
+        if verb == "force" and found != 0:
+            if hash_of(self.insist(VERBS["finished"])) != self.whole_hash("finished"):
+                raise Broken(f"the old result is lost: {said}")
+            found, output, message = self.call(words)
+        if found != 0 or hash_of(output) != self.whole_hash(verb):
+            raise Broken(f"cannot be continued, code {found}:\n{output[-300:]}{message}\nafter {said}")
+
+    def whole_hash(self, verb):
+        if verb not in self.whole:
+            self.count(verb, 0)
+        return self.whole[verb][0]
+
+
+def in_python(words, environment):
+    """Do a verb of Python in a child of this process, which has the library in front."""
+    with tempfile.TemporaryFile() as output, tempfile.TemporaryFile() as message:
+        child = os.fork()
+        if child == 0:
+            code = 70
+            try:
+                os.dup2(output.fileno(), 1)
+                os.dup2(message.fileno(), 2)
+                os.environ.update(environment)
+                code = polydem_post(words)
+                sys.stdout.flush()
+                sys.stderr.flush()
+            except BaseException:
+                traceback.print_exc()
+                sys.stderr.flush()
+            os._exit(code)
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+        texts = []
+        for file in (output, message):
+            file.seek(0)
+            texts.append(file.read().decode(errors="replace"))
+    return code, *texts
+
+
+def bytes_of(folder):
+    """All files in a folder, by name."""
+    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def made(folder, before):
+    """New files; those of a result are compared by its hash."""
+    return {name: text for name, text in bytes_of(folder).items() if before.get(name) != text and not name.startswith(
+        ("new/", "begun/", "whole/", "bench/"))}
+
+
+def outcome(output):
+    """What must not depend on a failure: the hash of a run, or all that is said"""
+    return hash_of(output) or output
+
+
+def try_calls(case, options, memory):
+    """Let calls fail, as many as there is time for; give those that went wrong."""
+    verbs = [*OF_RANKS] if options.ranks else [*VERBS, *PYTHON_VERBS]
+    if options.verbs:
+        verbs = options.verbs.split(",")
+    part, parts = (int(word) for word in options.part.split("/"))
+    if not options.full:
+        random.Random(memory.key).shuffle(verbs)
+        verbs.sort(key=lambda verb: verb != "continue")
+    all_calls, broken, outcomes, tried = Counter(), [], Counter(), Counter()
+
+    def is_over():
+        return not options.full and tried and time.monotonic() - BEGAN > options.seconds
+
+    for verb in verbs:
+        if is_over():
+            break
+        calls = [call for rank in range(options.ranks or 1) for call in case.count(verb, rank)]
+        all_calls[verb] = len(calls)
+        for call in in_order(calls, memory.key)[part - 1:None if options.full else SAMPLE:parts]:
+            if is_over():
+                break
+            point = (options.ranks, options.how, options.error, verb, call.rank, call.number)
+            tried[verb] += 1
+            try:
+                if point not in memory.passed:
+                    memory.keep(point, *case.attempt(call))
+                outcomes[memory.passed[point]["outcome"]] += 1
+            except Broken as problem:
+                broken.append(verb)
+                print(f"{verb}, {call}: {problem}", flush=True)
+    print(f"calls that read: {dict(all_calls)}\ntried: {dict(tried)}; {dict(outcomes)}; wrong: {dict(Counter(broken))}")
+    print(f"{sum(outcomes.values())} of {sum(tried.values())} calls passed ({options.how}, "
+          f"{os.strerror(options.error)}); {len(broken)} did not")
+    return broken
+
+
+def parse(words):
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("program", type=os.path.abspath)
+    parser.add_argument("library", type=os.path.abspath)
+    parser.add_argument("--ranks", type=int, default=0)
+    parser.add_argument("--full", action="store_true")
+    parser.add_argument("--verbs")
+    parser.add_argument("--part", default="1/1")
+    parser.add_argument("--how", choices=("once", "on", "short", "cut"), default="once")
+    parser.add_argument("--error", type=int, default=5)
+    parser.add_argument("--seconds", type=float, default=15.0)
+    parser.add_argument("--memory", type=os.path.abspath)
+    return parser.parse_args(words)
+
+
+def main(words):
+    options = parse(words)
+    programs = [options.program, options.library, *([os.environ["POLYDEM_MPI_PROGRAM"]] if options.ranks else [])]
+    memory = Memory(options.memory, programs)
+    with tempfile.TemporaryDirectory() as work:
+        os.chdir(os.path.realpath(work))
+        return 1 if try_calls(Case(options.program, options.library, options.ranks, options.how, options.error),
+                              options, memory) else 0
+
+
+if __name__ == "__main__":
+    if "--ranks" in sys.argv and not os.environ.get("POLYDEM_MPI_PROGRAM"):
+        print("skipped: POLYDEM_MPI_PROGRAM does not name a program with MPI")
+        sys.exit(SKIPPED)
+    PYTHON = ROOT / ".venv" / "bin" / "python"
+    if "LD_PRELOAD" not in os.environ:
+        # Verbs of Python are children of this process.
+        os.environ["LD_PRELOAD"] = os.path.abspath(sys.argv[2])
+        os.execv(PYTHON if PYTHON.exists() else sys.executable, [str(PYTHON), *sys.argv])
+    os.environ["POLYDEM_PROGRAM"] = os.path.abspath(sys.argv[1])
+    os.environ["POLYDEM_MPI_PROGRAM"] = os.path.abspath(os.environ.get("POLYDEM_MPI_PROGRAM", sys.argv[1]))
+    sys.dont_write_bytecode = True
+    sys.path[:0] = [str(ROOT / "tests" / "ranks"), str(ROOT / "postproc" / "src")]
+    import matplotlib.pyplot  # noqa: F401  the children need not import it
+    from polydem_post.__main__ import main as polydem_post
+    from runs import ENVIRONMENT as SURROUNDINGS
+
+    SURROUNDINGS = {name: text for name, text in SURROUNDINGS.items() if name != "LD_PRELOAD"}
+    sys.exit(main(sys.argv[1:]))
