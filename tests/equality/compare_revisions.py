@@ -6,7 +6,8 @@ usage: compare_revisions.py [--base REVISION] [--only PATTERN] [--list] [--keep]
 Builds the base revision (HEAD if none is given) and the working tree in build/guard, without MPI and with it, does the
 same runs with both and compares bit for bit: state hash, frames, contacts, forces on walls, ledger, counters, traces,
 single steps. PATTERN is a regular expression for names of cases (--list shows them). Results of runs that differ stay
-in build/guard/*/work/cases, with --keep all. --time compares the times of steps instead. Exit code 0: all equal, 1: not.
+in build/guard/*/work/cases, with --keep all. --time compares the times of steps instead.
+Exit code 0: all equal, 1: not.
 
 Names that changed since the base are in guard_names.py, the cases in guard_cases.py.
 """
