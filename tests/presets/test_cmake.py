@@ -77,7 +77,7 @@ class Revision(Scene):
     def ask(self):
         """The revision in a new build_info.f90."""
         result = self.folder / "build_info.f90"
-        room = SOURCES / "src/system"
+        room = SOURCES / "src/platform/system"
         code, _, message = call(CMAKE, "-D", f"TEMPLATE={room / 'build_info.f90.in'}", "-D", f"RESULT={result}",
                                 "-D", f"SOURCE_DIR={self.clone}", "-D", "VERSION=1", "-D", "BUILD_TYPE=Release",
                                 "-P", room / "build_info.cmake")

@@ -18,9 +18,9 @@ import tempfile
 import time
 
 #: Files that each recipe changes: the list of CMake, the table of namelist entries, and the factory
-CHANGED = {"src/forces/walton_braun.f90": {"src/forces/force_law.f90", "src/forces/CMakeLists.txt",
+CHANGED = {"src/contacts/forces/walton_braun.f90": {"src/contacts/forces/force_law.f90", "src/contacts/forces/CMakeLists.txt",
                                            "src/config/entries.txt"},
-           "src/neighbours/plain_loop.f90": {"src/neighbours/finder_factory.f90", "src/neighbours/CMakeLists.txt",
+           "src/neighbours/finders/plain_loop.f90": {"src/neighbours/finders/finder_factory.f90", "src/neighbours/finders/CMakeLists.txt",
                                              "src/config/entries.txt"}}
 
 

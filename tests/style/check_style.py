@@ -78,13 +78,13 @@ def of_any(statement, room):
     """Statements that are nowhere allowed, or only in one room."""
     code = statement.code
     if re.match(r"use\b.*\b(hdf5|h5lt|h5ds)\b\s*,", code) and room != "hdf5":
-        yield "the library HDF5 is used in src/hdf5 only"
+        yield "the library HDF5 is used in src/platform/hdf5 only"
     if re.match(r"use\b.*\bmpi(_f08)?\b\s*,", code) and room not in ("hdf5", "communicator"):
-        yield "MPI is used in src/communicator and src/hdf5 only"
+        yield "MPI is used in src/platform/communicator and src/platform/hdf5 only"
     if re.match(r"(if\s*\(.*\)\s*)?(error\s+)?stop\b(?!\s*[=%(])", code) and room != "app":
         yield "only the program in src/app stops"
     if re.search(r"\bcall\s+omp_set_num_threads\b", code) and room not in ("app", "bench", "run"):
-        yield "the number of threads is set in src/app, src/bench and src/run only"
+        yield "the number of threads is set in src/app, src/laboratory and src/run only"
     if re.match(r"(if\s*\(.*\)\s*)?call\s+(exit|abort)\b", code) and room != "app":
         yield "only the program in src/app stops"
     if re.match(r"(save|data|include)\b(?!\s*[=%(])", code) or re.match(r"save\s*/", code):

@@ -88,9 +88,9 @@ BAD = [
     ("!> A good module.\n", "\n", 2, "no comment !> above module"),
     ("only: ip, wp", "only: dp, ip, wp", 3, "dp is not used"),
     ("only: ip, wp", "only: ip, wp, half_of => ip", 3, "half_of is not used"),
-    ("polydem_kinds, only", "hdf5, only", 3, "the library HDF5 is used in src/hdf5 only"),
-    ("polydem_kinds, only", "h5lt, only", 3, "the library HDF5 is used in src/hdf5 only"),
-    ("polydem_kinds, only", "mpi_f08, only", 3, "MPI is used in src/communicator and src/hdf5 only"),
+    ("polydem_kinds, only", "hdf5, only", 3, "the library HDF5 is used in src/platform/hdf5 only"),
+    ("polydem_kinds, only", "h5lt, only", 3, "the library HDF5 is used in src/platform/hdf5 only"),
+    ("polydem_kinds, only", "mpi_f08, only", 3, "MPI is used in src/platform/communicator and src/platform/hdf5 only"),
     ("integer(ip), parameter ::", "integer(ip) ::", 9, "a variable of a module"),
     ("integer(ip), parameter ::", "integer(ip), save ::", 9, "no save"),
     ("   !> A good type\n", "\n", 12, "no comment !> above type good_t"),
@@ -206,7 +206,7 @@ class Tree(unittest.TestCase):
     def test_modules_are_named_as_their_files(self):
         self.write("state/better.f90", GOOD)
         self.assertEqual(self.messages(),
-                         ["src/state/better.f90:2: module polydem_good should be polydem_better, as its file"])
+                         ["src/bodies/better.f90:2: module polydem_good should be polydem_better, as its file"])
 
     def test_files_that_cmake_chooses_between_share_a_module(self):
         self.write("state/good_double.f90", GOOD)
@@ -215,7 +215,7 @@ class Tree(unittest.TestCase):
 
     def test_files_for_the_preprocessor_are_refused(self):
         self.write("state/good.F90", GOOD)
-        self.assertEqual(self.messages(), ["src/state/good.F90:1: free-form .f90 without preprocessor only"])
+        self.assertEqual(self.messages(), ["src/bodies/good.F90:1: free-form .f90 without preprocessor only"])
 
     def test_stages_are_folders_and_groups(self):
         type_comment = "   !> A good type\n"

@@ -57,7 +57,7 @@ class Tools(unittest.TestCase):
         self.root = Path(folder.name)
         for name in (".fortitude.toml", ".ruff.toml", "postproc/pyproject.toml"):
             self.write(name, (ROOT / name).read_text(encoding="utf-8"))
-        self.write("src/state/good.f90", GOOD)
+        self.write("src/bodies/good.f90", GOOD)
         self.write("postproc/good.py", GOOD_PYTHON)
         self.write("tests/good.py", GOOD_PYTHON)
         self.write("polydem", "#!/usr/bin/env bash\necho \"$1\"\n")
@@ -93,7 +93,7 @@ class Tools(unittest.TestCase):
         self.write(name, good)
 
     def test_fortitude_finds_planted_faults(self):
-        self.expect_faults("fortitude", "src/state/good.f90", GOOD, FORTRAN_FAULTS)
+        self.expect_faults("fortitude", "src/bodies/good.f90", GOOD, FORTRAN_FAULTS)
 
     def test_ruff_finds_planted_faults(self):
         self.expect_faults("ruff", "postproc/good.py", GOOD_PYTHON, PYTHON_FAULTS)
@@ -115,13 +115,13 @@ class Tools(unittest.TestCase):
         subprocess.run(["git", "init", "--quiet", self.root], check=True)
         subprocess.run(["git", "-C", self.root, "add", "src", "postproc/good.py", "polydem"], check=True)
         self.write("postproc/draft.py", "import os\n")
-        self.write("src/state/draft.f90", "x\n")
+        self.write("src/bodies/draft.f90", "x\n")
         self.write("draft.sh", "#!/bin/sh\nrm $1\n")
         self.assertEqual(what_to_read(self.root, "ruff"), ["postproc/good.py"])
-        self.assertEqual(what_to_read(self.root, "fortitude"), ["src/state/good.f90"])
+        self.assertEqual(what_to_read(self.root, "fortitude"), ["src/bodies/good.f90"])
         self.assertEqual(what_to_read(self.root, "shellcheck"), ["polydem"])
         read = [os.path.relpath(path, self.root) for path in text_files(str(self.root))]
-        self.assertEqual(read, ["polydem", "postproc/good.py", "src/state/good.f90"])
+        self.assertEqual(read, ["polydem", "postproc/good.py", "src/bodies/good.f90"])
         # What is deleted but still tracked cannot be read.
         (self.root / "postproc/good.py").unlink()
         self.assertEqual(what_to_read(self.root, "ruff"), [])

@@ -40,7 +40,7 @@ PARTITIONED = "partitioned_sweep"
 #: How it sorts, for readers
 BLOCKS = "blocks, changes kept by each thread"
 
-#: Sweeps as one would first write them (`src/bench/obvious_sweeps.f90`) -> how they sort
+#: Sweeps as one would first write them (`src/laboratory/obvious_sweeps.f90`) -> how they sort
 OBVIOUS = {
     "odd_even_sweep": "single ends, a barrier per pass",
     "locked_sweep": "blocks, a lock on the shared list",
@@ -60,7 +60,7 @@ WORKING = ("structure", "search", "filter", "order", "merge")
 TREE_BARRIERS, USUAL_PASSES = 3, 2.0
 
 #: Time in which the tree expects to repair and to search for one box that left its leaf, in comparisons of candidates
-#: (`src/neighbours/quadtree.f90`)
+#: (`src/neighbours/finders/quadtree/quadtree.f90`)
 MOVE_COST, SEARCH_COST = 500, 1600
 
 #: Most threads for which the model is asked

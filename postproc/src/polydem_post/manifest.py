@@ -25,7 +25,7 @@ MANIFEST = "manifest.txt"
 #: Its first line, without the hash
 HEADING = "polydem-manifest 1"
 
-#: Words of eight bytes in a slice of a file (src/system/file_checksum.f90), and slices that are hashed at once
+#: Words of eight bytes in a slice of a file (src/platform/system/file_checksum.f90), and slices that are hashed at once
 SLICE, SLICES = 8192, 2048
 
 _ALL = (1 << 64) - 1
