@@ -2,19 +2,19 @@
 #
 # One folder of src is one library with its own folder of module files. A layer sees the modules of the layers that it
 # names in USES and no others, not even those of theirs: the links are PRIVATE, so what a layer uses is linked into a
-# program but not shown to it. The test `rooms` tries every pair that is not named.
+# program but not shown to it. The test `layers` tries every pair that is not named.
 function(polydem_layer name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;USES")
   add_library(polydem_${name} STATIC ${arg_SOURCES})
   add_library(polydem::${name} ALIAS polydem_${name})
-  set(modules "${PROJECT_BINARY_DIR}/rooms/${name}")
+  set(modules "${PROJECT_BINARY_DIR}/layers/${name}")
   set_target_properties(polydem_${name} PROPERTIES Fortran_MODULE_DIRECTORY "${modules}")
   target_include_directories(polydem_${name} INTERFACE "${modules}")
   target_link_libraries(polydem_${name} PRIVATE ${arg_USES} polydem::flags)
   polydem_remove_old_modules("${modules}" "${arg_SOURCES}")
 endfunction()
 
-# Delete the module files of sources that have left a room, since other rooms would still see them.
+# Delete the module files of sources that have left a layer, since other layers would still see them.
 function(polydem_remove_old_modules folder sources)
   file(GLOB old "${folder}/*.mod")
   foreach(source IN LISTS sources)

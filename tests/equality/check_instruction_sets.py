@@ -35,7 +35,7 @@ def is_wide(path):
 
 
 def objects_of(build):
-    """Paths of the objects of the rooms and the program, and one command that compiles Fortran."""
+    """Paths of the objects of the layers and the program, and one command that compiles Fortran."""
     with open(os.path.join(build, "compile_commands.json"), encoding="utf-8") as file:
         entries = json.load(file)
     found, compiler = [], None

@@ -54,7 +54,7 @@ def is_called(found, variant, procedure, small):
 
 def main(inlined_path, called_path):
     inlined, called = calls(inlined_path), calls(called_path)
-    # Procedures of other rooms are other objects, which neither compilation can inline. Those of the filter are large.
+    # Procedures of other layers are other objects, which neither compilation can inline. Those of the filter are large.
     numbers = [sum(f"_{variant}_MOD_" in target and any(part in target for part in TREE)
                    for name, targets in found.items() if any(part in name for part in TREE) for target in targets)
                for variant, found in (("inlined", inlined), ("called", called))]

@@ -225,7 +225,8 @@ def test_the_others_wait_for_the_first_thread_of_the_tree(trees, moved, first):
 
 
 def test_the_tree_expects_what_its_source_says():
-    source = (Path(os.environ["POLYDEM_SOURCE_DIR"]) / "src/neighbours/finders/quadtree/quadtree.f90").read_text(encoding="utf-8")
+    path = Path(os.environ["POLYDEM_SOURCE_DIR"]) / "src/neighbours/finders/quadtree/quadtree.f90"
+    source = path.read_text(encoding="utf-8")
     said = re.search(r"move_cost = (\d+)_ip, search_cost = (\d+)_ip", source).groups()
     assert tuple(map(int, said)) == (MOVE_COST, SEARCH_COST)
 

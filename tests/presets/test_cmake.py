@@ -77,10 +77,10 @@ class Revision(Scene):
     def ask(self):
         """The revision in a new build_info.f90."""
         result = self.folder / "build_info.f90"
-        room = SOURCES / "src/platform/system"
-        code, _, message = call(CMAKE, "-D", f"TEMPLATE={room / 'build_info.f90.in'}", "-D", f"RESULT={result}",
+        layer = SOURCES / "src/platform/system"
+        code, _, message = call(CMAKE, "-D", f"TEMPLATE={layer / 'build_info.f90.in'}", "-D", f"RESULT={result}",
                                 "-D", f"SOURCE_DIR={self.clone}", "-D", "VERSION=1", "-D", "BUILD_TYPE=Release",
-                                "-P", room / "build_info.cmake")
+                                "-P", layer / "build_info.cmake")
         self.assertEqual(code, 0, message)
         return result.read_text(encoding="utf-8").split("git_revision = '")[1].split("'")[0]
 

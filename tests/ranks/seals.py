@@ -1,4 +1,4 @@
-"""Seals of checkpoints, so that a changed one is believed; src/platform/system/file_checksum.f90 says what a seal is."""
+"""Seals of checkpoints, so that a changed one is believed; file_checksum.f90 says what a seal is."""
 
 import struct
 

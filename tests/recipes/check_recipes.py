@@ -18,10 +18,11 @@ import tempfile
 import time
 
 #: Files that each recipe changes: the list of CMake, the table of namelist entries, and the factory
-CHANGED = {"src/contacts/forces/walton_braun.f90": {"src/contacts/forces/force_law.f90", "src/contacts/forces/CMakeLists.txt",
-                                           "src/config/entries.txt"},
-           "src/neighbours/finders/plain_loop.f90": {"src/neighbours/finders/finder_factory.f90", "src/neighbours/finders/CMakeLists.txt",
-                                             "src/config/entries.txt"}}
+CHANGED = {
+    "src/contacts/forces/walton_braun.f90": {"src/contacts/forces/force_law.f90", "src/contacts/forces/CMakeLists.txt",
+                                             "src/config/entries.txt"},
+    "src/neighbours/finders/plain_loop.f90": {"src/neighbours/finders/finder_factory.f90",
+                                              "src/neighbours/finders/CMakeLists.txt", "src/config/entries.txt"}}
 
 
 class RecipeError(Exception):
@@ -87,19 +88,13 @@ def compile_file(source, like, commands, modules, folder):
     """Compile a file with the flags of another file, with the modules of this test first; return the object."""
     words, directory = commands[like]
     target = os.path.join(folder, os.path.basename(source) + ".o")
-    # The module folder of the room becomes a search folder.
+    # The module folder of the layer becomes a search folder.
     flags = [re.sub("^-J", "-I", word) for word in words[1:words.index("-c")]]
     done = subprocess.run([words[0], f"-I{modules}", *flags, "-Werror", f"-J{modules}", "-c", source, "-o", target],
                           cwd=directory, capture_output=True, text=True, check=False)
     if done.returncode != 0:
         raise RecipeError(f"{source} does not compile:\n{done.stderr[:4000]}")
     return target
-
-
-def sources_of(folder):
-    """Fortran files of a room in the order of its CMakeLists.txt, in which they compile."""
-    with open(os.path.join(folder, "CMakeLists.txt"), encoding="utf-8") as page:
-        return [os.path.join(folder, name) for name in re.findall(r"^ +(\w+\.f90)$", page.read(), re.MULTILINE)]
 
 
 def build_program(root, copy, build, ninja, folder):
@@ -112,10 +107,11 @@ def build_program(root, copy, build, ninja, folder):
     subprocess.run([sys.executable, os.path.join(config, "make_entries.py"), os.path.join(config, "entries.txt"), made],
                    check=True)
     plan = [(os.path.join(made, "entry_table.f90"), os.path.join(build, "src", "config", "entry_table.f90"))]
-    forces, neighbours = (os.path.join(root, "src", *names) for names in (
-        ("forces", "force_law.f90"), ("neighbours", "finder_factory.f90")))
-    for name, like in (("forces/walton_braun.f90", forces), ("forces/force_law.f90", forces),
-                       ("neighbours/plain_loop.f90", neighbours), ("neighbours/finder_factory.f90", neighbours)):
+    forces, finders = (os.path.join(root, "src", name) for name in (
+        "contacts/forces/force_law.f90", "neighbours/finders/finder_factory.f90"))
+    for name, like in (("contacts/forces/walton_braun.f90", forces), ("contacts/forces/force_law.f90", forces),
+                       ("neighbours/finders/plain_loop.f90", finders),
+                       ("neighbours/finders/finder_factory.f90", finders)):
         plan.append((os.path.join(copy, "src", name), like))
     trial = os.path.join(root, "tests", "verification", "trial.f90")
     serial = os.path.join(root, "tests", "simulation", "serial_simulation.f90")

@@ -44,16 +44,16 @@ def check_lines(path, lines):
 
 # --- rules of one statement --------------------------------------------------------------------------------------
 
-def check_statements(source, room):
+def check_statements(source, layer):
     """Rules that need to see a statement and its scopes."""
     for statement in source.statements:
         if os.path.basename(source.path) != "elementary.f90":
             for name in INTRINSIC.findall(statement.code):
                 yield statement.line, (f"{name}: the bits of this intrinsic depend on the machine; "
-                                       "see arithmetic/elementary.f90")
+                                       "see base/arithmetic/elementary.f90")
         if REAL_POWER.search(statement.code):
             yield statement.line, "the bits of a power with a real exponent depend on the machine"
-        for message in [*of_any(statement, room), *of_declaration(statement), *of_directive(statement)]:
+        for message in [*of_any(statement, layer), *of_declaration(statement), *of_directive(statement)]:
             yield statement.line, message
         if is_pointer(statement) and not any("c_f_pointer" in other.code
                                              for other in source.inside(statement.scopes[-1])):
@@ -68,24 +68,24 @@ def is_pointer(statement):
 #: Arguments that are named by a shorter form of the name of their type
 SHORT_NAMES = {"communicator": "comm"}
 
-#: Stages that have the name of a namelist group, not that of the room that does the work
-STAGES_OF_ROOMS = {"output": "io"}
+#: Stages that have the name of a namelist group, not that of the layer that does the work
+STAGES_OF_LAYERS = {"output": "io"}
 #: Table of namelist entries, which names the groups
 TABLE = os.path.join("src", "config", "entries.txt")
 
 
-def of_any(statement, room):
-    """Statements that are nowhere allowed, or only in one room."""
+def of_any(statement, layer):
+    """Statements that are nowhere allowed, or only in one layer."""
     code = statement.code
-    if re.match(r"use\b.*\b(hdf5|h5lt|h5ds)\b\s*,", code) and room != "hdf5":
-        yield "the library HDF5 is used in src/platform/hdf5 only"
-    if re.match(r"use\b.*\bmpi(_f08)?\b\s*,", code) and room not in ("hdf5", "communicator"):
-        yield "MPI is used in src/platform/communicator and src/platform/hdf5 only"
-    if re.match(r"(if\s*\(.*\)\s*)?(error\s+)?stop\b(?!\s*[=%(])", code) and room != "app":
+    if re.match(r"use\b.*\b(hdf5|h5lt|h5ds)\b\s*,", code) and layer != "hdf5":
+        yield "the library HDF5 is used in the layer hdf5 only"
+    if re.match(r"use\b.*\bmpi(_f08)?\b\s*,", code) and layer not in ("hdf5", "communicator"):
+        yield "MPI is used in the layers communicator and hdf5 only"
+    if re.match(r"(if\s*\(.*\)\s*)?(error\s+)?stop\b(?!\s*[=%(])", code) and layer != "app":
         yield "only the program in src/app stops"
-    if re.search(r"\bcall\s+omp_set_num_threads\b", code) and room not in ("app", "bench", "run"):
-        yield "the number of threads is set in src/app, src/laboratory and src/run only"
-    if re.match(r"(if\s*\(.*\)\s*)?call\s+(exit|abort)\b", code) and room != "app":
+    if re.search(r"\bcall\s+omp_set_num_threads\b", code) and layer not in ("app", "laboratory", "run"):
+        yield "the number of threads is set in the layers app, laboratory and run only"
+    if re.match(r"(if\s*\(.*\)\s*)?call\s+(exit|abort)\b", code) and layer != "app":
         yield "only the program in src/app stops"
     if re.match(r"(save|data|include)\b(?!\s*[=%(])", code) or re.match(r"save\s*/", code):
         yield f"{code.split()[0]} is not used here"
@@ -250,7 +250,7 @@ def check_names(sources):
 
 def check_stages(sources, groups):
     """Timed stages are folders of src and groups of the namelist."""
-    folders = {os.path.basename(os.path.dirname(source.path)) for source in sources} | set(STAGES_OF_ROOMS)
+    folders = {name for source in sources for name in source.path.split(os.sep)} | set(STAGES_OF_LAYERS)
     for source in sources:
         if not source.path.endswith(os.path.join("base", "timers.f90")):
             continue
@@ -262,11 +262,19 @@ def check_stages(sources, groups):
                 yield source.path, 1, f"stage {name} is not a group of the namelist"
 
 
-def check_source(path, room, text):
+def check_source(path, layer, text):
     """All rules of one Fortran source of src."""
     source = Source(path, text)
-    return sorted({*check_statements(source, room), *check_scopes(source), *check_imports(source),
+    return sorted({*check_statements(source, layer), *check_scopes(source), *check_imports(source),
                    *check_documentation(source)})
+
+
+def layer_of(root, name):
+    """The layer of a source: the name of the deepest folder above it that CMake knows."""
+    folder = os.path.dirname(name)
+    while os.sep in folder and not os.path.exists(os.path.join(root, folder, "CMakeLists.txt")):
+        folder = os.path.dirname(folder)
+    return os.path.basename(folder if os.sep in folder else os.path.dirname(name))
 
 
 def check_tree(root):
@@ -283,7 +291,7 @@ def check_tree(root):
         yield from ((name, *found) for found in check_lines(name, text.split("\n")))
         if name.startswith("src" + os.sep) and name.endswith(".f90"):
             sources.append(Source(name, text))
-            yield from ((name, *found) for found in check_source(name, name.split(os.sep)[1], text))
+            yield from ((name, *found) for found in check_source(name, layer_of(root, name), text))
     if not sources:
         yield "src", 1, "no sources found"
     yield from check_names(sources)

@@ -88,9 +88,9 @@ BAD = [
     ("!> A good module.\n", "\n", 2, "no comment !> above module"),
     ("only: ip, wp", "only: dp, ip, wp", 3, "dp is not used"),
     ("only: ip, wp", "only: ip, wp, half_of => ip", 3, "half_of is not used"),
-    ("polydem_kinds, only", "hdf5, only", 3, "the library HDF5 is used in src/platform/hdf5 only"),
-    ("polydem_kinds, only", "h5lt, only", 3, "the library HDF5 is used in src/platform/hdf5 only"),
-    ("polydem_kinds, only", "mpi_f08, only", 3, "MPI is used in src/platform/communicator and src/platform/hdf5 only"),
+    ("polydem_kinds, only", "hdf5, only", 3, "the library HDF5 is used in the layer hdf5 only"),
+    ("polydem_kinds, only", "h5lt, only", 3, "the library HDF5 is used in the layer hdf5 only"),
+    ("polydem_kinds, only", "mpi_f08, only", 3, "MPI is used in the layers communicator and hdf5 only"),
     ("integer(ip), parameter ::", "integer(ip) ::", 9, "a variable of a module"),
     ("integer(ip), parameter ::", "integer(ip), save ::", 9, "no save"),
     ("   !> A good type\n", "\n", 12, "no comment !> above type good_t"),
@@ -130,8 +130,8 @@ BAD = [
 ]
 
 
-def found_in(text, room="state"):
-    return [*check_source("polydem_good.f90", room, text), *check_lines("good.f90", text.split("\n"))]
+def found_in(text, layer="state"):
+    return [*check_source("polydem_good.f90", layer, text), *check_lines("good.f90", text.split("\n"))]
 
 
 class Rules(unittest.TestCase):
@@ -169,7 +169,7 @@ class Rules(unittest.TestCase):
             self.assertEqual(list(check_lines(path, [120*"a", ""])), [])
             self.assertEqual([line for line, _ in check_lines(path, ["a", 121*"a", ""])], [2])
 
-    def test_what_a_room_alone_may_do(self):
+    def test_what_a_layer_alone_may_do(self):
         self.assertEqual(found_in(GOOD.replace("polydem_kinds, only", "hdf5, only"), "hdf5"), [])
         self.assertEqual(found_in(GOOD.replace("self%length + by", "by\n      if (by < 0.0_wp) stop"), "app"), [])
 
@@ -189,7 +189,7 @@ class Tree(unittest.TestCase):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.root = folder.name
-        self.write("state/good.f90", GOOD)
+        self.write("bodies/good.f90", GOOD)
 
     def write(self, path, text):
         path = os.path.join(self.root, "src", path)
@@ -204,13 +204,13 @@ class Tree(unittest.TestCase):
         self.assertEqual(self.messages(), [])
 
     def test_modules_are_named_as_their_files(self):
-        self.write("state/better.f90", GOOD)
+        self.write("bodies/better.f90", GOOD)
         self.assertEqual(self.messages(),
                          ["src/bodies/better.f90:2: module polydem_good should be polydem_better, as its file"])
 
     def test_files_that_cmake_chooses_between_share_a_module(self):
-        self.write("state/good_double.f90", GOOD)
-        self.write("state/good_single.f90", GOOD)
+        self.write("bodies/good_double.f90", GOOD)
+        self.write("bodies/good_single.f90", GOOD)
         self.assertEqual(self.messages(), [])
 
     def test_files_for_the_preprocessor_are_refused(self):

@@ -1,6 +1,6 @@
 # polydem_write_targets(FILE)
 #
-# Lists all libraries and programs with what they link, one to a line: name|link;link. For tests/style/check_rooms.py.
+# Lists all libraries and programs with what they link, one to a line: name|link;link. For tests/style/check_layers.py.
 function(polydem_write_targets file)
   set(lines "")
   set(folders "${PROJECT_SOURCE_DIR}")

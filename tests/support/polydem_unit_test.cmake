@@ -1,10 +1,9 @@
-# polydem_unit_test(ROOM SOURCES test_a.pf ... [HELPERS helper.f90 ...] [USES polydem::room ...])
+# polydem_unit_test(LAYER SOURCES test_a.pf ... [HELPERS helper.f90 ...] [USES polydem::layer ...])
 #
-# The tests of one room: the program test_ROOM, and in ctest ROOM with the label ROOM, and unit if ROOM is a room of
-# src. Built with an
-# installed pFUnit if CMake finds one, else with the stand-in of this folder. A test finds files of the repository
-# through the environment variable POLYDEM_SOURCE_DIR, and may write into its working directory,
-# which is empty at the start.
+# The tests of one layer: the program test_LAYER, and in ctest LAYER. Labels are LAYER, its group (the first folder below
+# tests), and unit if LAYER is a layer of src. Built with an installed pFUnit if CMake finds one, else with the stand-in
+# of this folder. A test finds files of the repository through the environment variable POLYDEM_SOURCE_DIR, and may
+# write into its working directory, which is empty at the start.
 find_package(PFUNIT QUIET)
 
 # pFUnit up to 4.12 ends with code 0 after failures; undefined behaviour does not end a program at all.
@@ -13,35 +12,38 @@ set(polydem_words_of_failure "Encountered 1 or more failures" "[(]0 tests?[)]" "
 # Working directories of the unit tests
 set(polydem_scratch "${PROJECT_BINARY_DIR}/tests/scratch")
 
-function(polydem_unit_test room)
+function(polydem_unit_test layer)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "SOURCES;HELPERS;USES")
   if(arg_UNPARSED_ARGUMENTS OR NOT arg_SOURCES)
-    message(FATAL_ERROR "polydem_unit_test(${room}): give SOURCES, HELPERS and USES only")
+    message(FATAL_ERROR "polydem_unit_test(${layer}): give SOURCES, HELPERS and USES only")
   endif()
   if(PFUNIT_FOUND)
-    add_pfunit_ctest(test_${room} TEST_SOURCES ${arg_SOURCES} OTHER_SOURCES ${arg_HELPERS}
+    add_pfunit_ctest(test_${layer} TEST_SOURCES ${arg_SOURCES} OTHER_SOURCES ${arg_HELPERS}
       LINK_LIBRARIES ${arg_USES} polydem::flags)
     # The main program that pFUnit writes calls its suites without interfaces.
-    set_source_files_properties("${CMAKE_CURRENT_BINARY_DIR}/test_${room}_driver.F90" PROPERTIES
+    set_source_files_properties("${CMAKE_CURRENT_BINARY_DIR}/test_${layer}_driver.F90" PROPERTIES
       COMPILE_OPTIONS "-w;-Wno-error=implicit-interface")
-    set(name test_${room})
+    set(name test_${layer})
   else()
-    polydem_stand_in_test(test_${room} "${arg_SOURCES}" "${arg_HELPERS}" "${arg_USES}")
-    add_test(NAME ${room} COMMAND test_${room} --verbose)
-    set(name ${room})
+    polydem_stand_in_test(test_${layer} "${arg_SOURCES}" "${arg_HELPERS}" "${arg_USES}")
+    add_test(NAME ${layer} COMMAND test_${layer} --verbose)
+    set(name ${layer})
   endif()
-  set(labels ${room})
-  if(TARGET polydem::${room} OR room STREQUAL "support")
+  cmake_path(RELATIVE_PATH CMAKE_CURRENT_SOURCE_DIR BASE_DIRECTORY "${PROJECT_SOURCE_DIR}/tests" OUTPUT_VARIABLE group)
+  string(REGEX REPLACE "/.*" "" group "${group}")
+  set(labels ${layer} ${group})
+  list(REMOVE_DUPLICATES labels)
+  if(TARGET polydem::${layer} OR layer STREQUAL "support")
     list(APPEND labels unit)
   endif()
   set_tests_properties(${name} PROPERTIES
     LABELS "${labels}"
     FAIL_REGULAR_EXPRESSION "${polydem_words_of_failure}"
     ENVIRONMENT "POLYDEM_SOURCE_DIR=${PROJECT_SOURCE_DIR};OMP_NUM_THREADS=2;OMP_WAIT_POLICY=passive"
-    WORKING_DIRECTORY "${polydem_scratch}/${room}"
+    WORKING_DIRECTORY "${polydem_scratch}/${layer}"
     FIXTURES_REQUIRED empty_folders
     PROCESSORS 2)
-  set_property(GLOBAL APPEND PROPERTY polydem_test_folders "${polydem_scratch}/${room}")
+  set_property(GLOBAL APPEND PROPERTY polydem_test_folders "${polydem_scratch}/${layer}")
 endfunction()
 
 # polydem_empty_folders()

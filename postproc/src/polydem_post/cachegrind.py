@@ -17,7 +17,7 @@ from .trajectory import ResultError
 #: second level of one core of a common server; the same everywhere, so that counts of all machines are the same.
 PLAIN_MODEL = {"I1": "32768,8,64", "D1": "32768,8,64", "LL": "1048576,16,64"}
 
-#: Modules outside the room of the finders that work for them
+#: Modules outside the layer of the finders that work for them
 HELPERS = ("sort", "sort_reals", "finder", "finder_statistics", "pair_changes", "pair_list")
 
 #: Procedures of finders that only report

@@ -14,7 +14,7 @@ from .emit import Table
 from .paper import COMPLEXITY
 
 #: Where the sources of the finders are: this package stands beside them in the repository
-SOURCES = Path(__file__).resolve().parents[3] / "src" / "neighbours"
+SOURCES = Path(__file__).resolve().parents[3] / "src" / "neighbours" / "finders"
 
 #: What to do when the tool is not there
 HOW_TO_GET = "the tool lizard: .venv/bin/pip install --editable './postproc[complexity]'"
@@ -74,15 +74,16 @@ def counter():
 
 def sources_of(finder: str, folder: Path) -> list[Path]:
     """The files that make a finder, its own first; empty if there is no such finder."""
-    found, waiting = [], [folder / f"{finder}.f90"]
+    files = {path.name: path for path in folder.rglob("*") if path.is_file()}
+    found, waiting = [], [f"{finder}.f90"]
     while waiting:
-        path = waiting.pop(0)
-        if path in found or not path.is_file():
+        path = files.get(waiting.pop(0))
+        if path in found or path is None:
             continue
         found.append(path)
         text = path.read_text(encoding="utf-8")
-        waiting += [folder / name for name in INCLUDE.findall(text)]
-        waiting += [folder / f"{name}.f90" for name in USE.findall(text) if name not in SHARED]
+        waiting += INCLUDE.findall(text)
+        waiting += [f"{name}.f90" for name in USE.findall(text) if name not in SHARED]
     return found
 
 
@@ -106,12 +107,12 @@ def finders_in(folder: Path) -> list[str]:
     """Finders that have a file of their own."""
     types = re.compile(r"extends\(finder_t\)", re.IGNORECASE)
     found = []
-    for path in sorted(folder.glob("*.f90")):
+    for path in sorted(folder.rglob("*.f90"), key=lambda path: path.name):
         texts = [path.read_text(encoding="utf-8")]
         texts += [
-            (folder / name).read_text(encoding="utf-8")
+            (path.parent / name).read_text(encoding="utf-8")
             for name in INCLUDE.findall(texts[0])
-            if (folder / name).is_file()
+            if (path.parent / name).is_file()
         ]
         if path.stem not in SHARED and any(types.search(text) for text in texts):
             found.append(path.stem)

@@ -1,8 +1,8 @@
 """Time of a step on many ranks, reckoned from counts.
 
 What ranks tell each other is counted exactly, on any machine, by runs of the program (exchange_runs.py) and, in still
-packings, by `count_exchange` (tests/ranks/partition). A rank has halo bodies in a strip around its region. If n grains fill a
-square of side sqrt(n), in mean distances of grains, and the strip is w wide, then n + halo bodies =
+packings, by `count_exchange` (tests/ranks/partition). A rank has halo bodies in a strip around its region. If n grains
+fill a square of side sqrt(n), in mean distances of grains, and the strip is w wide, then n + halo bodies =
 (sqrt(n) + 2 w)^2, so
 
     halo bodies per grain = 4 w sqrt(P/N) + 4 w^2 P/N

@@ -1,4 +1,4 @@
-!> Data sets of an open HDF5 file, by memory address and HDF5 type. The other modules of this room build on it.
+!> Data sets of an open HDF5 file, by memory address and HDF5 type. The other modules of this layer build on it.
 !>
 !> Shapes have the Fortran order, with the fastest dimension first; the file and h5py show them reversed. The messages
 !> of the HDF5 library are switched off. `expect` checks every status; its message names the file and the data set.

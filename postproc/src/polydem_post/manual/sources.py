@@ -18,8 +18,8 @@ project: polydem
 summary: Modules, types and procedures of the sources.
 src_dir: {sources}
 output_dir: {output}
-exclude_dir: {sources}/hdf5/parallel
-             {sources}/communicator/mpi
+exclude_dir: {sources}/platform/hdf5/parallel
+             {sources}/platform/communicator/mpi
 predocmark: >
 docmark: <
 display: public
@@ -35,11 +35,11 @@ Modules, types and procedures of polydem, from the comments of the sources. [Man
 """
 
 
-def build_sources(root: Path, output: Path, tools: Path, rooms: str = "") -> None:
-    """Write the pages of all sources, or of one room, into `output`. FORD is installed in `tools` at need."""
+def build_sources(root: Path, output: Path, tools: Path, layers: str = "") -> None:
+    """Write the pages of all sources, or of one layer, into `output`. FORD is installed in `tools` at need."""
     project = tools / "ford_project.md"
     ford = _find_ford(tools)
-    project.write_text(PROJECT.format(sources=root / "src" / rooms, output=output), encoding="utf-8")
+    project.write_text(PROJECT.format(sources=root / "src" / layers, output=output), encoding="utf-8")
     _run([ford, "--quiet", str(project)])
 
 

@@ -1,4 +1,4 @@
-!> The ranks of an MPI run. In this room only this module and `world_communicator.f90` use MPI.
+!> The ranks of an MPI run. In this layer only this module and `world_communicator.f90` use MPI.
 !>
 !> Buffers are contiguous. Real rows are sent as bytes, so one code serves every working precision. Open MPI does not
 !> copy array sections and does not use the asynchronous attribute. A compiler may therefore keep values of a buffer

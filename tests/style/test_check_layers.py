@@ -1,6 +1,6 @@
-"""Test of check_rooms.py: a room that sees, names or uses too much or too little is found.
+"""Test of check_layers.py: a layer that sees, names or uses too much or too little is found.
 
-usage: test_check_rooms.py COMPILER
+usage: test_check_layers.py COMPILER
 """
 
 import os
@@ -9,13 +9,13 @@ import sys
 import tempfile
 import unittest
 
-from check_rooms import LIBRARIES, USE, Target, check_declarations, check_visibility, folders_of, judge
+from check_layers import LIBRARIES, USE, Target, check_declarations, check_visibility, folders_of, judge
 
 COMPILER = sys.argv.pop() if len(sys.argv) > 1 else "gfortran"
 
 
-def rooms():
-    """Three rooms, each of which uses the one before."""
+def layers():
+    """Three layers, each of which uses the one before."""
     found = {}
     for name, below in (("low", ""), ("middle", "low"), ("high", "middle")):
         links, used = ([f"polydem::{below}"], {f"polydem_{below}_file"}) if below else ([], set())
@@ -25,20 +25,20 @@ def rooms():
 
 class TestDeclarations(unittest.TestCase):
     def test_names_and_uses_agree(self):
-        self.assertEqual(list(check_declarations(rooms())), [])
+        self.assertEqual(list(check_declarations(layers())), [])
 
     def test_what_is_used_and_not_named_is_found(self):
-        targets = rooms()
+        targets = layers()
         targets["polydem_high"].used.add("polydem_low_file")
         self.assertEqual(list(check_declarations(targets)), ["polydem_high uses low and does not name it"])
 
     def test_what_is_named_and_not_used_is_found(self):
-        targets = rooms()
+        targets = layers()
         targets["polydem_high"].links.append("polydem::low")
         self.assertEqual(list(check_declarations(targets)), ["polydem_high names low and does not use it"])
 
     def test_libraries_count_too(self):
-        targets = rooms()
+        targets = layers()
         targets["polydem_high"].used.add("hdf5")
         targets["polydem_middle"].links.append("MPI::MPI_Fortran")
         self.assertEqual(
@@ -56,12 +56,12 @@ class TestDeclarations(unittest.TestCase):
 
 
 class TestVisibility(unittest.TestCase):
-    """With the compiler: what a room does not name must be refused, for want of the module."""
+    """With the compiler: what a layer does not name must be refused, for want of the module."""
 
     def setUp(self):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
-        self.targets = rooms()
+        self.targets = layers()
         for name in ("low", "middle", "high"):
             os.mkdir(os.path.join(folder.name, name))
             path = os.path.join(folder.name, f"{name}.f90")
@@ -72,16 +72,16 @@ class TestVisibility(unittest.TestCase):
         for name, seen in (("low", ""), ("middle", "low"), ("high", "middle")):
             self.targets[f"polydem_{name}"].compiler = (COMPILER, f"-I{name}", *([f"-I{seen}"] if seen else []))
 
-    def test_rooms_that_see_what_they_name(self):
+    def test_layers_that_see_what_they_name(self):
         wrong, refused, seen = check_visibility(self.targets, list(self.targets.values()))
         self.assertEqual((wrong, refused, seen), ([], 4 + 3 * len(LIBRARIES), 2))
 
-    def test_a_room_that_sees_through_another_is_found(self):
+    def test_a_layer_that_sees_through_another_is_found(self):
         self.targets["polydem_high"].compiler += ("-Ilow",)
         wrong, _, _ = check_visibility(self.targets, list(self.targets.values()))
         self.assertEqual(wrong, ["polydem_high sees polydem_low_file of low, which it does not name"])
 
-    def test_a_room_that_is_named_and_not_seen_is_found(self):
+    def test_a_layer_that_is_named_and_not_seen_is_found(self):
         self.targets["polydem_middle"].compiler = (COMPILER,)
         wrong, _, _ = check_visibility(self.targets, list(self.targets.values()))
         self.assertEqual(len(wrong), 1)

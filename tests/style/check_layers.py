@@ -1,10 +1,10 @@
 """Who sees whom: what each target of the build declares, what its sources use, and what the compiler lets it use.
 
-usage: check_rooms.py BUILD      a built folder, with compile_commands.json and targets.txt
+usage: check_layers.py BUILD      a built folder, with compile_commands.json and targets.txt
 
-A room or test target must name in CMake just those rooms whose modules its sources use. For every target and every
-room that it does not name, a file that uses a module of that room is compiled with its flags: the compiler must
-say that it cannot open this module. A room that is named must be seen. The same holds for the modules of HDF5 and MPI.
+A layer or test target must name in CMake just those layers whose modules its sources use. For every target and every
+layer that it does not name, a file that uses a module of that layer is compiled with its flags: the compiler must
+say that it cannot open this module. A layer that is named must be seen. The same holds for the modules of HDF5 and MPI.
 """
 
 import json
@@ -38,15 +38,15 @@ class Target:
     directory: str = "."
 
     @property
-    def room(self):
-        """Name of the room if this is one."""
+    def layer(self):
+        """Name of the layer if this is one."""
         return self.name[len("polydem_"):] if self.name.startswith("polydem_") else None
 
-    def declares(self, room):
-        """Whether it names a room, or a library of LIBRARIES."""
-        if room in LIBRARIES:
-            return any(link.startswith(LIBRARIES[room][1]) for link in self.links)
-        return f"polydem::{room}" in self.links
+    def declares(self, layer):
+        """Whether it names a layer, or a library of LIBRARIES."""
+        if layer in LIBRARIES:
+            return any(link.startswith(LIBRARIES[layer][1]) for link in self.links)
+        return f"polydem::{layer}" in self.links
 
 
 def folders_of(command):
@@ -87,23 +87,23 @@ def read_targets(build):
     return {name: target for name, target in targets.items() if target.compiler}
 
 
-def rooms_of(targets):
-    """Rooms by name, each with a module that stands for it; and the libraries."""
-    found = {target.room: min(target.defined) for target in targets.values() if target.room and target.defined}
+def layers_of(targets):
+    """Layers by name, each with a module that stands for it; and the libraries."""
+    found = {target.layer: min(target.defined) for target in targets.values() if target.layer and target.defined}
     return {**found, **{name: module for name, (module, _) in LIBRARIES.items()}}
 
 
 def check_declarations(targets):
     """What is named and not used, and what is used and not named."""
-    owner = {module: target.room for target in targets.values() if target.room for module in target.defined}
+    owner = {module: target.layer for target in targets.values() if target.layer for module in target.defined}
     owner.update({module: name for name, (module, _) in LIBRARIES.items()})
     for target in targets.values():
-        used = {owner[module] for module in target.used if module in owner} - {target.room}
-        named = {room for room in set(owner.values()) if target.declares(room)}
-        for room in sorted(used - named):
-            yield f"{target.name} uses {room} and does not name it"
-        for room in sorted(named - used):
-            yield f"{target.name} names {room} and does not use it"
+        used = {owner[module] for module in target.used if module in owner} - {target.layer}
+        named = {layer for layer in set(owner.values()) if target.declares(layer)}
+        for layer in sorted(used - named):
+            yield f"{target.name} uses {layer} and does not name it"
+        for layer in sorted(named - used):
+            yield f"{target.name} names {layer} and does not use it"
 
 
 def try_use(target, module, folder):
@@ -116,39 +116,39 @@ def try_use(target, module, folder):
     return done.returncode, done.stderr
 
 
-def judge(target, room, module, code, words):
-    """What is wrong with what the compiler made of the use of a room; None if nothing is."""
+def judge(target, layer, module, code, words):
+    """What is wrong with what the compiler made of the use of a layer; None if nothing is."""
     refused = code != 0 and re.search(rf"Cannot open module file .{module}\.mod.", words)
-    if target.declares(room) and code != 0:
-        return f"{target.name} names {room} and does not see {module}:\n{words}"
-    if not target.declares(room) and code == 0:
-        return f"{target.name} sees {module} of {room}, which it does not name"
-    if not target.declares(room) and not refused:
-        return f"{target.name}: the compiler refuses {module} of {room} for another reason:\n{words}"
+    if target.declares(layer) and code != 0:
+        return f"{target.name} names {layer} and does not see {module}:\n{words}"
+    if not target.declares(layer) and code == 0:
+        return f"{target.name} sees {module} of {layer}, which it does not name"
+    if not target.declares(layer) and not refused:
+        return f"{target.name}: the compiler refuses {module} of {layer} for another reason:\n{words}"
     return None
 
 
 def check_visibility(targets, group):
-    """Try every pair of a target of a group and a room: what is wrong, how many were refused and how many seen."""
-    rooms = rooms_of(targets)
-    pairs = [(target, room) for target in group for room in rooms if target.room != room]
+    """Try every pair of a target of a group and a layer: what is wrong, how many were refused and how many seen."""
+    layers = layers_of(targets)
+    pairs = [(target, layer) for target in group for layer in layers if target.layer != layer]
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        answers = list(pool.map(lambda pair: try_use(pair[0], rooms[pair[1]], folder), pairs))
-    wrong = [judge(target, room, rooms[room], *answer) for (target, room), answer in zip(pairs, answers)]
+        answers = list(pool.map(lambda pair: try_use(pair[0], layers[pair[1]], folder), pairs))
+    wrong = [judge(target, layer, layers[layer], *answer) for (target, layer), answer in zip(pairs, answers)]
     seen = sum(code == 0 for code, _ in answers)
     return [sentence for sentence in wrong if sentence], len(pairs) - seen, seen
 
 
 def main():
     targets = read_targets(sys.argv[1])
-    groups = {"rooms": [target for target in targets.values() if target.room],
-              "programs and tests": [target for target in targets.values() if not target.room]}
-    if len(groups["rooms"]) < 2:
-        sys.exit(f"{sys.argv[1]}: no rooms found")
+    groups = {"layers": [target for target in targets.values() if target.layer],
+              "programs and tests": [target for target in targets.values() if not target.layer]}
+    if len(groups["layers"]) < 2:
+        sys.exit(f"{sys.argv[1]}: no layers found")
     breaches = list(check_declarations(targets))
     for name, group in groups.items():
         wrong, refused, seen = check_visibility(targets, group)
-        print(f"{len(group)} {name}: {refused} uses of rooms and libraries that they do not name are refused, "
+        print(f"{len(group)} {name}: {refused} uses of layers and libraries that they do not name are refused, "
               f"{seen} of those that they name compile")
         breaches += wrong
     for breach in breaches:
