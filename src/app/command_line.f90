@@ -13,7 +13,7 @@ module polydem_command_line
 
    !> A parsed command line
    type :: command_t
-      !> run, check, info, replay, bench or convert; empty if only help or version is requested
+      !> run, check, info, replay or bench; empty if only help or version is requested
       character(len=:), allocatable :: verb
       !> Path of the namelist, result or trace; empty if none is given
       character(len=:), allocatable :: file
@@ -41,8 +41,6 @@ module polydem_command_line
       logical :: oracle = .false.
       !> Whether the files of a result are compared with their checksums
       logical :: checks = .false.
-      !> File that a conversion writes; empty: it replaces the namelist file
-      character(len=:), allocatable :: output
       !> How the program was called, for messages: polydem, or ./polydem by the launcher
       character(len=:), allocatable :: program
       !> Whether help is requested, for the verb or for all verbs
@@ -64,8 +62,7 @@ module polydem_command_line
    !> Table of verbs
    type(verb_t), parameter :: verbs(*) = [ &
       verb_t('run', 'FILE.nml', .false.), verb_t('check', 'FILE.nml', .false.), verb_t('info', '[RESULT.h5]', .true.), &
-      verb_t('replay', 'TRACE.h5', .false.), verb_t('bench', 'FILE.nml', .false.), &
-      verb_t('convert', 'FILE.nml', .false.)]
+      verb_t('replay', 'TRACE.h5', .false.), verb_t('bench', 'FILE.nml', .false.)]
 
    !> An option; src/app/help explains it
    type :: option_t
@@ -78,7 +75,7 @@ module polydem_command_line
    end type option_t
 
    !> Names of all verbs
-   character(len=*), parameter :: all_verbs = 'run check info replay bench convert'
+   character(len=*), parameter :: all_verbs = 'run check info replay bench'
 
    !> Table of options
    type(option_t), parameter :: options(*) = [ &
@@ -95,7 +92,6 @@ module polydem_command_line
       option_t('--samples', 'FOLDER', 'replay'), &
       option_t('--oracle', '', 'replay'), &
       option_t('--check', '', 'info'), &
-      option_t('-o', 'OUT', 'convert'), &
       option_t('--help', '', all_verbs), &
       option_t('--version', '', all_verbs)]
 
@@ -162,7 +158,6 @@ contains
       command%file = ''
       command%finder = 'two_level'
       command%samples = ''
-      command%output = ''
       used = .false.
       n_overrides = 0
       only_files = .false.
@@ -302,8 +297,6 @@ contains
          command%oracle = .true.
       case ('--check')
          command%checks = .true.
-      case ('-o')
-         command%output = value
       case ('--help')
          command%help = .true.
       case default

@@ -7,7 +7,6 @@ module polydem_verbs
    use polydem_check_result, only: check_result
    use polydem_command_line, only: command_t, usage
    use polydem_communicator, only: communicator_t
-   use polydem_convert_file, only: convert_file
    use polydem_errors, only: error_t
    use polydem_host, only: environment
    use polydem_kinds, only: dp, ip
@@ -37,7 +36,7 @@ contains
       type(settings_t) :: settings
       type(bench_settings_t) :: bench
       type(thread_choice_t) :: threads
-      character(len=:), allocatable :: crowd, report
+      character(len=:), allocatable :: crowd
 
       if (command%help .or. command%version) then
          if (comm%is_root() .and. command%help) call print_line(usage(command%verb, command%program), error)
@@ -71,9 +70,6 @@ contains
          call read_settings(command%file, command%overrides, bench, error)
          if (.not. allocated(error)) call check_threads(maxval(bench%threads), error)
          if (.not. allocated(error)) call run_bench(bench, error)
-      case ('convert')
-         call convert_file(command%file, command%output, report, error)
-         if (.not. allocated(error)) call print_line(report, error)
       case default
          if (command%file == '') call describe_program(error)
          if (command%checks) then
@@ -92,7 +88,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: value
 
-      if (command%verb == 'info' .or. command%verb == 'convert') return
+      if (command%verb == 'info') return
       if (command%threads > 0) then
          choice%reason = 'given by --threads'
          call check_threads(int(command%threads, ip), error)

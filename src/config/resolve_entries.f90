@@ -6,7 +6,6 @@
 !> error.
 module polydem_resolve_entries
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_former_words, only: present_name, renaming
    use polydem_kinds, only: ip, wp
    use polydem_missing_entries, only: example_of, list_groups, missing_text
    use polydem_namelist_entries, only: bench_group, entries, entry_t, first_row, group_length, groups, keys_of, required
@@ -104,8 +103,6 @@ contains
       logical, intent(in) :: of_bench
       type(error_t), allocatable, intent(inout) :: error
 
-      call refuse_former_words(statement, error)
-      if (allocated(error)) return
       if (all(groups() /= statement%group)) then
          call raise(error, input_error, statement%place//': unknown group &'//statement%group// &
             suggestion(statement%group, pack(groups(), (groups() == bench_group) .eqv. of_bench)))
@@ -119,33 +116,6 @@ contains
          call raise_unknown_key(statement, error)
       end if
    end subroutine check_names
-
-   !> Refuse a group, key or value that has another name now.
-   pure subroutine refuse_former_words(statement, error)
-      type(statement_t), intent(in) :: statement
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: group, key, name, text, value
-      integer :: k
-
-      group = present_name(statement%group)
-      key = present_name(group, statement%key)
-      text = ''
-      do k = size(statement%values), 1, -1
-         value = trim(statement%values(k)%text)
-         name = present_name(group, key, value)
-         if (name /= value) text = renaming(group, key, value, name)
-      end do
-      if (key /= statement%key) text = renaming(group, statement%key, '', key)
-      if (group /= statement%group) text = renaming(statement%group, '', '', group)
-      if (group /= statement%group .and. statement%key /= '') &
-         text = statement%group//'.'//statement%key//' is now '//group//'.'//key
-      if (text == '') return
-      if (.not. statement%is_override) then
-         text = text//'; ./polydem convert '//statement%place(:index(statement%place, ':', back=.true.) - 1)// &
-            ' rewrites the file'
-      end if
-      call raise(error, input_error, statement%place//': '//text)
-   end subroutine refuse_former_words
 
    !> Raise an error about a key that the group does not have. The message names the groups that have it.
    pure subroutine raise_unknown_key(statement, error)

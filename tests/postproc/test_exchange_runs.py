@@ -107,13 +107,6 @@ def test_what_is_saved_is_read_again_and_nothing_else_is(shared, alone, tmp_path
     runs = [read_run(shared), read_run(alone)]
     write_runs(runs, tmp_path / "runs.csv")
     assert read_runs(tmp_path / "runs.csv") == runs
-    former = (tmp_path / "runs.csv").read_text(encoding="utf-8")
-    former = former.replace(",partition,", ",cut,", 1).replace(",redistributions,", ",settlements,", 1)
-    former = former.replace(",partitions,", ",divisions,", 1).replace(",most_halo_bodies,", ",most_ghosts,", 1)
-    former = former.replace(",halo_bodies,", ",ghosts,", 1)
-    assert ",divisions," in former and ",ghosts," in former and ",most_ghosts," in former
-    (tmp_path / "former.csv").write_text(former, encoding="utf-8")
-    assert ",cut," in former and ",settlements," in former and read_runs(tmp_path / "former.csv") == runs
     (tmp_path / "other.csv").write_text("shape,grains\nbox,1\n", encoding="utf-8")
     assert read_runs(tmp_path / "other.csv") == []
     damaged = (tmp_path / "runs.csv").read_text(encoding="utf-8").replace(",morton,", ",morton,x", 1)
@@ -141,9 +134,6 @@ def test_the_command_takes_folders_and_saved_files(shared, alone, tmp_path, caps
     again = capsys.readouterr().out
     assert again.startswith(printed) and again.count("| 4096 |") == 2
     assert "### Time of a step of 100000 bodies" in again and "| run | morton | 0 | 1 |" in again
-    former = ["--cut", "morton", "--settlement", "4", "--ghost", "0.5", "--settled-bytes", "300"]
-    assert main(["scale", saved, "--body", "1e-6", "--bodies", "1e5,1e6", *former]) == 0
-    assert capsys.readouterr().out == again
     assert main(["scale", saved, "--body", "1e-6"]) == 2
     assert "nothing was counted for run bisection 0" in capsys.readouterr().err
     assert main(["scale", str(alone)]) == 2

@@ -235,14 +235,14 @@ def _add_scale(verbs) -> None:
     scale.add_argument("--save", type=Path, metavar="FILE.csv")
     scale.add_argument("--bodies", type=_positives, default=[1e6], metavar="N,...")
     scale.add_argument("--body", type=_positive, metavar="S")
-    for default, *names in ((2e-6, "latency"), (1e9, "bandwidth"), (0.5, "ghost", "halo-body"), (1.1, "imbalance"),
-                            (40.0, "interval"), (4.0, "settlement", "redistribution"),
-                            (300.0, "settled-bytes", "redistributed-bytes")):
+    for default, *names in ((2e-6, "latency"), (1e9, "bandwidth"), (0.5, "halo-body"), (1.1, "imbalance"),
+                            (40.0, "interval"), (4.0, "redistribution"),
+                            (300.0, "redistributed-bytes")):
         scale.add_argument(*(f"--{name}" for name in names), type=_positive, default=default, metavar="X",
                            dest=names[-1].replace("-", "_"))
     scale.add_argument("--sums", type=_count, default=2, metavar="K")
     scale.add_argument("--shape")
-    scale.add_argument("--cut", "--partition", dest="partition", default="bisection")
+    scale.add_argument("--partition", default="bisection")
     scale.add_argument("--margin", type=_positive)
 
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .former_names import COUNTERS, STAGES, present
 from .result_file import cannot_read, entries_of
 from .scene_kinds import making_of, settings_of
 from .trajectory import UNREADABLE, ResultError, open_file
@@ -342,8 +341,7 @@ def _columns(steps: h5py.Group, what: str) -> dict:
     if what not in steps:
         return {}
     names = steps[f"{what}_name"].asstr()[:]
-    former = {"count": COUNTERS, "stage": STAGES}.get(what, {})
-    return {present(former, str(name).strip()): column for name, column in zip(names, np.atleast_2d(steps[what][:]).T)}
+    return {str(name).strip(): column for name, column in zip(names, np.atleast_2d(steps[what][:]).T)}
 
 
 def _facts(group: h5py.Group) -> dict:

@@ -7,7 +7,6 @@ import math
 from dataclasses import MISSING, asdict, astuple, fields
 from pathlib import Path
 
-from .former_names import COLUMNS, present
 from .new_file import new_file
 from .result_file import cannot_read
 from .trajectory import ResultError
@@ -29,7 +28,6 @@ def _read(path: Path) -> tuple:
     try:
         with Path(path).open(newline="", encoding="utf-8") as file:
             reader = csv.DictReader(file)
-            reader.fieldnames = [present(COLUMNS, name) for name in reader.fieldnames or []]
             rows = list(reader)
             return list(reader.fieldnames or []), rows
     except FileNotFoundError as error:

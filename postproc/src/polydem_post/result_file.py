@@ -95,6 +95,13 @@ def entries_of(group) -> Iterator[tuple[str, Any]]:
     return ((name, group[name]) for name in group)
 
 
+def balance_of(file):
+    """Group of the energy balance in an open segment; empty if the run did not compute it."""
+    if "energy_balance" not in file:
+        return {}
+    return file["energy_balance"]
+
+
 def open_file(path: Path, known: dict[Path, tuple[int, ...]] | None = None) -> h5py.File:
     """Open a file, also one that a run is still writing or has just closed and renamed.
 

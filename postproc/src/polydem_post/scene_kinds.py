@@ -10,8 +10,6 @@ from __future__ import annotations
 import math
 import re
 
-from .former_names import ENTRIES, present
-
 #: Boxes of which it is not recorded how they were made
 UNKNOWN = "unknown"
 
@@ -46,7 +44,7 @@ def settings_of(text: str) -> dict[str, str]:
             group = words[1:].strip()
         key, equals, value = words.partition("=")
         if group and equals:
-            settings[present(ENTRIES, f"{group}.{key.strip()}")] = value.strip().strip("'")
+            settings[f"{group}.{key.strip()}"] = value.strip().strip("'")
     return settings
 
 

@@ -11,9 +11,18 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from .former_names import balance_of
 from .manifest import MANIFEST, Closed, ManifestError
-from .result_file import OPEN_SUFFIX, ResultError, cannot_read, entries_of, insist, is_refused, present_path, reading
+from .result_file import (
+    OPEN_SUFFIX,
+    ResultError,
+    balance_of,
+    cannot_read,
+    entries_of,
+    insist,
+    is_refused,
+    present_path,
+    reading,
+)
 
 #: Name of a segment: trajectory_0001.h5, or trajectory_0001.h5.open while it is written
 SEGMENT_NAME = re.compile(r"trajectory_(\d{4,})\.h5(\.open)?")

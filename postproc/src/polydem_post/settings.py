@@ -6,7 +6,6 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any, Union
 
-from .former_names import ENTRIES, present
 from .result_file import ResultError
 
 Scalar = Union[str, bool, int, float]
@@ -82,7 +81,7 @@ class Settings(Mapping[str, Group]):
 
 
 def _parse(text: str) -> dict[str, dict[str, Value]]:
-    """Group -> key -> value of the text that a run writes: one entry per line, names of former versions replaced."""
+    """Group -> key -> value of the text that a run writes: one entry per line."""
     found: dict[str, dict[str, Value]] = {}
     group = ""
     for number, line in enumerate(text.splitlines(), 1):
@@ -94,9 +93,8 @@ def _parse(text: str) -> dict[str, dict[str, Value]]:
             key, equals, value = words.partition("=")
             if not (group and equals):
                 raise ResultError(f"line {number} of the stored input is not an entry of a namelist: {words[:80]!r}")
-            new_group, _, new_key = present(ENTRIES, f"{group}.{key.strip()}").partition(".")
             values = [_value(word) for word in _WORD.findall(value)]
-            found.setdefault(new_group, {})[new_key] = values[0] if len(values) == 1 else values
+            found[group][key.strip()] = values[0] if len(values) == 1 else values
     return {name: entries for name, entries in found.items() if entries}
 
 

@@ -13,9 +13,18 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from .former_names import COUNTERS, STAGES, balance_of, present
 from .frames import CONTACT_FIELDS, Contacts, Frame, Walls, find_contacts, sound_frame
-from .result_file import UNREADABLE, ResultError, entries_of, insist, insist_on_own_data, open_file, plain, reading
+from .result_file import (
+    UNREADABLE,
+    ResultError,
+    balance_of,
+    entries_of,
+    insist,
+    insist_on_own_data,
+    open_file,
+    plain,
+    reading,
+)
 from .result_folder import NoManifest, ResultFolder
 from .segments import Segment
 from .settings import Settings
@@ -233,7 +242,7 @@ class Trajectory:
         with self._files.open_profile() as file:
             group = file["profile"]
             profile: dict[str, Any] = {name: group[name][:] for name in ("calls", "total", "least", "most")}
-            profile["stage"] = [present(STAGES, str(name)) for name in group["stage"].asstr()[:]]
+            profile["stage"] = [str(name) for name in group["stage"].asstr()[:]]
             n = len(profile["stage"])
             columns = {name: profile[name] for name in ("calls", "total", "least", "most")}
             insist(self._files.profile_path, "profile", columns, dict.fromkeys(columns, (n,)), finite=False)
@@ -249,7 +258,7 @@ class Trajectory:
             if "counters" not in file:
                 return {}
             group = file["counters"]
-            names = [present(COUNTERS, str(name)) for name in group["name"].asstr()[:]]
+            names = [str(name) for name in group["name"].asstr()[:]]
             return dict(zip(names, map(int, group["value"][:])))
 
     @cached_property

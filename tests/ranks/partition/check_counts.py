@@ -29,12 +29,12 @@ def complaints(row: dict) -> list:
         found.append("wrong number of grains")
     if not own <= row["grains_most"] <= own + 2.0 or abs(row["imbalance"] - row["grains_most"] / own) > 1e-6:
         found.append("grains are not distributed evenly")
-    if row["bytes"] != 48 * row["ghosts"] or row["bytes_most"] < 48 * row["ghosts_most"]:
+    if row["bytes"] != 48 * row["halo_bodies"] or row["bytes_most"] < 48 * row["halo_bodies_most"]:
         found.append("bytes are not those of the halo bodies")
     if row["ranks"] == 1:
-        return found + (["a single rank has halo bodies"] if row["ghosts"] or row["messages"] else [])
+        return found + (["a single rank has halo bodies"] if row["halo_bodies"] or row["messages"] else [])
     strip = (1.0 + 2.0 * row["margin"]) * math.sqrt(own)
-    if not 0.5 * strip < row["ghosts_most"] < (4.0 if row["partition"] == "bisection" else 8.0) * strip:
+    if not 0.5 * strip < row["halo_bodies_most"] < (4.0 if row["partition"] == "bisection" else 8.0) * strip:
         found.append("halo bodies are not in a strip")
     if not 2 * row["ranks"] - 2 <= row["messages"] <= row["ranks"] * (row["ranks"] - 1):
         found.append("messages do not connect the ranks")
@@ -48,7 +48,7 @@ def main() -> int:
     if len(rows) != 40:
         wrong.append(f"{len(rows)} rows")
     for narrow, wide in zip(rows, rows[1:]):
-        if narrow["margin"] < wide["margin"] and narrow["ghosts"] > wide["ghosts"]:
+        if narrow["margin"] < wide["margin"] and narrow["halo_bodies"] > wide["halo_bodies"]:
             wrong.append(f"{wide}: fewer halo bodies with a wider margin")
     print(*wrong, sep="\n")
     return 1 if wrong else 0

@@ -18,7 +18,7 @@ program count_exchange
    !> Distances that a body may move before the next redistribution [m]
    real(wp), parameter :: margins(5) = [0.1_wp, 0.2_wp, 0.5_wp, 1.0_wp, 2.0_wp]
    !> Bytes of a halo body in a step: position, angle and velocities
-   integer(lp), parameter :: bytes_per_ghost = 48_lp
+   integer(lp), parameter :: bytes_per_halo_body = 48_lp
 
    class(communicator_t), allocatable :: comm
    type(error_t), allocatable :: error
@@ -35,8 +35,8 @@ program count_exchange
    if (comm%is_root()) then
       call get_word(1, word)
       open (newunit=unit, file=word, status='replace', action='write')
-      write (unit, '(a)') 'shape,grains,ranks,partition,margin,grains_most,ghosts,ghosts_most,messages,'// &
-         'messages_most,bytes,bytes_most,rectangles,imbalance,ghosts_per_grain,neighbours'
+      write (unit, '(a)') 'shape,grains,ranks,partition,margin,grains_most,halo_bodies,halo_bodies_most,messages,'// &
+         'messages_most,bytes,bytes_most,rectangles,imbalance,halo_bodies_per_grain,neighbours'
    end if
    do a = 2, command_argument_count()
       call get_word(a, word)
@@ -120,12 +120,12 @@ contains
       call comm%all_reduce_sum(received)
       call cover(boxes, rectangles)
       sums = [size(boxes, 2, lp), sum(sent), count(sent > 0_lp, kind=lp), size(rectangles, 2, lp)]
-      most = [sums(1), received(comm%rank), sums(3), max(sums(2), received(comm%rank))*bytes_per_ghost]
+      most = [sums(1), received(comm%rank), sums(3), max(sums(2), received(comm%rank))*bytes_per_halo_body]
       call comm%all_reduce_sum(sums)
       call comm%all_reduce_max(most)
       if (.not. comm%is_root()) return
       write (unit, '(a,2(",",i0),3a,f0.2,8(",",i0),3(",",f0.6))') shape, sums(1), comm%size, ',', cut, ',', margin, &
-         most(1), sums(2), most(2), sums(3), most(3), sums(2)*bytes_per_ghost, most(4), sums(4), &
+         most(1), sums(2), most(2), sums(3), most(3), sums(2)*bytes_per_halo_body, most(4), sums(4), &
          real(most(1)*comm%size, dp)/real(sums(1), dp), real(sums(2), dp)/real(sums(1), dp), &
          real(sums(3), dp)/real(comm%size, dp)
    end subroutine count_margin
