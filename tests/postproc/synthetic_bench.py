@@ -40,7 +40,7 @@ ENTRIES = {
     "soft": ("name = 'gas' bodies = {boxes} fraction = 2.0 speed = 0.1 overlap = .true.", "margin = 0.0"),
     "range": ("name = 'gas' bodies = {boxes} fraction = 0.3 speed = 0.5", "margin = {number}"),
     "worst": ("name = 'gas' bodies = {boxes} fraction = 0.3 speed = 0.5 order = 'descending'", "margin = 0.0"),
-    "rest": ("name = 'gas' bodies = {boxes} fraction = 0.3 speed = 1.0 movers = 1", "margin = 0.0"),
+    "rest": ("name = 'gas' bodies = {boxes} fraction = 0.3 speed = 1.0 moving_grains = 1", "margin = 0.0"),
     "line": ("name = 'channel' bodies = {boxes} fraction = 0.3 speed = 0.5", "margin = 0.0"),
     "other": ("name = 'heap' bodies = {boxes}", "margin = 0.0"),
 }

@@ -145,7 +145,7 @@ def test_bodies_must_be_in_their_file():
 
 
 def test_boxes_must_be_in_their_trace():
-    original = os.path.join(ROOT, "tests", "bench", "traces", "drum_cut.h5")
+    original = os.path.join(ROOT, "tests", "laboratory", "traces", "drum_cut.h5")
     names = []
     with h5py.File(original, "r") as file:
         file.visititems(lambda name, entry: names.append("/" + name) if isinstance(entry, h5py.Dataset) else None)

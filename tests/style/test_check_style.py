@@ -214,15 +214,15 @@ class Tree(unittest.TestCase):
         self.assertEqual(self.messages(), [])
 
     def test_files_for_the_preprocessor_are_refused(self):
-        self.write("state/good.F90", GOOD)
+        self.write("bodies/good.F90", GOOD)
         self.assertEqual(self.messages(), ["src/bodies/good.F90:1: free-form .f90 without preprocessor only"])
 
     def test_stages_are_folders_and_groups(self):
         type_comment = "   !> A good type\n"
-        names = "   integer, parameter :: stage_names(n_stages) = &\n      [character(len=5) :: 'state', 'flow']\n"
+        names = "   integer, parameter :: stage_names(n_stages) = &\n      [character(len=6) :: 'bodies', 'flow']\n"
         timers = GOOD.replace("_good\n", "_timers\n").replace(type_comment, names + type_comment)
         self.write("base/timers.f90", timers)
-        self.write("config/entries.txt", "# Comment\n\ngroup state: bodies\n")
+        self.write("config/entries.txt", "# Comment\n\ngroup bodies: bodies\n")
         self.assertEqual(self.messages(), ["src/base/timers.f90:1: stage flow is not a folder of src",
                                            "src/base/timers.f90:1: stage flow is not a group of the namelist"])
 

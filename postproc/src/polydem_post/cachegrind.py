@@ -72,7 +72,7 @@ def machine_model(folder: Path = Path("/sys/devices/system/cpu/cpu0/cache")) -> 
 
 def finder_functions(sources: Path) -> re.Pattern:
     """What the compiled names of the functions of finders look like; `sources` is the folder of their files."""
-    modules = sorted(path.stem for path in sources.glob("*.f90"))
+    modules = sorted(path.stem for path in sources.rglob("*.f90"))
     if not modules:
         raise ResultError(f"{sources}: the sources of the finders are not there; they name the functions to count")
     names = "|".join(map(re.escape, [*modules, *HELPERS]))

@@ -47,7 +47,8 @@ def write_mp4(path: Path, size: tuple[int, int], fps: float, frames: Iterable[by
         if ffmpeg.returncode != 0 or not path.exists():
             said.seek(0)
             lines = said.read().decode(errors="replace").splitlines() or [f"exit code {ffmpeg.returncode}"]
-            raise OSError(errno.EIO, "ffmpeg: " + re.sub(r"^(\[[^]]*\] )+", "", lines[-1]))
+            number = errno.EIO if path.parent.is_dir() else errno.ENOENT
+            raise OSError(number, "ffmpeg: " + re.sub(r"^(\[[^]]*\] )+", "", lines[-1]))
 
 
 def write_gif(path: Path, size: tuple[int, int], fps: float, frames: Iterable[bytes]) -> None:
