@@ -192,7 +192,11 @@ def a_run_whose_folder_was_taken_over_ends_and_writes_nothing_more(case, library
                 process.send_signal(signal.SIGCONT)
                 _, message = process.communicate(timeout=600)
             assert process.returncode == NO_FILE and "is gone or belongs to another run" in message, message
-            assert states_of("lost") == before, (before, states_of("lost"))
+            after = states_of("lost")
+            # A checkpoint that was begun before the pause may appear; no list names it.
+            begun = {name for name in after if name not in before}
+            assert begun <= {"checkpoint_1.h5", "checkpoint_2.h5"}, (before, after)
+            assert {name: after[name] for name in before} == before, (before, after)
             assert read(lock_of("lost")) == (words or "")
             shutil.rmtree("lost")
 
