@@ -79,6 +79,8 @@ contains
       real(dp) :: elapsed, before(n_stages)
 
       before = simulation%timers%total
+      ! As in a run between frames
+      simulation%keeps_contacts = .false.
       call clock%start()
       call advance(simulation, error)
       call clock%stop(elapsed, sample%processor(s))
