@@ -46,7 +46,7 @@ contains
       call choose_step(self, error)
       if (allocated(error)) return
       call find_median(self%comm, self%bodies%diameter(self%bodies%free), median_diameter)
-      call new_domain(self%domain, settings%decomposition, median_diameter, self%comm, error)
+      call new_domain(self%domain, settings%decomposition, median_diameter, self%comm)
       if (.not. allocated(error)) call fit_to_bodies(self, error, median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return

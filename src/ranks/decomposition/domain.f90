@@ -10,11 +10,9 @@
 module polydem_domain
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_errors, only: error_t
    use polydem_halo, only: halo_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_partition, only: partition_t
-   use polydem_partition_factory, only: new_partition
    use polydem_rank_bounds, only: rank_bounds_t
    use polydem_settings, only: decomposition_settings_t
    implicit none
@@ -26,7 +24,7 @@ module polydem_domain
       !> Group &decomposition
       type(decomposition_settings_t) :: settings
       !> Partition of space; not allocated in a run on one rank
-      class(partition_t), allocatable :: partition
+      type(partition_t), allocatable :: partition
       !> Bounding rectangles of the bodies of the other ranks
       type(rank_bounds_t) :: rank_bounds
       !> Halo: copies of bodies of other ranks
@@ -79,20 +77,18 @@ module polydem_domain
 contains
 
    !> Start a domain. In a run on several ranks the first redistribution is in the first step.
-   subroutine new_domain(domain, settings, median_diameter, comm, error)
+   subroutine new_domain(domain, settings, median_diameter, comm)
       type(domain_t), intent(out) :: domain
       type(decomposition_settings_t), intent(in) :: settings
       !> Median diameter of the free bodies of the run [m]
       real(wp), intent(in) :: median_diameter
       class(communicator_t), intent(in) :: comm
-      !> Allocated if the settings name no known partition of space
-      type(error_t), allocatable, intent(inout) :: error
 
       domain%settings = settings
       domain%median_diameter = median_diameter
       domain%margin = settings%margin
       if (settings%margin <= 0.0_wp) domain%margin = first_margin*median_diameter
-      if (comm%size > 1_ip) call new_partition(domain%partition, settings%partition, error)
+      if (comm%size > 1_ip) allocate (domain%partition)
    end subroutine new_domain
 
    !> Whether a redistribution is necessary: a box of a body of this rank is outside both the zone and its padded box
