@@ -61,7 +61,7 @@ module polydem_bodies
       real(wp), allocatable :: acceleration(:, :)
       !> Angular acceleration [rad/s2]
       real(wp), allocatable :: angular_acceleration(:)
-      !> Sum of the forces, (2, slot) [N/m]. A step keeps the sums of fixed bodies only, see `keep_forces`
+      !> Sum of the forces, (2, slot) [N/m]. A step keeps the sums of fixed bodies only, see `total_forces`
       real(wp), allocatable :: force(:, :)
       !> Sum of the torques about the centre of mass, likewise [N]
       real(wp), allocatable :: torque(:)

@@ -58,8 +58,8 @@ contains
       if (allocated(error)) return
       call move_walls(self, 0.0_wp)
       call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
-      call redistribute(self, error)
-      if (.not. allocated(error)) call compute_forces(self, 0.0_wp, error)
+      call redistribute(self, .false., error)
+      if (.not. allocated(error)) call compute_forces(self, error)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
       call start_integration(self)

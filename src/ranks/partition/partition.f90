@@ -1,8 +1,8 @@
 !> Partition of space among the ranks of a communicator, by weighted recursive coordinate bisection: M. J. Berger &
 !> S. H. Bokhari, IEEE Trans. Comput. C-36 (1987) 570.
 !>
-!> A group of ranks and its bodies are cut across the longer side of the bounding box of the bodies, until each group has
-!> one rank. If the cut meets a line of bodies with the same coordinate, as in a lattice, it has a step: the other
+!> A group of ranks and its bodies are cut across the longer side of the bounding box of the bodies, until each group
+!> has one rank. If the cut meets a line of bodies with the same coordinate, as in a lattice, it has a step: the other
 !> coordinate separates the bodies on this line.
 !>
 !> All ranks have the whole partition, with the same bits. The owner of a body depends on all positions and weights, but
