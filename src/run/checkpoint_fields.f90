@@ -62,7 +62,7 @@ contains
          if (.not. serializer%is_reading) call save_pairs(serializer, s)
          if (serializer%is_reading) call read_pairs(serializer, s)
          if (.not. serializer%is_reading .or. allocated(serializer%error)) return
-         call turn_bodies(s%bodies, s%moving, s%isa)
+         call turn_bodies(s%bodies, s%moving)
          call fit_to_bodies(s, serializer%error, s%domain%median_diameter)
       end associate
    end subroutine serialize_run

@@ -58,7 +58,7 @@ contains
       end associate
       call begin_sums(self%bodies%n, self%force_sums)
       if (self%law%needs_shares) &
-         call find_shares(self%law, self%bodies, self%neighbours%pairs, self%history, self%isa, self%walk%shares)
+         call find_shares(self%law, self%bodies, self%neighbours%pairs, self%history, self%walk%shares)
       !$omp parallel if (n > 1_ip) default(none) shared(self, dt, ends, last, n, clock) private(r, k)
       !$omp do schedule(static, 1)
       do r = 1_ip, n
@@ -122,7 +122,7 @@ contains
       do while (next > ends(1))
          call own_clock%begin_block()
          associate (pairs => self%neighbours%pairs)
-            call fill_block(self%bodies, pairs%first, pairs%second, self%law%needs_effective_area, self%isa, &
+            call fill_block(self%bodies, pairs%first, pairs%second, self%law%needs_effective_area, &
                             ends(1) + 1_ip, next, tested, self%history, block)
          end associate
          call own_clock%end_part(1)

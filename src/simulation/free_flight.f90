@@ -141,38 +141,34 @@ contains
 
    !> Update the boxes of up to `block_size` bodies, and turn their vertices as far as they are needed. Several threads
    !> may call it for different bodies.
-   subroutine bound(self, maker, slots, pairs, isa, bodies, boxes)
+   subroutine bound(self, maker, slots, pairs, bodies, boxes)
       class(free_flight_t), intent(inout) :: self
       type(box_maker_t), intent(in) :: maker
       !> Slots of the bodies, ascending
       integer(ip), intent(in), contiguous :: slots(:)
       !> Pairs of the last step
       type(pair_list_t), intent(in) :: pairs
-      !> Instruction set of the kernels
-      integer, intent(in) :: isa
       !> Bodies; only `turned` changes
       type(bodies_t), intent(inout) :: bodies
       !> Boxes; only `bounds` changes
       type(boxes_t), intent(inout) :: boxes
 
       if (self%is_dilute) then
-         call bound_block(self%corners, maker, slots, pairs%pairs_of, isa, bodies, boxes)
+         call bound_block(self%corners, maker, slots, pairs%pairs_of, bodies, boxes)
       else
-         call turn_and_bound_block(maker, slots, isa, bodies, boxes)
+         call turn_and_bound_block(maker, slots, bodies, boxes)
       end if
    end subroutine bound
 
    !> Turn the vertices of the bodies that have pairs since this step; those of other bodies with pairs are turned.
-   subroutine turn_joined(self, pairs, isa, bodies)
+   subroutine turn_joined(self, pairs, bodies)
       class(free_flight_t), intent(in) :: self
       !> Pairs of this step
       type(pair_list_t), intent(in) :: pairs
-      !> Instruction set of the kernels
-      integer, intent(in) :: isa
       !> Bodies; only `turned` changes
       type(bodies_t), intent(inout) :: bodies
 
-      if (self%is_dilute .and. pairs%n_joined > 0_ip) call turn_bodies(bodies, pairs%joined(:pairs%n_joined), isa)
+      if (self%is_dilute .and. pairs%n_joined > 0_ip) call turn_bodies(bodies, pairs%joined(:pairs%n_joined))
    end subroutine turn_joined
 
    !> Whether all bodies need the correction from the forces: none coasts

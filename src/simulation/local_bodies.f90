@@ -85,7 +85,7 @@ contains
 
       if (allocated(self%neighbours%finder)) statistics = self%neighbours%finder%work
       associate (choice => self%settings%neighbours)
-         call new_neighbours(self%neighbours, choice%finder, self%boxes, error, choice%skin, self%isa)
+         call new_neighbours(self%neighbours, choice%finder, self%boxes, error, choice%skin, self%bodies%isa)
       end associate
       if (allocated(error)) return
       self%neighbours%finder%work%value = statistics%value

@@ -145,7 +145,7 @@ contains
       !> Becomes true if a box leaves the zone of this rank and its padded box of the last redistribution
       logical, intent(inout) :: has_left
 
-      call self%flight%bound(self%maker, slots, self%neighbours%pairs, self%isa, self%bodies, self%boxes)
+      call self%flight%bound(self%maker, slots, self%neighbours%pairs, self%bodies, self%boxes)
       if (.not. allocated(self%domain%reference)) return
       has_left = has_left .or. .not. have_boxes_within(self%maker, slots, self%boxes, self%domain%rank_bounds%zone, &
                                                        self%domain%reference)

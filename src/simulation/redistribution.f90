@@ -155,7 +155,7 @@ contains
          end associate
       end do
       call self%domain%halo%follow(self%comm, self%bodies)
-      call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)], self%isa)
+      call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
       call fit_to_bodies(self, error, self%domain%median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
@@ -207,7 +207,7 @@ contains
       integer(ip) :: s, k
 
       associate (bodies => self%bodies, comm => self%comm)
-         call turn_bodies(bodies, bodies%free, self%isa)
+         call turn_bodies(bodies, bodies%free)
          slots = pack(bodies%free, owner(bodies%free) /= comm%rank)
          call sort_by_rank(owner(slots), comm%size, counts, order)
          call pack_state(self, slots(order), 0_ip, other)

@@ -123,7 +123,7 @@ contains
       integer(lp) :: redistributions
 
       call self%domain%halo%follow(self%comm, self%bodies)
-      call turn_bodies(self%bodies, self%moving, self%isa)
+      call turn_bodies(self%bodies, self%moving)
       call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
       redistributions = self%domain%redistributions
       call redistribute(self, have_boxes_left(self), error)
@@ -133,7 +133,7 @@ contains
       ! Other bodies have other boxes.
       associate (settings => self%settings%neighbours)
          if (.not. allocated(neighbours%finder) .or. self%domain%redistributions > redistributions) &
-            call new_neighbours(neighbours, settings%finder, self%boxes, error, settings%skin, self%isa)
+            call new_neighbours(neighbours, settings%finder, self%boxes, error, settings%skin, self%bodies%isa)
       end associate
       if (allocated(error)) return
       call neighbours%update(self%boxes)

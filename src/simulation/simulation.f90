@@ -13,7 +13,6 @@ module polydem_simulation
    use polydem_free_flight, only: free_flight_t
    use polydem_guards, only: motion_guard_t
    use polydem_integrator, only: integrator_t
-   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
    use polydem_neighbours, only: neighbours_t
    use polydem_packed_history, only: packed_history_t
@@ -61,8 +60,6 @@ module polydem_simulation
    type :: simulation_t
       !> Settings of the run
       type(settings_t) :: settings
-      !> Instruction set of the kernels
-      integer :: isa = isa_base
       !> Communicator of the ranks that share the bodies
       class(communicator_t), allocatable :: comm
       !> Part of space of this rank, and its halo

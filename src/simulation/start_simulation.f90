@@ -37,7 +37,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       real(wp) :: median_diameter, limit(1)
 
-      call choose_instruction_set(self%isa, error)
+      call choose_instruction_set(self%bodies%isa, error)
       call check_law(settings, 1_ip, error)
       if (allocated(error)) return
       allocate (self%comm, source=comm)

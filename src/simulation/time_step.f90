@@ -77,7 +77,7 @@ contains
       type(error_t), allocatable, intent(in) :: error
 
       if (.not. allocated(error)) &
-         call turn_and_bound(self%maker, self%moving(size(self%bodies%free) + 1:), self%isa, self%bodies, self%boxes)
+         call turn_and_bound(self%maker, self%moving(size(self%bodies%free) + 1:), self%bodies, self%boxes)
    end subroutine bound_others
 
    !> Update the pairs of bodies whose boxes overlap, and move their contact history with them.
@@ -93,7 +93,7 @@ contains
                     'program error; use finder all_pairs instead')
          return
       end if
-      call self%flight%turn_joined(self%neighbours%pairs, self%isa, self%bodies)
+      call self%flight%turn_joined(self%neighbours%pairs, self%bodies)
       call carry_history(self)
       call restore_history(self)
       associate (pairs => self%neighbours%pairs)
@@ -161,7 +161,7 @@ contains
       if (self%settings%output%contacts .and. .not. self%walk%has_table) then
          ! The end of the step changed velocities, and poses with some integrators.
          if (self%domain%has_halo()) call self%domain%halo%follow(self%comm, self%bodies)
-         call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)], self%isa)
+         call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
          call walk_contacts(self, 0.0_wp, needs_table(self), clock, known_error)
          call constrain(self, known_error)
       end if
