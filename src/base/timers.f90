@@ -3,10 +3,10 @@
 !> Each stage has the same name as its timer, its namelist group and its entry in `/profile/stage` of results.
 module polydem_timers
    use polydem_clock, only: wall_seconds
-   use polydem_kinds, only: dp, lp
+   use polydem_kinds, only: dp, ip, lp
    implicit none
    private
-   public :: timers_t, n_stages, stage_names
+   public :: timers_t, block_clock_t, n_stages, stage_names
    public :: stage_boxes, stage_neighbours, stage_overlap, stage_forces, stage_integrate
    public :: stage_decomposition, stage_output
 
@@ -46,6 +46,26 @@ module polydem_timers
       procedure :: add_to_total
    end type timers_t
 
+   !> Clock of a pass over blocks that does two things with each block, while the block is in the cache: it divides the
+   !> time of the pass between the two. Reading the time for every block would take too long; one of eight is timed.
+   type :: block_clock_t
+      private
+      !> Number of blocks so far
+      integer(ip) :: n_blocks = 0_ip
+      !> Whether the present block is timed
+      logical :: is_timed = .false.
+      !> Start of the present part of the block [s]
+      real(dp) :: began = 0.0_dp
+      !> Time of each part in the timed blocks [s]
+      real(dp) :: seconds(2) = 0.0_dp
+   contains
+      procedure :: begin_block
+      procedure :: end_part
+   end type block_clock_t
+
+   !> One of so many blocks is timed
+   integer(ip), parameter :: timed_blocks = 8_ip
+
 contains
 
    !> Start the first lap.
@@ -64,19 +84,43 @@ contains
       self%current(stage) = max(self%current(stage), 0.0_dp) + next_lap(self)
    end subroutine lap
 
-   !> Add the time since the last lap to two stages that alternate.
-   subroutine divide_lap(self, stage, other, share)
+   !> Add the time since the last lap to two stages that alternate from block to block.
+   subroutine divide_lap(self, stage, other, clock)
       class(timers_t), intent(inout) :: self
-      !> The two stages
+      !> Stages of the first and of the second part of each block
       integer, intent(in) :: stage, other
-      !> Share of the first stage
-      real(dp), intent(in) :: share
-      real(dp) :: seconds
+      !> Clock of the blocks
+      type(block_clock_t), intent(in) :: clock
+      real(dp) :: seconds, share
 
       seconds = next_lap(self)
+      share = 0.5_dp
+      if (sum(clock%seconds) > 0.0_dp) share = clock%seconds(1)/sum(clock%seconds)
       self%current(stage) = max(self%current(stage), 0.0_dp) + share*seconds
       self%current(other) = max(self%current(other), 0.0_dp) + (1.0_dp - share)*seconds
    end subroutine divide_lap
+
+   !> Begin the first part of a block.
+   subroutine begin_block(self)
+      class(block_clock_t), intent(inout) :: self
+
+      self%is_timed = mod(self%n_blocks, timed_blocks) == 0_ip
+      self%n_blocks = self%n_blocks + 1_ip
+      if (self%is_timed) self%began = wall_seconds()
+   end subroutine begin_block
+
+   !> End a part of a block.
+   subroutine end_part(self, part)
+      class(block_clock_t), intent(inout) :: self
+      !> 1 or 2
+      integer, intent(in) :: part
+      real(dp) :: now
+
+      if (.not. self%is_timed) return
+      now = wall_seconds()
+      self%seconds(part) = self%seconds(part) + (now - self%began)
+      self%began = now
+   end subroutine end_part
 
    !> End the step: add its times to the totals, and update the shortest and longest times per step.
    subroutine end_step(self)

@@ -15,6 +15,7 @@
 module polydem_bodies
    use polydem_elementary, only: sines_and_cosines
    use polydem_hash, only: mix_word
+   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp, dp, min_parallel_size
    use polydem_polygon, only: diameter, greatest_radius, thickness
    implicit none
@@ -41,6 +42,8 @@ module polydem_bodies
       integer(ip), allocatable :: global_index(:)
       !> Number of all bodies of the run
       integer(ip) :: n_all = 0_ip
+      !> Instruction set of the kernels that compute with these bodies
+      integer :: isa = isa_base
       !> Mass [kg/m]; an infinite mass is stored as 0
       real(wp), allocatable :: mass(:)
       !> Moment of inertia about the centre of mass [kg m]; an infinite one is stored as 0
@@ -61,7 +64,7 @@ module polydem_bodies
       real(wp), allocatable :: acceleration(:, :)
       !> Angular acceleration [rad/s2]
       real(wp), allocatable :: angular_acceleration(:)
-      !> Sum of the forces, (2, slot) [N/m]. A step keeps the sums of fixed bodies only, see `keep_forces`
+      !> Sum of the forces, (2, slot) [N/m]. A step keeps the sums of fixed bodies only, see `total_forces`
       real(wp), allocatable :: force(:, :)
       !> Sum of the torques about the centre of mass, likewise [N]
       real(wp), allocatable :: torque(:)
@@ -102,20 +105,18 @@ contains
    end subroutine allocate_bodies
 
    !> Update `turned` of the given bodies to their angles.
-   subroutine turn_bodies(bodies, slots, isa)
+   subroutine turn_bodies(bodies, slots)
       !> Bodies; only `turned` changes
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies that may have turned
       integer(ip), intent(in) :: slots(:)
-      !> Instruction set of the kernels
-      integer, intent(in) :: isa
       real(wp) :: extent(4, block_size), direction(2, block_size)
       integer(ip) :: low
 
       !$omp parallel do if (size(slots) > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(bodies, slots, isa) private(low, extent, direction)
+      !$omp    shared(bodies, slots) private(low, extent, direction)
       do low = 1_ip, size(slots, kind=ip), block_size
-         call turn_block(bodies, slots(low:min(low + block_size - 1_ip, size(slots, kind=ip))), isa, extent, direction)
+         call turn_block(bodies, slots(low:min(low + block_size - 1_ip, size(slots, kind=ip))), extent, direction)
       end do
       !$omp end parallel do
    end subroutine turn_bodies
@@ -138,20 +139,18 @@ contains
    end subroutine measure_sizes
 
    !> Update `turned` of up to `block_size` bodies to their angles.
-   subroutine turn_block(bodies, slots, isa, extent, direction)
+   subroutine turn_block(bodies, slots, extent, direction)
       !> Bodies; only `turned` of these bodies changes
       type(bodies_t), intent(inout) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in) :: slots(:)
-      !> Instruction set of the kernels
-      integer, intent(in) :: isa
       !> Least x and y and greatest x and y of the turned vertices of each body, (4, body) [m]
       real(wp), intent(out) :: extent(4, block_size)
       !> Cosine and sine of the angle of each body, (2, body)
       real(wp), intent(out) :: direction(2, block_size)
       integer(ip) :: k
 
-      call find_directions(bodies, slots, isa, direction)
+      call find_directions(bodies, slots, direction)
       do k = 1_ip, size(slots, kind=ip)
          associate (first => bodies%vertex_start(slots(k)), last => bodies%vertex_start(slots(k) + 1_ip) - 1_ip)
             call turn_vertices(last - first + 1_ip, bodies%shape(:, first:last), direction(1, k), direction(2, k), &
@@ -161,12 +160,10 @@ contains
    end subroutine turn_block
 
    !> Find cosine and sine of the angles of up to `block_size` bodies.
-   subroutine find_directions(bodies, slots, isa, direction)
+   subroutine find_directions(bodies, slots, direction)
       type(bodies_t), intent(in) :: bodies
       !> Slots of the bodies
       integer(ip), intent(in) :: slots(:)
-      !> Instruction set of the kernels
-      integer, intent(in) :: isa
       !> Cosine and sine of the angle of each body, (2, body)
       real(wp), intent(out) :: direction(2, block_size)
       real(wp) :: angle(block_size), cosine(block_size), sine(block_size)
@@ -176,7 +173,7 @@ contains
       do k = 1_ip, n
          angle(k) = bodies%angle(slots(k))
       end do
-      call sines_and_cosines(isa, angle(1:n), sine(1:n), cosine(1:n))
+      call sines_and_cosines(bodies%isa, angle(1:n), sine(1:n), cosine(1:n))
       do k = 1_ip, n
          direction(:, k) = [cosine(k), sine(k)]
       end do

@@ -2,7 +2,6 @@
 module polydem_body_list
    use polydem_bodies, only: allocate_bodies, bodies_t, measure_sizes, turn_bodies
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
    use polydem_polygon, only: clean_polygon, mass_properties
    use polydem_polygon_list, only: polygon_list_t
@@ -267,7 +266,7 @@ contains
       where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass
       where (bodies%inertia > 0.0_wp) bodies%inverse_inertia = 1.0_wp/bodies%inertia
       bodies%free = pack([(s, s=1_ip, bodies%n)],.not. bodies%fixed)
-      call turn_bodies(bodies, [(s, s=1_ip, bodies%n)], isa_base)
+      call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
    end subroutine finish
 
 end module polydem_body_list

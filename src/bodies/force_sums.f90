@@ -16,7 +16,7 @@ module polydem_force_sums
    implicit none
    private
    public :: force_sums_t, contact_terms_t, term_list_t, n_terms, of_elastic, of_normal, of_tangential
-   public :: sum_x, sum_y, sum_torque, sum_energy, reserve_sums, start_sums, clear_sums, terms_of_block, term_of
+   public :: sum_x, sum_y, sum_torque, sum_energy, begin_sums, start_sums, clear_sums, terms_of_block, term_of
    public :: reserve_terms, append_term, add_terms, add_late_terms, assemble_forces, total_forces, find_forces
    public :: set_force
 
@@ -35,6 +35,8 @@ module polydem_force_sums
       real(wp), allocatable :: value(:, :)
       !> Whether a term was added to the sums of a body, (slot); the others are zero
       logical, allocatable :: has_terms(:)
+      !> Whether `bodies` has the total forces of these sums on all bodies, not only on fixed ones
+      logical, private :: are_in_bodies = .true.
    end type force_sums_t
 
    !> Terms of the contacts of a block
@@ -56,6 +58,16 @@ module polydem_force_sums
    end type term_list_t
 
 contains
+
+   !> Begin to sum the forces on n bodies.
+   subroutine begin_sums(n, sums)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      type(force_sums_t), intent(inout) :: sums
+
+      call reserve_sums(n, sums)
+      sums%are_in_bodies = .false.
+   end subroutine begin_sums
 
    !> Make room for the sums of n bodies. New sums are zero.
    subroutine reserve_sums(n, sums)
@@ -310,27 +322,28 @@ contains
       type(term_list_t) :: none
       integer(ip) :: high
 
-      call start_sums(bodies%n, sums)
+      call begin_sums(bodies%n, sums)
+      call clear_sums(1_ip, bodies%n, sums)
       do high = contacts%n, 1_ip, -block_size
          call load_block(bodies, contacts, high, block)
          call terms_of_block(block, terms)
          call add_terms(block, terms, bodies%n, sums, none)
       end do
-      call total_forces(gravity, sums, 1_ip, bodies%n, bodies)
+      call total_forces(gravity, sums, bodies)
    end subroutine assemble_forces
 
-   !> Set the forces and torques on some bodies from the sums, and add gravity to free bodies.
-   pure subroutine total_forces(gravity, sums, low, high, bodies)
+   !> Set the forces and torques on all bodies from the sums, and add gravity to free bodies, unless they are set.
+   pure subroutine total_forces(gravity, sums, bodies)
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
-      type(force_sums_t), intent(in) :: sums
-      !> First and last slot
-      integer(ip), intent(in) :: low, high
+      type(force_sums_t), intent(inout) :: sums
       !> Bodies; `force` and `torque` are set
       type(bodies_t), intent(inout) :: bodies
       integer(ip) :: s
 
-      do s = low, high
+      if (sums%are_in_bodies) return
+      sums%are_in_bodies = .true.
+      do s = 1_ip, bodies%n
          call set_force(sums%value(:, s), s, bodies)
          if (bodies%fixed(s)) cycle
          bodies%force(1, s) = bodies%force(1, s) + bodies%mass(s)*gravity(1)

@@ -8,8 +8,8 @@ module polydem_changed_entries
    !> Entries that do not affect the computed result
    character(len=*), parameter :: harmless(*) = [character(len=23) :: 'output.folder', 'checkpoint.steps', &
                                                  'checkpoint.interval', 'checkpoint.elapsed', &
-                                                 'decomposition.partition', 'decomposition.margin', &
-                                                 'decomposition.balance', 'decomposition.imbalance']
+                                                 'decomposition.margin', 'decomposition.balance', &
+                                                 'decomposition.imbalance']
 
 contains
 

@@ -49,7 +49,7 @@ contains
       simulation%timers = timers_t()
       call new_finder_or_variant(finder, sample%case%finder, error)
       if (allocated(error)) return
-      finder%isa = simulation%isa
+      finder%isa = simulation%bodies%isa
       call simulation%neighbours%change_finder(finder, simulation%boxes)
       simulation%neighbours%finder%work%thorough = checked
       call begin_sample(sample%case%steps, checked, clock, sample)

@@ -6,10 +6,10 @@
 module polydem_checkpoint_fields
    use polydem_bodies, only: bodies_t, state_hash, turn_bodies
    use polydem_body_fields, only: serialize_bodies
-   use polydem_completion, only: keep_forces
    use polydem_contact_history, only: contact_history_t
    use polydem_energy_balance, only: serialize_contributions, serialize_balance
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_force_sums, only: total_forces
    use polydem_global_hash, only: hash_scene
    use polydem_hash, only: mix_word
    use polydem_kinds, only: dp, ip, lp, wp
@@ -50,8 +50,8 @@ contains
       type(monitor_t), intent(inout) :: monitor
 
       call serialize_global(serializer, simulation, attempts, monitor)
-      if (.not. serializer%is_reading) call keep_forces(simulation)
       associate (s => simulation)
+         if (.not. serializer%is_reading) call total_forces(s%settings%forces%gravity, s%force_sums, s%bodies)
          call serialize_bodies(serializer, s%bodies)
          call s%integrator%serialize(serializer)
          if (s%settings%output%energy_balance) call serialize_contributions(s%energy_balance, s%bodies%n, serializer)
@@ -62,7 +62,7 @@ contains
          if (.not. serializer%is_reading) call save_pairs(serializer, s)
          if (serializer%is_reading) call read_pairs(serializer, s)
          if (.not. serializer%is_reading .or. allocated(serializer%error)) return
-         call turn_bodies(s%bodies, s%moving, s%isa)
+         call turn_bodies(s%bodies, s%moving)
          call fit_to_bodies(s, serializer%error, s%domain%median_diameter)
       end associate
    end subroutine serialize_run

@@ -52,8 +52,8 @@ contains
       if (.not. may_be_finished(run)) return
       call build_start(settings, run, error)
       if (allocated(error)) return
-      if (run%comm%is_root()) call find_finished(run%folder, settings, run%provenance%text_of('scene'), &
-                                                 run%manifest, last_state, error)
+      if (run%comm%is_root()) call find_finished(run%folder, settings, run%scene_hash, run%manifest, &
+                                                  last_state, error)
       call run%comm%all_reduce_error(error)
    end subroutine find_finished_result
 

@@ -116,20 +116,19 @@ contains
       logical, intent(in) :: force
       type(run_t), intent(inout) :: run
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: scene
 
       ! Repeat the check: now no other run can write to the folder.
       call check_overwrite(run, force, error)
       if (allocated(error)) return
-      scene = run%provenance%text_of('scene')
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
-      call run%provenance%set('scene', scene)
+      call run%provenance%set('scene', run%scene_hash)
       if (settings%scene%name == 'file') call read_origin(settings%scene%bodies_file, run%provenance%origin, error)
       if (allocated(error)) return
       run%provenance%processes = run%comm%size
       if (allocated(run%attempt%threads%reason)) call run%provenance%set('thread_choice', run%attempt%threads%reason)
       if (run%manifest%is_found .and. run%attempt%continues) &
-         call find_restart(run%folder, run%manifest, settings, scene, run%attempt%may_change, run%earlier, error)
+         call find_restart(run%folder, run%manifest, settings, run%scene_hash, run%attempt%may_change, run%earlier, &
+                           error)
       if (allocated(error)) return
       call claim_folder(settings, run%measures%deep > 0_lp, run%folder, force, is_restart(run), run%manifest, error)
       if (.not. allocated(error)) call run%log%open(run%folder, error, appended=is_restart(run), &

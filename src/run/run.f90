@@ -55,6 +55,8 @@ module polydem_run
       type(checkpoints_t) :: checkpoints
       !> The simulation
       type(simulation_t) :: simulation
+      !> Hash of the initial scene, in hexadecimal; allocated once `build_start` has built the simulation
+      character(len=:), allocatable :: scene_hash
       !> Measures of the initial scene
       type(scene_measures_t) :: measures
       !> Writer of frames

@@ -23,7 +23,7 @@ module polydem_run_output
    use polydem_wall_forces, only: complete_wall_forces
    implicit none
    private
-   public :: choose_intervals, choose_tables, count_frames, end_step, finish, frames_per_segment
+   public :: choose_intervals, count_frames, end_step, finish, frames_per_segment, needs_table
 
    !> Limits of the automatic number of frames per segment, and of its product with the number of bodies
    integer(lp), parameter :: least_frames = 20_lp, most_frames = 200_lp, most_poses = 200000_lp
@@ -61,15 +61,15 @@ contains
       end associate
    end subroutine end_step
 
-   !> Choose whether the next step keeps the table of contacts: for output, or for the monitor.
-   subroutine choose_tables(run)
-      type(run_t), intent(inout) :: run
+   !> Whether output or the monitor needs the table of contacts of the next step
+   pure logical function needs_table(run)
+      type(run_t), intent(in) :: run
 
       associate (s => run%simulation)
-         s%keeps_contacts = s%settings%output%contacts .and. is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
-         s%keeps_contacts = s%keeps_contacts .or. checks_contacts(s, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
+         needs_table = s%settings%output%contacts .and. is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
+         needs_table = needs_table .or. checks_contacts(s, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
       end associate
-   end subroutine choose_tables
+   end function needs_table
 
    !> Whether the log gets a line after a step
    pure logical function is_line_due(run, step)

@@ -12,7 +12,7 @@ module polydem_run_simulation
    use polydem_prepare, only: build_and_lock, prepare
    use polydem_replacement, only: remove_replaced, restore_replaced
    use polydem_run, only: attempt_t, run_t, result_folder
-   use polydem_run_output, only: choose_tables, end_step, finish
+   use polydem_run_output, only: end_step, finish, needs_table
    use polydem_settings, only: settings_t
    use polydem_start, only: open_output
    use polydem_strings, only: to_text
@@ -71,8 +71,7 @@ contains
          if (.not. allocated(error)) call remove_replaced(run, error)
       end if
       do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
-         call choose_tables(run)
-         call advance(run%simulation, error)
+         call advance(run%simulation, error, needs_table(run))
          call synchronise_ranks(run, is_due, must_stop, error)
          if (.not. allocated(error)) call end_step(run, error)
          call run%simulation%timers%lap(stage_output)

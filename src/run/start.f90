@@ -78,12 +78,12 @@ contains
       !> Allocated for bad input
       type(error_t), allocatable, intent(inout) :: error
 
-      if (run%provenance%text_of('scene') /= '') return
+      if (allocated(run%scene_hash)) return
       call new_simulation(settings, run%simulation, error, run%comm, run%attempt%threads)
       if (allocated(error)) return
       call measure_scene(run%simulation, run%measures)
       call hash_scene_of(run%simulation, run%attempts%scene)
-      call run%provenance%set('scene', hexadecimal(run%attempts%scene))
+      run%scene_hash = hexadecimal(run%attempts%scene)
    end subroutine build_start
 
    !> Broadcast which checkpoint the root rank has chosen, start the schedule of checkpoints, and restore the checkpoint

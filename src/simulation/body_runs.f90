@@ -5,7 +5,7 @@ module polydem_body_runs
    use polydem_kinds, only: ip, min_parallel_size
    implicit none
    private
-   public :: find_run, list_others, list_accelerated, number_of_parts
+   public :: find_run, list_others, number_of_parts
 
 contains
 
@@ -40,34 +40,12 @@ contains
       end do
    end subroutine list_others
 
-   !> List the bodies that do not coast.
-   pure subroutine list_accelerated(n, slots, coasts, has_terms, n_chosen, chosen)
-      !> Number of bodies
-      integer(ip), intent(in) :: n
-      !> Their slots
-      integer(ip), intent(in) :: slots(n)
-      !> Whether a body coasts unless a force acts on it, and whether one does, (slot)
-      logical, intent(in), contiguous :: coasts(:), has_terms(:)
-      !> Number of the bodies that do not coast
-      integer(ip), intent(out) :: n_chosen
-      !> Their slots
-      integer(ip), intent(inout) :: chosen(block_size)
-      integer(ip) :: k
-
-      n_chosen = 0_ip
-      do k = 1_ip, n
-         if (coasts(slots(k)) .and. .not. has_terms(slots(k))) cycle
-         n_chosen = n_chosen + 1_ip
-         chosen(n_chosen) = slots(k)
-      end do
-   end subroutine list_accelerated
-
    !> Find the next run of consecutive slots in a list.
    pure subroutine find_run(slots, high, next, first, last)
-      !> Ascending slots
-      integer(ip), intent(in) :: slots(:)
       !> Index of the last slot that may belong to the run
       integer(ip), intent(in) :: high
+      !> Ascending slots
+      integer(ip), intent(in) :: slots(high)
       !> Index of the first slot of the run; on return that of the slot after the run
       integer(ip), intent(inout) :: next
       !> First and last slot of the run

@@ -3,17 +3,17 @@
 !> The pass does all that it can do for a block of bodies while the block is in the cache.
 module polydem_completion
    use polydem_bodies, only: block_size, bodies_t
-   use polydem_body_runs, only: find_run, list_accelerated, number_of_parts
+   use polydem_body_runs, only: find_run, number_of_parts
    use polydem_energy_balance, only: accumulate_bodies, accumulate_walls, count_step
    use polydem_errors, only: error_t
-   use polydem_force_sums, only: find_forces, force_sums_t, set_force, total_forces
+   use polydem_force_sums, only: find_forces, force_sums_t, set_force
    use polydem_guards, only: check_motion, move_within_limit
    use polydem_kinds, only: ip, wp
    use polydem_simulation, only: simulation_t
    use polydem_thread_changes, only: part
    implicit none
    private
-   public :: complete_step, keep_forces
+   public :: complete_step
 
 contains
 
@@ -57,8 +57,10 @@ contains
       !> Becomes false if a body moves too far
       logical, intent(inout) :: good
       integer(ip) :: k, end_of_block, next, done, first, last, n_chosen, chosen(block_size)
+      logical :: corrects_all
 
       if (high < low) return
+      corrects_all = self%flight%corrects_all()
       do k = low, high, block_size
          end_of_block = min(k + block_size - 1_ip, high)
          done = 0_ip
@@ -68,16 +70,15 @@ contains
             call find_run(self%bodies%free, end_of_block, next, first, last)
             call keep_fixed(done + 1_ip, first - 1_ip, self%force_sums, self%bodies)
             done = last
-            if (.not. self%skips_coasting) call complete_run(self, first, last, good)
+            if (corrects_all) call complete_run(self, first, last, good)
          end do
-         if (.not. self%skips_coasting) cycle
-         call list_accelerated(end_of_block - k + 1_ip, self%bodies%free(k:end_of_block), self%coasts, &
-                                 self%force_sums%has_terms, n_chosen, chosen)
+         if (corrects_all) cycle
+         call self%flight%list_accelerated(end_of_block - k + 1_ip, self%bodies%free(k:end_of_block), &
+                                           self%force_sums%has_terms, n_chosen, chosen)
          next = 1_ip
          do while (next <= n_chosen)
             call find_run(chosen, n_chosen, next, first, last)
             call complete_run(self, first, last, good)
-            self%coasts(first:last) = .false.
          end do
       end do
       if (low > high .or. .not. self%settings%output%energy_balance) return
@@ -86,7 +87,7 @@ contains
    end subroutine complete_part
 
    !> Set the total forces on those bodies of a run that are fixed. The run has no free bodies of this rank. Its halo
-   !> bodies keep former forces, which nothing reads, until `keep_forces`.
+   !> bodies keep former forces, which nothing reads, until `total_forces`.
    pure subroutine keep_fixed(first, last, sums, bodies)
       !> First and last slot
       integer(ip), intent(in) :: first, last
@@ -118,14 +119,5 @@ contains
       end associate
       good = good .and. move_within_limit(self%guard, self%bodies, first, last, self%dt)
    end subroutine complete_run
-
-   !> Set the total forces on all bodies at the end of a step, if only those on fixed bodies are known.
-   subroutine keep_forces(self)
-      type(simulation_t), intent(inout) :: self
-
-      if (.not. self%has_forces) call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, &
-                                                   self%bodies%n, self%bodies)
-      self%has_forces = .true.
-   end subroutine keep_forces
 
 end module polydem_completion

@@ -7,39 +7,45 @@ module polydem_contact_walk
    use omp_lib, only: omp_get_max_threads
    use polydem_clock, only: wall_seconds
    use polydem_contact_block, only: block_size, contact_block_t
+   use polydem_contact_incidence, only: index_contacts
    use polydem_contact_rows, only: append_rows, gather_rows, release_rows, start_rows
    use polydem_contacts, only: contacts_t, is_degenerate
+   use polydem_errors, only: error_t
    use polydem_fill_block, only: fill_block
-   use polydem_force_sums, only: add_late_terms, add_terms, clear_sums, contact_terms_t, reserve_sums, terms_of_block
+   use polydem_force_sums, only: add_late_terms, add_terms, begin_sums, clear_sums, contact_terms_t, terms_of_block
+   use polydem_guards, only: check_contacts
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: find_owned_pairs
    use polydem_pair_ranges, only: balance_ranges, divide_pairs, most_ranges
    use polydem_passing, only: test_block
-   use polydem_range_results, only: range_results_t
    use polydem_simulation, only: simulation_t, sum_contacts_own => sum_contacts, sum_degenerate
-   use polydem_walk_results, only: walk_results_t
+   use polydem_timers, only: block_clock_t
+   use polydem_walk_results, only: range_results_t, walk_results_t
    use polydem_wall_shares, only: find_shares, set_shares
    use polydem_wall_terms, only: append_walls, join_walls
    implicit none
    private
    public :: walk_contacts
 
-   !> One of so many blocks is timed
-   integer(ip), parameter :: timed_blocks = 8_ip
-
 contains
 
    !> Sum the contact forces on all bodies over the pairs of this step.
-   subroutine walk_contacts(self, dt, overlap_share)
+   subroutine walk_contacts(self, dt, tabulate, clock, error)
       !> The simulation with its pair list; sums of forces, contact history and the results of the walk are set
       type(simulation_t), intent(inout) :: self
       !> Time since the last evaluation [s]
       real(wp), intent(in) :: dt
-      !> Share of the time spent in the search for overlaps, in a walk of which some blocks were timed
-      real(dp), intent(out) :: overlap_share
+      !> Whether to keep the table of all contacts
+      logical, intent(in) :: tabulate
+      !> Clock of the blocks of the first range: overlaps, then forces
+      type(block_clock_t), intent(out) :: clock
+      !> Names a contact that must stop the run; on entry an error of the step, after which nothing is done
+      type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: ends(0:most_ranges), last(0:most_ranges)
       integer(ip) :: n, r, k
 
+      if (allocated(error)) return
+      self%walk%has_table = tabulate
       associate (pairs => self%neighbours%pairs)
          n = min(int(omp_get_max_threads(), ip), most_ranges)
          call divide_pairs(pairs%n, pairs%first, n, self%walk%upto, ends)
@@ -50,13 +56,13 @@ contains
          end do
          last(n) = self%bodies%n
       end associate
-      call reserve_sums(self%bodies%n, self%force_sums)
+      call begin_sums(self%bodies%n, self%force_sums)
       if (self%law%needs_shares) &
-         call find_shares(self%law, self%bodies, self%neighbours%pairs, self%history, self%isa, self%walk%shares)
-      !$omp parallel if (n > 1_ip) default(none) shared(self, dt, ends, last, n) private(r, k)
+         call find_shares(self%law, self%bodies, self%neighbours%pairs, self%history, self%walk%shares)
+      !$omp parallel if (n > 1_ip) default(none) shared(self, dt, ends, last, n, clock) private(r, k)
       !$omp do schedule(static, 1)
       do r = 1_ip, n
-         call walk_range(self, dt, r, ends(r - 1_ip:r), last(r - 1_ip:r))
+         call walk_range(self, dt, r, ends(r - 1_ip:r), last(r - 1_ip:r), clock)
       end do
       !$omp end do
       !$omp do schedule(static, 1)
@@ -71,10 +77,8 @@ contains
       self%walk%step = self%step
       call balance_ranges(self%walk%elapsed(:n), self%walk%upto)
       call gather_results(self, n)
-      overlap_share = 0.5_dp
-      associate (seconds => self%walk%ranges(1)%seconds)
-         if (sum(seconds) > 0.0_dp) overlap_share = seconds(1)/sum(seconds)
-      end associate
+      if (tabulate) call index_contacts(self%bodies%n, self%contacts, self%walk%incidence)
+      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%walk%suspects, self%step, error)
    end subroutine walk_contacts
 
    !> Make room for the results of n ranges.
@@ -90,7 +94,7 @@ contains
    end subroutine reserve_ranges
 
    !> Walk over the pairs of one range in descending order.
-   subroutine walk_range(self, dt, r, ends, last)
+   subroutine walk_range(self, dt, r, ends, last, clock)
       type(simulation_t), intent(inout) :: self
       real(wp), intent(in) :: dt
       !> Index of the range
@@ -99,30 +103,29 @@ contains
       integer(ip), intent(in) :: ends(2)
       !> Last slot of the range before, and last slot whose sums this thread may change; it sets those between
       integer(ip), intent(in) :: last(2)
+      !> Clock of the blocks of the first range
+      type(block_clock_t), intent(inout) :: clock
+      type(block_clock_t) :: own_clock
       type(contact_block_t) :: block
       type(contact_terms_t) :: terms
-      real(dp) :: clock(3), began
-      integer(ip) :: next, tested, n_blocks, low, high, cursor
-      logical :: timed
+      real(dp) :: began
+      integer(ip) :: next, tested, low, high, cursor
 
       began = wall_seconds()
-      call start_results(self%contacts, self%keeps_contacts, r, self%walk)
+      call start_results(self%contacts, r, self%walk)
       next = ends(2)
       tested = next + 1_ip
-      n_blocks = 0_ip
       high = last(2)
       cursor = 0_ip
       if (self%law%needs_shares .and. self%walk%shares%n > 0_ip) &
          cursor = count(self%walk%shares%pair(:self%walk%shares%n) <= ends(2), kind=ip)
       do while (next > ends(1))
-         timed = mod(n_blocks, timed_blocks) == 0_ip
-         n_blocks = n_blocks + 1_ip
-         if (timed) clock(1) = wall_seconds()
+         call own_clock%begin_block()
          associate (pairs => self%neighbours%pairs)
-            call fill_block(self%bodies, pairs%first, pairs%second, self%law%needs_effective_area, self%isa, &
+            call fill_block(self%bodies, pairs%first, pairs%second, self%law%needs_effective_area, &
                             ends(1) + 1_ip, next, tested, self%history, block)
          end associate
-         if (timed) clock(2) = wall_seconds()
+         call own_clock%end_part(1)
          if (self%law%needs_shares) call set_shares(self%walk%shares, cursor, block)
          call self%law%apply(self%bodies, dt, block, self%history)
          call terms_of_block(block, terms)
@@ -134,24 +137,21 @@ contains
          end if
          call add_terms(block, terms, last(2), self%force_sums, self%walk%ranges(r)%late)
          call keep_contacts(self, r, block, terms)
-         if (.not. timed) cycle
-         clock(3) = wall_seconds()
-         self%walk%ranges(r)%seconds = self%walk%ranges(r)%seconds + (clock(2:3) - clock(1:2))
+         call own_clock%end_part(2)
       end do
       call clear_sums(last(1) + 1_ip, high, self%force_sums)
+      if (r == 1_ip) clock = own_clock
       self%walk%elapsed(r) = max(wall_seconds() - began, tiny(began))
    end subroutine walk_range
 
-   !> Empty the results of a range.
-   subroutine start_results(contacts, keeps_contacts, r, walk)
+   !> Empty the results of a range. About as many contacts are expected as this rank owned in the last step.
+   subroutine start_results(contacts, r, walk)
       type(contacts_t), intent(in) :: contacts
-      !> Whether the range will keep all its contacts. About as many are expected as this rank owned in the last step
-      logical, intent(in) :: keeps_contacts
       !> Index of the range
       integer(ip), intent(in) :: r
       type(walk_results_t), intent(inout) :: walk
 
-      call start_rows(contacts, merge(walk%ranges(r)%n_contacts, 0_ip, keeps_contacts), walk%all_of(r))
+      call start_rows(contacts, merge(walk%ranges(r)%n_contacts, 0_ip, walk%has_table), walk%all_of(r))
       call start_rows(contacts, 0_ip, walk%suspects_of(r))
       walk%walls_of(r)%n = 0_ip
       associate (results => walk%ranges(r))
@@ -159,7 +159,6 @@ contains
          results%n_contacts = 0_ip
          results%n_degenerate = 0_ip
          results%passing_pair = 0_ip
-         results%seconds = 0.0_dp
       end associate
    end subroutine start_results
 
@@ -174,7 +173,7 @@ contains
 
       associate (walk => self%walk)
          call count_block(self, block, walk%ranges(r))
-         if (self%keeps_contacts) call append_rows(block, walk%all_of(r), with_forces=.true.)
+         if (walk%has_table) call append_rows(block, walk%all_of(r), with_forces=.true.)
          call append_walls(self%bodies%fixed, block, terms, walk%walls_of(r))
          call test_block(walk%contact_guard, self%bodies, block, self%history, suspect, some, &
                          walk%ranges(r)%passing_pair)
@@ -189,7 +188,7 @@ contains
       type(range_results_t), intent(inout) :: results
       logical :: owned(block_size)
 
-      if (self%comm%size == 1_ip) then
+      if (.not. self%domain%has_halo()) then
          results%n_contacts = results%n_contacts + block%n
          results%n_degenerate = results%n_degenerate + count(block%degenerate(:block%n) > 0.0_wp, kind=ip)
          return
@@ -216,9 +215,9 @@ contains
             n_degenerate = n_degenerate + walk%ranges(r)%n_degenerate
             if (walk%ranges(r)%passing_pair > 0_ip) walk%passing_pair = walk%ranges(r)%passing_pair
          end do
-         if (self%keeps_contacts) call gather_rows(walk%all_of(:n), self%contacts)
+         if (walk%has_table) call gather_rows(walk%all_of(:n), self%contacts)
          ! Most tables are for a frame. Then the memory of the rows serves better elsewhere.
-         if (self%keeps_contacts .and. .not. allocated(self%law%constraint)) call release_rows(walk%all_of)
+         if (walk%has_table .and. .not. allocated(self%law%constraint)) call release_rows(walk%all_of)
          call gather_rows(walk%suspects_of(:n), walk%suspects)
       end associate
       associate (suspects => self%walk%suspects)

@@ -5,7 +5,6 @@ module polydem_local_bodies
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_errors, only: error_t
-   use polydem_extreme_corners, only: forget_corners
    use polydem_finder_statistics, only: finder_statistics_t
    use polydem_force_law, only: force_law_t, new_force_law
    use polydem_force_sums, only: start_sums
@@ -38,10 +37,7 @@ contains
       self%n_contacts = 0_ip
       self%walk%passing_pair = 0_ip
       call start_sums(self%bodies%n, self%force_sums)
-      self%is_weightless = .not. any(abs(self%settings%forces%gravity) > 0.0_wp)
-      if (self%is_weightless) call forget_corners(self%extreme_corners, self%bodies%n)
-      self%skips_coasting = self%is_weightless .and. self%integrator%coasts_exactly
-      self%coasts = spread(.false., 1, self%bodies%n)
+      call self%flight%start(self%settings%forces%gravity, self%integrator, self%bodies%n)
       self%walk%incidence = incidence_t()
       call list_moving(self)
       call rebuild_guard(self)
@@ -56,7 +52,6 @@ contains
                              column_of(self%history, 'direction'))
       if (self%settings%guards%step /= 'off') self%walk%contact_guard%soft = &
          stiffest_product(self%law, self%integrator%stability(), self%bodies, self%dt/warn_share)
-      self%generation = self%generation + 1_ip
    end subroutine fit_to_bodies
 
    !> Empty a table of contacts, and give it the columns that the law needs.
@@ -77,7 +72,7 @@ contains
       integer :: n
 
       n = size(self%moving) - count(self%bodies%in_halo)
-      if (self%generation == 0_ip) call new_motion_guard(self%guard, self%settings%guards, self%bodies, &
+      if (.not. allocated(self%guard%moving)) call new_motion_guard(self%guard, self%settings%guards, self%bodies, &
                                                          self%moving(:n), shorter_step(self%settings%integrate))
       self%guard%moving = self%moving(:n)
    end subroutine rebuild_guard
@@ -90,7 +85,7 @@ contains
 
       if (allocated(self%neighbours%finder)) statistics = self%neighbours%finder%work
       associate (choice => self%settings%neighbours)
-         call new_neighbours(self%neighbours, choice%finder, self%boxes, error, choice%skin, self%isa)
+         call new_neighbours(self%neighbours, choice%finder, self%boxes, error, choice%skin, self%bodies%isa)
       end associate
       if (allocated(error)) return
       self%neighbours%finder%work%value = statistics%value

@@ -27,7 +27,7 @@ module polydem_redistribution
    use polydem_timers, only: stage_boxes, stage_forces, stage_integrate, stage_neighbours, stage_overlap
    implicit none
    private
-   public :: redistribute, compare_boxes, restore_history
+   public :: redistribute, have_boxes_left, restore_history
 
    !> Packed bodies with their state
    type :: packed_state_t
@@ -46,29 +46,32 @@ module polydem_redistribution
 
 contains
 
-   !> Find out whether a box of a free body is outside both the zone of this rank and its padded box of the last
-   !> redistribution. A step does this while it updates the boxes; others call this before `redistribute`.
-   pure subroutine compare_boxes(self)
+   !> Whether a box of a free body is outside both the zone of this rank and its padded box of the last redistribution.
+   !> A step finds this out while it updates the boxes.
+   pure logical function have_boxes_left(self)
       !> The simulation with updated boxes
-      type(simulation_t), intent(inout) :: self
+      type(simulation_t), intent(in) :: self
 
+      have_boxes_left = .false.
       if (.not. allocated(self%domain%reference)) return
-      self%domain%has_left = .not. have_boxes_within(self%maker, self%bodies%free, self%boxes, &
-                                                     self%domain%rank_bounds%zone, self%domain%reference)
-   end subroutine compare_boxes
+      have_boxes_left = .not. have_boxes_within(self%maker, self%bodies%free, self%boxes, &
+                                                self%domain%rank_bounds%zone, self%domain%reference)
+   end function have_boxes_left
 
    !> Exchange errors between ranks, and redistribute the bodies if any rank requests it. Collective.
-   subroutine redistribute(self, error)
+   subroutine redistribute(self, has_left, error)
       !> The simulation in the middle of a step, with the boxes of this step
       type(simulation_t), intent(inout) :: self
+      !> Whether a box has left the zone of this rank and its padded box, as in `have_boxes_left`
+      logical, intent(in) :: has_left
       !> On entry the error of this rank, if any; on return the same on all ranks
       type(error_t), allocatable, intent(inout) :: error
       integer(lp) :: request(1)
 
-      if (self%comm%size == 1_ip) return
+      if (.not. self%domain%has_zone()) return
       request = 0_lp
       if (.not. allocated(error)) then
-         if (self%domain%must_redistribute(self%step)) request = 1_lp
+         if (self%domain%must_redistribute(self%step, has_left)) request = 1_lp
       end if
       call self%comm%all_reduce_error(error, request)
       if (allocated(error) .or. request(1) == 0_lp) return
@@ -152,7 +155,7 @@ contains
          end associate
       end do
       call self%domain%halo%follow(self%comm, self%bodies)
-      call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)], self%isa)
+      call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
       call fit_to_bodies(self, error, self%domain%median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
@@ -204,7 +207,7 @@ contains
       integer(ip) :: s, k
 
       associate (bodies => self%bodies, comm => self%comm)
-         call turn_bodies(bodies, bodies%free, self%isa)
+         call turn_bodies(bodies, bodies%free)
          slots = pack(bodies%free, owner(bodies%free) /= comm%rank)
          call sort_by_rank(owner(slots), comm%size, counts, order)
          call pack_state(self, slots(order), 0_ip, other)
@@ -283,6 +286,9 @@ contains
       call self%integrator%serialize_step(serializer)
       if (self%settings%output%energy_balance) &
          call serialize_contributions(self%energy_balance, self%bodies%n, serializer)
+      if (.not. allocated(self%relaxation%from)) return
+      if (serializer%is_reading) self%relaxation%from = self%bodies%position
+      call serializer%field('/bodies/from', self%relaxation%from, 'm', 'centres of mass before the relaxation')
    end subroutine serialize_columns
 
 end module polydem_redistribution

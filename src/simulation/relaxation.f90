@@ -15,11 +15,11 @@ module polydem_relaxation
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_find_contacts, only: find_contacts
-   use polydem_kinds, only: ip, wp, min_parallel_size
+   use polydem_kinds, only: ip, lp, wp, min_parallel_size
    use polydem_local_bodies, only: fit_to_bodies
    use polydem_neighbours, only: neighbours_t, new_neighbours
    use polydem_origin, only: place_of
-   use polydem_redistribution, only: compare_boxes, redistribute
+   use polydem_redistribution, only: have_boxes_left, redistribute
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers
    use polydem_strings, only: to_text
@@ -46,16 +46,13 @@ contains
       type(neighbours_t) :: neighbours
       type(contacts_t) :: contacts
       real(wp) :: greatest(1), least, before(2)
-      integer(ip) :: worst, generation
+      integer(ip) :: worst
       logical :: is_idle
 
-      generation = -1_ip
       least = huge(least)
-
-      ! Until the forces are computed, the column `force` holds the positions before the relaxation.
-      self%bodies%force = self%bodies%position
+      self%relaxation%from = self%bodies%position
       do
-         call find_overlaps(self, neighbours, generation, contacts, error)
+         call find_overlaps(self, neighbours, contacts, error)
          call self%comm%all_reduce_error(error)
          if (allocated(error)) return
          worst = deepest_contact(contacts, self%bodies%thickness)
@@ -78,7 +75,7 @@ contains
          end associate
       end do
       self%relaxation%move = greatest_displacement(self)
-      self%bodies%force = 0.0_wp
+      deallocate (self%relaxation%from)
       call fit_to_bodies(self, error, self%domain%median_diameter)
    end subroutine relax_bodies
 
@@ -88,10 +85,9 @@ contains
       real(wp) :: greatest(1)
 
       greatest = 0.0_wp
-      associate (bodies => self%bodies)
-         if (bodies%n > 0_ip) greatest = sqrt(maxval((bodies%position(1, :) - bodies%force(1, :))**2 &
-                                                     + (bodies%position(2, :) - bodies%force(2, :))**2, &
-                                                     .not. bodies%in_halo))
+      associate (bodies => self%bodies, from => self%relaxation%from)
+         if (bodies%n > 0_ip) greatest = sqrt(maxval((bodies%position(1, :) - from(1, :))**2 &
+                                                     + (bodies%position(2, :) - from(2, :))**2,.not. bodies%in_halo))
       end associate
       call reduce_to_greatest(self%comm, greatest)
       greatest_displacement = greatest(1)
@@ -117,29 +113,29 @@ contains
    end subroutine check_progress
 
    !> Find the contacts of the bodies at their present positions. Collective.
-   subroutine find_overlaps(self, neighbours, generation, contacts, error)
+   subroutine find_overlaps(self, neighbours, contacts, error)
       type(simulation_t), intent(inout) :: self
       !> Pairs, found with a finder of their own; that of the simulation starts at time 0
       type(neighbours_t), intent(inout) :: neighbours
-      !> Generation of the bodies that the finder belongs to
-      integer(ip), intent(inout) :: generation
       type(contacts_t), intent(inout) :: contacts
       type(error_t), allocatable, intent(inout) :: error
       type(contact_history_t) :: no_history
+      integer(lp) :: redistributions
 
       call self%domain%halo%follow(self%comm, self%bodies)
-      call turn_bodies(self%bodies, self%moving, self%isa)
+      call turn_bodies(self%bodies, self%moving)
       call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
-      call compare_boxes(self)
-      call redistribute(self, error)
+      redistributions = self%domain%redistributions
+      call redistribute(self, have_boxes_left(self), error)
       if (allocated(error)) return
       ! The history of a redistribution is empty here.
       if (allocated(self%received_history)) deallocate (self%received_history)
-      if (generation /= self%generation) call new_neighbours(neighbours, self%settings%neighbours%finder, self%boxes, &
-                                                             error, self%settings%neighbours%skin, &
-                                                             self%isa)
+      ! Other bodies have other boxes.
+      associate (settings => self%settings%neighbours)
+         if (.not. allocated(neighbours%finder) .or. self%domain%redistributions > redistributions) &
+            call new_neighbours(neighbours, settings%finder, self%boxes, error, settings%skin, self%bodies%isa)
+      end associate
       if (allocated(error)) return
-      generation = self%generation
       call neighbours%update(self%boxes)
       associate (pairs => neighbours%pairs)
          call find_contacts(self%bodies, pairs%n, pairs%first, pairs%second, no_history, contacts)

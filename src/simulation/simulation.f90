@@ -8,12 +8,11 @@ module polydem_simulation
    use polydem_contacts, only: contacts_t
    use polydem_domain, only: domain_t
    use polydem_energy_balance, only: energy_balance_t, evaluate_balance, balance_t
-   use polydem_extreme_corners, only: extreme_corners_t
    use polydem_force_law, only: force_law_t
    use polydem_force_sums, only: force_sums_t
+   use polydem_free_flight, only: free_flight_t
    use polydem_guards, only: motion_guard_t
    use polydem_integrator, only: integrator_t
-   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
    use polydem_neighbours, only: neighbours_t
    use polydem_packed_history, only: packed_history_t
@@ -39,6 +38,8 @@ module polydem_simulation
       real(wp) :: before = 0.0_wp, after = 0.0_wp
       !> Greatest displacement of the centre of a body [m]
       real(wp) :: move = 0.0_wp
+      !> Positions before the relaxation, allocated while it lasts, (2, slot) [m]
+      real(wp), allocatable :: from(:, :)
    end type relaxation_t
 
    !> The impact for which the time step is chosen
@@ -59,14 +60,10 @@ module polydem_simulation
    type :: simulation_t
       !> Settings of the run
       type(settings_t) :: settings
-      !> Instruction set of the kernels
-      integer :: isa = isa_base
       !> Communicator of the ranks that share the bodies
       class(communicator_t), allocatable :: comm
       !> Part of space of this rank, and its halo
       type(domain_t) :: domain
-      !> Number of times that the bodies of this rank were exchanged for others (calls of `fit_to_bodies`)
-      integer(ip) :: generation = 0_ip
       !> Bodies
       type(bodies_t) :: bodies
       !> Prescribed motions of fixed bodies
@@ -77,18 +74,14 @@ module polydem_simulation
       type(boxes_t) :: boxes
       !> Pairs of bodies whose boxes overlap
       type(neighbours_t) :: neighbours
-      !> Table of the contacts of this step; empty if it was not kept
+      !> Table of the contacts of this step; empty if the walk did not keep it
       type(contacts_t) :: contacts
-      !> Whether to keep the table of contacts; who needs it asks for it before the step
-      logical :: keeps_contacts = .true.
       !> Results of the walk over the contacts of this step
       type(walk_results_t) :: walk
       !> Number of contacts that this rank owns
       integer(ip) :: n_contacts = 0_ip
       !> Sums of the contact forces on each body
       type(force_sums_t) :: force_sums
-      !> Whether `bodies` has the total forces of this step on all bodies, not only on fixed ones
-      logical :: has_forces = .true.
       !> Contact history of the pairs
       type(contact_history_t) :: history
       !> Contact history received by a redistribution, until the pairs are found again; unallocated between steps
@@ -115,17 +108,8 @@ module polydem_simulation
       type(motion_guard_t) :: guard
       !> Summary of the relaxation before time 0
       type(relaxation_t) :: relaxation
-      !> Whether there is no gravity. Then bodies often fly alone, and need neither turned vertices nor a correction
-      logical :: is_weightless = .false.
-      !> Whether vertices of bodies without pairs are not turned in this step: there is no gravity, and few have pairs
-      logical :: is_dilute = .false.
-      !> Extreme corners of the bodies, if `is_weightless`
-      type(extreme_corners_t) :: extreme_corners
-      !> Whether bodies that coast only drift: there is no gravity, and they coast exactly
-      logical :: skips_coasting = .false.
-      !> Whether a body coasts in this step unless a force acts on it, and, between steps, whether it has coasted in the
-      !> last one, (slot); false after bodies have been exchanged. Who changes velocities between steps must clear it
-      logical, allocatable :: coasts(:)
+      !> What a step leaves out for bodies in free flight
+      type(free_flight_t) :: flight
       !> Slots that may move: free bodies, then bodies with prescribed motion, then halo bodies
       integer(ip), allocatable :: moving(:)
       !> Sums over all steps, (`sum_contacts` to `sum_degenerate`)

@@ -37,7 +37,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       real(wp) :: median_diameter, limit(1)
 
-      call choose_instruction_set(self%isa, error)
+      call choose_instruction_set(self%bodies%isa, error)
       call check_law(settings, 1_ip, error)
       if (allocated(error)) return
       allocate (self%comm, source=comm)
@@ -46,7 +46,7 @@ contains
       call choose_step(self, error)
       if (allocated(error)) return
       call find_median(self%comm, self%bodies%diameter(self%bodies%free), median_diameter)
-      call new_domain(self%domain, settings%decomposition, median_diameter, self%comm, error)
+      call new_domain(self%domain, settings%decomposition, median_diameter, self%comm)
       if (.not. allocated(error)) call fit_to_bodies(self, error, median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
@@ -58,8 +58,8 @@ contains
       if (allocated(error)) return
       call move_walls(self, 0.0_wp)
       call update_boxes(self%maker, self%bodies, self%moving, self%boxes)
-      call redistribute(self, error)
-      if (.not. allocated(error)) call compute_forces(self, 0.0_wp, error)
+      call redistribute(self, .false., error)
+      if (.not. allocated(error)) call compute_forces(self, error)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
       call start_integration(self)

@@ -3,18 +3,17 @@ module polydem_time_step
    use polydem_bodies, only: turn_bodies
    use polydem_box_maker, only: turn_and_bound
    use polydem_completion, only: complete_step
-   use polydem_contact_incidence, only: index_contacts
    use polydem_contact_walk, only: walk_contacts
+   use polydem_energy_balance, only: begin_step
    use polydem_errors, only: error_t, raise, run_error
    use polydem_force_sums, only: assemble_forces, total_forces
-   use polydem_guards, only: check_contacts
-   use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_prediction, only: predict_bodies
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_prediction, only: predict_bodies, predict_border
    use polydem_redistribution, only: restore_history, redistribute
    use polydem_simulation, only: simulation_t, sum_began, sum_ended
    use polydem_strings, only: to_text
-   use polydem_timers, only: stage_boxes, stage_decomposition, stage_forces, stage_integrate, stage_neighbours, &
-      stage_overlap
+   use polydem_timers, only: block_clock_t, stage_boxes, stage_decomposition, stage_forces, stage_integrate, &
+      stage_neighbours, stage_overlap
    use polydem_wall_terms, only: select_walls
    implicit none
    private
@@ -24,61 +23,122 @@ contains
 
    !> Advance by one time step. Collective. An error of one rank reaches all ranks within the step, or at the latest in
    !> the all-reduce of errors after it.
-   subroutine advance(self, error)
+   subroutine advance(self, error, tabulate)
       type(simulation_t), intent(inout) :: self
       !> Allocated if the run must stop; names the body, its position and the step
       type(error_t), allocatable, intent(inout) :: error
-      real(dp) :: boxes_share
+      !> Whether to keep the table of all contacts; default: yes
+      logical, intent(in), optional :: tabulate
+      type(block_clock_t) :: clock
+      logical :: has_left
 
       self%step = self%step + 1_lp
-      self%energy_balance%is_current = .false.
-      self%has_forces = .false.
-      call self%timers%start()
-      call predict_bodies(self, boxes_share, error)
-      call self%timers%divide_lap(stage_boxes, stage_integrate, boxes_share)
-      call place_boxes(self, error)
-      if (allocated(error)) return
-      call sum_forces(self, self%dt, error)
-      ! A contact may stop the run here. Then no rank completes the step.
-      if (self%settings%overlap%degenerate == 'stop') call self%comm%all_reduce_error(error)
-      if (allocated(error)) return
-      call complete_step(self, error)
-      call self%timers%lap(stage_integrate)
+      call begin_step(self%energy_balance)
+      associate (timers => self%timers, domain => self%domain)
+         call timers%start()
+         if (domain%has_halo()) then
+            call predict_border(self)
+            call timers%lap(stage_integrate)
+            call domain%send_border(self%comm, self%bodies)
+            call timers%lap(stage_decomposition)
+         end if
+         call predict_bodies(self, has_left, clock, error)
+         call timers%divide_lap(stage_integrate, stage_boxes, clock)
+         if (domain%has_halo()) then
+            call domain%halo%receive_halo(self%comm, self%bodies)
+            call timers%lap(stage_decomposition)
+         end if
+         call bound_others(self, error)
+         call timers%lap(stage_boxes)
+         if (domain%has_zone()) then
+            call redistribute(self, has_left, error)
+            call domain%count_halo()
+            call timers%lap(stage_decomposition)
+         end if
+         if (allocated(error)) return
+         call find_pairs(self, error)
+         call timers%lap(stage_neighbours)
+         call walk_contacts(self, self%dt, needs_table(self, tabulate), clock, error)
+         call timers%divide_lap(stage_overlap, stage_forces, clock)
+         call constrain(self, error)
+         call timers%lap(stage_forces)
+         ! A contact may stop the run here. Then no rank completes the step.
+         if (self%settings%overlap%degenerate == 'stop') call self%comm%all_reduce_error(error)
+         if (allocated(error)) return
+         call complete_step(self, error)
+         call timers%lap(stage_integrate)
+      end associate
    end subroutine advance
 
-   !> Receive the halo, and update vertices and boxes of all but the free bodies. Redistribute the bodies if necessary.
-   subroutine place_boxes(self, error)
+   !> Update vertices and boxes of all but the free bodies.
+   subroutine bound_others(self, error)
       type(simulation_t), intent(inout) :: self
+      !> An error of the step, after which nothing is done
+      type(error_t), allocatable, intent(in) :: error
+
+      if (.not. allocated(error)) &
+         call turn_and_bound(self%maker, self%moving(size(self%bodies%free) + 1:), self%bodies, self%boxes)
+   end subroutine bound_others
+
+   !> Update the pairs of bodies whose boxes overlap, and move their contact history with them.
+   subroutine find_pairs(self, error)
+      type(simulation_t), intent(inout) :: self
+      !> Names the step and the finder that failed
       type(error_t), allocatable, intent(inout) :: error
-      logical :: is_parallel
 
-      is_parallel = self%comm%size > 1_ip
-      if (is_parallel) then
-         call self%domain%halo%receive_halo(self%comm, self%bodies)
-         call self%timers%lap(stage_decomposition)
+      call self%neighbours%update(self%boxes)
+      if (self%neighbours%pairs%contradictions > 0_lp) then
+         call raise(error, run_error, 'step '//to_text(self%step)//': finder '// &
+                    self%settings%neighbours%finder//' reported changes that contradict its pair list. This is a '// &
+                    'program error; use finder all_pairs instead')
+         return
       end if
-      if (.not. allocated(error)) then
-         call turn_and_bound(self%maker, self%moving(size(self%bodies%free) + 1:), self%isa, self%bodies, self%boxes)
-         call self%timers%lap(stage_boxes)
-      end if
-      call redistribute(self, error)
-      if (.not. is_parallel) return
-      self%domain%halo_steps = self%domain%halo_steps + int(size(self%domain%halo%slots), lp)
-      call self%timers%lap(stage_decomposition)
-   end subroutine place_boxes
+      call self%flight%turn_joined(self%neighbours%pairs, self%bodies)
+      call carry_history(self)
+      call restore_history(self)
+      associate (pairs => self%neighbours%pairs)
+         self%sums(sum_began) = self%sums(sum_began) + int(pairs%n_began, lp)
+         self%sums(sum_ended) = self%sums(sum_ended) + int(pairs%n_ended, lp)
+      end associate
+   end subroutine find_pairs
 
-   !> Compute the forces on the bodies from their boxes.
-   subroutine compute_forces(self, dt, error)
+   !> Whether the walk over the contacts keeps the table of all contacts: for the caller, or for a constraint
+   pure logical function needs_table(self, tabulate)
+      type(simulation_t), intent(in) :: self
+      !> Whether the caller needs it; absent: yes
+      logical, intent(in), optional :: tabulate
+
+      needs_table = .true.
+      if (present(tabulate)) needs_table = tabulate .or. allocated(self%law%constraint)
+   end function needs_table
+
+   !> Add the forces of a velocity constraint, if there is one.
+   subroutine constrain(self, error)
+      type(simulation_t), intent(inout) :: self
+      !> Names the step; on entry an error of the step, after which nothing is done
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (allocated(error) .or. .not. allocated(self%law%constraint)) return
+      call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
+      call self%law%constraint%apply(self%dt, self%walk%incidence, self%bodies, self%contacts, self%history, error)
+      if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
+      call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%force_sums)
+      call select_walls(self%bodies, self%contacts, self%walk%walls)
+   end subroutine constrain
+
+   !> Compute the forces on the bodies at time 0 from their boxes.
+   subroutine compute_forces(self, error)
       !> The simulation with updated boxes
       type(simulation_t), intent(inout) :: self
-      !> Time step of the force law [s]; 0 at time 0
-      real(wp), intent(in) :: dt
-      !> Names the step and the contact or the finder that failed
+      !> Names the contact or the finder that failed
       type(error_t), allocatable, intent(inout) :: error
+      type(block_clock_t) :: clock
 
-      call sum_forces(self, dt, error)
+      call find_pairs(self, error)
+      call walk_contacts(self, 0.0_wp, needs_table(self), clock, error)
+      call constrain(self, error)
       if (allocated(error)) return
-      call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, self%bodies%n, self%bodies)
+      call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
    end subroutine compute_forces
 
    !> After a failure, make the table of contacts of this step if the step has not kept it, and the forces on fixed
@@ -87,6 +147,7 @@ contains
    subroutine tabulate_contacts(self)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable :: known_error
+      type(block_clock_t) :: clock
       integer(lp) :: has_none(1)
       integer(ip) :: k
 
@@ -97,67 +158,15 @@ contains
          self%contacts%n = 0_ip
          return
       end if
-      if (self%settings%output%contacts .and. .not. self%keeps_contacts) then
+      if (self%settings%output%contacts .and. .not. self%walk%has_table) then
          ! The end of the step changed velocities, and poses with some integrators.
-         if (self%comm%size > 1_ip) call self%domain%halo%follow(self%comm, self%bodies)
-         call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)], self%isa)
-         self%keeps_contacts = .true.
-         call sum_forces(self, 0.0_wp, known_error)
+         if (self%domain%has_halo()) call self%domain%halo%follow(self%comm, self%bodies)
+         call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
+         call walk_contacts(self, 0.0_wp, needs_table(self), clock, known_error)
+         call constrain(self, known_error)
       end if
-      call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, self%bodies%n, self%bodies)
+      call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
    end subroutine tabulate_contacts
-
-   !> Sum the contact forces on the bodies from their boxes: neighbours, contacts, force law. This is the middle of a
-   !> step.
-   subroutine sum_forces(self, dt, error)
-      !> The simulation with updated boxes
-      type(simulation_t), intent(inout) :: self
-      !> Time step of the force law [s]; 0 at time 0
-      real(wp), intent(in) :: dt
-      !> Names the step and the contact or the finder that failed
-      type(error_t), allocatable, intent(inout) :: error
-      real(dp) :: overlap_share
-
-      call self%neighbours%update(self%boxes)
-      if (self%neighbours%pairs%contradictions > 0_lp) then
-         call raise(error, run_error, 'step '//to_text(self%step)//': finder '// &
-                    self%settings%neighbours%finder//' reported changes that contradict its pair list. This is a '// &
-                    'program error; use finder all_pairs instead')
-         return
-      end if
-      associate (pairs => self%neighbours%pairs)
-         ! Other bodies with pairs are turned already.
-         if (self%is_dilute .and. pairs%n_joined > 0_ip) &
-            call turn_bodies(self%bodies, pairs%joined(:pairs%n_joined), self%isa)
-      end associate
-      call carry_history(self)
-      call restore_history(self)
-      call self%timers%lap(stage_neighbours)
-      associate (pairs => self%neighbours%pairs)
-         self%sums(sum_began) = self%sums(sum_began) + int(pairs%n_began, lp)
-         self%sums(sum_ended) = self%sums(sum_ended) + int(pairs%n_ended, lp)
-      end associate
-      if (allocated(self%law%constraint)) self%keeps_contacts = .true.
-      call walk_contacts(self, dt, overlap_share)
-      call self%timers%divide_lap(stage_overlap, stage_forces, overlap_share)
-      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%walk%suspects, self%step, error)
-      if (self%keeps_contacts) call index_contacts(self%bodies%n, self%contacts, self%walk%incidence)
-      if (allocated(self%law%constraint)) call constrain(self, error)
-      call self%timers%lap(stage_forces)
-   end subroutine sum_forces
-
-   !> Add the forces of a velocity constraint.
-   subroutine constrain(self, error)
-      type(simulation_t), intent(inout) :: self
-      type(error_t), allocatable, intent(inout) :: error
-
-      if (allocated(error)) return
-      call total_forces(self%settings%forces%gravity, self%force_sums, 1_ip, self%bodies%n, self%bodies)
-      call self%law%constraint%apply(self%dt, self%walk%incidence, self%bodies, self%contacts, self%history, error)
-      if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
-      call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%force_sums)
-      call select_walls(self%bodies, self%contacts, self%walk%walls)
-   end subroutine constrain
 
    !> Apply the moves of the pair list to the columns of the contact history.
    subroutine carry_history(self)

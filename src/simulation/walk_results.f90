@@ -1,21 +1,34 @@
-!> Results of the walk over the contacts of a step.
+!> Results of the walk over the contacts of a step. The arrays stay from step to step, so that a step allocates no
+!> memory.
 module polydem_walk_results
    use polydem_contact_incidence, only: incidence_t
    use polydem_contact_rows, only: contact_rows_t
    use polydem_contacts, only: contacts_t
+   use polydem_force_sums, only: term_list_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_passing, only: contact_guard_t
-   use polydem_range_results, only: range_results_t
    use polydem_wall_shares, only: wall_shares_t
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: walk_results_t
+   public :: walk_results_t, range_results_t
+
+   !> What one thread finds in its range of pairs, as sums and single values
+   type :: range_results_t
+      !> Terms of bodies beyond the range
+      type(term_list_t) :: late
+      !> Number of contacts that this rank owns, and of those without direction
+      integer(ip) :: n_contacts = 0_ip, n_degenerate = 0_ip
+      !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none
+      integer(ip) :: passing_pair = 0_ip
+   end type range_results_t
 
    !> Results of the walk of a step, and the guard that it calls
    type :: walk_results_t
-      !> Step of the walk
+      !> Step of the walk; -1 before the first
       integer(lp) :: step = -1_lp
+      !> Whether the walk keeps the table of all contacts
+      logical :: has_table = .false.
       !> Results of the ranges of pairs, one per thread
       type(range_results_t), allocatable :: ranges(:)
       !> Their contacts, if the table is asked for, and those of them that are suspects

@@ -45,7 +45,7 @@ module polydem_wall_shares
 contains
 
    !> Find the shares of the present step.
-   subroutine find_shares(law, bodies, pairs, history, isa, shares)
+   subroutine find_shares(law, bodies, pairs, history, shares)
       type(force_law_t), intent(in) :: law
       !> Bodies with rotated polygons
       type(bodies_t), intent(in) :: bodies
@@ -53,17 +53,15 @@ contains
       type(pair_list_t), intent(in) :: pairs
       !> Contact history of the pairs; it is not changed
       type(contact_history_t), intent(in) :: history
-      !> Instruction set of the kernels
-      integer, intent(in) :: isa
       type(wall_shares_t), intent(inout) :: shares
       integer(ip) :: low
 
       call list_pairs(bodies, pairs, shares)
       if (shares%n == 0_ip) return
       !$omp parallel do if (shares%n > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(law, bodies, pairs, history, isa, shares) private(low)
+      !$omp    shared(law, bodies, pairs, history, shares) private(low)
       do low = 1_ip, shares%n, block_size
-         call find_ratios(law, bodies, pairs, history, isa, low, min(shares%n, low + block_size - 1_ip), shares)
+         call find_ratios(law, bodies, pairs, history, low, min(shares%n, low + block_size - 1_ip), shares)
       end do
       !$omp end parallel do
       call divide(shares)
@@ -153,12 +151,11 @@ contains
    end subroutine swap
 
    !> Find ratio and direction of some listed contacts, at most a block.
-   subroutine find_ratios(law, bodies, pairs, history, isa, low, high, shares)
+   subroutine find_ratios(law, bodies, pairs, history, low, high, shares)
       type(force_law_t), intent(in) :: law
       type(bodies_t), intent(in) :: bodies
       type(pair_list_t), intent(in) :: pairs
       type(contact_history_t), intent(in) :: history
-      integer, intent(in) :: isa
       !> First and last pair of the list
       integer(ip), intent(in) :: low, high
       !> The list; ratio and direction of these pairs are set
@@ -183,7 +180,7 @@ contains
             mine%memory(:n) = 0_ip
          end if
          do while (next >= 1_ip)
-            call fill_block(bodies, first(:n), second(:n), law%needs_effective_area, isa, 1_ip, next, tested, mine, &
+            call fill_block(bodies, first(:n), second(:n), law%needs_effective_area, 1_ip, next, tested, mine, &
                          block)
             call law%apply_elastic(bodies, block, mine)
             do c = 1_ip, block%n

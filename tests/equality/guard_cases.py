@@ -265,7 +265,6 @@ def process_cases():
             yield generated(f"ranks/{name}-{ranks}", settings, ranks=ranks, threads=1 + (ranks == 2))
     yield generated("ranks/measured-3", {**SIZES, **often, "decomposition.balance": "measured"}, ranks=3)
     yield generated("ranks/exact-friction-2", {**SCENES["drum"], **often, "forces.friction": "exact"}, ranks=2)
-    yield generated("ranks/morton-3", {**SIZES, **often, "decomposition.partition": "morton"}, ranks=3)
     for name, scene in (("drum", SCENES["drum"]), ("sizes", SIZES), ("gas", SCENES["gas"])):
         longer = 10 * float(scene["integrate.duration"]) * 80 / float(scene["scene.bodies"])
         settings = {**scene, **harder[name], **often, "integrate.duration": f"{longer:.6g}", "checkpoint.steps": "100",

@@ -4,7 +4,6 @@ module sample
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_counters, only: counters_t
    use polydem_errors, only: error_t
-   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_named_values, only: named_values_t
    use polydem_profile_file, only: write_profile
@@ -48,7 +47,7 @@ contains
       bodies%force = reshape([t, 2.0_wp*t, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], [2, 3])
       bodies%torque = [-t, 0.0_wp, 0.0_wp]
       allocate (bodies%turned(2, 11))
-      call turn_bodies(bodies, [1_ip, 2_ip, 3_ip], isa_base)
+      call turn_bodies(bodies, [1_ip, 2_ip, 3_ip])
    end subroutine sample_bodies
 
    !> Contacts of bodies 10 and 30: step modulo 3 in number; contact c has the area step + c.

@@ -6,7 +6,6 @@ module spread_world
    use polydem_contacts, only: contacts_t, reserve_contacts
    use polydem_force_sums, only: assemble_forces, force_sums_t
    use polydem_hash, only: mix_word
-   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
    implicit none
    private
@@ -125,7 +124,7 @@ contains
          end do
       end do
       call measure_sizes(bodies)
-      call turn_bodies(bodies, [(s, s=1_ip, bodies%n)], isa_base)
+      call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
    end subroutine make_bodies
 
    !> Contacts of the bodies that this rank owns, in ascending order

@@ -81,8 +81,7 @@ def whole(tmp_path_factory, finished):
                  steps=steps, repeat="0", status="finished", result="1 1 1 0.5")
             for steps in ("10", "20", "40") for precision in ("double", "quadruple")]
     write_csv(folder / "study" / "samples.csv", columns_of(WorkSample), rows)
-    write_csv(folder / "counts.csv", columns_of(Count), [some(Count, shape="drum", ranks="16", partition="bisection",
-                                                              margin="0.2")])
+    write_csv(folder / "counts.csv", columns_of(Count), [some(Count, shape="drum", ranks="16", margin="0.2")])
     write_csv(folder / "runs.csv", columns_of(RunCount), [some(RunCount)])
     ring = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
     (folder / "parts.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [
@@ -176,7 +175,7 @@ EVERY_DATASET = {
 }
 
 #: Columns of CSV files that hold texts
-TEXTS = ("scene", "finder", "model", "hardware", "program", "machine", "partition", "shape", "state", "started", "name",
+TEXTS = ("scene", "finder", "model", "hardware", "program", "machine", "shape", "state", "started", "name",
          "numerics", "precision", "result", "revision")
 
 #: Damages of the bytes of any file

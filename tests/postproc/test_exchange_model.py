@@ -14,7 +14,7 @@ MACHINE = Machine(body=1e-6, latency=1e-6, bandwidth=1e9)
 def counted(ranks, grains=1000000, strip=1.5, **others):
     """A count of squares with a strip of halo bodies all around."""
     halo_bodies = round(4 * strip * math.sqrt(grains / ranks) + 4 * strip**2)
-    plain = Count("drum", grains, ranks, "bisection", 0.2, grains // ranks, ranks * halo_bodies, halo_bodies,
+    plain = Count("drum", grains, ranks, 0.2, grains // ranks, ranks * halo_bodies, halo_bodies,
                   5 * ranks, 8, 48 * ranks * halo_bodies, 48 * halo_bodies, 2 * ranks)
     return replace(plain, **others)
 
@@ -28,7 +28,7 @@ def write(path, counts):
 
 @pytest.fixture
 def law():
-    return fit_law([counted(ranks) for ranks in (16, 32, 64)], "drum", "bisection", 0.2)
+    return fit_law([counted(ranks) for ranks in (16, 32, 64)], "drum", 0.2)
 
 
 def test_the_law_finds_the_strip_that_the_counts_were_made_with(law):
@@ -40,11 +40,11 @@ def test_the_law_finds_the_strip_that_the_counts_were_made_with(law):
 
 def test_few_ranks_do_not_count_and_are_not_enough():
     narrow = [counted(ranks, strip=0.1) for ranks in (1, 2, 4, 8)]
-    assert fit_law([*narrow, counted(16)], "drum", "bisection", 0.2).counts == 1
+    assert fit_law([*narrow, counted(16)], "drum", 0.2).counts == 1
     with pytest.raises(ResultError, match="at least 9 ranks"):
-        fit_law(narrow, "drum", "bisection", 0.2)
-    with pytest.raises(ResultError, match="nothing was counted for box morton 0.2; there are drum bisection 0.2"):
-        fit_law(narrow, "box", "morton", 0.2)
+        fit_law(narrow, "drum", 0.2)
+    with pytest.raises(ResultError, match="nothing was counted for box 0.2; there are drum 0.2"):
+        fit_law(narrow, "box", 0.2)
 
 
 def test_one_rank_costs_its_bodies_and_nothing_else(law):
@@ -85,10 +85,10 @@ def test_few_ranks_make_no_row_of_strips():
 
 
 def test_files_are_read_and_joined(tmp_path):
-    counts = [counted(16), counted(64, partition="morton", margin=1.0)]
+    counts = [counted(16), counted(64, margin=1.0)]
     paths = [write(tmp_path / f"{k}.csv", [count]) for k, count in enumerate(counts)]
     assert read_counts(paths) == counts
-    assert [row[:3] for row in strip_table(counts).rows] == [("drum", "bisection", "0.2"), ("drum", "morton", "1")]
+    assert [row[:2] for row in strip_table(counts).rows] == [("drum", "0.2"), ("drum", "1")]
 
 
 def test_damaged_and_missing_files_are_errors(tmp_path):
@@ -109,6 +109,6 @@ def test_the_command_prints_markdown(tmp_path, capsys):
     assert main(["scale", str(path), "--body", "1.5e-6", "--bodies", "1e6", "--shape", "drum"]) == 0
     printed = capsys.readouterr().out
     assert "### Time of a step of 1e+06 bodies, reckoned" in printed and "| 4096 |" in printed
-    assert "1.5 us per body" in printed and "| drum | bisection | 0.2 | 2 |" in printed
+    assert "1.5 us per body" in printed and "| drum | 0.2 | 2 |" in printed
     assert main(["scale", str(path), "--body", "1e-6", "--bodies", "1e6", "--margin", "0.3"]) == 2
     assert "nothing was counted" in capsys.readouterr().err

@@ -24,7 +24,7 @@ VALUES = {
 def make_result(finished, tmp_path):
     """Copy the finished result under a name, with these counters."""
 
-    def make(name, counters, exchange="partition = 'morton'\n   margin = 0.0"):
+    def make(name, counters, margin="0.0"):
         folder = tmp_path / name
         shutil.copytree(finished, folder)
         with h5py.File(folder / "profile.h5", "a") as file:
@@ -34,7 +34,7 @@ def make_result(finished, tmp_path):
             group["name"] = np.array(list(counters), dtype=h5py.string_dtype())
             group["value"] = np.array(list(counters.values()), dtype=np.int64)
             del file["provenance/resolved_input"]
-            file["provenance/resolved_input"] = f"&boxes\n   margin = 7.0\n/\n&decomposition\n   {exchange}\n/\n"
+            file["provenance/resolved_input"] = f"&boxes\n   margin = 7.0\n/\n&decomposition\n   margin = {margin}\n/\n"
         return folder
 
     return make
@@ -55,21 +55,21 @@ def test_all_counters_of_a_run_are_read(shared):
     assert {name: getattr(run, field) for field, name in COUNTERS.items()} == VALUES
     result = Trajectory(shared)
     assert run.bodies == int((~result.frame(0).fixed).sum()) > 0
-    assert (run.ranks, run.steps, run.partition, run.pairs) == (16, 101, "morton", 130)
+    assert (run.ranks, run.steps, run.pairs) == (16, 101, 130)
     assert run.state_hash == result.state_hash
 
 
-def test_cut_and_margin_are_those_of_the_group_decomposition(make_result):
+def test_the_margin_is_that_of_the_group_decomposition(make_result):
     counters = {"steps": 1, "pairs": 1}
     assert read_run(make_result("a", counters)).margin == 0.0
-    run = read_run(make_result("b", counters, "margin = 9.5E-003\n   partition = 'bisection'"))
-    assert (run.partition, run.margin, run.as_count().margin) == ("bisection", 0.0095, 0.0095)
+    run = read_run(make_result("b", counters, "9.5E-003"))
+    assert (run.margin, run.as_count().margin) == (0.0095, 0.0095)
 
 
 def test_counts_are_means_of_a_step_and_ghosts_do_not_follow_in_the_first(shared):
     run = replace(read_run(shared), bodies=40)
     count = run.as_count()
-    assert (count.shape, count.margin, count.partition, count.grains, count.ranks) == (SHAPE, MARGIN, "morton", 40, 16)
+    assert (count.shape, count.margin, count.grains, count.ranks) == (SHAPE, MARGIN, 40, 16)
     assert (count.halo_bodies, count.halo_bodies_most, count.messages, count.bytes) == (100, 10, 60, 4800)
     assert (count.messages_most, count.bytes_most, count.rectangles, count.grains_most) == (5, 480, 70, 3)
 
@@ -83,7 +83,7 @@ def test_the_tables_tell_steps_from_redistributions_and_these_from_the_first(sha
     assert (row["halo bodies per body"], row["most halo bodies"], row["pairs per halo body"]) == ("2.50", "10", "0.500")
     assert (row["bodies, most/mean"], row["pairs, most/mean"]) == ("1.200", "2.462")
     expected = ("101", "3", "1", "100", "250", "50000", "500", "900", "500", "900000")
-    assert [row[4:] for row in redistributing.rows] == [expected]
+    assert [row[3:] for row in redistributing.rows] == [expected]
 
 
 def test_a_run_on_one_rank_has_its_bodies_and_tells_nothing(alone):
@@ -109,7 +109,7 @@ def test_what_is_saved_is_read_again_and_nothing_else_is(shared, alone, tmp_path
     assert read_runs(tmp_path / "runs.csv") == runs
     (tmp_path / "other.csv").write_text("shape,grains\nbox,1\n", encoding="utf-8")
     assert read_runs(tmp_path / "other.csv") == []
-    damaged = (tmp_path / "runs.csv").read_text(encoding="utf-8").replace(",morton,", ",morton,x", 1)
+    damaged = (tmp_path / "runs.csv").read_text(encoding="utf-8").replace(",101,0.0,", ",101,x0.0,", 1)
     (tmp_path / "runs.csv").write_text(damaged, encoding="utf-8")
     with pytest.raises(ResultError, match="runs.csv: is not a file of .*, or was damaged: line 2: margin is 'x"):
         read_runs(tmp_path / "runs.csv")
@@ -130,12 +130,12 @@ def test_the_command_takes_folders_and_saved_files(shared, alone, tmp_path, caps
     assert main(["scale", str(shared), str(alone), "--save", saved]) == 0
     printed = capsys.readouterr().out
     assert "### Exact counts of runs, means of a step" in printed and "reckoned" not in printed
-    assert main(["scale", saved, "--body", "1e-6", "--bodies", "1e5,1e6", "--partition", "morton"]) == 0
+    assert main(["scale", saved, "--body", "1e-6", "--bodies", "1e5,1e6"]) == 0
     again = capsys.readouterr().out
     assert again.startswith(printed) and again.count("| 4096 |") == 2
-    assert "### Time of a step of 100000 bodies" in again and "| run | morton | 0 | 1 |" in again
-    assert main(["scale", saved, "--body", "1e-6"]) == 2
-    assert "nothing was counted for run bisection 0" in capsys.readouterr().err
+    assert "### Time of a step of 100000 bodies" in again and "| run | 0 | 1 |" in again
+    assert main(["scale", saved, "--body", "1e-6", "--margin", "3"]) == 2
+    assert "nothing was counted for run 3" in capsys.readouterr().err
     assert main(["scale", str(alone)]) == 2
     said = capsys.readouterr()
     assert said.out == "" and "a run on one rank exchanges nothing" in said.err

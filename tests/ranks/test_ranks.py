@@ -49,19 +49,19 @@ def test_the_result_has_the_same_bits(combination, expected, outcomes, tmp_path)
         outcome.migrations.append(count(output, "migrations"))
 
 
-#: Fast grains that fly through the areas of all ranks; those of the Morton curve are no rectangles
-MORTON = """\
+#: Fast grains that fly through the areas of all ranks
+FAST = """\
 &scene name = 'gas' bodies = 60 fraction = 0.2 speed = 1.75 spin = 175 seed = 641 /
 &forces gravity = 0, 0 stiffness = 1.25e6 /
 &integrate fraction = 0.2 duration = 0.043 /
-&decomposition partition = 'morton' balance = 'off' /
+&decomposition balance = 'off' /
 &guards displacement = 'off' step = 'off' /
 """
 
 
 @pytest.mark.parametrize("ranks", [3, 7])
-def test_no_contact_is_missed_where_the_areas_of_ranks_are_odd(ranks, tmp_path):
-    (tmp_path / "scene.nml").write_text(MORTON, encoding="utf-8")
+def test_no_contact_is_missed_where_grains_fly_through_the_areas_of_all_ranks(ranks, tmp_path):
+    (tmp_path / "scene.nml").write_text(FAST, encoding="utf-8")
     one, _ = run(tmp_path / "scene.nml", tmp_path / "one")
     for margin in ("1e-3", "4e-3"):
         override = ("--set", f"decomposition.margin={margin}")

@@ -9,7 +9,6 @@ module posed_pair
    use polydem_find_contacts, only: find_contacts
    use polydem_force_law, only: force_law_t, new_force_law
    use polydem_force_sums, only: assemble_forces, force_sums_t
-   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, wp
    use polydem_settings, only: forces_settings_t
    implicit none
@@ -60,7 +59,7 @@ contains
       !> The pair
       type(pair_t), intent(inout) :: pair
 
-      call turn_bodies(pair%bodies, [1_ip, 2_ip], isa_base)
+      call turn_bodies(pair%bodies, [1_ip, 2_ip])
       call find_contacts(pair%bodies, 1_ip, [1_ip], [2_ip], pair%history, pair%contacts)
       call evaluate_law(pair%law, pair%bodies, 0.0_wp, pair%contacts, pair%history)
       call assemble_forces([0.0_wp, 0.0_wp], pair%contacts, pair%bodies, pair%sums)

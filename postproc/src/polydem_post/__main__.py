@@ -242,7 +242,6 @@ def _add_scale(verbs) -> None:
                            dest=names[-1].replace("-", "_"))
     scale.add_argument("--sums", type=_count, default=2, metavar="K")
     scale.add_argument("--shape")
-    scale.add_argument("--partition", default="bisection")
     scale.add_argument("--margin", type=_positive)
 
 
@@ -385,7 +384,7 @@ def _scale(options: argparse.Namespace) -> None:
     if options.body:
         machine = Machine(**{field.name: getattr(options, field.name) for field in fields(Machine)})
         shape = options.shape or (SHAPE if runs else "drum")
-        law = fit_law(counts, shape, options.partition, options.margin or (MARGIN if shape == SHAPE else 0.2))
+        law = fit_law(counts, shape, options.margin or (MARGIN if shape == SHAPE else 0.2))
         tables += [scale_table(law, machine, bodies) for bodies in options.bodies]
     print("\n".join(table.document("markdown") for table in tables), end="")
 

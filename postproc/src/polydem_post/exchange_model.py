@@ -45,8 +45,6 @@ class Count:
     grains: int
     #: Number of ranks
     ranks: int
-    #: Partition of space: bisection or morton
-    partition: str
     #: How far grains may move until regions are found anew, in long axes; of runs in m, 0 if they choose it
     margin: float
     #: Grains of the rank that has most
@@ -65,6 +63,11 @@ class Count:
     bytes_most: int
     #: Rectangles of all ranks
     rectangles: int
+
+    @property
+    def shows_strip(self) -> bool:
+        """Whether there are enough ranks, and halo bodies."""
+        return self.ranks >= SURROUNDED and min(self.halo_bodies, self.halo_bodies_most) > 0
 
     @property
     def strip(self) -> float:
@@ -99,7 +102,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class Law:
-    """What grows with the number of ranks, for one packing, partition and margin."""
+    """What grows with the number of ranks, for one packing and margin."""
 
     #: Width of the strip of halo bodies, in mean distances of grains
     strip: float
@@ -156,18 +159,18 @@ def read_counts(paths) -> list[Count]:
     return counts
 
 
-def fit_law(counts: list[Count], shape: str, partition: str, margin: float) -> Law:
-    """The law of one packing, partition and margin, from counts of at least SURROUNDED ranks."""
-    mine = [count for count in counts if (count.shape, count.partition, count.margin) == (shape, partition, margin)]
+def fit_law(counts: list[Count], shape: str, margin: float) -> Law:
+    """The law of one packing and margin, from counts of at least SURROUNDED ranks."""
+    mine = [count for count in counts if (count.shape, count.margin) == (shape, margin)]
     if not counts:
         raise ResultError("the time on many ranks is computed from runs of several ranks, but none is given")
     if not mine:
-        known = sorted({f"{count.shape} {count.partition} {count.margin:g}" for count in counts})
-        raise ResultError(f"nothing was counted for {shape} {partition} {margin:g}; there are {', '.join(known)}")
-    mine = [count for count in mine if count.ranks >= SURROUNDED and count.halo_bodies > 0]
+        known = sorted({f"{count.shape} {count.margin:g}" for count in counts})
+        raise ResultError(f"nothing was counted for {shape} {margin:g}; there are {', '.join(known)}")
+    mine = [count for count in mine if count.shows_strip]
     if not mine:
         raise ResultError(f"a prediction needs counts of at least {SURROUNDED} ranks; there are none for "
-                          f"{shape} {partition} {margin:g} (packing, partition, margin)")
+                          f"{shape} {margin:g} (packing, margin)")
     strips = [count.strip for count in mine]
     return Law(
         strip=math.exp(sum(map(math.log, strips)) / len(strips)),
@@ -201,13 +204,13 @@ def predict(law: Law, machine: Machine, bodies: float, ranks: int) -> Step:
 
 def strip_table(counts: list[Count]) -> Table:
     """How wide the strip of halo bodies is, for everything that was counted."""
-    heading = ("packing", "partition", "margin", "counts", "strip", "least", "most", "messages", "rectangles per rank")
-    table = Table("strips", "Width of the strip of halo bodies, in mean distances of grains", heading, texts=2)
-    enough = [count for count in counts if count.ranks >= SURROUNDED and count.halo_bodies > 0]
-    for shape, partition, margin in sorted({(count.shape, count.partition, count.margin) for count in enough}):
-        law = fit_law(enough, shape, partition, margin)
+    heading = ("packing", "margin", "counts", "strip", "least", "most", "messages", "rectangles per rank")
+    table = Table("strips", "Width of the strip of halo bodies, in mean distances of grains", heading, texts=1)
+    enough = [count for count in counts if count.shows_strip]
+    for shape, margin in sorted({(count.shape, count.margin) for count in enough}):
+        law = fit_law(enough, shape, margin)
         widths = [f"{width:.2f}" for width in (law.strip, *law.spread)]
-        table.add(shape, partition, f"{margin:g}", law.counts, *widths, law.messages, f"{law.rectangles:.1f}")
+        table.add(shape, f"{margin:g}", law.counts, *widths, law.messages, f"{law.rectangles:.1f}")
     table.note = (
         "Halo bodies per body are 4 w sqrt(P/N) + 4 w^2 P/N for N bodies on P ranks and a strip of width w; the rank "
         f"with most halo bodies counts, and only runs and packings on {SURROUNDED} ranks or more. Messages: those of "

@@ -56,8 +56,6 @@ class RunCount:
     bodies: int
     ranks: int
     steps: int
-    #: Partition of space: bisection or morton
-    partition: str
     #: How far bodies may move until they are handed out anew [m]; 0: the run chose it
     margin: float
     #: How often bodies were handed out, the first time included; how often space was divided
@@ -104,8 +102,7 @@ class RunCount:
         """The means of a step, as count_exchange counts them in a packing."""
         steps, told = self.steps, self.told_steps
         return Count(
-            shape=SHAPE, grains=self.bodies, ranks=self.ranks, partition=self.partition, margin=self.margin,
-            grains_most=self.most_bodies,
+            shape=SHAPE, grains=self.bodies, ranks=self.ranks, margin=self.margin, grains_most=self.most_bodies,
             halo_bodies=round(self.halo_bodies / steps), halo_bodies_most=round(self.most_halo_bodies / steps),
             messages=round(self.messages / told), messages_most=math.ceil(self.most_messages / told),
             bytes=round(self.bytes / told), bytes_most=round(self.most_bytes / told), rectangles=self.rectangles)
@@ -133,8 +130,7 @@ def read_run(folder) -> RunCount:
     except ValueError as error:
         text = entries["margin"][:40]
         raise ResultError(f"{folder}: its margin of decomposition is not a number: {text!r}") from error
-    partition = str(entries.get("partition", entries.get("cut", "bisection")))
-    run = RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], partition=partition, margin=margin,
+    run = RunCount(bodies=bodies, ranks=ranks, steps=counters["steps"], margin=margin,
                    pairs=counters["pairs"], state_hash=result.state_hash,
                    revision=str(result.provenance.get("revision", NOT_RECORDED)), **counts)
     _insist_on_counts(folder, run)
@@ -173,26 +169,26 @@ def _insist_on_counts(place, run: RunCount) -> None:
 def runs_tables(runs: list[RunCount]) -> list[Table]:
     """What steps tell, and what handing bodies out tells."""
     heading: tuple[str, ...] = (
-        "partition", "margin", "bodies", "ranks", "halo bodies per body", "most halo bodies", "pairs per halo body",
+        "margin", "bodies", "ranks", "halo bodies per body", "most halo bodies", "pairs per halo body",
         "messages", "of one rank", "bytes", "of one rank", "bodies, most/mean", "pairs, most/mean", "steps", "hash")
-    steps = Table("runs", "Exact counts of runs, means of a step", heading, texts=1)
-    heading = ("partition", "margin", "bodies", "ranks", "steps", "redistributions", "partitions", "migrations",
+    steps = Table("runs", "Exact counts of runs, means of a step", heading, texts=0)
+    heading = ("margin", "bodies", "ranks", "steps", "redistributions", "partitions", "migrations",
                "messages",
                "bytes", "bytes per halo body", "at the start", "messages", "bytes")
-    redistributing = Table("redistributing", "Exact counts of redistributions", heading, texts=1)
-    order = sorted(runs, key=lambda run: (run.bodies, run.margin, run.partition, run.ranks))
+    redistributing = Table("redistributing", "Exact counts of redistributions", heading, texts=0)
+    order = sorted(runs, key=lambda run: (run.bodies, run.margin, run.ranks))
     alone = {(run.bodies, run.steps): run.pairs for run in order if run.ranks == 1}
     for run in order:
         count = run.as_count()
         extra = run.pairs - alone.get((run.bodies, run.steps), run.pairs)
-        steps.add(run.partition, f"{run.margin:g}", run.bodies, run.ranks,
+        steps.add(f"{run.margin:g}", run.bodies, run.ranks,
                   number(run.halo_bodies / run.steps / run.bodies), count.halo_bodies_most,
                   number(extra / count.halo_bodies) if extra and count.halo_bodies else "-",
                   count.messages, count.messages_most, count.bytes, count.bytes_most,
                   number(run.most_bodies * run.ranks / run.bodies, 4),
                   number(run.most_pairs * run.ranks / run.pairs, 4) if run.pairs else "-", run.steps, run.state_hash)
         if run.ranks > 1:
-            redistributing.add(run.partition, f"{run.margin:g}", run.bodies, run.ranks, run.steps,
+            redistributing.add(f"{run.margin:g}", run.bodies, run.ranks, run.steps,
                                run.redistributions, run.partitions, *_later(run), run.first_migrations,
                                run.first_messages, run.first_bytes)
     steps.note = ("Messages and bytes are those that let halo bodies follow; margin in m, 0: chosen by the run. Pairs "

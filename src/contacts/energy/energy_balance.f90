@@ -33,7 +33,7 @@ module polydem_energy_balance
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: energy_balance_t, balance_t, start_energy_balance, accumulate_bodies, &
+   public :: energy_balance_t, balance_t, start_energy_balance, begin_step, accumulate_bodies, &
       accumulate_all, accumulate_walls, count_step, evaluate_balance, serialize_balance, serialize_contributions
 
    !> Running sums of the energy and momentum balance, and its values at the start
@@ -42,9 +42,9 @@ module polydem_energy_balance
       real(wp) :: energy_scale = 0.0_wp
       !> Largest sums over bodies of absolute momenta [N s/m] and angular momenta [N s] so far
       real(wp), private :: momentum_scale(2) = 0.0_wp
-      !> Whether bodies and contacts are those of the last accumulated step. `count_step` sets it. The caller must
-      !> clear it when a step begins; the last rates then have full weight, as is right in the middle of a step
-      logical :: is_current = .false.
+      !> Whether bodies and contacts are those of the last accumulated step. In the middle of a step they are not, and
+      !> the last rates have full weight
+      logical, private :: is_current = .false.
       !> Sums over steps of the powers of forces on each body, (n_channels, slot); not allocated without a balance [W/m]
       real(wp), allocatable :: power_sum(:, :)
       !> Sums over steps of the torque of gravity on each body about the origin, (slot) [N]
@@ -189,6 +189,14 @@ contains
       call add_walls(bodies, walls, 1.0_wp, first, last, sums%power_sum, sums%wall_sum)
    end subroutine accumulate_walls
 
+   !> Begin a step: bodies and contacts are no longer those of the last accumulated step.
+   pure subroutine begin_step(sums)
+      !> Running sums
+      type(energy_balance_t), intent(inout) :: sums
+
+      sums%is_current = .false.
+   end subroutine begin_step
+
    !> Count a step of which the rates of all bodies and the action of fixed bodies are accumulated.
    pure subroutine count_step(sums)
       !> Running sums
@@ -325,7 +333,7 @@ contains
       type(exact_sum_t), allocatable :: partial_sums(:, :)
       type(energy_balance_t) :: now
       real(wp), allocatable :: energy(:)
-      integer(ip) :: b, n, n_blocks
+      integer(ip) :: ends(0:most_blocks), b, n, n_blocks
       integer :: i
 
       ! The last rates have half their weight.
@@ -338,12 +346,12 @@ contains
       if (.not. walls%energy_is_quadratic) energy = 0.0_wp
       n = size(bodies%free, kind=ip)
       n_blocks = max(1_ip, min(n/block, most_blocks))
+      ends(:n_blocks) = [(int(int(n, lp)*int(b, lp)/int(n_blocks, lp), ip), b=0_ip, n_blocks)]
       allocate (partial_sums(n_totals, n_blocks))
       !$omp parallel do if (n_blocks > 1_ip) schedule(static) default(none) &
-      !$omp    shared(n, n_blocks, partial_sums, now, energy, gravity, bodies) private(b)
+      !$omp    shared(ends, n_blocks, partial_sums, now, energy, gravity, bodies) private(b)
       do b = 1_ip, n_blocks
-         call add_block(now, energy, gravity, bodies, &
-                        end_of(b - 1_ip, n_blocks, n) + 1_ip, end_of(b, n_blocks, n), partial_sums(:, b))
+         call add_block(now, energy, gravity, bodies, ends(b - 1_ip) + 1_ip, ends(b), partial_sums(:, b))
       end do
       !$omp end parallel do
       do b = 2_ip, n_blocks
@@ -354,13 +362,6 @@ contains
       call all_reduce_exact_sums(comm, partial_sums(:, 1))
       total = partial_sums(:, 1)%value()
    end function totals
-
-   !> Last entry of block b if n entries are divided into n_blocks blocks
-   pure integer(ip) function end_of(b, n_blocks, n)
-      integer(ip), intent(in) :: b, n_blocks, n
-
-      end_of = int(int(n, lp)*int(b, lp)/int(n_blocks, lp), ip)
-   end function end_of
 
    !> Add the contributions of some free bodies to the sums.
    subroutine add_block(sums, energy, gravity, bodies, low, high, partial_sums)

@@ -30,15 +30,13 @@ module polydem_fill_block
 contains
 
    !> Fill a block with contacts of pairs in descending order.
-   subroutine fill_block(bodies, first, second, effective, isa, low, next, tested, history, block)
+   subroutine fill_block(bodies, first, second, effective, low, next, tested, history, block)
       !> Bodies with rotated polygons
       type(bodies_t), intent(in) :: bodies
       !> Lower and higher slot of each pair
       integer(ip), intent(in), contiguous :: first(:), second(:)
       !> Whether to compute the effective area
       logical, intent(in) :: effective
-      !> Instruction set of the kernels
-      integer, intent(in) :: isa
       !> Last pair to examine
       integer(ip), intent(in) :: low
       !> First pair to examine, at least `low`; afterwards the next one, less than `low` if there is none
@@ -53,10 +51,10 @@ contains
       type(overlap_batch_t) :: batch
       logical :: all_certified
 
-      call select_pairs(bodies, first, second, isa, low, next, tested, history, block, batch)
+      call select_pairs(bodies, first, second, low, next, tested, history, block, batch)
       call describe_pairs(block%n, block%pair, first, second, bodies%radius, bodies%vertex_start, bodies%position, &
                           block%first, block%second, batch)
-      call evaluate_batch(batch, block%n, bodies%turned, effective, isa, block%overlap_columns_t)
+      call evaluate_batch(batch, block%n, bodies%turned, effective, bodies%isa, block%overlap_columns_t)
       block%degenerate(:block%n) = 0.0_wp
       all_certified = count(batch%certified(:block%n) > 0.0_wp) == block%n
       if (.not. all_certified) call search_others(bodies, effective, batch%certified, history, block)
@@ -66,10 +64,9 @@ contains
    end subroutine fill_block
 
    !> Select the next pairs that may be contacts: those that no remembered edge separates.
-   subroutine select_pairs(bodies, first, second, isa, low, next, tested, history, block, batch)
+   subroutine select_pairs(bodies, first, second, low, next, tested, history, block, batch)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in), contiguous :: first(:), second(:)
-      integer, intent(in) :: isa
       integer(ip), intent(in) :: low
       integer(ip), intent(inout) :: next, tested
       type(contact_history_t), intent(inout) :: history
@@ -81,7 +78,7 @@ contains
       do while (next >= low .and. block%n < block_size)
          if (next < tested) then
             tested = max(low, next - ahead + 1_ip)
-            if (allocated(history%memory)) call forget_edges(bodies, tested, next, first, second, isa, &
+            if (allocated(history%memory)) call forget_edges(bodies, tested, next, first, second, &
                                                                     history%memory)
          end if
          if (allocated(history%memory)) then
@@ -94,12 +91,11 @@ contains
    end subroutine select_pairs
 
    !> Forget the remembered edges that do not separate the polygons any more.
-   subroutine forget_edges(bodies, from, to, first, second, isa, memory)
+   subroutine forget_edges(bodies, from, to, first, second, memory)
       type(bodies_t), intent(in) :: bodies
       !> First and last pair, at most `ahead` pairs
       integer(ip), intent(in) :: from, to
       integer(ip), intent(in), contiguous :: first(:), second(:)
-      integer, intent(in) :: isa
       integer(ip), intent(inout), contiguous :: memory(:)
       type(overlap_batch_t) :: batch
       integer(ip) :: found(ahead), i(block_size), j(block_size), k, n, n_found, p, done
@@ -117,7 +113,7 @@ contains
          do k = 1_ip, n
             batch%memory(k) = memory(found(done + k))
          end do
-         call test_edges(batch, n, size(bodies%turned, 2, kind=ip), bodies%turned, isa, apart)
+         call test_edges(batch, n, size(bodies%turned, 2, kind=ip), bodies%turned, bodies%isa, apart)
          do k = 1_ip, n
             memory(found(done + k)) = merge(batch%memory(k), 0_ip, apart(k))
          end do

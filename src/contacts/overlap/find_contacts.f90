@@ -7,7 +7,6 @@ module polydem_find_contacts
    use polydem_contact_rows, only: append_rows, contact_rows_t, gather_rows, start_rows
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_fill_block, only: fill_block
-   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: dp, ip
    use polydem_pair_ranges, only: divide_pairs, most_ranges
    implicit none
@@ -67,7 +66,7 @@ contains
       next = ends(2)
       tested = next + 1_ip
       do while (next > ends(1))
-         call fill_block(bodies, first, second, effective, isa_base, ends(1) + 1_ip, next, tested, history, block)
+         call fill_block(bodies, first, second, effective, ends(1) + 1_ip, next, tested, history, block)
          call append_rows(block, rows, with_forces=.false.)
       end do
    end subroutine find_in_range

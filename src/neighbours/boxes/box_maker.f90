@@ -258,13 +258,11 @@ contains
    end function is_within
 
    !> Turn bodies to their angles and update their boxes in one pass: the same as `turn_bodies` and then `update_boxes`.
-   subroutine turn_and_bound(maker, moving, isa, bodies, boxes)
+   subroutine turn_and_bound(maker, moving, bodies, boxes)
       !> From `new_box_maker`
       type(box_maker_t), intent(in) :: maker
       !> Slots of the bodies that may have moved since the last call
       integer(ip), intent(in), contiguous :: moving(:)
-      !> Instruction set of the kernels
-      integer, intent(in) :: isa
       !> Bodies; only `turned` changes
       type(bodies_t), intent(inout) :: bodies
       !> Boxes; only `bounds` changes
@@ -272,30 +270,28 @@ contains
       integer(ip) :: low
 
       !$omp parallel do if (size(moving) > min_parallel_size) schedule(static) default(none) &
-      !$omp    shared(maker, moving, isa, bodies, boxes) private(low)
+      !$omp    shared(maker, moving, bodies, boxes) private(low)
       do low = 1_ip, size(moving, kind=ip), block_size
-         call turn_and_bound_block(maker, moving(low:min(low + block_size - 1_ip, size(moving, kind=ip))), isa, &
-                                   bodies, boxes)
+         call turn_and_bound_block(maker, moving(low:min(low + block_size - 1_ip, size(moving, kind=ip))), bodies, &
+                                   boxes)
       end do
       !$omp end parallel do
    end subroutine turn_and_bound
 
    !> Turn up to `block_size` bodies to their angles and update their boxes. Several threads may call it for different
    !> bodies.
-   subroutine turn_and_bound_block(maker, slots, isa, bodies, boxes)
+   subroutine turn_and_bound_block(maker, slots, bodies, boxes)
       !> From `new_box_maker`
       type(box_maker_t), intent(in) :: maker
       !> Slots of the bodies
       integer(ip), intent(in), contiguous :: slots(:)
-      !> Instruction set of the kernels
-      integer, intent(in) :: isa
       !> Bodies; only `turned` changes
       type(bodies_t), intent(inout) :: bodies
       !> Boxes; only `bounds` changes
       type(boxes_t), intent(inout) :: boxes
       real(wp) :: extent(4, block_size), direction(2, block_size)
 
-      call turn_block(bodies, slots, isa, extent, direction)
+      call turn_block(bodies, slots, extent, direction)
       call place_boxes(maker, slots, extent, direction, bodies, boxes)
    end subroutine turn_and_bound_block
 

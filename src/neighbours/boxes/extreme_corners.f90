@@ -48,7 +48,7 @@ contains
 
    !> Update the boxes of up to `block_size` bodies to their poses, and turn those that have pairs. Turned vertices of
    !> the others may not be up to date afterwards. Several threads may call it for different bodies.
-   subroutine bound_block(self, maker, slots, pairs_of, isa, bodies, boxes)
+   subroutine bound_block(self, maker, slots, pairs_of, bodies, boxes)
       !> Extreme corners; those of these bodies may change
       type(extreme_corners_t), intent(inout) :: self
       type(box_maker_t), intent(in) :: maker
@@ -56,8 +56,6 @@ contains
       integer(ip), intent(in), contiguous :: slots(:)
       !> Number of pairs of each body, (slot)
       integer(ip), intent(in), contiguous :: pairs_of(:)
-      !> Instruction set of the kernels
-      integer, intent(in) :: isa
       !> Bodies; only `turned` changes
       type(bodies_t), intent(inout) :: bodies
       !> Boxes; only `bounds` changes
@@ -67,7 +65,7 @@ contains
 
       n = size(slots, kind=ip)
       call divide_by_pairs(n, slots, pairs_of, single, n_single, others, n_others)
-      call find_directions(bodies, single(:n_single), isa, direction)
+      call find_directions(bodies, single(:n_single), direction)
       n_known = 0_ip
       do k = 1_ip, n_single
          associate (s => single(k))
@@ -85,7 +83,7 @@ contains
          extent(:, n_known) = extent_of(self%known(single(k))%corner, direction(:, k))
       end do
       call place_boxes(maker, single(:n_known), extent, direction, bodies, boxes)
-      if (n_others > 0_ip) call turn_and_bound_block(maker, others(:n_others), isa, bodies, boxes)
+      if (n_others > 0_ip) call turn_and_bound_block(maker, others(:n_others), bodies, boxes)
    end subroutine bound_block
 
    !> Divide bodies into those without pairs and the others. Which are which, a processor cannot predict; there is no

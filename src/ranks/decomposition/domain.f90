@@ -10,11 +10,9 @@
 module polydem_domain
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_errors, only: error_t
    use polydem_halo, only: halo_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_partition, only: partition_t
-   use polydem_partition_factory, only: new_partition
    use polydem_rank_bounds, only: rank_bounds_t
    use polydem_settings, only: decomposition_settings_t
    implicit none
@@ -25,8 +23,8 @@ module polydem_domain
    type :: domain_t
       !> Group &decomposition
       type(decomposition_settings_t) :: settings
-      !> Partition of space; not allocated in a run on one rank
-      class(partition_t), allocatable :: partition
+      !> Partition of space; not allocated without a zone
+      type(partition_t), allocatable :: partition
       !> Bounding rectangles of the bodies of the other ranks
       type(rank_bounds_t) :: rank_bounds
       !> Halo: copies of bodies of other ranks
@@ -39,8 +37,6 @@ module polydem_domain
       real(wp) :: halo_share = 0.0_wp
       !> Padded boxes recorded at the last redistribution, (4, box) [m]
       real(wp), allocatable :: reference(:, :)
-      !> Whether a box is outside both its padded box and the zone of the rank in this step
-      logical :: has_left = .false.
       !> Step of the last redistribution; -1 before the first
       integer(lp) :: last_step = -1_lp
       !> Step of the last partition of space; -1 before the first
@@ -56,11 +52,14 @@ module polydem_domain
       !> Number of messages of this rank in the halo exchanges of all steps, and of their bytes
       integer(lp) :: step_messages = 0_lp, step_bytes = 0_lp
    contains
+      procedure :: has_zone
+      procedure :: has_halo
       procedure :: must_redistribute
       procedure :: choose_margin
       procedure :: set_reference
       procedure :: adapt_margin
       procedure :: send_border
+      procedure :: count_halo
    end type domain_t
 
    !> Bounds of the margin at the start, and of later margins, in median diameters
@@ -79,32 +78,46 @@ module polydem_domain
 contains
 
    !> Start a domain. In a run on several ranks the first redistribution is in the first step.
-   subroutine new_domain(domain, settings, median_diameter, comm, error)
+   subroutine new_domain(domain, settings, median_diameter, comm)
       type(domain_t), intent(out) :: domain
       type(decomposition_settings_t), intent(in) :: settings
       !> Median diameter of the free bodies of the run [m]
       real(wp), intent(in) :: median_diameter
       class(communicator_t), intent(in) :: comm
-      !> Allocated if the settings name no known partition of space
-      type(error_t), allocatable, intent(inout) :: error
 
       domain%settings = settings
       domain%median_diameter = median_diameter
       domain%margin = settings%margin
       if (settings%margin <= 0.0_wp) domain%margin = first_margin*median_diameter
-      if (comm%size > 1_ip) call new_partition(domain%partition, settings%partition, error)
+      if (comm%size > 1_ip) allocate (domain%partition)
    end subroutine new_domain
+
+   !> Whether bodies that leave the zone of this rank are redistributed: there are other ranks.
+   pure logical function has_zone(self)
+      class(domain_t), intent(in) :: self
+
+      has_zone = allocated(self%partition)
+   end function has_zone
+
+   !> Whether this rank has a halo: from the first redistribution on, even if no body is in it.
+   pure logical function has_halo(self)
+      class(domain_t), intent(in) :: self
+
+      has_halo = allocated(self%halo%border)
+   end function has_halo
 
    !> Whether a redistribution is necessary: a box of a body of this rank is outside both the zone and its padded box
    !> recorded at the last one, the last one was long ago, or there was none yet.
-   pure logical function must_redistribute(self, step)
+   pure logical function must_redistribute(self, step, has_left)
       class(domain_t), intent(in) :: self
       !> The present step
       integer(lp), intent(in) :: step
+      !> Whether a box is outside both its padded box and the zone
+      logical, intent(in) :: has_left
 
-      must_redistribute = allocated(self%partition)
+      must_redistribute = self%has_zone()
       if (.not. allocated(self%reference)) return
-      must_redistribute = self%has_left .or. &
+      must_redistribute = has_left .or. &
          (self%settings%balance /= 'off' .and. step - self%last_step >= longest_interval)
    end function must_redistribute
 
@@ -127,7 +140,6 @@ contains
       !> The step
       integer(lp), intent(in) :: step
 
-      self%has_left = .false.
       if (allocated(self%reference)) deallocate (self%reference)
       allocate (self%reference(4, size(bounds, 2)))
       self%reference(1:2, :) = bounds(1:2, :) - self%margin
@@ -167,5 +179,12 @@ contains
       self%step_messages = self%step_messages + comm%messages
       self%step_bytes = self%step_bytes + comm%bytes
    end subroutine send_border
+
+   !> Count the halo bodies of a step.
+   pure subroutine count_halo(self)
+      class(domain_t), intent(inout) :: self
+
+      if (self%has_halo()) self%halo_steps = self%halo_steps + int(size(self%halo%slots), lp)
+   end subroutine count_halo
 
 end module polydem_domain

@@ -3,6 +3,7 @@ module polydem_packed_bodies
    use polydem_bodies, only: allocate_bodies, bodies_t
    use polydem_body_fields, only: serialize_constants
    use polydem_communicator, only: communicator_t
+   use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp
    use polydem_migration_buffer, only: migration_buffer_t
    use polydem_serializer, only: serializer_t
@@ -20,6 +21,8 @@ module polydem_packed_bodies
       type(migration_buffer_t) :: constants
       !> Vertices in the body frame, those of each body in order
       type(migration_buffer_t) :: vertices
+      !> Instruction set of the kernels that compute with the bodies
+      integer :: isa = isa_base
    end type packed_bodies_t
 
 contains
@@ -43,6 +46,7 @@ contains
          packed%vertices%room = int(min(int(room, lp)*int(size(bodies%shape, 2)/max(1_ip, bodies%n) + 1, lp), &
                                         size(bodies%shape, 2, kind=lp)), ip)
       end if
+      packed%isa = bodies%isa
       corners = bodies%vertex_start(2:) - bodies%vertex_start(:bodies%n)
       packed%list%slots = slots
       call serialize_list(packed%list, bodies%global_index, corners)
@@ -176,6 +180,7 @@ contains
       n = size(corners, kind=ip)
       call allocate_bodies(bodies, n, sum(corners))
       bodies%n_all = n_all
+      bodies%isa = packed%isa
       allocate (bodies%turned(2, size(bodies%shape, 2)), source=0.0_wp)
       order = ascending_order(int(global_index, lp))
       allocate (slots(n))

@@ -1,7 +1,7 @@
 !> Count the halo exchange of one step: mpirun -n RANKS count_exchange FILE.csv GRAINS...
 !>
-!> The counts come from the code of the program, for grains packed in a box and in a drum, for both partitions of space
-!> and several margins (in long axes of a grain). They are exact on any machine, even if many ranks share a processor.
+!> The counts come from the code of the program, for grains packed in a box and in a drum, and for several
+!> margins (in long axes of a grain). They are exact on any machine, even if many ranks share a processor.
 program count_exchange
    use, intrinsic :: iso_fortran_env, only: error_unit
    use packed_grains, only: pack_share, shape_names
@@ -10,7 +10,6 @@ program count_exchange
    use polydem_world_communicator, only: create_world
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_partition, only: partition_t
-   use polydem_partition_factory, only: new_partition, partition_names
    use polydem_rank_bounds, only: rank_bounds_t
    use polydem_communicator, only: communicator_t
    implicit none
@@ -23,7 +22,7 @@ program count_exchange
    class(communicator_t), allocatable :: comm
    type(error_t), allocatable :: error
    character(len=:), allocatable :: word
-   integer :: unit, a, s, c
+   integer :: unit, a, s
    integer(ip) :: n
 
    call create_world(comm, error)
@@ -35,16 +34,14 @@ program count_exchange
    if (comm%is_root()) then
       call get_word(1, word)
       open (newunit=unit, file=word, status='replace', action='write')
-      write (unit, '(a)') 'shape,grains,ranks,partition,margin,grains_most,halo_bodies,halo_bodies_most,messages,'// &
+      write (unit, '(a)') 'shape,grains,ranks,margin,grains_most,halo_bodies,halo_bodies_most,messages,'// &
          'messages_most,bytes,bytes_most,rectangles,imbalance,halo_bodies_per_grain,neighbours'
    end if
    do a = 2, command_argument_count()
       call get_word(a, word)
       read (word, *) n
       do s = 1, size(shape_names)
-         do c = 1, size(partition_names)
-            call count_cut(trim(shape_names(s)), n, trim(partition_names(c)))
-         end do
+         call count_shape(trim(shape_names(s)), n)
       end do
    end do
    if (comm%is_root()) close (unit)
@@ -52,28 +49,27 @@ program count_exchange
 
 contains
 
-   !> Count for one packing and one partition.
-   subroutine count_cut(shape, n, cut)
-      character(len=*), intent(in) :: shape, cut
+   !> Count for one packing.
+   subroutine count_shape(shape, n)
+      character(len=*), intent(in) :: shape
       integer(ip), intent(in) :: n
-      class(partition_t), allocatable :: partition
+      type(partition_t) :: partition
       real(wp), allocatable :: share(:, :), grains(:, :)
       real(dp), allocatable :: weight(:)
       integer :: m
 
-      call new_partition(partition, cut, error)
       call pack_share(shape, n, comm%rank, comm%size, share)
       allocate (weight(size(share, 2)), source=1.0_dp)
       call partition%divide(comm, share(1:2, :), weight)
       call send_to_owners(partition, share, grains)
       do m = 1, size(margins)
-         call count_margin(shape, cut, margins(m), grains)
+         call count_margin(shape, margins(m), grains)
       end do
-   end subroutine count_cut
+   end subroutine count_shape
 
    !> Send all grains to their owners.
    subroutine send_to_owners(partition, share, grains)
-      class(partition_t), intent(in) :: partition
+      type(partition_t), intent(in) :: partition
       real(wp), intent(in) :: share(:, :)
       real(wp), allocatable, intent(out) :: grains(:, :)
       real(wp) :: rows(4, size(share, 2))
@@ -98,8 +94,8 @@ contains
    end subroutine send_to_owners
 
    !> Count for one margin; the root rank writes a row.
-   subroutine count_margin(shape, cut, margin, grains)
-      character(len=*), intent(in) :: shape, cut
+   subroutine count_margin(shape, margin, grains)
+      character(len=*), intent(in) :: shape
       real(wp), intent(in) :: margin
       real(wp), intent(in) :: grains(:, :)
       type(rank_bounds_t) :: rank_bounds
@@ -124,7 +120,7 @@ contains
       call comm%all_reduce_sum(sums)
       call comm%all_reduce_max(most)
       if (.not. comm%is_root()) return
-      write (unit, '(a,2(",",i0),3a,f0.2,8(",",i0),3(",",f0.6))') shape, sums(1), comm%size, ',', cut, ',', margin, &
+      write (unit, '(a,2(",",i0),",",f0.2,8(",",i0),3(",",f0.6))') shape, sums(1), comm%size, margin, &
          most(1), sums(2), most(2), sums(3), most(3), sums(2)*bytes_per_halo_body, most(4), sums(4), &
          real(most(1)*comm%size, dp)/real(sums(1), dp), real(sums(2), dp)/real(sums(1), dp), &
          real(sums(3), dp)/real(comm%size, dp)

@@ -1,4 +1,4 @@
-!> Check partitions of space and rank bounds on all ranks of an MPI run. The exit status is 1 if a check fails.
+!> Check the partition of space and rank bounds on all ranks of an MPI run. The exit status is 1 if a check fails.
 !>
 !> All ranks make the same bodies from the same random numbers. Each rank can therefore check its own results.
 program divide_checks
@@ -7,7 +7,6 @@ program divide_checks
    use polydem_world_communicator, only: create_world
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_partition, only: partition_t
-   use polydem_partition_factory, only: new_partition, partition_names
    use polydem_random, only: new_random, random_t
    use polydem_rank_bounds, only: rank_bounds_t
    use polydem_communicator, only: communicator_t
@@ -16,15 +15,12 @@ program divide_checks
    class(communicator_t), allocatable :: comm
    type(error_t), allocatable :: error
    integer(lp) :: broken(1)
-   integer :: c
 
    call create_world(comm, error)
    broken = 0_lp
-   do c = 1, size(partition_names)
-      call check_cloud(trim(partition_names(c)), 0_ip)
-      call check_cloud(trim(partition_names(c)), 1_ip)
-      call check_cloud(trim(partition_names(c)), 3000_ip)
-   end do
+   call check_cloud(0_ip)
+   call check_cloud(1_ip)
+   call check_cloud(3000_ip)
    call comm%all_reduce_sum(broken)
    call comm%finalize()
    if (broken(1) > 0_lp) error stop 1
@@ -32,26 +28,25 @@ program divide_checks
 contains
 
    !> Check the partition of a cloud of bodies for several distributions of the bodies over the ranks.
-   subroutine check_cloud(name, n)
-      character(len=*), intent(in) :: name
+   subroutine check_cloud(n)
       integer(ip), intent(in) :: n
-      class(partition_t), allocatable :: expected
+      type(partition_t) :: expected
       real(wp) :: position(2, n), boxes(4, n)
       real(dp) :: weight(n), share(0:comm%size - 1_ip)
       integer(ip) :: owner(n)
       integer :: k
 
       call strew(n + 5_ip, 2.0_wp, 3.0_wp, position, weight)
-      call divided(expected, name, comm%size, position, weight)
+      call divided(expected, comm%size, position, weight)
       owner = owners_of(expected, position)
       share = shares(expected, comm%size, position, weight)
-      if (n > 0_ip) call demand(maxval(abs(share - sum(share)/comm%size)) <= maxval(weight), name//': balance')
-      call check_division(name//': dealt out', position, weight, [(modulo(k, int(comm%size)), k=1, int(n))], owner)
-      call check_division(name//': in blocks', position, weight, [((k - 1)/(n/comm%size + 1), k=1, int(n))], owner)
-      call check_division(name//': all on the last rank', position, weight, [(int(comm%size) - 1, k=1, int(n))], owner)
-      call check_division(name//': where they belong', position, weight, int(owner), owner)
+      if (n > 0_ip) call demand(maxval(abs(share - sum(share)/comm%size)) <= maxval(weight), 'balance')
+      call check_division('dealt out', position, weight, [(modulo(k, int(comm%size)), k=1, int(n))], owner)
+      call check_division('in blocks', position, weight, [((k - 1)/(n/comm%size + 1), k=1, int(n))], owner)
+      call check_division('all on the last rank', position, weight, [(int(comm%size) - 1, k=1, int(n))], owner)
+      call check_division('where they belong', position, weight, int(owner), owner)
       call grow_boxes(position, boxes)
-      call check_regions(name, boxes, owner)
+      call check_regions(boxes, owner)
    end subroutine check_cloud
 
    !> Check that the partition is that of a single rank with all bodies.
@@ -63,12 +58,10 @@ contains
       integer, intent(in) :: before(:)
       !> Expected owner of each body
       integer(ip), intent(in) :: owner(:)
-      class(partition_t), allocatable :: partition
+      type(partition_t) :: partition
       integer, allocatable :: mine(:)
       integer :: k
 
-      call new_partition(partition, what(1:index(what, ':') - 1), error)
-      call demand(.not. allocated(error), what)
       mine = pack([(k, k=1, size(before))], before == int(comm%rank))
       call partition%divide(comm, position(:, mine), weight(mine))
       call demand(all(owners_of(partition, position) == owner), what)
@@ -90,8 +83,7 @@ contains
    end subroutine grow_boxes
 
    !> Check that the owners of overlapping boxes need each other's bodies.
-   subroutine check_regions(name, boxes, owner)
-      character(len=*), intent(in) :: name
+   subroutine check_regions(boxes, owner)
       real(wp), intent(in) :: boxes(:, :)
       integer(ip), intent(in) :: owner(:)
       type(rank_bounds_t) :: rank_bounds
@@ -106,10 +98,10 @@ contains
          call rank_bounds%needed_by(boxes(:, mine(j)), ranks, n)
          needed = .false.
          needed(ranks(1:n)) = .true.
-         call demand(count(needed, kind=ip) == n .and. .not. needed(comm%rank), name//': list of ranks')
+         call demand(count(needed, kind=ip) == n .and. .not. needed(comm%rank), 'list of ranks')
          do k = 1, size(owner)
             if (owner(k) /= comm%rank .and. overlap(boxes(:, k), boxes(:, mine(j)))) &
-               call demand(needed(owner(k)), name//': body not sent to where it is needed')
+               call demand(needed(owner(k)), 'body not sent to where it is needed')
          end do
       end do
    end subroutine check_regions

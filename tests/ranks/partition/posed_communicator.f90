@@ -1,10 +1,8 @@
 !> Communicator for tests in one process, which acts as one rank after the other.
 module posed_communicator
    use polydem_communicator, only: communicator_t
-   use polydem_errors, only: error_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_partition, only: partition_t
-   use polydem_partition_factory, only: new_partition
    use polydem_random, only: new_random, random_t
    implicit none
    private
@@ -52,24 +50,21 @@ contains
    end subroutine gather_longs
 
    !> Partition of bodies that are all on rank 0
-   subroutine divided(partition, name, size, position, weight)
-      class(partition_t), allocatable, intent(out) :: partition
-      character(len=*), intent(in) :: name
+   subroutine divided(partition, size, position, weight)
+      type(partition_t), intent(out) :: partition
       !> Number of ranks
       integer(ip), intent(in) :: size
       real(wp), intent(in) :: position(:, :)
       real(dp), intent(in) :: weight(:)
       type(posed_communicator_t) :: comm
-      type(error_t), allocatable :: error
 
       call pose(comm, size)
-      call new_partition(partition, name, error)
-      if (.not. allocated(error)) call partition%divide(comm, position, weight)
+      call partition%divide(comm, position, weight)
    end subroutine divided
 
    !> Owner of each body
    pure function owners_of(partition, position) result(owner)
-      class(partition_t), intent(in) :: partition
+      type(partition_t), intent(in) :: partition
       real(wp), intent(in) :: position(:, :)
       integer(ip) :: owner(size(position, 2))
       integer :: k
@@ -81,7 +76,7 @@ contains
 
    !> Weight of each rank, (0:size - 1)
    pure function shares(partition, size, position, weight) result(share)
-      class(partition_t), intent(in) :: partition
+      type(partition_t), intent(in) :: partition
       integer(ip), intent(in) :: size
       real(wp), intent(in) :: position(:, :)
       real(dp), intent(in) :: weight(:)
