@@ -79,10 +79,8 @@ contains
       real(dp) :: elapsed, before(n_stages)
 
       before = simulation%timers%total
-      ! As in a run between frames
-      simulation%keeps_contacts = .false.
       call clock%start()
-      call advance(simulation, error)
+      call advance(simulation, error, tabulate=.false.)   ! as a run between frames
       call clock%stop(elapsed, sample%processor(s))
       if (allocated(error)) return
       call simulation%timers%end_step()
