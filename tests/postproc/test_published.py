@@ -26,7 +26,6 @@ PAGES = [
     "tests/equality/bits.md",
     "tests/ranks/equality.md",
     "tests/verification/README.md",
-    "tests/verification/results.md",
 ]
 
 #: Pages whose tables hold no measured numbers of one run: manuals, and lists of cases with the tests that check them
