@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import h5py
 import pytest
@@ -253,6 +254,15 @@ def test_a_contact_that_stops_the_run_stops_all_in_the_same_state(tmp_path):
     assert "has no direction" in results[None][0], results[None][0]
     assert all(result[:2] == results[None][:2] for result in results.values()), results
     assert all(differences(results[None][2], result[2]) == [] for result in results.values())
+
+
+@pytest.mark.parametrize("ranks", [2, 3])
+def test_an_error_of_the_finder_of_one_rank_reaches_all(ranks):
+    build = Path(PARALLEL).parents[2]
+    subprocess.run(["cmake", "--build", build, "--target", "faulty_finder"], check=True, stdout=subprocess.PIPE)
+    done = subprocess.run(["mpirun", "-n", str(ranks), build / "tests/simulation/faulty_finder"], env=ENVIRONMENT,
+                          timeout=120, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
 
 
 def test_bodies_at_the_end_of_the_numbers_are_told(tmp_path):
