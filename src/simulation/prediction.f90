@@ -11,10 +11,10 @@ module polydem_prediction
    use polydem_guards, only: check_poses, find_coasting, have_valid_poses
    use polydem_integrator, only: drift
    use polydem_kinds, only: dp, ip, wp
-   use polydem_prescribed_motion, only: move_bodies
    use polydem_simulation, only: simulation_t, time_of
    use polydem_thread_changes, only: part
    use polydem_timers, only: stage_decomposition, stage_integrate
+   use polydem_wall, only: move_wall
    implicit none
    private
    public :: predict_bodies, move_walls
@@ -220,8 +220,8 @@ contains
       real(wp), intent(in) :: time
       integer :: k
 
-      do k = 1, size(self%motions)
-         if (time >= self%motions(k)%start) call move_bodies(self%motions(k), time, self%bodies)
+      do k = 1, size(self%walls)
+         call move_wall(self%walls(k), time, self%bodies)
       end do
    end subroutine move_walls
 
