@@ -8,9 +8,9 @@ module polydem_prescribed_motion
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: motion_t, new_motion, move_bodies
+   public :: motion_t, pose_bodies, carry_bodies
 
-   !> Prescribed motion of a set of fixed bodies
+   !> Prescribed motion
    type :: motion_t
       !> 'rotation', 'translation' or 'oscillation', as in the namelist
       character(len=11) :: kind = ''
@@ -28,12 +28,6 @@ module polydem_prescribed_motion
       real(wp) :: start = 0.0_wp
       !> Time from the start to the full rate [s]
       real(wp) :: ramp = 0.0_wp
-      !> Slots of the bodies that it moves
-      integer(ip), allocatable :: slots(:)
-      !> Their positions before the motion, (2, :) [m]
-      real(wp), allocatable :: position(:, :)
-      !> Their angles before the motion [rad]
-      real(wp), allocatable :: angle(:)
    end type motion_t
 
    !> Ramp of a motion, which rises smoothly from rest to the full rate
@@ -46,48 +40,51 @@ module polydem_prescribed_motion
       real(wp) :: growth = 0.0_wp
    end type ramp_t
 
+   !> Displacement along a vector: multiples of it that are displacement, velocity and acceleration
+   type :: shift_t
+      !> The vector, (2)
+      real(wp) :: vector(2) = 0.0_wp
+      !> The multiples
+      real(wp) :: place = 0.0_wp, speed = 0.0_wp, change = 0.0_wp
+   end type shift_t
+
 contains
 
-   !> Make a motion of some bodies from their present positions and angles.
-   subroutine new_motion(motion, prescription, bodies, slots)
-      !> The motion with slots, positions and angles of its bodies
-      type(motion_t), intent(out) :: motion
-      !> Parameters of the motion; its `slots`, `position` and `angle` are ignored
-      type(motion_t), intent(in) :: prescription
-      !> All bodies
-      type(bodies_t), intent(in) :: bodies
-      !> Slots of the bodies to move
-      integer(ip), intent(in) :: slots(:)
-
-      motion = prescription
-      motion%slots = slots
-      motion%position = bodies%position(:, slots)
-      motion%angle = bodies%angle(slots)
-   end subroutine new_motion
-
-   !> Set positions, angles, velocities and accelerations of the bodies of a motion at a time.
-   subroutine move_bodies(motion, time, bodies)
+   !> Set positions, angles, velocities and accelerations of bodies that one motion moves from their reference poses.
+   subroutine pose_bodies(motion, time, slots, position, angle, bodies)
       type(motion_t), intent(in) :: motion
       !> Time since the start of the run [s]
       real(wp), intent(in) :: time
-      !> Bodies; position, angle, velocities and accelerations of the bodies of the motion change
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Their positions before the motion, (2, :) [m]
+      real(wp), intent(in) :: position(:, :)
+      !> Their angles before the motion [rad]
+      real(wp), intent(in) :: angle(:)
+      !> Bodies; position, angle, velocities and accelerations of the bodies in the slots change
       type(bodies_t), intent(inout) :: bodies
       type(ramp_t) :: ramp
+      type(shift_t) :: shift
+      integer(ip) :: k
 
       ramp = ramp_at(motion, time)
-      select case (motion%kind)
-      case ('rotation')
-         call rotate(motion, ramp, bodies)
-      case ('translation')
-         call shift(motion, motion%velocity, ramp%elapsed, ramp%factor, ramp%growth, bodies)
-      case default
-         call oscillate(motion, ramp, bodies)
-      end select
-   end subroutine move_bodies
+      if (motion%kind == 'rotation') then
+         call rotate(motion, ramp, slots, position, angle, bodies)
+         return
+      end if
+      shift = shift_at(motion, ramp)
+      do k = 1_ip, size(slots, kind=ip)
+         bodies%position(:, slots(k)) = position(:, k) + shift%vector*shift%place
+         bodies%velocity(:, slots(k)) = shift%vector*shift%speed
+         bodies%acceleration(:, slots(k)) = shift%vector*shift%change
+      end do
+   end subroutine pose_bodies
 
-   subroutine rotate(motion, ramp, bodies)
+   subroutine rotate(motion, ramp, slots, position, angle, bodies)
       type(motion_t), intent(in) :: motion
       type(ramp_t), intent(in) :: ramp
+      integer(ip), intent(in) :: slots(:)
+      real(wp), intent(in) :: position(:, :), angle(:)
       type(bodies_t), intent(inout) :: bodies
       real(wp) :: turn, rate, growth, c, s, arm(2)
       integer(ip) :: k, slot
@@ -96,12 +93,12 @@ contains
       rate = motion%rate*ramp%factor
       growth = motion%rate*ramp%growth
       call sine_and_cosine(turn, s, c)
-      do k = 1_ip, size(motion%slots, kind=ip)
-         slot = motion%slots(k)
-         arm = motion%position(:, k) - motion%pivot
+      do k = 1_ip, size(slots, kind=ip)
+         slot = slots(k)
+         arm = position(:, k) - motion%pivot
          arm = [c*arm(1) - s*arm(2), s*arm(1) + c*arm(2)]
          bodies%position(:, slot) = motion%pivot + arm
-         bodies%angle(slot) = motion%angle(k) + turn
+         bodies%angle(slot) = angle(k) + turn
          bodies%velocity(:, slot) = [-rate*arm(2), rate*arm(1)]
          bodies%angular_velocity(slot) = rate
          bodies%acceleration(:, slot) = [-growth*arm(2), growth*arm(1)] - rate**2*arm
@@ -109,34 +106,88 @@ contains
       end do
    end subroutine rotate
 
-   !> x = x0 + a sin(w e(t)) with the ramped time e. The amplitude is full from the start; the frequency rises.
-   subroutine oscillate(motion, ramp, bodies)
+   !> Apply a motion to bodies that other motions have moved already: to their present positions, angles, velocities and
+   !> accelerations.
+   subroutine carry_bodies(motion, time, slots, bodies)
       type(motion_t), intent(in) :: motion
-      type(ramp_t), intent(in) :: ramp
+      !> Time since the start of the run [s]
+      real(wp), intent(in) :: time
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Bodies; position, angle, velocities and accelerations of the bodies in the slots change
       type(bodies_t), intent(inout) :: bodies
-      real(wp) :: rate, c, s
-
-      rate = motion%frequency*ramp%factor
-      call sine_and_cosine(motion%frequency*ramp%elapsed, s, c)
-      call shift(motion, motion%amplitude, s, rate*c, motion%frequency*ramp%growth*c - rate**2*s, bodies)
-   end subroutine oscillate
-
-   !> Shift the bodies of a motion along a vector.
-   subroutine shift(motion, vector, place, speed, change, bodies)
-      type(motion_t), intent(in) :: motion
-      !> The vector, and the multiples of it that are the displacement, the velocity and the acceleration
-      real(wp), intent(in) :: vector(2), place, speed, change
-      type(bodies_t), intent(inout) :: bodies
+      type(ramp_t) :: ramp
+      type(shift_t) :: shift
       integer(ip) :: k
 
-      do k = 1_ip, size(motion%slots, kind=ip)
-         associate (slot => motion%slots(k))
-            bodies%position(:, slot) = motion%position(:, k) + vector*place
-            bodies%velocity(:, slot) = vector*speed
-            bodies%acceleration(:, slot) = vector*change
+      ramp = ramp_at(motion, time)
+      if (motion%kind == 'rotation') then
+         call rotate_further(motion, ramp, slots, bodies)
+         return
+      end if
+      shift = shift_at(motion, ramp)
+      do k = 1_ip, size(slots, kind=ip)
+         associate (slot => slots(k))
+            bodies%position(:, slot) = bodies%position(:, slot) + shift%vector*shift%place
+            bodies%velocity(:, slot) = bodies%velocity(:, slot) + shift%vector*shift%speed
+            bodies%acceleration(:, slot) = bodies%acceleration(:, slot) + shift%vector*shift%change
          end associate
       end do
-   end subroutine shift
+   end subroutine carry_bodies
+
+   !> x = p + R (x0 - p) with moving x0: the velocity is R v0 + w x R (x0 - p), and the acceleration follows likewise.
+   subroutine rotate_further(motion, ramp, slots, bodies)
+      type(motion_t), intent(in) :: motion
+      type(ramp_t), intent(in) :: ramp
+      integer(ip), intent(in) :: slots(:)
+      type(bodies_t), intent(inout) :: bodies
+      real(wp) :: turn, rate, growth, c, s, arm(2), velocity(2), acceleration(2)
+      integer(ip) :: k, slot
+
+      turn = motion%rate*ramp%elapsed
+      rate = motion%rate*ramp%factor
+      growth = motion%rate*ramp%growth
+      call sine_and_cosine(turn, s, c)
+      do k = 1_ip, size(slots, kind=ip)
+         slot = slots(k)
+         arm = turned(bodies%position(:, slot) - motion%pivot)
+         velocity = turned(bodies%velocity(:, slot))
+         acceleration = turned(bodies%acceleration(:, slot))
+         bodies%position(:, slot) = motion%pivot + arm
+         bodies%angle(slot) = bodies%angle(slot) + turn
+         bodies%velocity(:, slot) = velocity + rate*[-arm(2), arm(1)]
+         bodies%angular_velocity(slot) = bodies%angular_velocity(slot) + rate
+         bodies%acceleration(:, slot) = acceleration + 2.0_wp*rate*[-velocity(2), velocity(1)] &
+                                        + growth*[-arm(2), arm(1)] - rate**2*arm
+         bodies%angular_acceleration(slot) = bodies%angular_acceleration(slot) + growth
+      end do
+
+   contains
+
+      pure function turned(vector)
+         real(wp), intent(in) :: vector(2)
+         real(wp) :: turned(2)
+
+         turned = [c*vector(1) - s*vector(2), s*vector(1) + c*vector(2)]
+      end function turned
+
+   end subroutine rotate_further
+
+   !> Displacement of a translation, or of an oscillation x = x0 + a sin(w e(t)) with the ramped time e. The amplitude
+   !> of an oscillation is full from the start; the frequency rises.
+   type(shift_t) function shift_at(motion, ramp) result(shift)
+      type(motion_t), intent(in) :: motion
+      type(ramp_t), intent(in) :: ramp
+      real(wp) :: rate, c, s
+
+      if (motion%kind == 'translation') then
+         shift = shift_t(motion%velocity, ramp%elapsed, ramp%factor, ramp%growth)
+      else
+         rate = motion%frequency*ramp%factor
+         call sine_and_cosine(motion%frequency*ramp%elapsed, s, c)
+         shift = shift_t(motion%amplitude, s, rate*c, motion%frequency*ramp%growth*c - rate**2*s)
+      end if
+   end function shift_at
 
    !> The ramp of a motion at a time
    pure type(ramp_t) function ramp_at(motion, time) result(ramp)

@@ -1,5 +1,6 @@
 !> Comparison of the settings of two runs: a text that lists the entries that differ.
 module polydem_changed_entries
+   use polydem_namelist_entries, only: is_repeatable
    use polydem_strings, only: text_t
    implicit none
    private
@@ -49,12 +50,14 @@ contains
       text = text//sentence
    end subroutine add
 
-   !> Split resolved settings into names 'group.key' and values, without the entries that do not affect the result.
+   !> Split resolved settings into names and values, without the entries that do not affect the result. Names are
+   !> 'group.key', or 'group.instance.key' of a repeatable group; 'group.name' has the names of all its instances, since
+   !> their order affects the result.
    pure subroutine list_entries(settings, names, values)
       character(len=*), intent(in) :: settings
       type(text_t), allocatable, intent(out) :: names(:), values(:)
       character(len=:), allocatable :: group, line, name
-      integer :: equals, first, last
+      integer :: equals, first, last, place
 
       allocate (names(0), values(0))
       group = ''
@@ -69,6 +72,15 @@ contains
          else if (equals > 0) then
             name = group//'.'//line(:equals - 1)
             if (any(harmless == name)) cycle
+            if (is_repeatable(group)) then
+               ! The first entry of a repeatable group is its name.
+               group = group//'.'//line(equals + 4:len(line) - 1)
+               place = place_of(name, names)
+               if (place > 0) then
+                  values(place)%text = values(place)%text//', '//line(equals + 3:)
+                  cycle
+               end if
+            end if
             names = [names, text_t(name)]
             values = [values, text_t(line(equals + 3:))]
          end if

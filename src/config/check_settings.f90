@@ -1,8 +1,8 @@
 !> Checks that involve two or more entries. The table of entries holds the checks of single entries.
 module polydem_check_settings
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_group_instances, only: index_of_instance, instance_t, row_of
    use polydem_kinds, only: lp, wp
-   use polydem_namelist_values, only: row_of, value_t
    use polydem_settings, only: settings_t
    implicit none
    private
@@ -21,6 +21,8 @@ module polydem_check_settings
    real(wp), parameter :: slenderness_limit = 1.0e6_wp
    !> What is said of entries beyond this limit, and of containers without room for a grain
    character(len=*), parameter :: too_slender = 'must not exceed 1e6 times', too_small = 'must be 0, or at least'
+   !> What is said of an oscillation beyond the limit of the speed
+   character(len=*), parameter :: too_fast = 'gives a speed of 1e6 m/s or more together with'
    !> Angle of a full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586_wp
    !> Lower limit of the restitution. Below it, the stable time step is proportional to the square root of the
@@ -35,82 +37,120 @@ module polydem_check_settings
 contains
 
    !> Check entries against each other.
-   pure subroutine check_settings(settings, values, error)
+   pure subroutine check_settings(settings, instances, error)
       !> Settings with all entries filled in
       type(settings_t), intent(in) :: settings
-      !> Values of all entries, (row of the table); they contain the places for messages
-      type(value_t), intent(in) :: values(:)
+      !> All groups with their values, which contain the places for messages
+      type(instance_t), intent(in) :: instances(:)
       !> First pair of contradictory entries
+      type(error_t), allocatable, intent(inout) :: error
+
+      call check_scene(settings, instances(index_of_instance(instances, 'scene')), error)
+      call check_motions(settings, instances, error)
+      associate (group => instances(index_of_instance(instances, 'forces')))
+         associate (given => group%values(row_of(group, 'restitution')))
+            if (given%is_active .and. settings%forces%restitution < least_restitution) then
+               call raise(error, input_error, given%place//': ''restitution'' in &forces must be at least 0.01, '// &
+                  'because a smaller value needs a very small time step; give ''damping_coefficient'' instead')
+            end if
+         end associate
+      end associate
+      if (settings%guards%energy /= 'off' .and. .not. settings%output%energy_balance) then
+         associate (group => instances(index_of_instance(instances, 'guards')))
+            call raise(error, input_error, group%values(row_of(group, 'energy'))%place// &
+               ': ''energy'' in &guards needs ''energy_balance'' = .true. in &output')
+         end associate
+      end if
+   end subroutine check_settings
+
+   !> Check entries of &scene against each other.
+   pure subroutine check_scene(settings, group, error)
+      type(settings_t), intent(in) :: settings
+      !> The group &scene
+      type(instance_t), intent(in) :: group
       type(error_t), allocatable, intent(inout) :: error
 
       associate (scene => settings%scene, longest => length_limit*settings%scene%long_axis_max, &
                  most_corners => int(settings%scene%corners_max, lp))
          call require(scene%corners_min <= scene%corners_max, &
-            'must not exceed', 'corners_min', 'corners_max', values, error)
+            'must not exceed', 'corners_min', 'corners_max', group, error)
          call require(scene%short_axis <= scene%long_axis_min, &
-            'must not exceed', 'short_axis', 'long_axis_min', values, error)
+            'must not exceed', 'short_axis', 'long_axis_min', group, error)
          call require(scene%long_axis_min <= scene%long_axis_max, &
-            'must not exceed', 'long_axis_min', 'long_axis_max', values, error)
+            'must not exceed', 'long_axis_min', 'long_axis_max', group, error)
          ! Lengths and numbers are 0 if their entries are not in use.
-         call require(scene%radius <= longest, too_long, 'radius', 'long_axis_max', values, error)
-         call require(scene%opening <= longest, too_long, 'opening', 'long_axis_max', values, error)
+         call require(scene%radius <= longest, too_long, 'radius', 'long_axis_max', group, error)
+         call require(scene%opening <= longest, too_long, 'opening', 'long_axis_max', group, error)
          call require(scene%width <= longest .or. all(scene%name /= grain_scenes), &
-            too_long, 'width', 'long_axis_max', values, error)
+            too_long, 'width', 'long_axis_max', group, error)
          call require(scene%width >= scene%short_axis .or. all(scene%name /= grain_scenes) .or. &
-            .not. scene%width > 0.0_wp, too_small, 'width', 'short_axis', values, error)
+            .not. scene%width > 0.0_wp, too_small, 'width', 'short_axis', group, error)
          call require(scene%radius >= scene%short_axis .or. .not. scene%radius > 0.0_wp, &
-            too_small, 'radius', 'short_axis', values, error)
+            too_small, 'radius', 'short_axis', group, error)
          call require(scene%long_axis_max <= slenderness_limit*scene%short_axis, &
-            too_slender, 'long_axis_max', 'short_axis', values, error)
+            too_slender, 'long_axis_max', 'short_axis', group, error)
          if (any(scene%name == block_scenes)) then
-            call require(scene%width <= slenderness_limit*scene%height, too_slender, 'width', 'height', values, error)
-            call require(scene%height <= slenderness_limit*scene%width, too_slender, 'height', 'width', values, error)
+            call require(scene%width <= slenderness_limit*scene%height, too_slender, 'width', 'height', group, error)
+            call require(scene%height <= slenderness_limit*scene%width, too_slender, 'height', 'width', group, error)
          end if
-         call require(scene%bodies*most_corners <= corner_limit, too_many, 'bodies', 'corners_max', values, error)
-         call require(scene%boxes*most_corners <= corner_limit, too_many, 'boxes', 'corners_max', values, error)
-         call require(scene%moving_grains <= scene%bodies, 'must not exceed', 'moving_grains', 'bodies', values, error)
+         call require(scene%bodies*most_corners <= corner_limit, too_many, 'bodies', 'corners_max', group, error)
+         call require(scene%boxes*most_corners <= corner_limit, too_many, 'boxes', 'corners_max', group, error)
+         call require(scene%moving_grains <= scene%bodies, 'must not exceed', 'moving_grains', 'bodies', group, error)
          call require(scene%size_ratio <= 1.0_wp .or. scene%packing == '', &
-            'above 1 cannot be combined with', 'size_ratio', 'packing', values, error)
+            'above 1 cannot be combined with', 'size_ratio', 'packing', group, error)
          call require(scene%size_ratio <= 1.0_wp .or. .not. scene%overlap, &
-            'above 1 cannot be combined with', 'size_ratio', 'overlap', values, error)
-         associate (fastest => two_pi*scene%motion_frequency*maxval(abs(scene%motion_amplitude)))
-            call require(scene%motion /= 'oscillation' .or. fastest < speed_limit, &
-               'gives a speed of 1e6 m/s or more together with', 'motion_amplitude', 'motion_frequency', values, error)
-         end associate
+            'above 1 cannot be combined with', 'size_ratio', 'overlap', group, error)
          if (scene%name == 'drum') then
             call require(scene%boxes > 0 .or. scene%bodies > 0, &
-               'is 0; give it, or give', 'boxes', 'bodies', values, error)
+               'is 0; give it, or give', 'boxes', 'bodies', group, error)
             call require(scene%boxes == 0 .or. scene%bodies == 0, &
-               'cannot be combined with', 'boxes', 'bodies', values, error)
+               'cannot be combined with', 'boxes', 'bodies', group, error)
          end if
       end associate
-      associate (given => values(row_of(values, 'forces', 'restitution')))
-         if (given%is_active .and. settings%forces%restitution < least_restitution) then
-            call raise(error, input_error, given%place//': ''restitution'' in &forces must be at least 0.01, '// &
-               'because a smaller value needs a very small time step; give ''damping_coefficient'' instead')
-         end if
-      end associate
-      if (settings%guards%energy /= 'off' .and. .not. settings%output%energy_balance) then
-         call raise(error, input_error, values(row_of(values, 'guards', 'energy'))%place// &
-            ': ''energy'' in &guards needs ''energy_balance'' = .true. in &output')
-      end if
-   end subroutine check_settings
+   end subroutine check_scene
 
-   !> Raise an error about two entries of &scene if their relation does not hold. The error names the place of `key` if
+   !> Check the speeds of oscillations, and that motions are given either in &scene or in groups &motion.
+   pure subroutine check_motions(settings, instances, error)
+      type(settings_t), intent(in) :: settings
+      type(instance_t), intent(in) :: instances(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+
+      associate (scene => settings%scene, group => instances(index_of_instance(instances, 'scene')))
+         if (scene%motion == 'oscillation') call require( &
+            two_pi*scene%motion_frequency*maxval(abs(scene%motion_amplitude)) < speed_limit, &
+            too_fast, 'motion_amplitude', 'motion_frequency', group, error)
+         if (scene%motion /= 'none' .and. size(settings%motion) > 0) call raise(error, input_error, &
+            group%values(row_of(group, 'motion'))%place//': ''motion'' in &scene cannot be combined with groups '// &
+            '&motion; write it as one of them')
+      end associate
+      do k = 1, size(settings%motion)
+         associate (motion => settings%motion(k))
+            if (motion%kind == 'oscillation') call require( &
+               two_pi*motion%frequency*maxval(abs(motion%amplitude)) < speed_limit, too_fast, 'amplitude', &
+               'frequency', instances(index_of_instance(instances, 'motion', motion%name)), error)
+         end associate
+      end do
+   end subroutine check_motions
+
+   !> Raise an error about two entries of a group if their relation does not hold. The error names the place of `key` if
    !> this entry is given, otherwise the place of `other`; of both, the place on the command line.
-   pure subroutine require(holds, relation, key, other, values, error)
+   pure subroutine require(holds, relation, key, other, group, error)
       logical, intent(in) :: holds
       character(len=*), intent(in) :: relation, key, other
-      type(value_t), intent(in) :: values(:)
+      type(instance_t), intent(in) :: group
       type(error_t), allocatable, intent(inout) :: error
       integer :: row, second
 
       if (holds) return
-      row = row_of(values, 'scene', key)
-      second = row_of(values, 'scene', other)
-      if (.not. values(row)%is_given .or. (values(second)%is_override .and. .not. values(row)%is_override)) row = second
-      call raise(error, input_error, values(row)%place//': '''//key//''' in &scene '//relation// &
-         ' '''//other//'''')
+      row = row_of(group, key)
+      second = row_of(group, other)
+      associate (values => group%values)
+         if (.not. values(row)%is_given .or. (values(second)%is_override .and. .not. values(row)%is_override)) &
+            row = second
+      end associate
+      call raise(error, input_error, group%values(row)%place//': '''//key//''' in &'//trim(group%group)//' '// &
+         relation//' '''//other//'''')
    end subroutine require
 
 end module polydem_check_settings

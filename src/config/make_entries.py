@@ -13,9 +13,12 @@ from collections import namedtuple
 from pathlib import Path
 
 Row = namedtuple("Row", "group key type count default unit allowed needs meaning")
+Group = namedtuple("Group", "meaning is_repeatable")
 #: Components: the Fortran type of one value and its value before it is filled
 TYPES = {"real": ("real(wp)", "0.0_wp"), "integer": ("integer(ip)", "0_ip"), "logical": ("logical", ".false.")}
-TEXTS = ("word", "path")
+TEXTS = ("word", "path", "name")
+#: The row of the name of a repeatable group, from its key to what it is used with
+NAME_ROW = ("name", "name", 1, "required", "", "", "")
 #: Group of a bench; all other groups belong to a run
 BENCH = "bench"
 #: Longest piece of a text on a line
@@ -27,7 +30,7 @@ class TableError(Exception):
 
 
 def read_table(text):
-    """Meaning of each group, and all rows."""
+    """Groups by name, and all rows."""
     groups, lists, rows = {}, {}, []
     for number, line in enumerate(text.splitlines(), 1):
         if not line.strip() or line.startswith("#"):
@@ -35,7 +38,8 @@ def read_table(text):
         word, _, rest = line.partition(" ")
         if word == "group":
             name, _, meaning = rest.partition(": ")
-            groups[name] = meaning
+            name, mark, _ = name.partition(" *")
+            groups[name] = Group(meaning, mark != "")
         elif word == "list":
             name, _, words = rest.partition(" = ")
             lists[name] = with_lists(words.strip(), lists, number)
@@ -46,15 +50,29 @@ def read_table(text):
             if not fields[3].isdigit():
                 raise TableError(f"line {number}: {fields[3]} is not a number of values")
             row = Row(*(with_lists(field, lists, number) for field in fields))._replace(count=int(fields[3]))
-            if row.group != next(reversed(groups), None):
-                raise TableError(f"line {number}: the row is not in its group")
-            if row.type not in (*TYPES, *TEXTS) or (row.type == "logical" and row.count != 1):
-                raise TableError(f"line {number}: there is no entry of type {row.type} with {row.count} values")
-            earlier = [other for other in rows if (other.group, other.key) == (row.group, row.key)]
-            if any((other.type, other.count) != (row.type, row.count) for other in earlier):
-                raise TableError(f"line {number}: {row.key} has another type in an earlier row")
+            problem = problem_of(row, groups, rows)
+            if problem:
+                raise TableError(f"line {number}: {problem}")
             rows.append(row)
+    for row in rows:
+        if row.type == "name" and row.allowed and not groups.get(row.allowed, Group("", False)).is_repeatable:
+            raise TableError(f"{row.key} of {row.group} is the name of a group {row.allowed}, which is not repeatable")
     return groups, rows
+
+
+def problem_of(row, groups, earlier):
+    """What is wrong with a row that follows others; empty if nothing is."""
+    if row.group != next(reversed(groups), None):
+        return "the row is not in its group"
+    if row.type not in (*TYPES, *TEXTS) or (row.type == "logical" and row.count != 1):
+        return f"there is no entry of type {row.type} with {row.count} values"
+    same = [other for other in earlier if (other.group, other.key) == (row.group, row.key)]
+    if any((other.type, other.count) != (row.type, row.count) for other in same):
+        return f"{row.key} has another type in an earlier row"
+    is_first = all(other.group != row.group for other in earlier)
+    if is_first and groups[row.group].is_repeatable and row[1:8] != NAME_ROW:
+        return "the first row of a repeatable group is its name, of type name and required"
+    return ""
 
 
 def with_lists(text, lists, number):
@@ -102,9 +120,12 @@ def table_module(groups, rows):
         body += (f"   !> Group &{group}\n   type(entry_t), parameter :: {group}_entries(*) = [ &\n"
                  + ", &\n".join(entries) + "]\n\n")
     names = ", &\n      ".join(f"{group}_entries" for group in groups)
-    body += f"   !> The table of entries\n   type(entry_t), parameter :: entries(*) = [ &\n      {names}]\n"
-    return module("entry_table", "Table of namelist entries.", ["namelist_entry, only: entry_t, required"], ["entries"],
-                  body)
+    body += f"   !> The table of entries\n   type(entry_t), parameter :: entries(*) = [ &\n      {names}]\n\n"
+    names = "".join(f", &\n      '{name}'" for name, group in groups.items() if group.is_repeatable)[1:]
+    body += ("   !> Groups that a file may contain several times\n"
+             "   character(len=*), parameter :: repeatable_groups(*) = [character(len=group_length) ::" + names + "]\n")
+    return module("entry_table", "Table of namelist entries.",
+                  ["namelist_entry, only: entry_t, group_length, required"], ["entries", "repeatable_groups"], body)
 
 
 def component(row):
@@ -125,15 +146,18 @@ def component(row):
 def settings_module(groups, rows):
     """One type per group, one of all groups of a run, and one of a bench."""
     body = ""
-    for group, meaning in groups.items():
+    for group, (meaning, _) in groups.items():
         components = "\n".join(component(row) for row in first_rows(rows, group))
         comment = textwrap.fill(f"Group &{group}" + (f": {meaning}" if meaning else ""), 110,
                                 initial_indent="   !> ", subsequent_indent="   !> ")
         base = ", extends(origin_t)" if group == BENCH else ""
         body += f"{comment}\n   type{base} :: {group}_settings_t\n{components}\n   end type {group}_settings_t\n\n"
     body += "   !> All settings of a run. They do not change after reading\n   type, extends(origin_t) :: settings_t\n"
-    body += "".join(f"      !> Group &{group}\n      type({group}_settings_t) :: {group}\n"
-                    for group in groups if group != BENCH)
+    for group, (_, is_repeatable) in groups.items():
+        if group != BENCH:
+            kind, shape = (", allocatable", "(:)") if is_repeatable else ("", "")
+            body += (f"      !> Group{'s' * is_repeatable} &{group}{', in the order of the file' * is_repeatable}\n"
+                     f"      type({group}_settings_t){kind} :: {group}{shape}\n")
     body += "   end type settings_t\n"
     return module("settings", "Settings of a run and of a bench: one type per namelist group.",
                   ["kinds, only: ip, wp", "origin, only: origin_t", "strings, only: text_t"],
@@ -145,27 +169,34 @@ def assignment(row):
     values = {"real": "reals", "integer": "integers", "logical": "flag"}.get(row.type)
     values = values or ("text" if row.count == 1 else "texts")
     first = "(1)" if row.count == 1 and values in ("reals", "integers") else ""
-    place = f"row_of(values, '{row.group}', '{row.key}')"
-    return f"      settings%{row.key} = &\n         values({place})%{values}{first}\n"
+    return f"      settings%{row.key} = &\n         instance%values(row_of(instance, '{row.key}'))%{values}{first}\n"
 
 
 def fill_module(groups, rows):
-    """Procedures that fill the types, one per group."""
+    """Procedures that fill the types, one per group, and the one that fills all groups of a run."""
     run = [group for group in groups if group != BENCH]
-    parts = ["   !> Fill all groups of a run.\n   pure subroutine fill_groups(values, settings)\n"
-             "      !> Values, (row of the table)\n      type(value_t), intent(in) :: values(:)\n"
-             "      !> Settings to fill\n      type(settings_t), intent(inout) :: settings\n\n"
-             + "".join(f"      call fill_{group}(values, settings%{group})\n" for group in run)
-             + "   end subroutine fill_groups\n"]
+    allocations, cases = "", ""
+    for group in run:
+        place = ""
+        if groups[group].is_repeatable:
+            place = "(instances(k)%number)"
+            allocations += (f"      if (allocated(settings%{group})) deallocate (settings%{group})\n"
+                            f"      allocate (settings%{group}(count(instances%group == '{group}')))\n")
+        cases += f"         case ('{group}')\n            call fill_{group}(instances(k), settings%{group}{place})\n"
+    parts = ["   !> Fill all groups of a run.\n   pure subroutine fill_groups(instances, settings)\n"
+             "      !> Instances of all groups\n      type(instance_t), intent(in) :: instances(:)\n"
+             "      !> Settings to fill\n      type(settings_t), intent(inout) :: settings\n      integer :: k\n\n"
+             f"{allocations}      do k = 1, size(instances)\n         select case (instances(k)%group)\n{cases}"
+             "         end select\n      end do\n   end subroutine fill_groups\n"]
     for group in groups:
         copies = "".join(assignment(row) for row in first_rows(rows, group))
-        parts.append(f"   !> Fill group &{group}.\n   pure subroutine fill_{group}(values, settings)\n"
-                     "      !> Values, (row of the table)\n      type(value_t), intent(in) :: values(:)\n"
+        parts.append(f"   !> Fill a group &{group}.\n   pure subroutine fill_{group}(instance, settings)\n"
+                     "      !> The group with its values\n      type(instance_t), intent(in) :: instance\n"
                      f"      !> Settings to fill\n      type({group}_settings_t), intent(inout) :: settings\n\n"
                      f"{copies}   end subroutine fill_{group}\n")
     uses = [f"settings, only: {group}_settings_t" for group in groups]
     return module("fill_groups", "Copies the values of the table of entries to the settings.",
-                  ["namelist_values, only: row_of, value_t", "settings, only: settings_t", *uses],
+                  ["group_instances, only: instance_t, row_of", "settings, only: settings_t", *uses],
                   ["fill_groups", f"fill_{BENCH}"], "", "\n".join(parts))
 
 
@@ -178,6 +209,8 @@ def manual(rows):
         is_text = row.type in TEXTS and row.count > 0
         default = f"`'{row.default}'`" if is_text and row.default != "required" else row.default
         allowed = ", ".join(row.allowed.split()) if row.type == "word" else row.allowed
+        if row.type == "name":
+            allowed = f"name of a &{row.allowed}" if row.allowed else "letters, digits, _"
         key, _, words = row.needs.rpartition(":")
         used = ", ".join(words.split())
         cells = [f"&{row.group}", f"`{row.key}`", kind, row.unit, default, allowed,

@@ -2,12 +2,13 @@
 !>
 !> A new entry is a row of `entries.txt`; afterwards the manual must be generated again (see `entries_manual`).
 module polydem_namelist_entries
-   use polydem_entry_table, only: entries
+   use polydem_entry_table, only: entries, repeatable_groups
    use polydem_namelist_entry, only: allowed_length, bench_group, entry_t, group_length, key_length, required
    use polydem_strings, only: count_words, split_words
    implicit none
    private
-   public :: entry_t, entries, required, group_length, bench_group, first_row, groups, keys_of, choices_of
+   public :: entry_t, entries, required, group_length, key_length, bench_group, first_row, groups, is_repeatable, &
+      keys_of, choices_of
 
 contains
 
@@ -35,6 +36,14 @@ contains
       end do
       names = pack(entries%group, is_new)
    end function groups
+
+   !> Whether a file may contain a group several times, each time with another `name`
+   pure logical function is_repeatable(group)
+      !> Namelist group
+      character(len=*), intent(in) :: group
+
+      is_repeatable = any(repeatable_groups == group)
+   end function is_repeatable
 
    !> Keys of the entries of a group in the order of the table, each key once
    pure function keys_of(group) result(names)

@@ -13,7 +13,7 @@ module polydem_namelist_entry
       character(len=group_length) :: group
       !> Key of the entry in its group
       character(len=key_length) :: key
-      !> real, integer, logical, word (one of `allowed`) or path (any text)
+      !> real, integer, logical, word (one of `allowed`), path (any text) or name (letters, digits and _)
       character(len=7) :: type
       !> Number of values; 0: a list, which is empty by default and has at least one value if given
       integer :: count
@@ -21,7 +21,8 @@ module polydem_namelist_entry
       character(len=20) :: default
       !> Unit; blank if dimensionless
       character(len=8) :: unit
-      !> Choices of a word, or bounds of a number such as '>= 0, < 1'; blank: any (finite) value
+      !> Choices of a word, bounds of a number such as '>= 0, < 1', or the group of which a name is one; blank: any
+      !> (finite) value
       character(len=allowed_length) :: allowed
       !> Condition under which the entry is in use: 'key: word word' in the same group; blank: always
       character(len=80) :: needs

@@ -2,15 +2,18 @@
 module polydem_namelist_values
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
-   use polydem_namelist_entries, only: entries, entry_t, first_row, required
+   use polydem_namelist_entries, only: entry_t, required
    use polydem_namelist_statements, only: literal_t, statement_t
    use polydem_strings, only: to_text, counted, count_words, lower_case, quoted, split_words, suggestion, text_t
    implicit none
    private
-   public :: value_t, read_value, row_of, value_text, label, is_text
+   public :: value_t, read_value, value_text, label, is_text
 
    !> Decimal digits
    character(len=*), parameter :: digits = '0123456789'
+   !> Characters of a name
+   character(len=*), parameter :: name_characters = &
+      'abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ_'//digits
 
    !> The value of an entry
    type :: value_t
@@ -28,9 +31,9 @@ module polydem_namelist_values
       integer(ip), allocatable :: integers(:)
       !> Value of a logical entry
       logical :: flag = .false.
-      !> Value of a word or path entry
+      !> Value of a word, path or name entry
       character(len=:), allocatable :: text
-      !> Values of a word or path entry or of a list of them, (count)
+      !> Values of a word, path or name entry or of a list of them, (count)
       type(text_t), allocatable :: texts(:)
    end type value_t
 
@@ -70,19 +73,6 @@ contains
       end do
    end subroutine read_value
 
-   !> Row of an entry that is in use; the first row of the entry if none is in use
-   pure integer function row_of(values, group, key) result(row)
-      !> Values, (row of the table)
-      type(value_t), intent(in) :: values(:)
-      !> Namelist group, and name in the group; the entry must exist
-      character(len=*), intent(in) :: group, key
-
-      do row = first_row(group, key), size(entries)
-         if (values(row)%is_active .and. entries(row)%group == group .and. entries(row)%key == key) return
-      end do
-      row = first_row(group, key)
-   end function row_of
-
    !> Name of an entry in messages
    pure function label(entry) result(text)
       type(entry_t), intent(in) :: entry
@@ -91,11 +81,11 @@ contains
       text = quoted(trim(entry%key))//' in &'//trim(entry%group)
    end function label
 
-   !> Whether the values of an entry are words or paths
+   !> Whether the values of an entry are words, paths or names
    pure logical function is_text(entry)
       type(entry_t), intent(in) :: entry
 
-      is_text = entry%type == 'word' .or. entry%type == 'path'
+      is_text = any(entry%type == [character(len=4) :: 'word', 'path', 'name'])
    end function is_text
 
    !> Read value k of an entry.
@@ -278,7 +268,8 @@ contains
       end do
    end subroutine check_bounds
 
-   !> Check that a text is in quotes, that a word is one of the choices, and that a required path is not empty.
+   !> Check that a text is in quotes, that a word is one of the choices, that a required path or name is not empty, and
+   !> the characters of a name.
    pure subroutine check_text(entry, literal, problem)
       type(entry_t), intent(in) :: entry
       type(literal_t), intent(in) :: literal
@@ -286,9 +277,12 @@ contains
 
       if (.not. literal%has_quotes) then
          problem = 'must be in quotes: write '//quoted(literal%text)
-      else if (entry%type == 'path') then
-         if (literal%text == '' .and. entry%default == required) problem = 'must not be empty'
-      else if (all(split_words(entry%allowed) /= literal%text)) then
+      else if (entry%type /= 'word' .and. literal%text == '') then
+         if (entry%default == required) problem = 'must not be empty'
+      else if (entry%type == 'name') then
+         if (verify(literal%text, name_characters) > 0) problem = 'cannot be '//literal%as_written()// &
+            '; a name has only letters, digits and _'
+      else if (entry%type == 'word' .and. all(split_words(entry%allowed) /= literal%text)) then
          problem = 'cannot be '//literal%as_written()//suggestion(literal%text, split_words(entry%allowed))
       end if
    end subroutine check_text

@@ -1,13 +1,19 @@
 !> Where settings come from: the base of the types that `make_entries.py` makes of the table of entries.
 module polydem_origin
-   use polydem_namelist_entries, only: entries, first_row
-   use polydem_strings, only: text_t
    implicit none
    private
    public :: origin_t, overrides_of, place_of
 
    !> Beginning of the place of an override of the command line
    character(len=*), parameter :: option = '--set '
+
+   !> Where an entry was given
+   type :: entry_place_t
+      !> Group and key; a repeatable group with its name, such as 'motion.turn'
+      character(len=:), allocatable :: group, key
+      !> Beginning of a message: file:line, --set group.key=value, or the file alone
+      character(len=:), allocatable :: place
+   end type entry_place_t
 
    !> Origin of settings
    type :: origin_t
@@ -17,8 +23,8 @@ module polydem_origin
       character(len=:), allocatable :: text
       !> Every entry in use with its value, one per line, as namelist text
       character(len=:), allocatable :: resolved
-      !> Where each entry was given, (rows of the table); not allocated in settings that no text gave
-      type(text_t), allocatable :: places(:)
+      !> Where each entry was given, (any); not allocated in settings that no text gave
+      type(entry_place_t), allocatable :: places(:)
    end type origin_t
 
 contains
@@ -27,14 +33,18 @@ contains
    pure function place_of(settings, group, key) result(place)
       !> Settings of a run or a bench
       class(origin_t), intent(in) :: settings
-      !> Namelist group
+      !> Namelist group; a repeatable group with its name, such as 'motion.turn'
       character(len=*), intent(in) :: group
-      !> Name in the group; the entry must exist
+      !> Key in the group
       character(len=*), intent(in) :: key
       character(len=:), allocatable :: place
+      integer :: k
 
       place = settings%file
-      if (allocated(settings%places)) place = settings%places(first_row(group, key))%text
+      if (.not. allocated(settings%places)) return
+      do k = 1, size(settings%places)
+         if (settings%places(k)%group == group .and. settings%places(k)%key == key) place = settings%places(k)%place
+      end do
    end function place_of
 
    !> Overrides of a group on the command line, for the end of a message that says what follows from several entries:
@@ -45,13 +55,13 @@ contains
       !> Namelist group
       character(len=*), intent(in) :: group
       character(len=:), allocatable :: text
-      integer :: row
+      integer :: k
 
       text = ''
       if (.not. allocated(settings%places)) return
-      do row = 1, size(entries)
-         if (entries(row)%group /= group .or. first_row(group, entries(row)%key) /= row) cycle
-         associate (place => settings%places(row)%text)
+      do k = 1, size(settings%places)
+         if (settings%places(k)%group /= group) cycle
+         associate (place => settings%places(k)%place)
             if (index(place, option) == 1) text = text//trim(merge(' (with', ',     ', text == ''))//' '//place
          end associate
       end do

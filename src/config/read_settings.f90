@@ -9,9 +9,9 @@ module polydem_read_settings
    use polydem_errors, only: error_t
    use polydem_exclusive_entries, only: resolve_exclusive_entries
    use polydem_fill_groups, only: fill_bench, fill_groups
-   use polydem_namelist_entries, only: entries
+   use polydem_group_instances, only: full_name, index_of_instance, instance_t, row_of
+   use polydem_namelist_entries, only: bench_group, key_length, keys_of
    use polydem_namelist_tokens, only: source_t
-   use polydem_namelist_values, only: row_of, value_t
    use polydem_origin, only: origin_t
    use polydem_resolve_entries, only: resolve_entries, resolved_text
    use polydem_settings, only: bench_settings_t, settings_t
@@ -26,7 +26,8 @@ contains
    subroutine read_settings(file, overrides, settings, error)
       !> Path of the namelist file
       character(len=*), intent(in) :: file
-      !> Overrides of the command line, each 'group.key=value'; the last override of an entry applies
+      !> Overrides of the command line, each 'group.key=value' or 'group.name.key=value'; the last override of an entry
+      !> applies
       character(len=*), intent(in) :: overrides(:)
       !> Complete, checked settings: `settings_t` of a run, or `bench_settings_t`
       class(origin_t), intent(inout) :: settings
@@ -45,58 +46,97 @@ contains
       character(len=*), intent(in) :: file_name
       !> Text with the namelist groups
       character(len=*), intent(in) :: text
-      !> Overrides of the command line, each 'group.key=value'; the last override of an entry applies
+      !> Overrides of the command line, each 'group.key=value' or 'group.name.key=value'; the last override of an entry
+      !> applies
       character(len=*), intent(in) :: overrides(:)
       !> Complete, checked settings: `settings_t` of a run, or `bench_settings_t`
       class(origin_t), intent(inout) :: settings
       !> Error in the text or an override
       type(error_t), allocatable, intent(inout) :: error
-      type(value_t), allocatable :: values(:)
+      type(instance_t), allocatable :: instances(:)
 
       select type (settings)
       type is (settings_t)
-         call read_values(file_name, text, overrides, .false., settings%origin_t, values, error)
+         call read_values(file_name, text, overrides, .false., settings%origin_t, instances, error)
          if (allocated(error)) return
-         call fill_groups(values, settings)
-         call check_settings(settings, values, error)
+         call fill_groups(instances, settings)
+         call check_settings(settings, instances, error)
+         call expand_short_motion(settings)
       type is (bench_settings_t)
-         call read_values(file_name, text, overrides, .true., settings%origin_t, values, error)
+         call read_values(file_name, text, overrides, .true., settings%origin_t, instances, error)
          if (allocated(error)) return
-         call fill_bench(values, settings)
+         call fill_bench(instances(index_of_instance(instances, bench_group)), settings)
          call check_bench(settings, error)
       end select
    end subroutine read_settings_text
 
    !> Read the values of all entries and their origin.
-   pure subroutine read_values(file_name, text, overrides, of_bench, origin, values, error)
+   pure subroutine read_values(file_name, text, overrides, of_bench, origin, instances, error)
       character(len=*), intent(in) :: file_name, text, overrides(:)
       !> Whether the text describes a bench
       logical, intent(in) :: of_bench
       type(origin_t), intent(inout) :: origin
-      !> Values, (row of the table)
-      type(value_t), allocatable, intent(out) :: values(:)
+      !> Instances of all groups with their values
+      type(instance_t), allocatable, intent(out) :: instances(:)
       type(error_t), allocatable, intent(inout) :: error
       type(source_t) :: source
-      integer :: k
 
       source%name = trim(file_name)
       source%text = text
-      call resolve_entries(source, of_bench, overrides, values, error)
+      call resolve_entries(source, of_bench, overrides, instances, error)
       if (allocated(error)) return
-      call resolve_exclusive_entries(values, error)
+      call resolve_exclusive_entries(instances(index_of_instance(instances, 'forces')), error)
       if (allocated(error)) return
       origin%file = trim(file_name)
       origin%text = normalise_line_ends(text)
-      origin%resolved = resolved_text(values)
-      if (allocated(origin%places)) deallocate (origin%places)
-      allocate (origin%places(size(values)))
-      do k = 1, size(values)
-         origin%places(k)%text = origin%file
-         associate (value => values(row_of(values, entries(k)%group, entries(k)%key)))
-            if (allocated(value%place)) origin%places(k)%text = value%place
-         end associate
-      end do
+      origin%resolved = resolved_text(instances)
+      call list_places(instances, origin)
    end subroutine read_values
+
+   !> List where the entries were given.
+   pure subroutine list_places(instances, origin)
+      type(instance_t), intent(in) :: instances(:)
+      type(origin_t), intent(inout) :: origin
+      character(len=key_length), allocatable :: keys(:)
+      integer :: i, k, n
+
+      if (allocated(origin%places)) deallocate (origin%places)
+      allocate (origin%places(sum([(size(keys_of(instances(i)%group)), i=1, size(instances))])))
+      n = 0
+      do i = 1, size(instances)
+         keys = keys_of(instances(i)%group)
+         do k = 1, size(keys)
+            n = n + 1
+            associate (entry => origin%places(n), value => instances(i)%values(row_of(instances(i), trim(keys(k)))))
+               entry%group = full_name(instances(i))
+               entry%key = trim(keys(k))
+               entry%place = origin%file
+               if (allocated(value%place)) entry%place = value%place
+            end associate
+         end do
+      end do
+   end subroutine list_places
+
+   !> Make the motion of the group &scene the only one of the run. Its name is empty.
+   pure subroutine expand_short_motion(settings)
+      type(settings_t), intent(inout) :: settings
+
+      if (settings%scene%motion == 'none') return
+      deallocate (settings%motion)
+      allocate (settings%motion(1))
+      associate (scene => settings%scene, motion => settings%motion(1))
+         motion%name = ''
+         motion%kind = settings%scene%motion
+         motion%bodies = scene%motion_bodies
+         motion%pivot = scene%motion_pivot
+         motion%rate = scene%motion_rate
+         motion%velocity = scene%motion_velocity
+         motion%amplitude = scene%motion_amplitude
+         motion%frequency = scene%motion_frequency
+         motion%start = scene%motion_start
+         motion%ramp = scene%motion_ramp
+      end associate
+   end subroutine expand_short_motion
 
    !> Text without carriage returns and with a line end after the last line
    pure function normalise_line_ends(text) result(plain)

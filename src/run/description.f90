@@ -6,7 +6,7 @@ module polydem_description
    use polydem_overlap_table, only: write_overlap_table
    use polydem_result_files, only: overlaps_name
    use polydem_simulation, only: simulation_t
-   use polydem_strings, only: to_text, counted
+   use polydem_strings, only: to_text, counted, join
    use polydem_scene_measures, only: scene_measures_t
    implicit none
    private
@@ -151,16 +151,17 @@ contains
       end associate
    end function gravity_text
 
-   !> Kind and number of bodies of each prescribed motion
+   !> Kinds of the motions and number of bodies of each moving wall
    function motion_text(simulation) result(text)
       type(simulation_t), intent(in) :: simulation
       character(len=:), allocatable :: text
       integer :: k
 
       text = ''
-      do k = 1, size(simulation%motions)
-         text = text//', '//trim(simulation%motions(k)%kind)//' of '// &
-            counted(size(simulation%motions(k)%slots, kind=lp), 'wall')
+      do k = 1, size(simulation%walls)
+         associate (wall => simulation%walls(k))
+            text = text//', '//join(wall%motions%kind, ' and ')//' of '//counted(size(wall%slots, kind=lp), 'wall')
+         end associate
       end do
    end function motion_text
 

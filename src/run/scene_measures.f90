@@ -6,13 +6,13 @@ module polydem_scene_measures
    use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
    use polydem_elementary, only: hypotenuse
    use polydem_energy_guard, only: find_stored_energy
-   use polydem_expected_speed, only: greatest_wall_speed
    use polydem_guards, only: greatest_displacement, place_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_body, owns_pair
    use polydem_simulation, only: simulation_t
    use polydem_stability_check, only: find_stable_step
    use polydem_strings, only: to_text
+   use polydem_wall, only: greatest_wall_speed
    use polydem_whole_run, only: keep_greatest, reduce_to_greatest, reduce_to_least, sum_exactly
    implicit none
    private
@@ -92,8 +92,9 @@ contains
          call greatest_displacement(s%bodies, s%guard%moving, s%dt, measures%move, slot)
          if (slot > 0_ip) measures%farthest = int(s%bodies%id(slot), lp)
          call keep_greatest(comm, measures%move, measures%farthest)
-         do k = 1, size(s%motions)
-            measures%wall_speed = max(measures%wall_speed, greatest_wall_speed(s%motions(k), s%bodies%radius))
+         do k = 1, size(s%walls)
+            measures%wall_speed = max(measures%wall_speed, greatest_wall_speed(s%walls(k), s%bodies%radius, &
+                                                                               s%settings%integrate%duration))
          end do
          gravity = hypotenuse(s%settings%forces%gravity(1), s%settings%forces%gravity(2))
          if (gravity > 0.0_wp) then

@@ -6,7 +6,7 @@ module polydem_bed
    use polydem_kinds, only: wp
    use polydem_lattice, only: lattice_height
    use polydem_pour, only: loose_spacing, place_grains
-   use polydem_settings, only: scene_settings_t
+   use polydem_settings, only: scene_settings_t, settings_t
    use polydem_walls, only: append_box, rectangle
    implicit none
    private
@@ -20,28 +20,30 @@ module polydem_bed
 contains
 
    !> List the bodies of the bed: grains first, then floor, left wall, right wall. The floor is at y = 0.
-   subroutine list_bed(scene, list, error)
-      !> Settings: bodies (grains), width, grains, packing
-      type(scene_settings_t), intent(in) :: scene
+   subroutine list_bed(settings, list, error)
+      !> Settings: bodies (grains), width, grains, packing; motions
+      type(settings_t), intent(in) :: settings
       type(body_list_t), intent(inout) :: list
       !> Allocated if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error
       real(wp) :: width, height, inside(2, 4)
 
-      width = scene%width
-      if (.not. width > 0.0_wp) then
-         width = max(sqrt(aspect*settled_area(scene, scene%bodies)), 2.0_wp*scene%size_ratio*loose_spacing(scene))
-      end if
-      height = loose_height(scene, width)
-      if (height < 0.0_wp) then
-         call raise(error, input_error, 'width is too small for a grain; increase width')
-         return
-      end if
-      ! Grains that start with a speed may rise above the lattice.
-      inside = rectangle(-0.5_wp*width, 0.5_wp*width, 0.0_wp, height + 2.0_wp*loose_spacing(scene))
-      call place_grains(list, scene, inside, scene%bodies, error)
-      if (allocated(error)) return
-      call append_box(list, inside, scene%long_axis_max*sqrt(scene%size_ratio), closed=.false.)
+      associate (scene => settings%scene)
+         width = scene%width
+         if (.not. width > 0.0_wp) then
+            width = max(sqrt(aspect*settled_area(scene, scene%bodies)), 2.0_wp*scene%size_ratio*loose_spacing(scene))
+         end if
+         height = loose_height(scene, width)
+         if (height < 0.0_wp) then
+            call raise(error, input_error, 'width is too small for a grain; increase width')
+            return
+         end if
+         ! Grains that start with a speed may rise above the lattice.
+         inside = rectangle(-0.5_wp*width, 0.5_wp*width, 0.0_wp, height + 2.0_wp*loose_spacing(scene))
+         call place_grains(list, scene, inside, scene%bodies, error, settings%motion)
+         if (allocated(error)) return
+         call append_box(list, inside, scene%long_axis_max*sqrt(scene%size_ratio), closed=.false.)
+      end associate
    end subroutine list_bed
 
    !> Height that loose grains need [m]; negative if the bed is too narrow for one grain

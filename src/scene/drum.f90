@@ -10,7 +10,7 @@ module polydem_drum
    use polydem_kinds, only: ip, wp
    use polydem_lattice, only: row_height
    use polydem_pour, only: loose_spacing, place_grains
-   use polydem_settings, only: scene_settings_t
+   use polydem_settings, only: scene_settings_t, settings_t
    implicit none
    private
    public :: list_drum, draw_segments
@@ -25,9 +25,9 @@ module polydem_drum
 contains
 
    !> List the bodies of the drum: grains first, then the segments of the ring, anticlockwise from the right.
-   subroutine list_drum(scene, list, error)
-      !> Settings: boxes (total) or bodies (grains), radius, grains
-      type(scene_settings_t), intent(in) :: scene
+   subroutine list_drum(settings, list, error)
+      !> Settings: boxes (total) or bodies (grains), radius, grains; motions
+      type(settings_t), intent(in) :: settings
       type(body_list_t), intent(inout) :: list
       !> Allocated if the segments need all boxes, or if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error
@@ -35,15 +35,15 @@ contains
       real(wp) :: radius
       integer(ip) :: k, n, segments
 
-      call choose_drum_size(scene, n, segments, radius)
+      call choose_drum_size(settings%scene, n, segments, radius)
       if (n < 1_ip) then
          call raise(error, input_error, 'the ring alone needs all boxes; increase boxes or decrease radius')
          return
       end if
       call draw_ring(radius, segments, inner)
-      call place_grains(list, scene, inner, n, error)
+      call place_grains(list, settings%scene, inner, n, error, settings%motion)
       if (allocated(error)) return
-      call draw_segments(radius, segment_thickness*mean_axis(scene), segments, corners)
+      call draw_segments(radius, segment_thickness*mean_axis(settings%scene), segments, corners)
       do k = 1_ip, segments
          call list%append(corners(:, :, k), fixed=.true.)
       end do

@@ -8,7 +8,7 @@ module polydem_packing
    use polydem_grains, only: grain_t, grains_t, pi
    use polydem_kinds, only: ip, wp
    use polydem_patch, only: patch_t, read_patch
-   use polydem_settings, only: scene_settings_t
+   use polydem_settings, only: motion_settings_t, scene_settings_t
    use polydem_strings, only: to_text
    implicit none
    private
@@ -103,9 +103,9 @@ contains
 
    !> If walls rotate from time 0 on, add the same rotation to the grains. Walls and grains then move as one rigid body,
    !> and their contacts do not change.
-   pure subroutine rotate_with_walls(scene, centres, velocities, spins)
-      !> Prescribed motion
-      type(scene_settings_t), intent(in) :: scene
+   pure subroutine rotate_with_walls(motions, centres, velocities, spins)
+      !> Prescribed motions of the walls
+      type(motion_settings_t), intent(in) :: motions(:)
       !> Centres of the grains, (2, grain) [m]
       real(wp), intent(in) :: centres(:, :)
       !> Velocities, (2, grain) [m/s]; the velocities of the rotation are added
@@ -113,12 +113,17 @@ contains
       !> Angular velocities, (grain) [rad/s]; the angular velocity of the rotation is added
       real(wp), intent(inout) :: spins(:)
       real(wp) :: rate
+      integer :: k
 
-      if (scene%motion /= 'rotation' .or. max(scene%motion_start, scene%motion_ramp) > 0.0_wp) return
-      rate = 2.0_wp*pi*scene%motion_rate
-      velocities(1, :) = velocities(1, :) - rate*(centres(2, :) - scene%motion_pivot(2))
-      velocities(2, :) = velocities(2, :) + rate*(centres(1, :) - scene%motion_pivot(1))
-      spins = spins + rate
+      do k = 1, size(motions)
+         associate (motion => motions(k))
+            if (motion%kind /= 'rotation' .or. max(motion%start, motion%ramp) > 0.0_wp) cycle
+            rate = 2.0_wp*pi*motion%rate
+            velocities(1, :) = velocities(1, :) - rate*(centres(2, :) - motion%pivot(2))
+            velocities(2, :) = velocities(2, :) + rate*(centres(1, :) - motion%pivot(1))
+            spins = spins + rate
+         end associate
+      end do
    end subroutine rotate_with_walls
 
    !> Make an outline from its corners.

@@ -9,7 +9,7 @@ module polydem_pour
    use polydem_lattice, only: fill_lattice
    use polydem_packing, only: pack_grains, rotate_with_walls
    use polydem_random, only: new_random, random_t
-   use polydem_settings, only: scene_settings_t
+   use polydem_settings, only: motion_settings_t, scene_settings_t
    use polydem_start_velocities, only: draw_velocities
    use polydem_strings, only: to_text
    implicit none
@@ -22,7 +22,7 @@ module polydem_pour
 contains
 
    !> Append n free grains, from the bottom of the outline up, with random velocities.
-   subroutine place_grains(list, scene, outline, n, error)
+   subroutine place_grains(list, scene, outline, n, error, motions)
       type(body_list_t), intent(inout) :: list
       !> Settings: grains, seed, speed, packing
       type(scene_settings_t), intent(in) :: scene
@@ -32,6 +32,8 @@ contains
       integer(ip), intent(in) :: n
       !> Allocated if the grains do not fit
       type(error_t), allocatable, intent(inout) :: error
+      !> Motions of the walls, with which packed grains rotate from the start; default: none
+      type(motion_settings_t), intent(in), optional :: motions(:)
       type(random_t) :: random
       type(grains_t) :: grains
       real(wp), allocatable :: centres(:, :), velocities(:, :), spins(:)
@@ -47,7 +49,7 @@ contains
       allocate (velocities(2, n), spins(n))
       call draw_velocities(random, scene%speed, velocities)
       spins = 0.0_wp
-      if (scene%packing /= '') call rotate_with_walls(scene, centres, velocities, spins)
+      if (scene%packing /= '' .and. present(motions)) call rotate_with_walls(motions, centres, velocities, spins)
       call append_grains(list, scene, grains, centres, velocities, spins)
    end subroutine place_grains
 

@@ -7,19 +7,19 @@
 module polydem_expected_speed
    use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
-   use polydem_prescribed_motion, only: motion_t
    use polydem_simulation, only: simulation_t
+   use polydem_wall, only: greatest_wall_speed
    use polydem_whole_run, only: reduce_to_greatest, reduce_to_least
    implicit none
    private
-   public :: find_expected_speed, greatest_wall_speed
+   public :: find_expected_speed
 
 contains
 
    !> Set the expected speed and its origin: the entry `speed` of &integrate, or an estimate. Collective; all ranks get
    !> the same.
    subroutine find_expected_speed(self)
-      !> The simulation with settings, ranks, bodies and motions; `expected` is set
+      !> The simulation with settings, ranks, bodies and walls; `expected` is set
       type(simulation_t), intent(inout) :: self
       real(wp) :: start, fall, wall
       integer :: k
@@ -31,8 +31,8 @@ contains
          call find_start_speed(self, start)
          call find_fall_speed(self, fall)
          wall = 0.0_wp
-         do k = 1, size(self%motions)
-            wall = max(wall, greatest_wall_speed(self%motions(k), self%bodies%radius))
+         do k = 1, size(self%walls)
+            wall = max(wall, greatest_wall_speed(self%walls(k), self%bodies%radius, self%settings%integrate%duration))
          end do
          expected%speed = max(start, fall, wall)
          expected%origin = 'the velocities at the start'
@@ -81,7 +81,7 @@ contains
             do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
                height = sum(up*(bodies%position(:, s) + bodies%turned(:, v)))
                lowest = min(lowest, height)
-               if (.not. bodies%fixed(s) .or. size(self%motions) > 0) highest = max(highest, height)
+               if (.not. bodies%fixed(s) .or. size(self%walls) > 0) highest = max(highest, height)
             end do
          end do
          call reduce_to_greatest(self%comm, highest)
@@ -89,28 +89,5 @@ contains
          speed = sqrt(2.0_wp*strength*max(0.0_wp, highest(1) - lowest(1)))
       end associate
    end subroutine find_fall_speed
-
-   !> Greatest speed of any point of the bodies of a prescribed motion [m/s]
-   pure real(wp) function greatest_wall_speed(motion, radius)
-      !> The motion with its bodies
-      type(motion_t), intent(in) :: motion
-      !> Greatest distance of a vertex from the centre of each body, (slot) [m]
-      real(wp), intent(in) :: radius(:)
-      integer :: k
-
-      greatest_wall_speed = 0.0_wp
-      select case (motion%kind)
-      case ('rotation')
-         do k = 1, size(motion%slots)
-            greatest_wall_speed = max(greatest_wall_speed, abs(motion%rate)*(radius(motion%slots(k)) &
-                                  + hypotenuse(motion%position(1, k) - motion%pivot(1), &
-                                               motion%position(2, k) - motion%pivot(2))))
-         end do
-      case ('translation')
-         greatest_wall_speed = hypotenuse(motion%velocity(1), motion%velocity(2))
-      case default
-         greatest_wall_speed = motion%frequency*hypotenuse(motion%amplitude(1), motion%amplitude(2))
-      end select
-   end function greatest_wall_speed
 
 end module polydem_expected_speed

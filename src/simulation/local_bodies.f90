@@ -22,7 +22,7 @@ contains
 
    !> Rebuild the parts that depend on the bodies: force law, boxes, an empty pair list with contact history, guards.
    subroutine fit_to_bodies(self, error, median_diameter)
-      !> The simulation, with its bodies and motions set
+      !> The simulation, with its bodies and walls set
       type(simulation_t), intent(inout) :: self
       !> Allocated if the bodies or the settings are invalid
       type(error_t), allocatable, intent(inout) :: error
@@ -113,8 +113,8 @@ contains
       integer(ip) :: s
 
       self%moving = self%bodies%free
-      do k = 1, size(self%motions)
-         self%moving = [self%moving, self%motions(k)%slots]
+      do k = 1, size(self%walls)
+         self%moving = [self%moving, self%walls(k)%slots]
       end do
       self%moving = [self%moving, pack([(s, s=1_ip, self%bodies%n)], self%bodies%in_halo)]
    end subroutine list_moving

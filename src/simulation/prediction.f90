@@ -8,10 +8,10 @@ module polydem_prediction
    use polydem_errors, only: error_t
    use polydem_guards, only: check_poses, have_valid_poses
    use polydem_kinds, only: ip, wp
-   use polydem_prescribed_motion, only: move_bodies
    use polydem_simulation, only: simulation_t, time_of
    use polydem_thread_changes, only: part
    use polydem_timers, only: block_clock_t
+   use polydem_wall, only: move_wall
    implicit none
    private
    public :: predict_border, predict_bodies, move_walls
@@ -158,8 +158,8 @@ contains
       real(wp), intent(in) :: time
       integer :: k
 
-      do k = 1, size(self%motions)
-         if (time >= self%motions(k)%start) call move_bodies(self%motions(k), time, self%bodies)
+      do k = 1, size(self%walls)
+         call move_wall(self%walls(k), time, self%bodies)
       end do
    end subroutine move_walls
 

@@ -142,15 +142,15 @@ contains
       integer(ip), allocatable :: owner(:)
       integer(ip) :: j, k
 
-      do k = 1_ip, size(self%motions, kind=ip)
-         self%motions(k)%slots = self%bodies%global_index(self%motions(k)%slots)
+      do k = 1_ip, size(self%walls, kind=ip)
+         self%walls(k)%slots = self%bodies%global_index(self%walls(k)%slots)
       end do
       owner = owners_of(self%domain, self%bodies)
       call send_history(self, owner)
       call send_bodies(self, owner, own)
       call receive_halo(self, own)
-      do k = 1_ip, size(self%motions, kind=ip)
-         associate (slots => self%motions(k)%slots)
+      do k = 1_ip, size(self%walls, kind=ip)
+         associate (slots => self%walls(k)%slots)
             slots = [(place_in(self%bodies%global_index, slots(j)), j=1_ip, size(slots, kind=ip))]
          end associate
       end do

@@ -16,9 +16,9 @@ module polydem_simulation
    use polydem_kinds, only: ip, lp, wp
    use polydem_neighbours, only: neighbours_t
    use polydem_packed_history, only: packed_history_t
-   use polydem_prescribed_motion, only: motion_t
    use polydem_settings, only: settings_t
    use polydem_timers, only: timers_t
+   use polydem_wall, only: wall_t
    use polydem_walk_results, only: walk_results_t
    implicit none
    private
@@ -66,8 +66,8 @@ module polydem_simulation
       type(domain_t) :: domain
       !> Bodies
       type(bodies_t) :: bodies
-      !> Prescribed motions of fixed bodies
-      type(motion_t), allocatable :: motions(:)
+      !> Fixed bodies with prescribed motions; other fixed bodies are at rest
+      type(wall_t), allocatable :: walls(:)
       !> Maker of the bounding boxes
       type(box_maker_t) :: maker
       !> Bounding boxes

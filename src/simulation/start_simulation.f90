@@ -31,7 +31,7 @@ contains
       !> Checked settings; the group &scene is not used
       type(settings_t), intent(in) :: settings
       class(communicator_t), intent(in) :: comm
-      !> On entry with bodies and motions, on return ready to advance
+      !> On entry with bodies and walls, on return ready to advance
       type(simulation_t), intent(inout) :: self
       !> Allocated if bodies or settings are invalid
       type(error_t), allocatable, intent(inout) :: error

@@ -39,6 +39,8 @@ SCENES = {
     "channel": {"bodies": "20", "speed": "1"}, "incline": {"width": "0.02", "height": "0.01", "slope": "30"},
     "stack": {"bodies": "3", "width": "0.01", "height": "0.01"},
 }
+#: Name of the instance of a repeatable group
+NAME = "only_1"
 #: Required entries of each motion
 MOTIONS = {"rotation": {"motion_rate": "1"}, "translation": {"motion_velocity": "0.1, 0"},
            "oscillation": {"motion_amplitude": "1e-3, 0", "motion_frequency": "10"}}
@@ -57,6 +59,8 @@ VALUES = {
     "logical": ("'text'", "maybe", "1", "0", "-1", "", "nan", ".true. .false.", "'.true.'", "9e99"),
     "word": ("'nonsense'", "nonsense", "1", "''", "", "'none', 'none'", "nan", ".true.", "'NONE'", "' '",
              f"'{5000*'x'}'"),
+    "name": ("nonsense", "1", "''", "", "'a', 'b'", "nan", ".true.", "' '", "'a b'", "'a.b'", "'a-b'", "'\u00e9'",
+             "'/'", "'legal_1'", f"'{5000*'x'}'"),
     "path": ("1", "''", "", "'a', 'b'", "nan", ".true.", "'/nonexistent/x'", "'/dev/null'", "' '", "'a\tb'",
              f"'{5000*'x'}'"),
 }
@@ -79,7 +83,12 @@ class Case(NamedTuple):
 
     @property
     def name(self):
-        return f"{self.row.group}.{self.row.key}"
+        return entry_of(self.row.group, self.row.key)
+
+
+def entry_of(group, key):
+    """The entry as overrides name it."""
+    return f"{group}.{NAME}.{key}" if group in REPEATABLE else f"{group}.{key}"
 
 
 def contexts(row):
@@ -93,8 +102,12 @@ def contexts(row):
                   for word in words.split()]
     elif row.group == "scene" and not key:
         scenes = list(SCENES)
+    elif row.group == "motion":
+        others = [{entry_of("motion", "name"): f"'{NAME}'", entry_of("motion", "kind"): word,
+                   **{entry_of("motion", key.removeprefix("motion_")): value for key, value in MOTIONS[word].items()}}
+                  for word in words.split() or MOTIONS]
     elif key:
-        others = [{f"{row.group}.{key}": word} for word in words.split()]
+        others = [{entry_of(row.group, key): word} for word in words.split()]
     for scene, other in itertools.product(scenes, others):
         yield {"scene.name": scene, **{f"scene.{key}": value for key, value in SCENES[scene].items()}, **other,
                "integrate.duration": "1e-3"}
@@ -122,7 +135,7 @@ def namelist(settings):
         for name, value in settings.items():
             if name.startswith(f"{group}."):
                 quoted = f"'{value}'" if re.fullmatch("[a-z_]+", value) and name in WORDS else value
-                text += f"  {name.partition('.')[2]} = {quoted}\n"
+                text += f"  {name.rpartition('.')[2]} = {quoted}\n"
         text += "/\n"
     return text
 
@@ -190,8 +203,9 @@ def sample(cases):
 
 def main():
     program, table = str(Path(sys.argv[1]).resolve()), sys.argv[2]
-    _, rows = read_table(Path(table).read_text(encoding="utf-8"))
-    WORDS.update(f"{row.group}.{row.key}" for row in rows if row.type == "word")
+    groups, rows = read_table(Path(table).read_text(encoding="utf-8"))
+    REPEATABLE.update(name for name, group in groups.items() if group.is_repeatable)
+    WORDS.update(entry_of(row.group, row.key) for row in rows if row.type == "word")
     cases = list(all_cases(rows))
     tried = [case for each in cases for case in each] if "--full" in sys.argv else sample(cases)
     faults = 0
@@ -205,8 +219,8 @@ def main():
     sys.exit(faults > 0)
 
 
-#: Entries that are words
-WORDS = set()
+#: Entries that are words, and groups that have names
+WORDS, REPEATABLE = set(), set()
 
 if __name__ == "__main__":
     main()

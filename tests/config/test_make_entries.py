@@ -13,6 +13,9 @@ group walk: how it goes
 walk | way | word | 1 | slow | - | {ways} none | - | Way to go
 walk | steps | integer | 2 | 0, 0 | m | >= 0 | way: {ways} | Steps, don't count
 walk | steps | integer | 2 | required | m | > 0 | way: none | Steps
+group dog *: who comes along
+dog | name | name | 1 | required | - | - | - | Name of the dog
+dog | friends | name | 2 | required | - | dog | - | Other dogs
 group bench
 bench | names | path | 0 | - | - | - | - | Names
 """
@@ -29,16 +32,29 @@ class TestMakeEntries(unittest.TestCase):
         self.assertEqual(settings_module(*table).count(":: steps(2) = 0_ip"), 1)
         self.assertIn("type(text_t), allocatable :: names(:)", settings_module(*table))
         self.assertEqual(fill_module(*table).count("settings%steps = &"), 1)
-        self.assertIn("values(row_of(values, 'walk', 'steps'))%integers\n", fill_module(*table))
+        self.assertIn("settings%steps = &\n         instance%values(row_of(instance, 'steps'))%integers\n",
+                      fill_module(*table))
         self.assertIn("| &walk | `way` | word | | `'slow'` | slow, fast, none | | Way to go |\n", manual(table[1]))
         self.assertIn("| 2 integers | m | required | > 0 | way = none | Steps |\n", manual(table[1]))
+
+    def test_a_repeatable_group_makes_an_array(self):
+        table = read_table(GOOD)
+        self.assertIn("repeatable_groups(*) = [character(len=group_length) :: &\n      'dog']", table_module(*table))
+        self.assertIn("type(dog_settings_t), allocatable :: dog(:)", settings_module(*table))
+        self.assertIn("type(walk_settings_t) :: walk\n", settings_module(*table))
+        self.assertIn("allocate (settings%dog(count(instances%group == 'dog')))", fill_module(*table))
+        self.assertIn("call fill_dog(instances(k), settings%dog(instances(k)%number))", fill_module(*table))
+        self.assertIn("| &dog | `name` | name | | required | letters, digits, _ | | Name", manual(table[1]))
+        self.assertIn("| &dog | `friends` | 2 names | | required | name of a &dog | | Other", manual(table[1]))
 
     def test_bad_rows_are_named(self):
         for old, new, message in (("| 1 | slow", "| slow", "line 4: 8 fields, not 9"),
                                   ("| 1 | slow", "| one | slow", "line 4: one is not a number of values"),
                                   ("{ways} none", "{way} none", "line 4: there is no list way above it"),
                                   ("way | word", "way | wort", "line 4: there is no entry of type wort"),
-                                  ("group bench", "group other", "line 8: the row is not in its group"),
+                                  ("group bench", "group other", "line 11: the row is not in its group"),
+                                  ("name | name | 1 | required", "name | name | 1 | -", "line 8: the first row of a"),
+                                  ("dog | -", "walk | -", "friends of dog is the name of a group walk, which is not"),
                                   ("integer | 2 | required", "real | 2 | 0", "line 6: steps has another type")):
             with self.assertRaisesRegex(TableError, message):
                 read_table(GOOD.replace(old, new))

@@ -66,6 +66,8 @@ GUARDS = {
     "listed": {**SCENES["gas"], "scene.overlap": ".true.", "guards.listed_depth": "1e-4", "guards.step": "warn",
                "guards.displacement": "off"},
 }
+#: Name of the group in cases of a group that may be there several times
+NAME = "one"
 #: A value other than the default for each entry that is neither a word nor logical; by entry, or entry@scene
 VARIED = {
     "scene.seed": "7", "scene.boxes": "150", "scene.bodies": "50", "scene.packing": None, "scene.corners_min": "3",
@@ -78,6 +80,9 @@ VARIED = {
     "scene.motion_velocity": "0.1, 0.2",
     "scene.motion_amplitude": "1e-3, 0", "scene.motion_frequency": "50", "scene.motion_start": "0.005",
     "scene.motion_ramp": "0.01", "scene.motion_bodies": "82, 84", "scene.bodies_file": None,
+    "motion.one.bodies": "82, 84", "motion.one.pivot": "0.01, 0.02", "motion.one.rate": "1",
+    "motion.one.velocity": "0.1, 0.2", "motion.one.amplitude": "1e-3, 0", "motion.one.frequency": "50",
+    "motion.one.start": "0.005", "motion.one.ramp": "0.01",
     "boxes.largest_ratio": "2", "boxes.margin": "1e-4", "neighbours.skin": "1e-3",
     "forces.gravity": "10, -40", "forces.stiffness": "1e6", "forces.damping_coefficient": "0.2",
     "forces.restitution": "0.3",
@@ -109,7 +114,7 @@ class Case:
     """One comparison."""
 
     name: str
-    #: Entries, group.key -> value; beside a namelist they override it
+    #: Entries, group.key or group.name.key -> value; beside a namelist they override it
     settings: dict
     #: A namelist below inputs, without its suffix; None: `settings` is all
     source: str | None = None
@@ -138,9 +143,13 @@ class Entry:
 def read_entries(manual):
     """The table of namelist entries in the text of inputs/README.md."""
     rows = re.findall(r"^\| &(\w+) \| `(\w+)` \|(.*)\|$", manual, re.MULTILINE)
-    entries = []
+    entries, named = [], set()
     for group, key, rest in rows:
         kind, _, default, allowed, used, _ = re.split(r"\s*\|\s*", rest.strip(), maxsplit=5)
+        if key == "name" and kind == "name":
+            named.add(group)
+            continue
+        group = f"{group}.{NAME}" if group in named else group
         condition = ()
         if used:
             needed, _, words = used.rpartition(" = ")
@@ -194,8 +203,10 @@ def entry_cases(entries):
         if condition and condition != "scene.name" and OUTPUT.get(condition) not in words:
             base[condition] = words[0]
             base = {key: value for key, value in base.items() if fits(key, base, entries)}
-        if entry.name == "scene.motion":
+        if entry.name == "scene.motion" or entry.name.startswith("motion."):
             base = {key: value for key, value in base.items() if not key.startswith("scene.motion")}
+        if entry.name.startswith("motion."):
+            base.setdefault(f"motion.{NAME}.kind", "rotation")
         for value in values_of(entry, scene):
             settings = {**base, **BESIDE.get(entry.name, {}), entry.name: value}
             if entry.name == "scene.name":
@@ -223,7 +234,8 @@ def companions(settings, name, entries):
     """Entries that are required with these settings and not given."""
     return {entry.name: VARIED[entry.name] for entry in entries
             if entry.default == "required" and entry.name not in settings and entry.name != name
-            and entry.name.startswith("scene.motion_") and settings.get("scene.motion", "none") in entry.condition[1]}
+            and entry.name.startswith(("scene.motion_", "motion.")) and entry.condition
+            and settings.get(entry.condition[0], "none") in entry.condition[1]}
 
 
 def values_of(entry, scene):

@@ -4,7 +4,7 @@ Cases and comparisons use the names of the base revision. Whoever renames someth
 commit: the name in the base revision, then the name of today, or None if it was removed or changed on purpose. Cases
 that need a removed name are skipped, data that were removed or changed are not compared; both are listed at the end.
 
-    entries     "output.ledger": "output.balance"         entry of the namelist, group.key
+    entries     "output.ledger": "output.balance"         entry of the namelist, group.key or group.name.key
     groups      "exchange": "decomposition"               all entries of a group that are not in `entries`
     words       "forces.damping=book": "matuttis_chen"    value of an entry; also "--finder=quadtree_o2"
     options     "--samples": "--record"                   option of the command line
@@ -41,7 +41,7 @@ class Names:
         """An entry group.key; None if it was removed."""
         if name in self.entries:
             return self.entries[name]
-        group, key = name.split(".")
+        group, _, key = name.partition(".")
         group = self.groups.get(group, group)
         return group and f"{group}.{key}"
 

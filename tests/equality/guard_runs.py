@@ -88,9 +88,11 @@ class Side:
             name, value = self.names.entry(entry), self.names.word(entry, value)
             if name is None or value is None:
                 return None
-            group, key = name.split(".")
-            groups.setdefault(group, []).append(f"   {key} = {quoted(value)}")
-        return "".join("\n".join([f"&{group}", *lines, "/\n"]) for group, lines in groups.items())
+            group, _, key = name.rpartition(".")
+            kind, _, instance = group.partition(".")
+            lines = groups.setdefault(group, [f"&{kind}", *([f"   name = '{instance}'"] if instance else [])])
+            lines.append(f"   {key} = {quoted(value)}")
+        return "".join("\n".join([*lines, "/\n"]) for lines in groups.values())
 
     def command(self, case, folder):
         """Arguments of the run of a case, which leaves its result in a folder; None if a name was removed."""

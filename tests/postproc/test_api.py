@@ -112,6 +112,18 @@ def test_settings_are_those_of_the_namelist(run):
         _ = run.settings.force
 
 
+def test_groups_with_names_are_found_by_them():
+    text = ("&scene\n   name = 'bed'\n/\n&motion\n   name = 'turn'\n   rate = 0.25\n/\n"
+            "&motion\n   name = 'shake'\n   amplitude = 0.0, 0.001\n/")
+    settings = Settings(text)
+    assert settings.scene.name == "bed" and list(settings) == ["scene", "motion"]
+    assert settings.motion.turn.rate == 0.25 and settings["motion"]["shake"]["amplitude"] == [0.0, 0.001]
+    assert list(settings.motion) == ["turn", "shake"] and len(settings.motion) == 2
+    assert repr(settings) == text and Settings(repr(settings)) == settings
+    with pytest.raises(AttributeError, match="there is no &motion turnn; there are turn, shake"):
+        _ = settings.motion.turnn
+
+
 def test_settings_print_as_a_namelist_that_reads_the_same(run):
     assert run.settings == Settings(repr(run.settings))
     assert Settings("&a\n   b = 'it''s, so'\n   c = 1, 2\n/")["a"]["b"] == "it's, so"
@@ -198,6 +210,14 @@ def test_flags_say_which_walls_move(run, tmp_path):
     assert list(frame.id[frame.driven]) == [61]
     assert_array_equal(frame.static, frame.fixed & (frame.id != 61))
     assert frame.speed[frame.driven] == pytest.approx(0.01)
+    motion = "/\n&motion name = '{}' kind = 'translation' velocity = 0.0, 0.01 bodies = {}"
+    two = make_run(tmp_path / "two", motion.format("a", 63) + motion.format("b", "61, 63"))
+    frame = Trajectory(two)[-1]
+    assert list(frame.id[frame.driven]) == [61, 63]
+    assert list(frame.speed[frame.driven]) == pytest.approx([0.01, 0.02])
+    every = make_run(tmp_path / "every", motion.format("a", 61).replace("bodies", "start = 9 bodies")
+                     + "/\n&motion name = 'b' kind = 'translation' velocity = 0.0, 0.0")
+    assert_array_equal(Trajectory(every)[-1].driven, Trajectory(every)[-1].fixed)
 
 
 def test_series_stacks_a_column(run):

@@ -168,6 +168,15 @@ def test_a_scene_that_is_made_otherwise_is_of_another_kind(kind, old, new):
     assert kind_of(settings_of(text.replace(old, new))) == OTHER
 
 
+@pytest.mark.parametrize("kind, rate, expected", [("drum", 0.25, "drum"), ("drum", 0.0, OTHER), ("bed", 0.25, OTHER)])
+def test_walls_that_turn_by_a_group_make_a_drum_and_no_bed(kind, rate, expected):
+    text = input_of(kind, 1000).replace("motion = 'rotation'", "motion = 'none'").replace("   motion_rate = 0.25\n", "")
+    groups = "".join(f"&motion\n   name = '{name}'\n   rate = {each}\n/\n" for name, each in (("a", rate), ("b", 0.0)))
+    settings = settings_of(text + groups)
+    assert settings["motion.a.rate"] == str(rate) and settings["motion.b.rate"] == "0.0"
+    assert kind_of(settings) == expected
+
+
 def test_drums_of_another_rate_do_not_join_a_series(tmp_path):
     for boxes in (1000, 2000, 4000):
         write_sample(tmp_path, f"drum_{boxes}", "quadtree", TRUTH, boxes)

@@ -134,6 +134,7 @@ def test_reads_a_table_as_spreadsheets_write_it(tmp_path):
         ("scene.seed\n1\n", 1, "needs a column name"),
         ("name,scene.seed,scene.seed\n", 1, "'scene.seed' is there twice"),
         ("name,seed\n", 1, "'seed' is not an entry"),
+        ("name,motion.turn.rate.x\na,1\n", 1, "'motion.turn.rate.x' is not an entry"),
         ("name;scene.seed\na;1\n", 1, "separate the columns with commas, as in name,scene.seed"),
         ("name\tscene.seed\na\t1\n", 1, "separate the columns with commas, as in name,scene.seed"),
         ("name,scene.seed,\na,1,\n", 1, "column 3 has no name; remove the comma too many from each line"),
@@ -184,7 +185,13 @@ def test_runs_are_numbered_where_values_make_no_names():
     assert [row.name for row in expand([], [], ["a.x=1 2,1/2"])[1]] == ["run_0001", "run_0002"]
 
 
-@pytest.mark.parametrize("lists", [["a.x="], ["a.x=1", "a.x=2"], ["output.folder=a,b"]])
+def test_a_group_with_a_name_is_named_in_a_list():
+    columns, rows = expand([], [], ["motion.turn.rate=1,2", "motion.shake_2.rate=3,4"])
+    assert columns == ["motion.turn.rate", "motion.shake_2.rate"]
+    assert rows[1].name == "turn.rate_1-shake_2.rate_4" and rows[1].values == ("1", "4")
+
+
+@pytest.mark.parametrize("lists", [["a.b.c.d=1"], ["a.x="], ["a.x=1", "a.x=2"], ["output.folder=a,b"]])
 def test_refuses_lists_that_are_none(lists):
     with pytest.raises(ResultError):
         expand([], [], lists)

@@ -2,22 +2,20 @@
 
 #: Namelists by name, without the groups that `write_scene` adds
 SCENES = {
-    # Grains fall in a drum that already turns; friction with memory. Grains on two segments share the dashpot of the
-    # default restitution.
+    # Grains fall in a drum that already turns, with segments that also shake; friction with memory. Grains on two
+    # segments share the dashpot of the default restitution.
     "drum": """\
-&scene
-   name = 'drum' bodies = 300 speed = 1.0
-   motion = 'rotation' motion_rate = 2.0
-/
+&scene name = 'drum' bodies = 300 speed = 1.0 /
+&motion name = 'turn' kind = 'rotation' rate = 2.0 /
+&motion name = 'shake' kind = 'oscillation' amplitude = 2e-4, 1e-3 frequency = 100 bodies = 316, 317, 318 /
 &forces gravity = 0, -80 stiffness = 2e5 midstep_slip = .false. /
 &integrate duration = 0.03 /
 """,
-    # Grains that fly about between walls that shake; most change their region several times.
+    # Grains that fly about between two walls that shake and two that turn; most change their region several times.
     "gas": """\
-&scene
-   name = 'gas' bodies = 120 fraction = 0.35 speed = 1.0 spin = 50
-   motion = 'oscillation' motion_amplitude = 1e-3, 2e-3 motion_frequency = 100
-/
+&scene name = 'gas' bodies = 120 fraction = 0.35 speed = 1.0 spin = 50 /
+&motion name = 'shake' kind = 'oscillation' bodies = 121, 124 amplitude = 1e-3, 2e-3 frequency = 100 /
+&motion name = 'turn' kind = 'rotation' bodies = 122, 123 rate = 2.0 ramp = 5e-3 /
 &forces
    gravity = 0, 0 stiffness = 2e5
    law = 'conservative' damping = 'hunt_crossley' damping_coefficient = 300

@@ -3,10 +3,10 @@ module scene_checks
    use polydem_bodies, only: bodies_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
-   use polydem_prescribed_motion, only: motion_t
    use polydem_read_settings, only: read_settings_text
    use polydem_scene, only: build_scene
    use polydem_settings, only: settings_t
+   use polydem_wall, only: wall_t
    implicit none
    private
    public :: make_scene, scene_message, find_vertices, polygon_area, all_convex, count_overlaps
@@ -15,7 +15,7 @@ module scene_checks
 contains
 
    !> Make a scene from entries of &scene.
-   subroutine make_scene(entries, bodies, error, settings, motions)
+   subroutine make_scene(entries, bodies, error, settings, walls)
       !> Entries, separated by commas
       character(len=*), intent(in) :: entries
       !> Bodies
@@ -24,17 +24,17 @@ contains
       type(error_t), allocatable, intent(out) :: error
       !> Settings
       type(settings_t), intent(out), optional :: settings
-      !> Motions
-      type(motion_t), allocatable, intent(out), optional :: motions(:)
+      !> Moving walls
+      type(wall_t), allocatable, intent(out), optional :: walls(:)
       type(settings_t) :: own_settings
-      type(motion_t), allocatable :: own_motions(:)
+      type(wall_t), allocatable :: own_walls(:)
       character(len=8) :: no_overrides(0)
 
       call read_settings_text('test.nml', '&scene '//entries//' /'//new_line('a') &
                               //'&integrate duration = 1 /'//new_line('a'), no_overrides, own_settings, error)
-      if (.not. allocated(error)) call build_scene(own_settings, bodies, own_motions, error)
+      if (.not. allocated(error)) call build_scene(own_settings, bodies, own_walls, error)
       if (present(settings)) settings = own_settings
-      if (present(motions) .and. .not. allocated(error)) call move_alloc(own_motions, motions)
+      if (present(walls) .and. .not. allocated(error)) call move_alloc(own_walls, walls)
    end subroutine make_scene
 
    !> Message of the error of a scene; empty if there is none

@@ -3,10 +3,10 @@ module serial_simulation
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t
-   use polydem_prescribed_motion, only: motion_t
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_start_simulation, only: start_with_bodies
+   use polydem_wall, only: wall_t
    implicit none
    private
    public :: start_simulation
@@ -14,20 +14,20 @@ module serial_simulation
 contains
 
    !> Set up a serial simulation with given bodies, and compute the forces at time 0.
-   subroutine start_simulation(settings, bodies, motions, self, error)
+   subroutine start_simulation(settings, bodies, walls, self, error)
       !> Checked settings; the group &scene is not used
       type(settings_t), intent(in) :: settings
       !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
-      !> Prescribed motions of fixed bodies
-      type(motion_t), intent(in) :: motions(:)
+      !> Fixed bodies with prescribed motions
+      type(wall_t), intent(in) :: walls(:)
       !> The simulation, ready to advance
       type(simulation_t), intent(out) :: self
       !> Allocated if bodies or settings are invalid
       type(error_t), allocatable, intent(inout) :: error
 
       self%bodies = bodies
-      self%motions = motions
+      self%walls = walls
       call start_with_bodies(settings, communicator_t(), self, error)
    end subroutine start_simulation
 

@@ -5,11 +5,12 @@ module trial
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
-   use polydem_prescribed_motion, only: motion_t, new_motion
+   use polydem_prescribed_motion, only: motion_t
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_time_step, only: advance
+   use polydem_wall, only: new_wall, wall_t
    implicit none
    private
    public :: begin, steps, block_at
@@ -35,7 +36,7 @@ contains
       integer(ip), intent(in), optional :: moved(:)
       type(settings_t) :: settings
       type(bodies_t) :: bodies
-      type(motion_t), allocatable :: motions(:)
+      type(wall_t), allocatable :: walls(:)
       character(len=1) :: no_overrides(0)
 
       call read_settings_text('trial.nml', "&scene name = 'file' bodies_file = 'none' /"//new_line('a')//text, &
@@ -43,9 +44,9 @@ contains
       if (allocated(error)) return
       call new_bodies(list, bodies, error)
       if (allocated(error)) return
-      allocate (motions(merge(1, 0, present(motion))))
-      if (present(motion)) call new_motion(motions(1), motion, bodies, moved)
-      call start_simulation(settings, bodies, motions, simulation, error)
+      allocate (walls(merge(1, 0, present(motion))))
+      if (present(motion)) call new_wall(walls(1), [motion], bodies, moved)
+      call start_simulation(settings, bodies, walls, simulation, error)
    end subroutine begin
 
    !> Advance by a number of steps, or until an error.

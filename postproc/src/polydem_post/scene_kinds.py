@@ -36,15 +36,18 @@ COVERED = 0.8
 
 
 def settings_of(text: str) -> dict[str, str]:
-    """'group.key' -> value of a resolved input; strings without their quotes."""
+    """'group.key', or 'group.name.key', -> value of a resolved input; strings without their quotes."""
     settings, group = {}, ""
     for line in text.splitlines():
         words = line.strip()
         if words.startswith("&"):
             group = words[1:].strip()
         key, equals, value = words.partition("=")
+        key, value = key.strip(), value.strip().strip("'")
+        if key == "name" and group != "scene":
+            group += f".{value}"
         if group and equals:
-            settings[f"{group}.{key.strip()}"] = value.strip().strip("'")
+            settings[f"{group}.{key}"] = value
     return settings
 
 
@@ -72,8 +75,7 @@ def kind_of(settings: dict) -> str:
     if settings.get("scene.order", "natural") != "natural":
         return OTHER
     if name == "drum":
-        turns = settings.get("scene.motion") == "rotation" and number_in(settings, "scene.motion_rate") != 0.0
-        return "drum" if turns else OTHER
+        return "drum" if any(rate != 0.0 for rate in _rates_of_walls(settings)) else OTHER
     if name == "bed":
         return _kind_of_bed(settings)
     return OTHER
@@ -87,6 +89,13 @@ def family_of(settings: dict) -> tuple:
 def making_of(settings: dict) -> tuple:
     """What decides over the boxes of a scene: all settings but where its result lies and how long it runs."""
     return tuple(sorted((entry, value) for entry, value in settings.items() if not REST_OF_ENTRIES.fullmatch(entry)))
+
+
+def _rates_of_walls(settings: dict) -> list[float]:
+    """The rates of all rotations of walls."""
+    entries = ["scene.motion_rate"] if settings.get("scene.motion") == "rotation" else []
+    entries += [entry for entry in settings if re.fullmatch(r"motion\.\w+\.rate", entry)]
+    return [number_in(settings, entry) for entry in entries]
 
 
 def _kind_of_gas(settings: dict) -> str:
@@ -114,7 +123,8 @@ def float_or_one(word: str) -> float:
 
 
 def _kind_of_bed(settings: dict) -> str:
-    if number_in(settings, "scene.size_ratio", 1.0) > 1.0 or settings.get("scene.motion", "none") != "none":
+    moves = settings.get("scene.motion", "none") != "none" or any(entry.startswith("motion.") for entry in settings)
+    if number_in(settings, "scene.size_ratio", 1.0) > 1.0 or moves:
         return OTHER
     if number_in(settings, "output.trace_start") < SETTLED:
         return OTHER

@@ -11,91 +11,112 @@ from .result_file import ResultError
 Scalar = Union[str, bool, int, float]
 Value = Union[Scalar, list[Scalar]]
 
+#: The only group with a `name` that is there once
+_SINGLE = "scene"
+
 #: One value of an entry: a quoted string, in which '' is a quote, or a word
 _WORD = re.compile(r"'(?:[^']|'')*'|[^,\s]+")
 
 
-class Group(Mapping[str, Value]):
+class _Items(Mapping[str, Any]):
+    """Items by name: items.name or items["name"]."""
+
+    def __init__(self, items: dict[str, Any]):
+        self._items = items
+
+    def __getitem__(self, name: str) -> Any:
+        """The item of a name."""
+        return self._items[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the items."""
+        return iter(self._items)
+
+    def __len__(self) -> int:
+        """Number of items."""
+        return len(self._items)
+
+    def __getattr__(self, name: str) -> Any:
+        if not name.startswith("_") and name in self._items:
+            return self._items[name]
+        raise AttributeError(self._unknown(name))
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._items]
+
+    def __repr__(self) -> str:
+        return "\n".join(map(repr, self._items.values()))
+
+    def _unknown(self, name: str) -> str:
+        """What is said of an unknown name."""
+        raise NotImplementedError
+
+
+class Group(_Items):
     """The entries of one group: group.key or group["key"]."""
 
     def __init__(self, name: str, entries: dict[str, Value]):
-        self._name, self._entries = name, entries
-
-    def __getitem__(self, key: str) -> Value:
-        """Value of an entry."""
-        return self._entries[key]
-
-    def __iter__(self) -> Iterator[str]:
-        """Names of the entries."""
-        return iter(self._entries)
-
-    def __len__(self) -> int:
-        """Number of entries."""
-        return len(self._entries)
-
-    def __getattr__(self, key: str) -> Any:
-        if not key.startswith("_") and key in self._entries:
-            return self._entries[key]
-        raise AttributeError(f"&{self._name} has no entry {key}; it has {', '.join(self._entries)}")
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._entries]
+        super().__init__(entries)
+        self._name = name
 
     def __repr__(self) -> str:
-        lines = [f"   {key} = {_text(value)}" for key, value in self._entries.items()]
+        lines = [f"   {key} = {_text(value)}" for key, value in self._items.items()]
         return "\n".join([f"&{self._name}", *lines, "/"])
 
+    def _unknown(self, name: str) -> str:
+        return f"&{self._name} has no entry {name}; it has {', '.join(self._items)}"
 
-class Settings(Mapping[str, Group]):
+
+class Groups(_Items):
+    """The groups of one kind by name, in the order of the namelist: motion.turn or motion["turn"]."""
+
+    def __init__(self, kind: str):
+        super().__init__({})
+        self._kind = kind
+
+    def add(self, group: Group) -> None:
+        """Append a group, which has a name."""
+        self._items[group["name"]] = group
+
+    def _unknown(self, name: str) -> str:
+        return f"there is no &{self._kind} {name}; there are {', '.join(self._items)}"
+
+
+class Settings(_Items):
     """All settings of a run: settings.forces.stiffness or settings["forces"]["stiffness"]; printed as a namelist.
 
     Values are text, bool, int or float, or lists of these where an entry has several. Units are those of the table of
-    namelist entries in the manual. An entry that the run did not use is absent.
+    namelist entries in the manual. An entry that the run did not use is absent. A group that may be there several times
+    has a name: settings.motion.turn.rate or settings["motion"]["turn"]["rate"].
     """
 
     def __init__(self, text: str):
-        self._groups = {name: Group(name, entries) for name, entries in _parse(text).items()}
+        super().__init__({})
+        for kind, entries in _parse(text):
+            group = Group(kind, entries)
+            if "name" in entries and kind != _SINGLE:
+                self._items.setdefault(kind, Groups(kind)).add(group)
+            else:
+                self._items[kind] = group
 
-    def __getitem__(self, name: str) -> Group:
-        """A group of entries."""
-        return self._groups[name]
-
-    def __iter__(self) -> Iterator[str]:
-        """Names of the groups."""
-        return iter(self._groups)
-
-    def __len__(self) -> int:
-        """Number of groups."""
-        return len(self._groups)
-
-    def __getattr__(self, name: str) -> Group:
-        if not name.startswith("_") and name in self._groups:
-            return self._groups[name]
-        raise AttributeError(f"there is no group &{name}; there are {', '.join('&' + each for each in self._groups)}")
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._groups]
-
-    def __repr__(self) -> str:
-        return "\n".join(map(repr, self._groups.values()))
+    def _unknown(self, name: str) -> str:
+        return f"there is no group &{name}; there are {', '.join('&' + each for each in self._items)}"
 
 
-def _parse(text: str) -> dict[str, dict[str, Value]]:
-    """Group -> key -> value of the text that a run writes: one entry per line."""
-    found: dict[str, dict[str, Value]] = {}
-    group = ""
+def _parse(text: str) -> list[tuple[str, dict[str, Value]]]:
+    """Groups, each with key -> value, of the text that a run writes: one entry per line."""
+    found: list[tuple[str, dict[str, Value]]] = []
     for number, line in enumerate(text.splitlines(), 1):
         words = line.strip()
         if words.startswith("&"):
-            group = words[1:].strip()
-            found.setdefault(group, {})
+            found.append((words[1:].strip(), {}))
         elif words not in ("", "/"):
             key, equals, value = words.partition("=")
-            if not (group and equals):
+            if not (found and equals):
                 raise ResultError(f"line {number} of the stored input is not an entry of a namelist: {words[:80]!r}")
             values = [_value(word) for word in _WORD.findall(value)]
-            found[group][key.strip()] = values[0] if len(values) == 1 else values
-    return {name: entries for name, entries in found.items() if entries}
+            found[-1][1][key.strip()] = values[0] if len(values) == 1 else values
+    return [(name, entries) for name, entries in found if entries]
 
 
 def _value(word: str) -> Scalar:

@@ -35,9 +35,9 @@ NAME = "name"
 #: What names become part of paths
 SAFE_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9._+-]{0,99}")
 
-#: An entry of the namelist, and one with the list of its values
-ENTRY = re.compile(r"[A-Za-z]\w*\.[A-Za-z]\w*")
-LISTED_ENTRY = re.compile(r"([A-Za-z]\w*\.[A-Za-z]\w*)=(.*)", re.DOTALL)
+#: An entry of the namelist, group.key or group.name.key, and one with the list of its values
+ENTRY = re.compile(r"[A-Za-z]\w*(?:\.\w+)?\.[A-Za-z]\w*")
+LISTED_ENTRY = re.compile(rf"({ENTRY.pattern})=(.*)", re.DOTALL)
 
 #: The sweep itself says where results go
 OWN_ENTRY = "output.folder"
@@ -242,7 +242,7 @@ def expand(columns: list[str], rows: list[Row], lists: list[str]) -> tuple[list[
     product = []
     for row in rows or [Row("", (), " ".join(lists))]:
         for combination in itertools.product(*choices):
-            words = [f"{entry.split('.')[1]}_{value}" for entry, value, values in zip(entries, combination, choices)
+            words = [f"{entry.partition('.')[2]}_{value}" for entry, value, values in zip(entries, combination, choices)
                      if len(values) > 1]
             name = "-".join(filter(None, [row.name, *(re.sub(r"[^A-Za-z0-9._+-]+", "_", word) for word in words)]))
             product.append(Row(name, row.values + combination, row.place))

@@ -350,14 +350,14 @@ class Trajectory:
             return walls
 
     def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
-        """Which bodies the stored namelist moves, (n): all fixed ones, or those in scene.motion_bodies."""
-        scene = self.settings["scene"]
-        if scene.get("motion", "none") == "none":
-            return np.zeros(len(frame), dtype=bool)
-        chosen = scene.get("motion_bodies")
-        if chosen is None:
+        """Which bodies the stored namelist moves, (n): all fixed ones, or those that a motion lists."""
+        scene = self.settings.scene
+        chosen = [motion.get("bodies") for motion in self.settings.get("motion", {}).values()]
+        if scene.get("motion", "none") != "none":
+            chosen.append(scene.get("motion_bodies"))
+        if None in chosen:
             return frame.fixed
-        return frame.fixed & np.isin(frame.id, np.atleast_1d(chosen))
+        return frame.fixed & np.isin(frame.id, np.concatenate([np.atleast_1d(ids) for ids in [[], *chosen]]))
 
     def origin_for(self, frame: Frame) -> tuple[float, float]:
         """The point that the coordinates of a frame lack [m]: `origin`, and (0, 0) in a trajectory in the world."""

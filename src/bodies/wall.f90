@@ -1,0 +1,117 @@
+!> Walls: fixed bodies that move as one. Their pose is the reference pose, to which each motion is applied in turn.
+module polydem_wall
+   use polydem_bodies, only: bodies_t
+   use polydem_elementary, only: hypotenuse
+   use polydem_kinds, only: ip, wp
+   use polydem_prescribed_motion, only: carry_bodies, motion_t, pose_bodies
+   implicit none
+   private
+   public :: wall_t, new_wall, move_wall, greatest_wall_speed
+
+   !> A wall with prescribed motions
+   type :: wall_t
+      !> Slots of its bodies
+      integer(ip), allocatable :: slots(:)
+      !> Their positions before all motions, (2, :) [m]
+      real(wp), allocatable :: position(:, :)
+      !> Their angles before all motions [rad]
+      real(wp), allocatable :: angle(:)
+      !> Motions, of which each one moves what the motions before it have moved
+      type(motion_t), allocatable :: motions(:)
+   end type wall_t
+
+contains
+
+   !> Make a wall of some bodies from their present positions and angles.
+   pure subroutine new_wall(wall, motions, bodies, slots)
+      !> The wall
+      type(wall_t), intent(out) :: wall
+      !> Its motions in their order, at least one
+      type(motion_t), intent(in) :: motions(:)
+      !> All bodies
+      type(bodies_t), intent(in) :: bodies
+      !> Slots of the bodies of the wall
+      integer(ip), intent(in) :: slots(:)
+
+      wall%slots = slots
+      wall%position = bodies%position(:, slots)
+      wall%angle = bodies%angle(slots)
+      wall%motions = motions
+   end subroutine new_wall
+
+   !> Set positions, angles, velocities and accelerations of the bodies of a wall at a time.
+   subroutine move_wall(wall, time, bodies)
+      type(wall_t), intent(in) :: wall
+      !> Time since the start of the run [s]
+      real(wp), intent(in) :: time
+      !> Bodies; position, angle, velocities and accelerations of the bodies of the wall change
+      type(bodies_t), intent(inout) :: bodies
+      logical :: is_moved
+      integer :: k
+
+      if (size(wall%motions) > 1) call reset_bodies(wall, bodies)
+      is_moved = .false.
+      do k = 1, size(wall%motions)
+         if (time < wall%motions(k)%start) cycle
+         if (is_moved) then
+            call carry_bodies(wall%motions(k), time, wall%slots, bodies)
+         else
+            call pose_bodies(wall%motions(k), time, wall%slots, wall%position, wall%angle, bodies)
+         end if
+         is_moved = .true.
+      end do
+   end subroutine move_wall
+
+   !> Put the bodies of a wall at rest in their reference poses.
+   pure subroutine reset_bodies(wall, bodies)
+      type(wall_t), intent(in) :: wall
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: k
+
+      do k = 1_ip, size(wall%slots, kind=ip)
+         associate (slot => wall%slots(k))
+            bodies%position(:, slot) = wall%position(:, k)
+            bodies%angle(slot) = wall%angle(k)
+            bodies%velocity(:, slot) = 0.0_wp
+            bodies%angular_velocity(slot) = 0.0_wp
+            bodies%acceleration(:, slot) = 0.0_wp
+            bodies%angular_acceleration(slot) = 0.0_wp
+         end associate
+      end do
+   end subroutine reset_bodies
+
+   !> Upper bound of the speed of any point of the bodies of a wall; of one motion, the greatest speed [m/s]
+   pure real(wp) function greatest_wall_speed(wall, radius, duration) result(speed)
+      type(wall_t), intent(in) :: wall
+      !> Greatest distance of a vertex from the centre of each body, (slot) [m]
+      real(wp), intent(in) :: radius(:)
+      !> Duration of the run, in which a motion can move a body away from the pivot of the next one [s]
+      real(wp), intent(in) :: duration
+      real(wp) :: arm, reach
+      integer :: j, k
+
+      speed = 0.0_wp
+      reach = 0.0_wp
+      do k = 1, size(wall%motions)
+         associate (motion => wall%motions(k))
+            select case (motion%kind)
+            case ('rotation')
+               arm = 0.0_wp
+               do j = 1, size(wall%slots)
+                  arm = max(arm, radius(wall%slots(j)) + hypotenuse(wall%position(1, j) - motion%pivot(1), &
+                                                                    wall%position(2, j) - motion%pivot(2)))
+               end do
+               speed = speed + abs(motion%rate)*(arm + reach)
+               reach = reach + 2.0_wp*(arm + reach)
+            case ('translation')
+               speed = speed + hypotenuse(motion%velocity(1), motion%velocity(2))
+               reach = reach + hypotenuse(motion%velocity(1), motion%velocity(2))*max(0.0_wp, duration - motion%start)
+            case default
+               speed = speed + motion%frequency*hypotenuse(motion%amplitude(1), motion%amplitude(2))
+               reach = reach + hypotenuse(motion%amplitude(1), motion%amplitude(2))
+            end select
+         end associate
+      end do
+   end function greatest_wall_speed
+
+end module polydem_wall

@@ -1,0 +1,272 @@
+!> Collects what is given of each namelist group: the statements of the file, and the overrides of the command line.
+module polydem_collect_entries
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_group_instances, only: index_of_instance, instance_t, names_of, new_instances
+   use polydem_missing_entries, only: missing_text
+   use polydem_namelist_entries, only: bench_group, entries, first_row, group_length, groups, is_repeatable, keys_of
+   use polydem_namelist_statements, only: read_statements, statement_t
+   use polydem_namelist_tokens, only: source_t
+   use polydem_namelist_values, only: is_text, read_value, value_t
+   use polydem_strings, only: lower_case, quoted, suggestion, to_text
+   implicit none
+   private
+   public :: collect_entries
+
+   !> Greatest number of characters of an override in a message
+   integer, parameter :: longest_name = 200
+
+contains
+
+   !> Make the instances of all groups with the statements of the file and, in their place, the overrides.
+   pure subroutine collect_entries(source, statements, overrides, of_bench, instances, error)
+      !> Namelist text
+      type(source_t), intent(in) :: source
+      !> Statements of the text
+      type(statement_t), intent(in) :: statements(:)
+      !> Overrides; the last override of an entry applies
+      character(len=*), intent(in) :: overrides(:)
+      !> Whether the text describes a bench
+      logical, intent(in) :: of_bench
+      !> Instances with their names, without values
+      type(instance_t), allocatable, intent(out) :: instances(:)
+      !> First group or entry that is unknown, is given twice or has no valid name
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: current, k, opened(size(statements))
+
+      call new_instances(source%name, statements, instances, opened, error)
+      if (allocated(error)) return
+      do k = 1, size(statements)
+         call check_names(statements(k), of_bench, error)
+         if (allocated(error)) return
+         if (statements(k)%key == '') then
+            current = opened(k)
+            call open_instance(statements(k), instances(current), error)
+         else
+            call store_statement(statements(k), instances(current), error)
+         end if
+         if (allocated(error)) return
+      end do
+      call name_instances(instances, error)
+      do k = 1, size(overrides)
+         if (allocated(error)) return
+         call apply_override(trim(overrides(k)), of_bench, instances, error)
+      end do
+   end subroutine collect_entries
+
+   !> Open an instance; a single group can be opened once.
+   pure subroutine open_instance(opening, instance, error)
+      type(statement_t), intent(in) :: opening
+      type(instance_t), intent(inout) :: instance
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (instance%line > 0) then
+         call raise_twice(opening, instance%line, error)
+         return
+      end if
+      instance%line = opening%line
+      instance%is_given = .true.
+      if (is_repeatable(opening%group)) instance%place = opening%place
+   end subroutine open_instance
+
+   !> Store a statement of the file under the first row of its entry.
+   pure subroutine store_statement(statement, instance, error)
+      type(statement_t), intent(in) :: statement
+      type(instance_t), intent(inout) :: instance
+      type(error_t), allocatable, intent(inout) :: error
+
+      associate (given => instance%given(first_row(statement%group, statement%key)))
+         if (allocated(given%values)) then
+            call raise_twice(statement, given%line, error)
+         else
+            given = statement
+         end if
+      end associate
+   end subroutine store_statement
+
+   !> Raise an error about a group or an entry that is given twice.
+   pure subroutine raise_twice(statement, line, error)
+      type(statement_t), intent(in) :: statement
+      !> Line where it is given first
+      integer, intent(in) :: line
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: name
+
+      name = 'group &'//statement%group
+      if (statement%key /= '') name = quoted(statement%key)//' in &'//statement%group
+      call raise(error, input_error, statement%place//': '//name//' is given twice (first on line '//to_text(line)//')')
+   end subroutine raise_twice
+
+   !> Set the names of the instances of repeatable groups, which the file must give and which must differ in a group.
+   pure subroutine name_instances(instances, error)
+      type(instance_t), intent(inout) :: instances(:)
+      type(error_t), allocatable, intent(inout) :: error
+      type(value_t) :: value
+      integer :: k, row, same
+
+      do k = 1, size(instances)
+         if (.not. is_repeatable(instances(k)%group)) cycle
+         row = first_row(instances(k)%group, 'name')
+         associate (instance => instances(k), given => instances(k)%given(row))
+            if (allocated(given%values)) then
+               call read_value(entries(row), given, value, error)
+            else
+               call raise(error, input_error, instance%place//': '//missing_text(entries(row), instance))
+            end if
+            if (allocated(error)) return
+            same = index_of_instance(instances(:k - 1), instance%group, value%text)
+            if (same > 0) then
+               call raise(error, input_error, given%place//': the name '//quoted(value%text)//' of a group &'// &
+                  trim(instance%group)//' is given twice (first on line '// &
+                  to_text(instances(same)%given(row)%line)//')')
+               return
+            end if
+            instance%name = value%text
+         end associate
+      end do
+   end subroutine name_instances
+
+   !> Check that the table contains the group and the key, and that the group fits a bench or a run.
+   pure subroutine check_names(statement, of_bench, error)
+      type(statement_t), intent(in) :: statement
+      logical, intent(in) :: of_bench
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (all(groups() /= statement%group)) then
+         call raise(error, input_error, statement%place//': unknown group &'//statement%group// &
+            suggestion(statement%group, pack(groups(), (groups() == bench_group) .eqv. of_bench)))
+      else if (of_bench .and. statement%group /= bench_group) then
+         call raise(error, input_error, statement%place//': group &'//statement%group//' belongs to a run; a bench '// &
+            'has only the group &bench')
+      else if (statement%group == bench_group .and. .not. of_bench) then
+         call raise(error, input_error, statement%place// &
+            ': group &bench belongs to a bench; use polydem bench FILE.nml')
+      else if (statement%key /= '' .and. first_row(statement%group, statement%key) == 0) then
+         call raise_unknown_key(statement, error)
+      end if
+   end subroutine check_names
+
+   !> Raise an error about a key that the group does not have. The message names the groups that have it.
+   pure subroutine raise_unknown_key(statement, error)
+      type(statement_t), intent(in) :: statement
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=group_length), allocatable :: names(:)
+      character(len=:), allocatable :: owners
+      integer :: k
+
+      names = groups()
+      owners = ''
+      do k = 1, size(names)
+         if ((names(k) == bench_group) .neqv. (statement%group == bench_group)) cycle
+         if (first_row(names(k), statement%key) == 0) cycle
+         if (owners /= '') owners = owners//' and '
+         owners = owners//'&'//trim(names(k))
+      end do
+      if (owners /= '') then
+         call raise(error, input_error, statement%place//': '//quoted(statement%key)//' is a key of '//owners// &
+            ', not of &'//statement%group)
+      else
+         call raise(error, input_error, statement%place//': unknown key '//quoted(statement%key)//' in &'// &
+            statement%group//suggestion(statement%key, keys_of(statement%group)))
+      end if
+   end subroutine raise_unknown_key
+
+   !> Put an override in the place of a statement of the file.
+   pure subroutine apply_override(override, of_bench, instances, error)
+      !> 'group.key=value', or 'group.name.key=value' of a repeatable group. Words, paths and names need no quotes
+      character(len=*), intent(in) :: override
+      logical, intent(in) :: of_bench
+      type(instance_t), intent(inout) :: instances(:)
+      type(error_t), allocatable, intent(inout) :: error
+      type(statement_t) :: statement
+      character(len=:), allocatable :: name
+      integer :: place
+
+      call read_override(override, of_bench, statement, name, error)
+      if (allocated(error)) return
+      if (is_repeatable(statement%group)) then
+         place = index_of_instance(instances, statement%group, name)
+         if (place == 0) call raise_unknown_instance(statement, name, names_of(instances, statement%group), error)
+         if (place > 0 .and. statement%key == 'name') call raise(error, input_error, statement%place// &
+            ': ''name'' in &'//statement%group//' cannot be overridden')
+         if (allocated(error)) return
+      else
+         place = index_of_instance(instances, statement%group)
+      end if
+      instances(place)%given(first_row(statement%group, statement%key)) = statement
+      instances(place)%is_given = .true.
+   end subroutine apply_override
+
+   !> Read 'group.key=value' as the statement '&group key = value', and the name in 'group.name.key=value'.
+   pure subroutine read_override(override, of_bench, statement, name, error)
+      character(len=*), intent(in) :: override
+      logical, intent(in) :: of_bench
+      type(statement_t), intent(out) :: statement
+      !> Name of the instance of a repeatable group; empty if it is not given
+      character(len=:), allocatable, intent(out) :: name
+      type(error_t), allocatable, intent(inout) :: error
+      type(statement_t), allocatable :: statements(:)
+      type(source_t) :: source
+      character(len=*), parameter :: line_end = new_line('a')
+      integer :: dot, equals, last
+
+      ! Every statement stores the name, so long overrides are shortened.
+      source%name = '--set '//override(:min(len(override), longest_name))
+      if (len(override) > longest_name) source%name = source%name//' ...'
+      source%has_lines = .false.
+      equals = index(override, '=')
+      dot = index(override(:max(0, equals - 1)), '.')
+      last = dot
+      if (is_repeatable(lower_case(override(:max(0, dot - 1))))) last = index(override(:equals - 1), '.', back=.true.)
+      if (dot < 2 .or. equals < last + 2) then
+         call raise(error, input_error, source%name//': group.key=value is expected')
+         return
+      end if
+      name = override(dot + 1:last - 1)
+      associate (group => override(:dot - 1), key => override(last + 1:equals - 1), &
+                 value => override(equals + 1:))
+         source%text = '&'//group//line_end//key//'='//value_of_override(group, key, value)//line_end//'/'
+      end associate
+      call read_statements(source, statements, error)
+      if (allocated(error)) return
+      if (size(statements) /= 2) then
+         call raise(error, input_error, source%name//': exactly one entry, group.key=value, is expected')
+         return
+      end if
+      statement = statements(2)
+      statement%is_override = .true.
+      call check_names(statement, of_bench, error)
+   end subroutine read_override
+
+   !> Value of an override; quotes are added if the entry is a text without quotes
+   pure function value_of_override(group, key, given) result(text)
+      character(len=*), intent(in) :: group, key, given
+      character(len=:), allocatable :: text
+      integer :: row
+
+      text = given
+      row = first_row(group, key)
+      if (row == 0) return
+      if (.not. is_text(entries(row))) return
+      if (scan(adjustl(given)//' ', '''"') == 1) return
+      text = quoted(trim(adjustl(given)))
+   end function value_of_override
+
+   !> Raise an error about an override of a repeatable group that names no instance of the file.
+   pure subroutine raise_unknown_instance(statement, name, names, error)
+      type(statement_t), intent(in) :: statement
+      !> Name in the override, possibly empty, and the names that exist
+      character(len=*), intent(in) :: name, names(:)
+      type(error_t), allocatable, intent(inout) :: error
+
+      if (size(names) == 0) then
+         call raise(error, input_error, statement%place//': the file has no group &'//statement%group)
+      else if (name == '') then
+         call raise(error, input_error, statement%place//': '//statement%group//'.name.'//statement%key// &
+            '=value is expected'//suggestion(name, names))
+      else
+         call raise(error, input_error, statement%place//': there is no &'//statement%group//' '//quoted(name)// &
+            suggestion(name, names))
+      end if
+   end subroutine raise_unknown_instance
+
+end module polydem_collect_entries

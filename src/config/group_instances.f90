@@ -1,0 +1,157 @@
+!> Instances of namelist groups. A single group has one instance in every run. Of a repeatable group, each one that the
+!> file contains is an instance; they follow each other in the order of the file, and their names differ.
+module polydem_group_instances
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_namelist_entries, only: entries, first_row, group_length, groups, is_repeatable
+   use polydem_namelist_statements, only: statement_t
+   use polydem_namelist_values, only: value_t
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: instance_t, new_instances, row_of, index_of_instance, names_of, full_name
+
+   !> Greatest number of instances of a group. The check of their names compares all pairs
+   integer, parameter :: most_instances = 9999
+
+   !> An instance of a group: what is given, and the resulting values
+   type :: instance_t
+      !> Namelist group
+      character(len=group_length) :: group = ''
+      !> Name of an instance of a repeatable group; empty for a single group
+      character(len=:), allocatable :: name
+      !> Number in the group, from 1
+      integer :: number = 1
+      !> For messages: file:line where a repeatable group opens; the file of a single group
+      character(len=:), allocatable :: place
+      !> Line of the file where the group opens; 0 if the file does not contain it
+      integer :: line = 0
+      !> Whether the file or an override contains the group
+      logical :: is_given = .false.
+      !> Statement of each entry, under its first row; unallocated values if it is not given, (row of the table)
+      type(statement_t), allocatable :: given(:)
+      !> Values, (row of the table)
+      type(value_t), allocatable :: values(:)
+   end type instance_t
+
+contains
+
+   !> Make the instances of all groups, in the order of the table of entries, without their names and entries.
+   pure subroutine new_instances(file, statements, instances, opened, error)
+      !> Name of the source in messages
+      character(len=*), intent(in) :: file
+      !> Statements of the file
+      type(statement_t), intent(in) :: statements(:)
+      !> Instances
+      type(instance_t), allocatable, intent(out) :: instances(:)
+      !> Index of the instance that a statement opens; 0 if it opens no known group, (statement)
+      integer, intent(out) :: opened(:)
+      !> A group has too many instances
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=group_length), allocatable :: names(:)
+      integer :: counts(size(groups())), first, g, k, n
+
+      names = groups()
+      opened = 0
+      n = 0
+      do g = 1, size(names)
+         counts(g) = 0
+         do k = 1, size(statements)
+            if (statements(k)%key /= '' .or. statements(k)%group /= names(g)) cycle
+            if (is_repeatable(names(g)) .or. counts(g) == 0) counts(g) = counts(g) + 1
+            opened(k) = n + counts(g)
+         end do
+         if (counts(g) > most_instances) call raise(error, input_error, file//': there are '//to_text(counts(g))// &
+            ' groups &'//trim(names(g))//', but at most '//to_text(most_instances)//' are possible')
+         if (.not. is_repeatable(names(g))) counts(g) = 1
+         n = n + counts(g)
+      end do
+      if (allocated(error)) return
+      allocate (instances(n))
+      n = 0
+      do g = 1, size(names)
+         first = first_entry(names(g))
+         do k = 1, counts(g)
+            n = n + 1
+            instances(n)%group = names(g)
+            instances(n)%name = ''
+            instances(n)%number = k
+            instances(n)%place = file
+            associate (last => first + count(entries%group == names(g)) - 1)
+               allocate (instances(n)%given(first:last), instances(n)%values(first:last))
+            end associate
+         end do
+      end do
+   end subroutine new_instances
+
+   !> First row of a group
+   pure integer function first_entry(group)
+      character(len=*), intent(in) :: group
+
+      do first_entry = 1, size(entries)
+         if (entries(first_entry)%group == group) return
+      end do
+   end function first_entry
+
+   !> Row of an entry that is in use; the first row of the entry if none is in use
+   pure integer function row_of(instance, key) result(row)
+      !> Instance of a group
+      type(instance_t), intent(in) :: instance
+      !> Name in the group; the entry must exist
+      character(len=*), intent(in) :: key
+
+      do row = lbound(instance%values, 1), ubound(instance%values, 1)
+         if (instance%values(row)%is_active .and. entries(row)%key == key) return
+      end do
+      row = first_row(instance%group, key)
+   end function row_of
+
+   !> Index of an instance; 0 if there is none
+   pure integer function index_of_instance(instances, group, name) result(place)
+      !> Instances of all groups
+      type(instance_t), intent(in) :: instances(:)
+      !> Namelist group
+      character(len=*), intent(in) :: group
+      !> Name of the instance of a repeatable group; default: the instance of a single group
+      character(len=*), intent(in), optional :: name
+
+      do place = 1, size(instances)
+         if (instances(place)%group /= group) cycle
+         if (.not. present(name)) return
+         if (instances(place)%name == name) return
+      end do
+      place = 0
+   end function index_of_instance
+
+   !> Names of the instances of a repeatable group, in their order
+   pure function names_of(instances, group) result(names)
+      !> Instances of all groups
+      type(instance_t), intent(in) :: instances(:)
+      !> Namelist group
+      character(len=*), intent(in) :: group
+      character(len=:), allocatable :: names(:)
+      integer :: k, n, width
+
+      width = 0
+      do k = 1, size(instances)
+         if (instances(k)%group == group) width = max(width, len(instances(k)%name))
+      end do
+      allocate (character(len=width) :: names(count(instances%group == group)))
+      n = 0
+      do k = 1, size(instances)
+         if (instances(k)%group /= group) cycle
+         n = n + 1
+         names(n) = instances(k)%name
+      end do
+   end function names_of
+
+   !> Group and name as overrides give them, such as 'forces' or 'motion.turn'
+   pure function full_name(instance) result(text)
+      !> Instance of a group
+      type(instance_t), intent(in) :: instance
+      character(len=:), allocatable :: text
+
+      text = trim(instance%group)
+      if (instance%name /= '') text = text//'.'//instance%name
+   end function full_name
+
+end module polydem_group_instances
