@@ -190,8 +190,8 @@ def extract(root, revision, folder):
 def write_bodies(base, present):
     """The bodies files that inputs/precision wants, made once by the package of the base, renamed for the other."""
     sys.path.insert(0, str(base.sources / "postproc" / "src"))
-    from polydem_post.precision_scenes import SCENES, last_frame
-    from polydem_post.trajectory import Trajectory
+    from polydem_lab.precision.scenes import SCENES, last_frame
+    from polydem_post.read.trajectory import Trajectory
 
     folder = base.work / "results" / "workprecision" / "bodies"
     folder.mkdir(parents=True, exist_ok=True)

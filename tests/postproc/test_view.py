@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 import polydem_post
 import pytest
-from polydem_post import Trajectory, view_data
-from polydem_post.__main__ import main
-from polydem_post.view import SCRIPTS, SOURCES
+from polydem_post import Trajectory
+from polydem_post.command_line.main import main
+from polydem_post.pictures import view_data
+from polydem_post.pictures.view import SCRIPTS, SOURCES
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,1 @@
+"""All tables, figures and verdicts of a bench in one folder."""
