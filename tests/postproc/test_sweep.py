@@ -403,7 +403,7 @@ def test_a_run_that_outlives_its_sweep_is_running_is_not_started_twice_and_count
     assert process.returncode == 75, said
     assert "a: left out: another call runs it, or has left it running" in said
     assert states(sweep)["b"] == "finished"
-    assert read_outcome(sweep, sweep.runs[0]).facts == {"state": "running", "attempts": 0}
+    assert read_outcome(sweep.runs[0]).facts == {"state": "running", "attempts": 0}
     (sweep.runs[0].result / "told").touch()
     await_end(sweep.runs[0])
     assert states(sweep) == {"a": "finished", "b": "finished"}

@@ -14,12 +14,6 @@ MACHINES = (
     ("Apple M4, E-core", "2.6", "1/6", "LPDDR5X", "64 KB, 4 MB shared, undisclosed"),
 )
 
-#: Clocks of the two servers of Fig. 8, of which the slower clock was the faster machine [GHz]
-CLOCKS = {"Xeon32": 3.3, "Xeon56": 2.4}
-
-#: Fig. 13: how much faster than Xeon56 the Apple machines were, small to large systems
-FASTER = {"M2": (1.8, 1.8), "M4": (3.5, 3.0)}
-
 #: Table 2: boxes -> (depth of the tree, nodes reserved)
 DEPTH_AND_NODES = {2522: (9, 87381), 5058: (9, 87381), 7599: (10, 349525), 10014: (10, 349525), 12651: (10, 349525)}
 
@@ -38,9 +32,6 @@ TOTAL_RATIO = 0.9
 #: Fig. 10: the same of the update of the structure alone
 UPDATE_SLOPE = {"sort_and_sweep": 1.43, "quadtree": 1.39}
 UPDATE_RATIO = 0.1
-
-#: Share of the time of the tree that goes into the list of contacts
-LIST_SHARE = 0.8
 
 #: Fig. 11: exponents with and without inlining; below the first number of boxes inlining hurts, beyond the second
 #: it helps; near the first one times lie above the trend

@@ -9,6 +9,7 @@ import time
 from pathlib import Path
 
 from polydem_post.base.result_file import ResultError
+from polydem_post.command_line.arguments import say, words
 
 from ..comparison.plan import QUICK_LIMIT, ROOT, make_plan
 
@@ -29,7 +30,7 @@ def add_paper(verbs) -> None:
     paper.add_argument("--verifier", type=Path)
     paper.add_argument("--overlaps", type=Path)
     paper.add_argument("--spent", type=float, metavar="S")
-    paper.add_argument("--without", type=_names, default=[], metavar="PIECES")
+    paper.add_argument("--without", type=words, default=[], metavar="PIECES")
     paper.add_argument("--plan", type=Path, metavar="FILE")
 
 
@@ -58,7 +59,7 @@ def run_paper(options: argparse.Namespace) -> int:
                           f"{', '.join(piece.name for piece in pieces)}")
     deadline = began + QUICK_LIMIT if mode == "quick" else None
     dry = options.dry_run or options.report_only
-    comparison = Comparison(folder, mode, pieces, tools, deadline, _say, dry, without=frozenset(options.without))
+    comparison = Comparison(folder, mode, pieces, tools, deadline, say, dry, without=frozenset(options.without))
     comparison.open(as_it_is=options.report_only)
     if not options.report_only:
         signal.signal(signal.SIGTERM, _interrupt)
@@ -68,13 +69,13 @@ def run_paper(options: argparse.Namespace) -> int:
         try:
             comparison.run()
         except KeyboardInterrupt:
-            _say("interrupted; the same command goes on where it was")
+            say("interrupted; the same command goes on where it was")
             return INTERRUPTED
     contents = collect(comparison, options.other)
     page = write_comparison(comparison, contents, output)
     if published:
-        _say(f"{publish(contents, mode, output, published)}: published")
-    _say(f"{page}: written {time.monotonic() - began:.0f} s after the start")
+        say(f"{publish(contents, mode, output, published)}: published")
+    say(f"{page}: written {time.monotonic() - began:.0f} s after the start")
     return 0
 
 
@@ -91,14 +92,5 @@ def _folder(text: str) -> Path:
     return Path(text).resolve()
 
 
-def _names(text: str) -> list[str]:
-    """Names between commas."""
-    return text.split(",")
-
-
 def _interrupt(*_) -> None:
     raise KeyboardInterrupt
-
-
-def _say(line: str) -> None:
-    print(line, flush=True)

@@ -248,17 +248,6 @@ class Contest:
         step = self.predict(PARTITIONED, threads)
         return (step.work + step.fetched) / self.passes(threads)
 
-    def waiting_over_work(self, threads: int) -> Estimate:
-        """Measured waiting of a thread over its work, in the passes."""
-        case = self.sweep[threads]
-        waits, passes = (case.phase(name) for name in ("waiting", "structure"))
-        return median(of_one_bench({key: waits[key] / (passes[key] - waits[key]) for key in waits}))
-
-    def predicted_waiting_over_work(self, threads: int) -> float:
-        """Waiting of a thread over its work, by the model."""
-        step = self.predict(PARTITIONED, threads)
-        return step.waiting / (step.work + step.fetched)
-
     @property
     def has_model(self) -> bool:
         """Whether the samples say what waiting costs."""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from ..base.emit import FORMATS, Table
+from ..base.emit import Table
 from .trajectory import Trajectory
-
-__all__ = ["FORMATS", "timing_rows", "timing_table"]
 
 HEADING = ("stage", "steps", "least [us]", "mean [us]", "most [us]", "total [s]", "share [%]")
 
@@ -28,7 +26,7 @@ def timing_rows(trajectory: Trajectory) -> list[tuple[str, ...]]:
 
 
 def timing_table(trajectory: Trajectory, form: str = "text") -> str:
-    """The table in one of FORMATS."""
+    """The table in one of the forms of `emit.FORMATS`."""
     table = Table("times", "Times of the stages", HEADING)
     for row in timing_rows(trajectory):
         table.add(*row)

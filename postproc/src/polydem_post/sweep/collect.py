@@ -59,7 +59,7 @@ def collect_sweep(sweep: Sweep, say=print) -> list[Outcome]:
     """Write results.csv and results.h5 into the folder of a sweep; tell which runs are missing."""
     outcomes = []
     for run in sweep.runs:
-        outcomes.append(read_outcome(sweep, run))
+        outcomes.append(read_outcome(run))
         if outcomes[-1].facts["state"] != FINISHED:
             say(describe(run))
     try:
@@ -74,7 +74,7 @@ def collect_sweep(sweep: Sweep, say=print) -> list[Outcome]:
     return outcomes
 
 
-def read_outcome(sweep: Sweep, run: Run) -> Outcome:
+def read_outcome(run: Run) -> Outcome:
     """All that is known of a run."""
     outcome = Outcome(run.name, run.values)
     attempts = run.attempts()
