@@ -11,9 +11,9 @@ import pytest
 from polydem_lab.bench.samples import read_bench
 from polydem_lab.bench.series import SWEEP as PLAIN
 from polydem_lab.bench.series import TREE
-from polydem_lab.figures.fine_grained_figures import fine_grained_drawings, scenes_of, what_fails
 from polydem_lab.fine_grained.exchanges import Exchanges, exchanges_down, exchanges_of, exchanges_up_to, way_of
 from polydem_lab.fine_grained.model import MOVE_COST, PARTITIONED, SEARCH_COST, Waiting, contests, not_negative
+from polydem_lab.report.fine_grained_figures import fine_grained_drawings, scenes_of, what_fails
 from polydem_lab.tables.fine_grained_tables import agreement, error_told, fine_grained_tables, span_of_error
 from synthetic_bench import Truth, write_sample
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from polydem_lab.comparison.publish import TITLE, answers
-from polydem_lab.figures.fine_grained_figures import sixteen
+from polydem_lab.report.fine_grained_figures import sixteen
 from polydem_post.base.emit import Table
 from published_numbers import REVISION, disagreements, rows_of
 

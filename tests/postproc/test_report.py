@@ -11,10 +11,10 @@ from matplotlib.image import imread
 from polydem_lab.bench.samples import read_bench
 from polydem_lab.claims.targets import targets
 from polydem_lab.costs import complexity
-from polydem_lab.figures.bench_figures import bench_drawings
-from polydem_lab.figures.own_figures import own_drawings
-from polydem_lab.figures.paper_figures import paper_drawings
-from polydem_lab.figures.style import LOOKS
+from polydem_lab.report.bench_figures import bench_drawings
+from polydem_lab.report.own_figures import own_drawings
+from polydem_lab.report.paper_figures import paper_drawings
+from polydem_lab.report.style import LOOKS
 from polydem_lab.tables import bench_tables, paper_tables
 from polydem_lab.tables.slope_tables import slopes
 from polydem_post.command_line.main import main

@@ -540,6 +540,6 @@ def test_the_program_finds_the_wrong_entry(tmp_path, capsys):
 
 def test_knows_the_cores_of_this_process():
     only = str(available_cores()[0])
-    code = "from polydem_post.sweep_run import available_cores; print(available_cores())"
+    code = "from polydem_post.sweep.runner import available_cores; print(available_cores())"
     command = ["taskset", "-c", only, sys.executable, "-c", code]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == f"[{only}]"

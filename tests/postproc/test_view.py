@@ -34,7 +34,7 @@ def test_the_page_is_one_file_that_needs_no_network(view):
 def test_all_scripts_of_the_folder_are_in_the_page_and_in_the_package():
     assert {path.name for path in SOURCES.glob("*.js")} == set(SCRIPTS)
     project = Path(polydem_post.__file__).parents[2] / "pyproject.toml"
-    assert '"viewer/*"' in project.read_text(encoding="utf-8")
+    assert '"pictures/viewer/*"' in project.read_text(encoding="utf-8")
 
 
 def block(text, name, kind):

@@ -5,5 +5,5 @@ not import it. Each of its packages imports only itself, polydem_post and those 
 """
 
 #: The packages, lowest first
-LAYERS = ("bench", "costs", "fine_grained", "tables", "claims", "figures", "report", "precision", "scaling",
+LAYERS = ("bench", "costs", "fine_grained", "tables", "claims", "report", "precision", "scaling",
           "comparison", "command_line")

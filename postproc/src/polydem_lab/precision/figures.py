@@ -9,7 +9,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
-from ..figures.style import Drawing, panels, shared_legend
+from ..report.style import Drawing, panels, shared_legend
 from .scenes import SCENES
 from .work_precision import Curve, WorkPrecision
 

@@ -1,1 +1,1 @@
-"""All tables, figures and verdicts of a bench in one folder."""
+"""Figures of a bench; all its tables, figures and verdicts in one folder."""

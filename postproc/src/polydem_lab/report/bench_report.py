@@ -47,9 +47,9 @@ def tables_of(bench: Bench, judged: list) -> list[Table]:
 
 def drawings_of(bench: Bench) -> list:
     """All figures of a report."""
-    from ..figures.bench_figures import bench_drawings  # matplotlib takes long to load and tables do not need it
-    from ..figures.fine_grained_figures import fine_grained_drawings
-    from ..figures.own_figures import own_drawings
-    from ..figures.paper_figures import paper_drawings
+    from .bench_figures import bench_drawings  # matplotlib takes long to load and tables do not need it
+    from .fine_grained_figures import fine_grained_drawings
+    from .own_figures import own_drawings
+    from .paper_figures import paper_drawings
 
     return [*paper_drawings(bench), *bench_drawings(bench), *fine_grained_drawings(bench), *own_drawings(bench)]

@@ -25,7 +25,7 @@ def write_tables(tables: list, folder: Path, origin: str) -> list[Path]:
 
 def write_figures(drawings: list, folder: Path) -> list[Path]:
     """Write figures in all forms, and their captions."""
-    from ..figures.style import save_drawing  # matplotlib takes long to load and tables do not need it
+    from .style import save_drawing  # matplotlib takes long to load and tables do not need it
 
     folder.mkdir(parents=True, exist_ok=True)
     captions = folder / "captions.md"
