@@ -15,8 +15,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from polydem_lab.bench.bench_file import number_of, read_bench_file
-from polydem_lab.bench.published import read_points
+from polydem_lab.comparison.bench_file import number_of, read_bench_file
 from polydem_lab.comparison.html_page import Page
 from polydem_lab.comparison.plan import (
     BENCHES,
@@ -31,6 +30,7 @@ from polydem_lab.comparison.plan import (
     threads_up_to,
 )
 from polydem_lab.comparison.publish import publish
+from polydem_lab.comparison.published import read_points
 from polydem_lab.comparison.run import FOR_THE_REPORT, Comparison, Tools
 from polydem_lab.precision.scenes import SCENES
 from polydem_post.base.emit import Table

@@ -11,8 +11,8 @@ from pathlib import Path
 
 from polydem_post.base.result_file import ResultError
 
-from ..bench.bench_file import RECORDED, BenchFile, number_of, read_bench_file
 from ..bench.paper import SIZES
+from .bench_file import RECORDED, BenchFile, number_of, read_bench_file
 
 #: The repository
 ROOT = Path(__file__).resolve().parents[4]

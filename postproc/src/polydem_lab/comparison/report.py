@@ -9,8 +9,6 @@ from pathlib import Path
 from polydem_post.base.emit import Table
 from polydem_post.base.result_file import ResultError, cannot_write
 
-from ..bench.bench_file import BenchFile
-from ..bench.published import published_table
 from ..bench.samples import read_bench
 from ..bench.statistics import number
 from ..claims.judge import claims_document, judge_all
@@ -19,7 +17,9 @@ from ..claims.verdicts import counts_table, of_quick
 from ..precision.report import origin_of
 from ..report.bench_report import drawings_of, tables_of
 from ..report.files import write_figures, write_tables
+from .bench_file import BenchFile
 from .html_page import Page
+from .published import published_table
 from .run import Comparison
 
 #: Benches whose times mean nothing

@@ -24,9 +24,9 @@ from pathlib import Path
 
 from polydem_post.base.result_file import ResultError, cannot_read
 
-from ..bench.bench_file import BenchFile
 from ..bench.samples import read_bench
 from ..bench.statistics import number, typical
+from .bench_file import BenchFile
 from .plan import ROOT, Piece, Rates, estimate
 
 #: File in the folder of the pieces

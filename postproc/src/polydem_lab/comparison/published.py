@@ -13,9 +13,9 @@ from pathlib import Path
 
 from polydem_post.base.emit import Table
 
-from . import series
-from .samples import Bench
-from .series import SWEEP, TREE
+from ..bench import series
+from ..bench.samples import Bench
+from ..bench.series import SWEEP, TREE
 
 #: The numbers
 POINTS = Path(__file__).parent / "published_points.csv"
