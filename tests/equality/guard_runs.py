@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 from guard_names import Names
@@ -191,13 +192,15 @@ def extract(root, revision, folder):
 
 def write_bodies(base, present):
     """The bodies files that inputs/precision wants, made once by the package of the base, renamed for the other."""
-    sys.path.insert(0, str(base.sources / "postproc" / "src"))
-    from polydem_post.precision_scenes import SCENES, last_frame
-    from polydem_post.trajectory import Trajectory
-
+    packages = base.sources / "postproc" / "src"
+    sys.path.insert(0, str(packages))
+    # The base may be older than the package of the laboratory.
+    is_older = (packages / "polydem_post" / "precision_scenes.py").exists()
+    scenes = import_module("polydem_post.precision_scenes" if is_older else "polydem_lab.precision.scenes")
+    trajectory = import_module("polydem_post").Trajectory
     folder = base.work / "results" / "workprecision" / "bodies"
     folder.mkdir(parents=True, exist_ok=True)
-    for name, scene in SCENES.items():
+    for name, scene in scenes.SCENES.items():
         path = folder / f"{name}.h5"
         if path.exists():
             continue
@@ -209,7 +212,7 @@ def write_bodies(base, present):
             code, output = base.run(["run", str(source), "--force", "--set", f"output.folder={result}"])
             if code != 0:
                 raise GuardError(f"{source} ended with {code}:\n{output}")
-            last_frame(Trajectory(result)).write(path)
+            scenes.last_frame(trajectory(result)).write(path)
     copies = present.work / "results" / "workprecision" / "bodies"
     copies.mkdir(parents=True, exist_ok=True)
     for path in folder.glob("*.h5"):

@@ -76,7 +76,8 @@ for name in gfortran cmake ninja git h5fc; do ln -sf "$(PATH=$REAL_PATH command 
 MOST_ATTEMPTS = 100
 
 # Where the help texts of the verbs are
-HELP_PLACES = ("src/app/help", "postproc/src/polydem_post/help")
+HELP_PLACES = ("src/app/help", "postproc/src/polydem_post/command_line/help",
+               "postproc/src/polydem_lab/command_line/help")
 
 # What the launcher and the tools may call on a bare machine.
 COMMANDS = ("ar as bash cat cp dirname env find flock grep head id ld ln mkdir mv nproc ranlib readlink rm sed "

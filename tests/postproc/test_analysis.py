@@ -8,6 +8,7 @@ import numpy as np
 import polydem_post.analysis as analysis
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
+from polydem_lab.bench.statistics import _student
 from polydem_post import Frame, ResultError, Trajectory
 from polydem_post.analysis import (
     ShortSeries,
@@ -33,9 +34,8 @@ from polydem_post.analysis import (
     surface_angle,
 )
 from polydem_post.analysis.windows import area_inside
-from polydem_post.columns import columns_of, field_names
-from polydem_post.polygons import area_of, clip
-from polydem_post.statistics import _student
+from polydem_post.base.columns import columns_of, field_names
+from polydem_post.base.polygons import area_of, clip
 
 SQUARE = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from polydem_post import Contacts, Frame, NoFrame, ResultError, Trajectory, Walls
-from polydem_post.columns import columns_of, field_names
-from polydem_post.settings import Settings
+from polydem_post.base.columns import columns_of, field_names
+from polydem_post.read.settings import Settings
 
 PROGRAM = os.environ["POLYDEM_PROGRAM"]
 HEAP = """&scene

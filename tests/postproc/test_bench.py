@@ -7,11 +7,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from polydem_post import series
-from polydem_post.bench import build_label, read_bench
-from polydem_post.scene_kinds import OTHER, kind_of, settings_of
-from polydem_post.statistics import median
-from polydem_post.trajectory import ResultError
+from polydem_lab.bench import series
+from polydem_lab.bench.samples import build_label, read_bench
+from polydem_lab.bench.scene_kinds import OTHER, kind_of, settings_of
+from polydem_lab.bench.statistics import median
+from polydem_post.base.result_file import ResultError
 from synthetic_bench import ENTRIES, Machine, Truth, input_of, truths, write_drums, write_sample
 
 TRUTH = Truth(40.0, counts={"swaps": 0.25})

@@ -8,10 +8,10 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from polydem_post import cache, cachegrind
-from polydem_post.cachegrind import PLAIN_MODEL, Model, count_events, finder_functions, machine_model
-from polydem_post.complexity import SOURCES
-from polydem_post.trajectory import ResultError
+from polydem_lab.costs import cache, cachegrind
+from polydem_lab.costs.cachegrind import PLAIN_MODEL, Model, count_events, finder_functions, machine_model
+from polydem_lab.costs.complexity import SOURCES
+from polydem_post.base.result_file import ResultError
 
 MODEL = Model(**PLAIN_MODEL)
 

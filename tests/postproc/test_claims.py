@@ -4,9 +4,11 @@ import itertools
 from dataclasses import replace
 
 import pytest
-from polydem_post import claim_rules_structure, complexity
-from polydem_post.bench import Case, read_bench
-from polydem_post.claims import (
+from polydem_lab.bench.samples import Case, read_bench
+from polydem_lab.claims import rules_structure as claim_rules_structure
+from polydem_lab.claims.judge import claims_document, judge_all
+from polydem_lab.claims.targets import targets
+from polydem_lab.claims.verdicts import (
     CONFIRMED,
     CONTRADICTED,
     IN_PART,
@@ -14,14 +16,12 @@ from polydem_post.claims import (
     NOT_TESTABLE,
     UNDECIDED,
     UNDECIDED_QUICK,
-    claims_document,
     counts_table,
-    judge_all,
     of_parts,
     of_quick,
     verdict_table,
 )
-from polydem_post.targets import targets
+from polydem_lab.costs import complexity
 from synthetic_bench import Machine, input_of, truths, write_drums, write_hard_scenes, write_sample
 
 SIZES = (2522, 5058, 12651, 100000)

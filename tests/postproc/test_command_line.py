@@ -5,7 +5,7 @@ import re
 
 import pytest
 from matplotlib.image import imread
-from polydem_post.__main__ import HELP, _parser, help_text, main
+from polydem_post.command_line.main import _parser, help_files, help_text, main
 
 
 def test_draws_the_last_frame_into_the_result(finished, capsys):
@@ -56,7 +56,7 @@ def test_an_interrupted_verb_ends_with_a_sentence(monkeypatch, capsys):
     def press(options):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("polydem_post.__main__._table", press)
+    monkeypatch.setattr("polydem_post.command_line.data_verbs._table", press)
     assert main(["table", "result"]) == 130
     assert capsys.readouterr().err == "table: interrupted\n"
 
@@ -120,7 +120,7 @@ def test_a_wrong_command_line_ends_with_code_2(arguments):
 
 def parsers():
     """All parsers by their words, without the program's name."""
-    found, open_ones = {}, [_parser()]
+    found, open_ones = {}, [_parser(["tables"])]
     while open_ones:
         parser = open_ones.pop()
         found[tuple(parser.prog.split()[1:])] = parser
@@ -155,7 +155,7 @@ def test_the_help_texts_name_no_other_options():
     known = {}
     for words, parser in parsers().items():
         known.setdefault(words[0], set()).update(name for action in parser._actions for name in action.option_strings)
-    assert {path.stem for path in HELP.glob("*.txt")} == set(known)
+    assert set(help_files()) == set(known)
     for verb, options in known.items():
         assert set(re.findall(r"(?<![\w-])--?[a-zA-Z][\w-]*", help_text(verb))) <= options, verb
 

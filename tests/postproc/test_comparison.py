@@ -15,8 +15,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from polydem_post.bench_file import number_of, read_bench_file
-from polydem_post.comparison_plan import (
+from polydem_lab.comparison.bench_file import number_of, read_bench_file
+from polydem_lab.comparison.html_page import Page
+from polydem_lab.comparison.plan import (
     BENCHES,
     QUICK_LIMIT,
     QUICK_PRECISION,
@@ -28,13 +29,12 @@ from polydem_post.comparison_plan import (
     make_plan,
     threads_up_to,
 )
-from polydem_post.comparison_publish import publish
-from polydem_post.comparison_run import FOR_THE_REPORT, Comparison, Tools
-from polydem_post.emit import Table
-from polydem_post.html_page import Page
-from polydem_post.precision_scenes import SCENES
-from polydem_post.published import read_points
-from polydem_post.trajectory import ResultError
+from polydem_lab.comparison.publish import publish
+from polydem_lab.comparison.published import read_points
+from polydem_lab.comparison.run import FOR_THE_REPORT, Comparison, Tools
+from polydem_lab.precision.scenes import SCENES
+from polydem_post.base.emit import Table
+from polydem_post.base.result_file import ResultError
 from published_numbers import REVISION, disagreements, missing_numbers, paragraphs_of
 
 PROGRAM = Path(os.environ["POLYDEM_PROGRAM"]).resolve()

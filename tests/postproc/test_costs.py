@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import h5py
 import pytest
-from polydem_post import costs
-from polydem_post.costs import MODELS, Sample, Study, bytes_per_body, costs_table, read_samples, share_of_step
-from polydem_post.trajectory import ResultError, Trajectory
+from polydem_lab.costs import models as costs
+from polydem_lab.costs.models import MODELS, Sample, Study, bytes_per_body, costs_table, read_samples, share_of_step
+from polydem_post.base.result_file import ResultError
+from polydem_post.read.trajectory import Trajectory
 
 PLAIN = Sample("nothing", "time", 1, 1000, 400, 1, 100.0, 5.0, 0, "polydem 1", "a machine")
 

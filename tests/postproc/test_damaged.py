@@ -17,13 +17,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from polydem_post import __main__ as command_line
-from polydem_post.costs import MODELS
-from polydem_post.costs import Sample as CostSample
-from polydem_post.emit import Table, printable
-from polydem_post.exchange_model import Count
-from polydem_post.exchange_runs import RunCount
-from polydem_post.precision_samples import Sample as WorkSample
+from polydem_lab.costs.models import MODELS
+from polydem_lab.costs.models import Sample as CostSample
+from polydem_lab.precision.samples import Sample as WorkSample
+from polydem_lab.scaling.exchange_model import Count
+from polydem_lab.scaling.exchange_runs import RunCount
+from polydem_post.base.emit import Table, printable
+from polydem_post.command_line import data_verbs
+from polydem_post.command_line import main as command_line
 from synthetic_bench import truths, write_sample
 from test_manifest import texts_of, write_manifest
 
@@ -238,8 +239,8 @@ def place(whole, tmp_path, monkeypatch):
     """A copy of the whole files, in which the verbs run."""
     shutil.copytree(whole, tmp_path / "files")
     monkeypatch.chdir(tmp_path / "files")
-    monkeypatch.setattr("polydem_post.cache.simulate", lambda *_: {})
-    monkeypatch.setattr("polydem_post.cache.count_hardware", lambda *_: {})
+    monkeypatch.setattr("polydem_lab.costs.cache.simulate", lambda *_: {})
+    monkeypatch.setattr("polydem_lab.costs.cache.count_hardware", lambda *_: {})
     return tmp_path / "files"
 
 
@@ -333,8 +334,8 @@ def test_a_closed_pipe_ends_quietly(whole):
 
 
 def test_what_no_reader_foresaw_is_a_sentence_and_a_traceback_for_those_who_ask(monkeypatch, capsys):
-    monkeypatch.setattr(command_line, "timing_table", lambda *_: 1 / 0)
-    monkeypatch.setattr(command_line, "Trajectory", lambda *_: None)
+    monkeypatch.setattr(data_verbs, "timing_table", lambda *_: 1 / 0)
+    monkeypatch.setattr(data_verbs, "Trajectory", lambda *_: None)
     assert command_line.main(["table", "x"]) == command_line.UNFORESEEN
     assert capsys.readouterr().err.startswith("error: table cannot go on: ZeroDivisionError: division by zero. ")
     monkeypatch.setenv("POLYDEM_TRACEBACK", "1")

@@ -4,7 +4,7 @@ import csv
 import io
 
 import pytest
-from polydem_post.emit import FORMATS, Table
+from polydem_post.base.emit import FORMATS, Table
 
 
 @pytest.fixture

@@ -4,9 +4,18 @@ import math
 from dataclasses import astuple, fields, replace
 
 import pytest
-from polydem_post.__main__ import main
-from polydem_post.exchange_model import RANKS, Count, Machine, fit_law, predict, read_counts, scale_table, strip_table
-from polydem_post.trajectory import ResultError
+from polydem_lab.scaling.exchange_model import (
+    RANKS,
+    Count,
+    Machine,
+    fit_law,
+    predict,
+    read_counts,
+    scale_table,
+    strip_table,
+)
+from polydem_post.base.result_file import ResultError
+from polydem_post.command_line.main import main
 
 MACHINE = Machine(body=1e-6, latency=1e-6, bandwidth=1e9)
 

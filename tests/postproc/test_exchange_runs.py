@@ -6,9 +6,10 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
-from polydem_post.__main__ import main
-from polydem_post.exchange_runs import COUNTERS, MARGIN, SHAPE, read_run, read_runs, runs_tables, write_runs
-from polydem_post.trajectory import ResultError, Trajectory
+from polydem_lab.scaling.exchange_runs import COUNTERS, MARGIN, SHAPE, read_run, read_runs, runs_tables, write_runs
+from polydem_post.base.result_file import ResultError
+from polydem_post.command_line.main import main
+from polydem_post.read.trajectory import Trajectory
 
 #: Of 16 ranks, 101 steps, settled three times
 VALUES = {

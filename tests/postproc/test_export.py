@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from polydem_post import ResultError
-from polydem_post.__main__ import main
+from polydem_post.command_line.main import main
 from polydem_post.export import FORMATS, export_result
 
 

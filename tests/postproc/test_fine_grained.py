@@ -8,13 +8,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from polydem_post.bench import read_bench
-from polydem_post.fine_grained import MOVE_COST, PARTITIONED, SEARCH_COST, Waiting, contests, not_negative
-from polydem_post.fine_grained_figures import fine_grained_drawings, scenes_of, what_fails
-from polydem_post.fine_grained_tables import agreement, error_told, fine_grained_tables, span_of_error
-from polydem_post.series import SWEEP as PLAIN
-from polydem_post.series import TREE
-from polydem_post.sweep_parts import Exchanges, exchanges_down, exchanges_of, exchanges_up_to, way_of
+from polydem_lab.bench.samples import read_bench
+from polydem_lab.bench.series import SWEEP as PLAIN
+from polydem_lab.bench.series import TREE
+from polydem_lab.fine_grained.exchanges import Exchanges, exchanges_down, exchanges_of, exchanges_up_to, way_of
+from polydem_lab.fine_grained.model import MOVE_COST, PARTITIONED, SEARCH_COST, Waiting, contests, not_negative
+from polydem_lab.report.fine_grained_figures import fine_grained_drawings, scenes_of, what_fails
+from polydem_lab.tables.fine_grained_tables import agreement, error_told, fine_grained_tables, span_of_error
 from synthetic_bench import Truth, write_sample
 
 BOXES = 10000

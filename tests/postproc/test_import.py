@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from polydem_post import Frame, ResultError
-from polydem_post.__main__ import main
+from polydem_post.base.convex import concave_vertices, decompose
+from polydem_post.base.polygons import area_of, join, moments
 from polydem_post.bodies_file import ConcaveOutline, import_bodies, import_shapely, origin_of, write_bodies
-from polydem_post.convex import concave_vertices, decompose
-from polydem_post.polygons import area_of, join, moments
-from polydem_post.trajectory import Trajectory
+from polydem_post.command_line.main import main
+from polydem_post.read.trajectory import Trajectory
 
 PROGRAM = os.environ["POLYDEM_PROGRAM"]
 SQUARE = [(0.0, 0.0), (0.01, 0.0), (0.01, 0.01), (0.0, 0.01)]

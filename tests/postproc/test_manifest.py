@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 import pytest
 from polydem_post import NoManifest, ResultError, Trajectory
-from polydem_post import manifest as manifests
-from polydem_post.__main__ import main
+from polydem_post.command_line.main import main
+from polydem_post.read import manifest as manifests
 
 sys.path.insert(0, str(Path(os.environ["POLYDEM_SOURCE_DIR"]) / "tests" / "ranks"))
 from seals import SLICE, mix
@@ -161,7 +161,7 @@ def test_no_flipped_bit_of_a_segment_stays_unseen(result, name, capsys):
 
 
 def test_only_what_is_used_is_hashed(result, monkeypatch):
-    monkeypatch.setattr("polydem_post.result_folder.CHECKED_AT_ONCE", 1)
+    monkeypatch.setattr("polydem_post.read.result_folder.CHECKED_AT_ONCE", 1)
     with h5py.File(result / NAMES[1], "r+") as file:
         at = file["frames/velocity"].id.get_chunk_info(0).byte_offset
     write_manifest(result, texts_of(result))

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from polydem_post.manifest import HEADING, file_hashes, line_hash
+from polydem_post.read.manifest import HEADING, file_hashes, line_hash
 
 #: Bodies, contacts and frames of a segment, and segments; POLYDEM_SEGMENTS=220 makes the 1 GB of the manual
 BODIES, CONTACTS, FRAMES = 20000, 40000, 1

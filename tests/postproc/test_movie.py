@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from PIL import Image
 from polydem_post import ResultError, Trajectory
-from polydem_post.__main__ import main
-from polydem_post.drawing import Look, settle
-from polydem_post.movie import Film, Painter, make_movie
+from polydem_post.command_line.main import main
+from polydem_post.pictures.drawing import Look, settle
+from polydem_post.pictures.movie import Film, Painter, make_movie
 
 ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="films in MP4 need imageio-ffmpeg")
 

@@ -1,4 +1,4 @@
-"""The types of the package are right: mypy finds nothing, with the choices of postproc/pyproject.toml."""
+"""The types of the packages are right: mypy finds nothing, with the choices of postproc/pyproject.toml."""
 
 import os
 import subprocess
@@ -20,7 +20,7 @@ def _is_there():
     pytest.importorskip("mypy", reason="mypy is not installed: pip install 'postproc[test]'")
 
 
-def test_the_package_has_no_wrong_types():
+def test_the_packages_have_no_wrong_types():
     found = check()
     assert found.returncode == 0, found.stdout + found.stderr
 
@@ -34,5 +34,5 @@ def test_a_user_sees_the_types(tmp_path):
         "x: int = run[0].time\n", encoding="utf-8")
     found = check("--config-file", str(ROOT / "postproc" / "pyproject.toml"), str(tmp_path / "user.py"))
     for kind in ("frames.Frame", "trajectory.Trajectory", "contacts.Contacts"):
-        assert f'Revealed type is "polydem_post.{kind}"' in found.stdout
+        assert f'Revealed type is "polydem_post.read.{kind}"' in found.stdout
     assert 'expression has type "float", variable has type "int"' in found.stdout

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from polydem_post import ResultError, Trajectory
-from polydem_post.__main__ import help_text, main
-from polydem_post.drawing import OVERLAYS, Look, settle
-from polydem_post.plot import plot_frames
-from polydem_post.quantities import QUANTITIES, pressure, range_of, stress
-from polydem_post.tree_cells import cell_grid, tree_cells
+from polydem_post.command_line.main import help_text, main
+from polydem_post.pictures.drawing import OVERLAYS, Look, settle
+from polydem_post.pictures.plot import plot_frames
+from polydem_post.pictures.quantities import QUANTITIES, pressure, range_of, stress
+from polydem_post.pictures.tree_cells import cell_grid, tree_cells
 
 
 @pytest.fixture(scope="module")
@@ -148,7 +148,7 @@ def test_bodies_are_drawn_where_they_are_in_their_colour(run, tmp_path):
 @pytest.mark.parametrize("words", [["--limits", "-0.1,0.05,-.2,1e-1"], ["--limits=-0.1,0.05,-.2,1e-1"]])
 def test_limits_and_frames_may_begin_with_a_minus_sign(run, small_drum, tmp_path, words, monkeypatch):
     seen = []
-    monkeypatch.setattr("polydem_post.plot.plot_frames",
+    monkeypatch.setattr("polydem_post.pictures.plot.plot_frames",
                         lambda run, numbers, look, *rest, **more: seen.append((numbers, look)) or plot_frames(
                             run, numbers, look, *rest, **more))
     out = str(tmp_path / "p.png")

@@ -7,9 +7,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from polydem_post.comparison_publish import TITLE, answers
-from polydem_post.emit import Table
-from polydem_post.fine_grained_figures import sixteen
+from polydem_lab.comparison.publish import TITLE, answers
+from polydem_lab.report.fine_grained_figures import sixteen
+from polydem_post.base.emit import Table
 from published_numbers import REVISION, disagreements, rows_of
 
 ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])

@@ -8,15 +8,16 @@ from pathlib import Path
 
 import pytest
 from matplotlib.image import imread
-from polydem_post import bench_tables, complexity, paper_tables
-from polydem_post.__main__ import main
-from polydem_post.bench import read_bench
-from polydem_post.bench_figures import bench_drawings
-from polydem_post.figure_style import LOOKS
-from polydem_post.own_figures import own_drawings
-from polydem_post.paper_figures import paper_drawings
-from polydem_post.slope_tables import slopes
-from polydem_post.targets import targets
+from polydem_lab.bench.samples import read_bench
+from polydem_lab.claims.targets import targets
+from polydem_lab.costs import complexity
+from polydem_lab.report.bench_figures import bench_drawings
+from polydem_lab.report.own_figures import own_drawings
+from polydem_lab.report.paper_figures import paper_drawings
+from polydem_lab.report.style import LOOKS
+from polydem_lab.tables import bench_tables, paper_tables
+from polydem_lab.tables.slope_tables import slopes
+from polydem_post.command_line.main import main
 from synthetic_bench import Machine, input_of, truths, write_drums, write_hard_scenes, write_sample
 
 FIGURES = (

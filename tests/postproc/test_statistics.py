@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from polydem_post import statistics
+from polydem_lab.bench import statistics
 
 
 def coverage(estimate, truth, trials=300, seed=5):

@@ -12,12 +12,13 @@ from pathlib import Path
 
 import h5py
 import pytest
-from polydem_post import Trajectory, sweep_run
-from polydem_post.__main__ import main
-from polydem_post.sweep import Row, Run, expand, make_sweep, read_table
-from polydem_post.sweep_collect import read_outcome
-from polydem_post.sweep_run import Runner, available_cores, environment, is_running, state_of
-from polydem_post.trajectory import ResultError
+from polydem_post import Trajectory
+from polydem_post.base.result_file import ResultError
+from polydem_post.command_line.main import main
+from polydem_post.sweep import runner as sweep_run
+from polydem_post.sweep.batch import Row, Run, expand, make_sweep, read_table
+from polydem_post.sweep.collect import read_outcome
+from polydem_post.sweep.runner import Runner, available_cores, environment, is_running, state_of
 
 #: How long something may take on a busy machine [s]
 PATIENCE = 600
@@ -312,7 +313,7 @@ def test_begins_anew_where_the_program_cannot_go_on(sweep_of):
 
 def test_binds_runs_to_cores_of_their_own_if_all_are_theirs(monkeypatch):
     monkeypatch.setenv("OMP_PLACES", "cores")
-    monkeypatch.setattr("polydem_post.sweep_run.available_cores", lambda: [2, 3, 6, 7])
+    monkeypatch.setattr("polydem_post.sweep.runner.available_cores", lambda: [2, 3, 6, 7])
     places = [environment(4, 2, slot)["OMP_PLACES"] for slot in range(2)]
     assert places == ["{2},{3}", "{6},{7}"]
     part = environment(2, 1, 0)
@@ -409,7 +410,7 @@ def test_a_run_that_outlives_its_sweep_is_running_is_not_started_twice_and_count
     assert process.returncode == 75, said
     assert "a: left out: another call runs it, or has left it running" in said
     assert states(sweep)["b"] == "finished"
-    assert read_outcome(sweep, sweep.runs[0]).facts == {"state": "running", "attempts": 0}
+    assert read_outcome(sweep.runs[0]).facts == {"state": "running", "attempts": 0}
     (sweep.runs[0].result / "told").touch()
     await_end(sweep.runs[0])
     assert states(sweep) == {"a": "finished", "b": "finished"}
@@ -546,6 +547,6 @@ def test_the_program_finds_the_wrong_entry(tmp_path, capsys):
 
 def test_knows_the_cores_of_this_process():
     only = str(available_cores()[0])
-    code = "from polydem_post.sweep_run import available_cores; print(available_cores())"
+    code = "from polydem_post.sweep.runner import available_cores; print(available_cores())"
     command = ["taskset", "-c", only, sys.executable, "-c", code]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip() == f"[{only}]"

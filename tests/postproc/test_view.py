@@ -13,9 +13,10 @@ from pathlib import Path
 import numpy as np
 import polydem_post
 import pytest
-from polydem_post import Trajectory, view_data
-from polydem_post.__main__ import main
-from polydem_post.view import SCRIPTS, SOURCES
+from polydem_post import Trajectory
+from polydem_post.command_line.main import main
+from polydem_post.pictures import view_data
+from polydem_post.pictures.view import SCRIPTS, SOURCES
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ def test_the_page_is_one_file_that_needs_no_network(view):
 def test_all_scripts_of_the_folder_are_in_the_page_and_in_the_package():
     assert {path.name for path in SOURCES.glob("*.js")} == set(SCRIPTS)
     project = Path(polydem_post.__file__).parents[2] / "pyproject.toml"
-    assert '"viewer/*"' in project.read_text(encoding="utf-8")
+    assert '"pictures/viewer/*"' in project.read_text(encoding="utf-8")
 
 
 def block(text, name, kind):

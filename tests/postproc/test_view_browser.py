@@ -8,8 +8,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from polydem_post import Trajectory
-from polydem_post.quantities import QUANTITIES
-from polydem_post.tree_cells import cell_grid, tree_cells
+from polydem_post.pictures.quantities import QUANTITIES
+from polydem_post.pictures.tree_cells import cell_grid, tree_cells
 
 need_browser()
 

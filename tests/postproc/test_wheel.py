@@ -1,4 +1,4 @@
-"""The package as a wheel, installed into a fresh virtual environment beside nothing but its dependencies."""
+"""The packages as a wheel, installed into a fresh virtual environment beside nothing but its dependencies."""
 
 import os
 import subprocess
@@ -18,7 +18,7 @@ def wheel(tmp_path_factory):
     names = subprocess.run(["git", "ls-files", "postproc"], cwd=ROOT, capture_output=True, text=True, check=True)
     for name in [*names.stdout.split(), *added(ROOT)]:
         source, target = ROOT / name, folder / name
-        if "verdicts" not in name and source.exists():
+        if not name.startswith("postproc/verdicts/") and source.exists():
             target.parent.mkdir(parents=True, exist_ok=True)
             target.write_bytes(source.read_bytes())
     subprocess.run([sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation",
@@ -35,9 +35,11 @@ def added(root):
 
 def test_a_wheel_has_all_files(wheel):
     inside = set(zipfile.ZipFile(wheel).namelist())
-    for path in (ROOT / "postproc" / "src" / "polydem_post").rglob("*"):
-        if path.is_file() and "__pycache__" not in path.parts:
-            assert f"polydem_post/{path.relative_to(ROOT / 'postproc' / 'src' / 'polydem_post')}" in inside
+    sources = ROOT / "postproc" / "src"
+    for package in ("polydem_post", "polydem_lab"):
+        for path in (sources / package).rglob("*"):
+            if path.is_file() and "__pycache__" not in path.parts:
+                assert str(path.relative_to(sources)) in inside
 
 
 def test_an_installed_wheel_reads_and_exports(wheel, tmp_path, heap_with_contacts):
@@ -61,6 +63,6 @@ def test_an_installed_wheel_reads_and_exports(wheel, tmp_path, heap_with_contact
     read = "import sys; from polydem_post import Trajectory; print(Trajectory(sys.argv[1])[-1].contacts)"
     assert "pairs" in call("-c", read, str(heap_with_contacts.folder))
     for words in (["export", str(heap_with_contacts.folder), "--to", "csv", "-o", "out.csv"], ["--help"],
-                  ["plot", "--help"]):
+                  ["plot", "--help"], ["scale", "--help"]):
         assert call("-m", "polydem_post", *words)
     assert (tmp_path / "out.csv").exists()

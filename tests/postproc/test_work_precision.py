@@ -4,13 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from polydem_post.precision_figures import precision_drawings
-from polydem_post.precision_report import write_precision_report
-from polydem_post.precision_samples import Sample, choices_of, read_samples, references_of, result_text
-from polydem_post.precision_scenes import SCENES, Model, restitution, spread
-from polydem_post.precision_tables import all_tables, overall, recommendation
-from polydem_post.trajectory import ResultError
-from polydem_post.work_precision import WorkPrecision, errors_of, fastest
+from polydem_lab.precision.figures import precision_drawings
+from polydem_lab.precision.report import write_precision_report
+from polydem_lab.precision.samples import Sample, choices_of, read_samples, references_of, result_text
+from polydem_lab.precision.scenes import SCENES, Model, restitution, spread
+from polydem_lab.precision.tables import all_tables, overall, recommendation
+from polydem_lab.precision.work_precision import WorkPrecision, errors_of, fastest
+from polydem_post.base.result_file import ResultError
 
 SCENE, MODEL = "flat_impact", "area/rate/none"
 DURATION = 1.0e-3

@@ -5,11 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from polydem_post import precision_samples
-from polydem_post.precision_samples import Study, read_samples
-from polydem_post.precision_scenes import SCENES, Model
-from polydem_post.trajectory import ResultError
-from polydem_post.work_precision import read_study
+from polydem_lab.precision import samples as precision_samples
+from polydem_lab.precision.samples import Study, read_samples
+from polydem_lab.precision.scenes import SCENES, Model
+from polydem_lab.precision.work_precision import read_study
+from polydem_post.base.result_file import ResultError
 
 PROGRAM = Path(os.environ["POLYDEM_PROGRAM"])
 

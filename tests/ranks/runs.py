@@ -7,7 +7,7 @@ from pathlib import Path
 
 import h5py
 from polydem_post import Trajectory
-from polydem_post.columns import field_names
+from polydem_post.base.columns import field_names
 
 #: Programs without and with MPI
 SERIAL = os.environ["POLYDEM_PROGRAM"]

@@ -356,7 +356,7 @@ if __name__ == "__main__":
     sys.dont_write_bytecode = True
     sys.path[:0] = [str(ROOT / "tests" / "ranks"), str(ROOT / "postproc" / "src")]
     import matplotlib.pyplot  # noqa: F401  the children need not import it
-    from polydem_post.__main__ import main as polydem_post
+    from polydem_post.command_line.main import main as polydem_post
     from runs import ENVIRONMENT as SURROUNDINGS
 
     SURROUNDINGS = {name: text for name, text in SURROUNDINGS.items() if name != "LD_PRELOAD"}

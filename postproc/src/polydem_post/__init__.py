@@ -7,13 +7,21 @@
         print(frame.time, frame.kinetic_energy.sum())
 
 `help(Trajectory)`, `help(Frame)` and `help(Contacts)` describe all columns with their units.
+
+Each subpackage or module imports only itself and those before it in `LAYERS`. The laboratory is a package of its own,
+`polydem_lab`; only the command line knows that it is there.
 """
 
-from .contacts import Contacts, Walls
-from .frames import Frame
-from .result_file import ResultError
-from .settings import Settings
-from .trajectory import NoFrame, NoManifest, Trajectory
+from .base.result_file import ResultError
+from .read.contacts import Contacts, Walls
+from .read.frames import Frame
+from .read.result_folder import NoManifest
+from .read.settings import Settings
+from .read.trajectory import NoFrame, Trajectory
 
 __all__ = ["Contacts", "Frame", "NoFrame", "NoManifest", "ResultError", "Settings", "Trajectory", "Walls"]
 __version__ = "0.1.0"
+
+#: The subpackages and modules, lowest first
+LAYERS = ("base", "outlines", "bodies_file", "read", "analysis", "pictures", "export", "sweep", "command_line",
+          "manual")

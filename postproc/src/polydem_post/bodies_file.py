@@ -7,19 +7,16 @@ import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Optional, Union
+from typing import Any, Optional, Union
 
 import h5py
 import numpy as np
 
-from .convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
-from .new_file import NewHdf5, new_file
+from .base.convex import OutlineError, concave_vertices, decompose, insist_on_simple, tidy
+from .base.new_file import NewHdf5, new_file
+from .base.polygons import FloatArray, join
+from .base.result_file import ResultError, cannot_read, cannot_write
 from .outlines import PROPERTIES, Outline, read_outlines, shapely_outlines
-from .polygons import FloatArray, join
-from .result_file import ResultError, cannot_read, cannot_write
-
-if TYPE_CHECKING:
-    from .frames import Frame
 
 #: What becomes the origin of a bodies file: a point (x, y) [m], the centre of the polygons, or nothing
 Origin = Optional[Union[str, tuple[float, float]]]
@@ -95,8 +92,8 @@ def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[st
     return _save(path, given, scale, shift, decomposed, None if origin is None else shift, overwrite)
 
 
-def write_frame(frame: Frame, output: str | os.PathLike[str], origin: tuple[float, float], overwrite: bool) -> int:
-    """Write the bodies of a frame; `origin` is what the coordinates lack, and is stored with them [m]."""
+def write_frame(frame: Any, output: str | os.PathLike[str], origin: tuple[float, float], overwrite: bool) -> int:
+    """Write the bodies of a `Frame`; `origin` is what the coordinates lack, and is stored with them [m]."""
     given = [Outline(outline, f"body {number}") for number, outline in zip(frame.id, frame.vertices)]
     given = _with_columns(given, {
         "fixed": frame.fixed, "mass": frame.mass, "inertia": frame.inertia, "id": frame.id,

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from .polygons import FloatArray
-from .result_file import ResultError, cannot_read
+from .base.polygons import FloatArray
+from .base.result_file import ResultError, cannot_read
 
 #: Properties of a body that GeoJSON may give, besides its outline
 PROPERTIES = ("fixed", "velocity", "angular_velocity", "density", "mass", "inertia", "id")

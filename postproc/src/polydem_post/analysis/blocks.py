@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..polygons import FloatArray
-from ..result_file import ResultError
+from ..base.polygons import FloatArray
+from ..base.result_file import ResultError
 
 #: Length of a block, and least length of a series, in correlation times
 BLOCK_LENGTH, LEAST_LENGTH = 10.0, 20.0

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..frames import Frame
-from ..polygons import FloatArray, IntArray
-from ..result_file import ResultError
+from ..base.polygons import FloatArray, IntArray
+from ..base.result_file import ResultError
+from ..read.frames import Frame
 from .stress import branches
 
 #: Points of a branch vector on which its stress is spread, per distance of grid points, and the least number

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..frames import Frame
-from ..polygons import FloatArray, area_of, clip
-from ..result_file import ResultError
+from ..base.polygons import FloatArray, area_of, clip
+from ..base.result_file import ResultError
+from ..read.frames import Frame
 
 
 @dataclass(frozen=True)

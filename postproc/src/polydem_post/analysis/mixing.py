@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ..frames import Frame
-from ..result_file import ResultError
+from ..base.result_file import ResultError
+from ..read.frames import Frame
 
 
 def lacey_index(frame: Frame, kind: Any, cell: float) -> float:

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from ..frames import Frame
-from ..polygons import FloatArray, IntArray
-from ..result_file import ResultError
+from ..base.polygons import FloatArray, IntArray
+from ..base.result_file import ResultError
+from ..read.frames import Frame
 
 #: Differences of intervals that count as equal, relative to the interval
 EQUAL = 0.01

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..frames import Frame
-from ..polygons import FloatArray
-from ..result_file import ResultError
+from ..base.polygons import FloatArray
+from ..base.result_file import ResultError
+from ..read.frames import Frame
 
 
 def rattlers(frame: Frame, least: int = 2) -> npt.NDArray[np.bool_]:

@@ -8,9 +8,9 @@ from typing import Any, Union
 
 import numpy as np
 
-from ..frames import Frame
-from ..polygons import FloatArray, IntArray, area_of, clip, following, join, moments, sums
-from ..result_file import ResultError
+from ..base.polygons import FloatArray, IntArray, area_of, clip, following, join, moments, sums
+from ..base.result_file import ResultError
+from ..read.frames import Frame
 from .blocks import average_in_blocks
 
 #: What a body weighs in a slab, per area of it that is inside

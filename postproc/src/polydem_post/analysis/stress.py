@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..frames import Frame
-from ..polygons import FloatArray, area_of
+from ..base.polygons import FloatArray, area_of
+from ..read.frames import Frame
 from .windows import Window, contains, outline_of, share_inside
 
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..frames import Frame
-from ..polygons import FloatArray, following
-from ..result_file import ResultError
-from ..trajectory import Trajectory
+from ..base.polygons import FloatArray, following
+from ..base.result_file import ResultError
+from ..read.frames import Frame
+from ..read.trajectory import Trajectory
 from .blocks import block_average
 
 

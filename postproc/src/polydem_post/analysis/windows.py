@@ -6,10 +6,10 @@ from typing import Any, Union
 
 import numpy as np
 
-from ..convex import OutlineError, concave_vertices, tidy
-from ..frames import Frame
-from ..polygons import FloatArray, area_of, clip_convex
-from ..result_file import ResultError
+from ..base.convex import OutlineError, concave_vertices, tidy
+from ..base.polygons import FloatArray, area_of, clip_convex
+from ..base.result_file import ResultError
+from ..read.frames import Frame
 
 #: A rectangle (least x, least y, greatest x, greatest y) [m], or the vertices of a convex polygon [m]
 Window = Union[tuple[float, float, float, float], FloatArray]

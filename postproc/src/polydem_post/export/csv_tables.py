@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..tables import body_columns, contact_columns
-from ..trajectory import Trajectory
+from ..read.tables import body_columns, contact_columns
+from ..read.trajectory import Trajectory
 
 #: Columns of the table of bodies
 COLUMNS = ("fixed", "position", "angle", "velocity", "angular_velocity", "mass", "inertia", "area", "radius")

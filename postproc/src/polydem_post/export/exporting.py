@@ -8,9 +8,9 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 
-from ..frames import Frame
-from ..result_file import ResultError, cannot_write, is_of_run
-from ..trajectory import Trajectory
+from ..base.result_file import ResultError, cannot_write, is_of_run
+from ..read.frames import Frame
+from ..read.trajectory import Trajectory
 from .csv_tables import write_balance_csv, write_bodies_csv, write_contacts_csv, write_vertices_csv
 from .gsd_file import write_gsd
 from .meshes import Mesh, body_mesh, contact_mesh, filled_contact_mesh

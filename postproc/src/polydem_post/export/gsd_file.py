@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ..frames import Frame
-from ..tables import need
-from ..trajectory import Trajectory
+from ..read.frames import Frame
+from ..read.tables import need
+from ..read.trajectory import Trajectory
 from .meshes import contact_data, finite, in_space
 
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ..frames import Frame
-from ..polygons import FloatArray, IntArray
+from ..base.polygons import FloatArray, IntArray
+from ..read.frames import Frame
 
 Columns = dict[str, npt.NDArray[Any]]
 

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 import numpy.typing as npt
 
-from ..new_file import NewHdf5
+from ..base.new_file import NewHdf5
 from .meshes import Mesh
 
 #: Kinds of cells of poly data, in the order of the columns of offsets

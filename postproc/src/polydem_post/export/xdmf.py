@@ -12,7 +12,7 @@ from xml.sax.saxutils import escape
 import numpy as np
 import numpy.typing as npt
 
-from ..new_file import NewHdf5
+from ..base.new_file import NewHdf5
 from .meshes import Mesh
 
 #: Number of polygons in a mixed topology

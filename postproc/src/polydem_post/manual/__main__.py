@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from ..__main__ import INPUT_ERROR
-from ..result_file import reason
+from ..base.result_file import reason
+from ..command_line.main import INPUT_ERROR
 
 #: Default folder of the site, below the root of the repository
 FOLDER = Path("build") / "manual"

@@ -1,0 +1,1 @@
+"""The whole comparison with the paper: its plan, runs, report and publication."""

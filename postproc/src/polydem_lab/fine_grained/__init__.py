@@ -1,0 +1,1 @@
+"""The model of sweeps whose lists are sorted in parallel parts."""

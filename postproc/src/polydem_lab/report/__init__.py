@@ -1,0 +1,1 @@
+"""Figures of a bench; all its tables, figures and verdicts in one folder."""

@@ -1,0 +1,1 @@
+"""Prediction of the scaling over MPI ranks from counted exchanges."""

@@ -1,0 +1,1 @@
+"""Geometry of polygons, files that are read and written, errors in sentences, tables of text."""

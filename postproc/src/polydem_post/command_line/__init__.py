@@ -1,0 +1,1 @@
+"""The verbs of this package, their options and help texts."""

@@ -1,0 +1,325 @@
+"""Draws one frame into axes: bodies and what is laid over them. Pictures and films share it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import PathCollection
+from matplotlib.colors import Colormap, Normalize
+from matplotlib.lines import Line2D
+from matplotlib.path import Path
+
+from ..base.result_file import ResultError
+from ..read.frames import Frame
+from ..read.trajectory import Trajectory
+from .quantities import QUANTITIES, Quantity, range_of, stress
+from .tree_cells import CellGrid, cell_grid, tree_cells
+
+#: What can be laid over the bodies, with its meaning in a legend
+OVERLAYS = {
+    "contacts": "contact points",
+    "forces": "contact forces",
+    "boxes": "bounding boxes",
+    "cells": "cells of the quadtree",
+    "stress": "principal stresses",
+}
+NEED_CONTACTS = ("contacts", "forces", "stress")
+
+#: Colours of the fixed bodies and of bodies without a scale, of overlays, and of values that are not known
+WALL_COLOUR, PLAIN_COLOUR, UNKNOWN_COLOUR = "0.62", "#d9b98a", "0.85"
+FORCE_COLOUR, CONTACT_COLOUR, BOX_COLOUR, CELL_COLOUR = "#a01020", "#d55e00", "#0072b2", "#7a3db8"
+COMPRESSED_COLOUR, PULLED_COLOUR = "#a01020", "#0072b2"
+
+#: Width of the line of the largest force as a share of the median equivalent diameter of the free bodies, and greatest
+#: width [pt]
+WIDEST_FORCE, WIDEST_LINE = 0.45, 8.0
+
+#: Share of the forces and stresses that the scale of widths and lengths covers: those of a few impacts are greater
+COVERED_FORCES = 99.0
+
+#: Widths of lines that are told apart
+WIDTHS = 32
+
+#: Width of outlines as a share of the median equivalent diameter of the free bodies, and least and greatest width [pt]
+OUTLINE, OUTLINES = 0.05, (0.05, 0.8)
+
+
+@dataclass(frozen=True)
+class Look:
+    """What pictures of a run show, alike for all frames."""
+
+    #: Name of a quantity, or "none"
+    colour: str = "none"
+    #: Names of OVERLAYS
+    show: tuple = ()
+    #: x0, x1, y0, y1 [m]; by default all bodies of all frames that are shown
+    limits: tuple | None = None
+    #: Least and greatest value of the scale of colours; found from the frames if absent
+    colour_range: tuple | None = None
+    #: Colour map of matplotlib; that of the quantity if absent
+    colours: str | None = None
+    #: Force that has the widest line [N/m]; found from the frames if absent
+    greatest_force: float | None = None
+    #: Pressure that has the longest cross [N/m2]; found from the frames if absent
+    greatest_stress: float | None = None
+    #: Grid of the quadtree
+    grid: CellGrid | None = field(default=None, compare=False)
+
+    @property
+    def quantity(self) -> Quantity | None:
+        """The quantity of the colours."""
+        return QUANTITIES.get(self.colour)
+
+    def colour_map(self, quantity: Quantity) -> Colormap:
+        """The colour map."""
+        colours = matplotlib.colormaps[self.colours or quantity.colours].with_extremes(bad=UNKNOWN_COLOUR)
+        return colours.resampled(quantity.count) if quantity.count else colours
+
+    @property
+    def needs_contacts(self) -> bool:
+        """Whether contacts must be read."""
+        return any(name in NEED_CONTACTS for name in self.show) or bool(self.quantity and self.quantity.needs_contacts)
+
+    def check(self) -> None:
+        """Refuse what is not known."""
+        if self.colour != "none" and self.colour not in QUANTITIES:
+            raise ResultError(f"there is no colour {self.colour}; there are {', '.join(QUANTITIES)} and none")
+        for name in self.show:
+            if name not in OVERLAYS:
+                raise ResultError(f"{name} cannot be shown; there are {', '.join(OVERLAYS)}")
+        if self.colours is not None and self.colours not in matplotlib.colormaps:
+            raise ResultError(f"there is no colour map {self.colours}; there are viridis, cividis, inferno, magma, "
+                              "plasma, coolwarm, PuOr, twilight and the others of matplotlib")
+
+
+@dataclass(frozen=True)
+class SettledLook(Look):
+    """A look that leaves nothing open."""
+
+    limits: tuple[float, float, float, float] = (0.0, 1.0, 0.0, 1.0)
+    colour_range: tuple[float, float] = (0.0, 1.0)
+    greatest_force: float = 0.0
+    greatest_stress: float = 0.0
+
+
+class _Extent:
+    """What all frames together span."""
+
+    def __init__(self) -> None:
+        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
+        self.values: list[np.ndarray] = []
+        self.forces: list[np.ndarray] = []
+        self.stresses: list[np.ndarray] = []
+
+    def add(self, frame: Frame, look: Look) -> None:
+        """Take a frame into account."""
+        if len(frame.vertex):
+            self.low = np.minimum(self.low, frame.vertex.min(axis=0))
+            self.high = np.maximum(self.high, frame.vertex.max(axis=0))
+        free = ~frame.fixed
+        if look.quantity and look.colour_range is None:
+            self.values.append(look.quantity.values(frame)[free])
+        if "forces" in look.show and look.greatest_force is None:
+            self.forces.append(frame.contacts.force_magnitude)
+        if "stress" in look.show and look.greatest_stress is None:
+            self.stresses.append(np.abs(np.linalg.eigvalsh(stress(frame)[free])).max(axis=1, initial=0.0))
+
+    def settle(self, look: Look) -> SettledLook:
+        """The look with all that was left open."""
+        limits, colour_range = look.limits, look.colour_range
+        if limits is None:
+            if not np.all(np.isfinite(self.low)):
+                raise ResultError("there are no bodies to draw")
+            margin = 0.02 * max(self.high - self.low)
+            limits = (self.low[0] - margin, self.high[0] + margin, self.low[1] - margin, self.high[1] + margin)
+        elif np.any(self.high < limits[::2]) or np.any(self.low > limits[1::2]):
+            spans = (f"{axis} {low:.4g} to {high:.4g} m" for axis, low, high in zip("xy", self.low, self.high))
+            raise ResultError(f"no body is within the limits {','.join(f'{side:g}' for side in limits)}; the bodies "
+                              f"are at {', '.join(spans)}")
+        if colour_range is None:
+            colour_range = range_of(look.quantity, _joined(self.values)) if look.quantity else (0.0, 1.0)
+        return SettledLook(look.colour, look.show, limits, colour_range, look.colours,
+                           look.greatest_force or _covered(self.forces),
+                           look.greatest_stress or _covered(self.stresses), look.grid)
+
+
+def _joined(parts: list[np.ndarray]) -> np.ndarray:
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _covered(parts: list[np.ndarray]) -> float:
+    values = _joined(parts)
+    return float(np.percentile(values, COVERED_FORCES)) if len(values) else 0.0
+
+
+def settle(trajectory: Trajectory, numbers: list[int], look: Look) -> SettledLook:
+    """Find from frames what a look leaves open: limits, ranges and the grid of the quadtree."""
+    look.check()
+    if look.needs_contacts and not trajectory.has_contacts:
+        named = [name for name in look.show if name in NEED_CONTACTS] or [look.colour]
+        raise ResultError(f"{trajectory.folder}: holds no contacts, which {named[0]} needs; run with "
+                          "output.contacts = .true.")
+    extent = _Extent()
+    for frame in trajectory[numbers]:
+        extent.add(frame, look)
+    if "cells" in look.show:
+        look = replace(look, grid=cell_grid(trajectory[0]))
+    return extent.settle(look)
+
+
+class Bodies:
+    """Some bodies in axes. Their outlines are views of one array, so moving them costs little."""
+
+    def __init__(self, axis: Axes, frame: Frame, rows: np.ndarray, **style):
+        start = frame.vertex_start
+        self.rows = np.flatnonzero(rows)
+        count = np.diff(start)[self.rows]
+        ends = np.cumsum(count + 1)
+        begins = ends - count - 1
+        # Each outline and one row more, in which a closed path needs a point.
+        self._chosen = np.repeat(start[self.rows] - begins, count + 1) + np.arange(ends[-1] if len(ends) else 0)
+        self._chosen[ends - 1] = start[self.rows]
+        self._vertices = frame.vertex[self._chosen]
+        paths = [Path(self._vertices[a:b], closed=True) for a, b in zip(begins, ends)]
+        self.artist = PathCollection(paths, **style)
+        axis.add_collection(self.artist, autolim=False)
+
+    def move(self, frame: Frame, look: SettledLook) -> None:
+        """Move them to where they are in another frame."""
+        self._vertices[:] = frame.vertex[self._chosen]
+        if look.quantity and self.artist.get_array() is not None:
+            self.artist.set_array(look.quantity.values(frame)[self.rows])
+
+
+def draw_bodies(axis: Axes, frame: Frame, look: SettledLook) -> tuple[Bodies, Bodies]:
+    """Draw the fixed and the free bodies."""
+    fixed = frame.fixed
+    walls = Bodies(axis, frame, fixed, facecolor=WALL_COLOUR, edgecolor="none", zorder=1)
+    grains = Bodies(axis, frame, ~fixed, facecolor=PLAIN_COLOUR, edgecolor="black", linewidth=0.2, zorder=2)
+    if look.quantity:
+        grains.artist.set(array=look.quantity.values(frame)[grains.rows], cmap=look.colour_map(look.quantity),
+                          norm=Normalize(*look.colour_range))
+    return walls, grains
+
+
+def overlays(axis: Axes, frame: Frame, look: SettledLook) -> list[PathCollection]:
+    """Draw what is laid over the bodies. Widths are in units of the axes, which must have their final size."""
+    makers = {"cells": _cells, "boxes": _boxes, "stress": _stresses, "forces": _forces, "contacts": _contacts}
+    drawn = [artist for name, make in makers.items() if name in look.show
+             for artist in make(frame, look, points_per_metre(axis))]
+    for order, artist in enumerate(drawn):
+        artist.set_zorder(3 + order)
+        axis.add_collection(artist, autolim=False)
+    return drawn
+
+
+def points_per_metre(axis: Axes) -> float:
+    """Points of a line width (1/72 inch) per metre of the axes."""
+    inverse = axis.transData.transform([(0.0, 0.0), (1.0, 0.0)])
+    return float(inverse[1, 0] - inverse[0, 0]) * 72.0 / axis.figure.dpi
+
+
+def fit_outlines(grains: Bodies, frame: Frame, scale: float) -> None:
+    """Give the outlines of bodies a width that suits the size in which they are drawn."""
+    grains.artist.set_linewidth(float(np.clip(OUTLINE * _typical_size(frame) * scale, *OUTLINES)))
+
+
+def force_width(frame: Frame, scale: float) -> float:
+    """Width in points of the line of the greatest force."""
+    return float(np.clip(WIDEST_FORCE * _typical_size(frame) * scale, 1.0, WIDEST_LINE))
+
+
+def _typical_size(frame: Frame) -> float:
+    """Median equivalent diameter of the free bodies [m]."""
+    free = ~frame.fixed
+    return float(np.median(frame.equivalent_diameter[free])) if free.any() else 0.0
+
+
+def _forces(frame: Frame, look: SettledLook, scale: float) -> list[PathCollection]:
+    """Each contact as lines from the two centres to its point, as wide as its force is large."""
+    contacts = frame.contacts
+    if not look.greatest_force or not len(contacts):
+        return []
+    # A wall is large, and its centre may be anywhere: draw no line to it.
+    ends = [np.where(frame.fixed[rows][:, None], contacts.point, frame.position[rows])
+            for rows in (contacts.first_index, contacts.second_index)]
+    widths = np.minimum(contacts.force_magnitude / look.greatest_force, 1.0) * force_width(frame, scale)
+    lines = np.stack([ends[0], contacts.point, ends[1]], axis=1)
+    # Lines of about the same width are one path, which is drawn much faster.
+    steps = np.ceil(np.clip(widths / widths.max(initial=1e-9), 0.0, 1.0) * WIDTHS).astype(int)
+    used = [step for step in range(1, WIDTHS + 1) if (steps == step).any()]
+    paths = [_strokes(lines[steps == step]) for step in used]
+    means = [float(widths[steps == step].mean()) for step in used]
+    return [PathCollection(paths, linewidths=means, edgecolor=FORCE_COLOUR, facecolor="none", capstyle="round")]
+
+
+def _strokes(lines: np.ndarray) -> Path:
+    """One path of lines of the same number of points, (lines, points, 2)."""
+    codes = np.full(lines.shape[:2], Path.LINETO, dtype=Path.code_type)
+    codes[:, 0] = Path.MOVETO
+    return Path(lines.reshape(-1, 2), codes.ravel())
+
+
+def _lines(lines: np.ndarray, width: float, colour: str) -> PathCollection:
+    return PathCollection([_strokes(lines)], linewidths=[width], edgecolor=colour, facecolor="none")
+
+
+def _contacts(frame: Frame, look: SettledLook, scale: float) -> list[PathCollection]:
+    """The contact points as crosses."""
+    point, size = frame.contacts.point, 0.07 * _typical_size(frame)
+    lines = [np.stack([point - arm, point + arm], axis=1) for arm in (np.array([size, size]), np.array([size, -size]))]
+    return [_lines(np.concatenate(lines), float(np.clip(0.5 * size * scale, 0.3, 1.2)), CONTACT_COLOUR)]
+
+
+def _boxes(frame: Frame, look: SettledLook, scale: float) -> list[PathCollection]:
+    x0, y0, x1, y1 = frame.bounds[~frame.fixed].T
+    outlines = np.stack([x0, y0, x1, y0, x1, y1, x0, y1, x0, y0], axis=1).reshape(-1, 5, 2)
+    return [_lines(outlines, 0.5, BOX_COLOUR)]
+
+
+def _cells(frame: Frame, look: SettledLook, scale: float) -> list[PathCollection]:
+    if look.grid is None:
+        return []
+    cells = tree_cells(look.grid, frame.bounds)
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]])
+    return [_lines(cells.low[:, None, :] + cells.side[:, None, None] * corners, 0.5, CELL_COLOUR)]
+
+
+def _stresses(frame: Frame, look: SettledLook, scale: float) -> list[PathCollection]:
+    """Each free body's principal stresses as a cross; the longest as long as the bodies are wide."""
+    free = ~frame.fixed
+    if not look.greatest_stress or not free.any():
+        return []
+    values, axes = np.linalg.eigh(stress(frame)[free])
+    size = 0.9 * _typical_size(frame)
+    half = 0.5 * size * np.minimum(np.abs(values) / look.greatest_stress, 1.0)
+    arm = half[:, :, None] * axes.transpose(0, 2, 1)
+    centre = frame.position[free][:, None, :]
+    lines = np.stack([centre - arm, centre + arm], axis=2)
+    width = float(np.clip(0.1 * size * scale, 0.4, 2.0))
+    return [_lines(lines[values >= 0.0], width, COMPRESSED_COLOUR), _lines(lines[values < 0.0], width, PULLED_COLOUR)]
+
+
+def legend_of(frame: Frame, look: SettledLook, scale: float) -> list[Line2D]:
+    """What the overlays are, with a scale of the widths of forces and the lengths of crosses."""
+    lines = []
+    for name in look.show:
+        if name == "forces" and look.greatest_force:
+            widest = force_width(frame, scale)
+            lines += [Line2D([], [], color=FORCE_COLOUR, linewidth=share * widest, solid_capstyle="butt",
+                             label=f"force {share * look.greatest_force:.3g} N/m{more}")
+                      for share, more in ((1.0, " or more"), (0.3, ""))]
+        elif name == "stress" and look.greatest_stress:
+            lines += [Line2D([], [], color=colour, linewidth=1.2, label=label) for colour, label in (
+                (COMPRESSED_COLOUR, f"compression {look.greatest_stress:.2g} N/m2 or more"),
+                (PULLED_COLOUR, "tension"))]
+        elif name == "contacts":
+            lines.append(Line2D([], [], color=CONTACT_COLOUR, marker="x", linestyle="none", label=OVERLAYS[name]))
+        elif name in ("boxes", "cells"):
+            colour = BOX_COLOUR if name == "boxes" else CELL_COLOUR
+            lines.append(Line2D([], [], color=colour, marker="s", markerfacecolor="none", linestyle="none",
+                                label=OVERLAYS[name]))
+    return lines

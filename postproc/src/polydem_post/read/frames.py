@@ -1,0 +1,342 @@
+"""The bodies of a trajectory at one time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from ..base.polygons import FloatArray, IntArray, following, join, moments
+from ..base.result_file import ResultError, insist
+from ..bodies_file import write_frame
+from .contacts import Contacts, Walls
+from .tables import body_table
+
+#: What a contact has of its own; the rest follows from the bodies
+CONTACT_FIELDS = ("first", "second", "area", "point", "normal", "force")
+
+#: Distances of vertices that are held in memory at once
+MOST_DISTANCES = 2**20
+
+
+class FrameSource(Protocol):
+    """What gives the contacts and walls of a frame when they are asked for."""
+
+    def contacts_of(self, frame: Frame) -> Contacts:
+        """The contacts of a frame."""
+        ...
+
+    def walls_of(self, frame: Frame) -> Walls:
+        """The loads on the fixed bodies of a frame."""
+        ...
+
+    def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
+        """Which bodies have a prescribed motion."""
+        ...
+
+    def origin_for(self, frame: Frame) -> tuple[float, float]:
+        """The point that was subtracted from the coordinates of a frame [m]."""
+        ...
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Frame:
+    """The bodies at one time, in ascending order of identifiers: n bodies; SI units with unit depth.
+
+    Read from the file:
+
+        step              [1]      number of the time step
+        time              [s]      simulated time
+        id                [1]      identifiers, (n)
+        fixed             [1]      whether each body is fixed, at rest or in prescribed motion, (n)
+        position          [m]      centres of mass, (n, 2)
+        angle             [rad]    angles since the start, anticlockwise, (n)
+        velocity          [m/s]    velocities of the centres of mass, (n, 2)
+        angular_velocity  [rad/s]  angular velocities, anticlockwise, (n)
+        shape             [m]      vertices of all bodies relative to the centres of mass at angle 0, (nv, 2)
+        vertex_start      [1]      first row of each body in `shape`, from 0; at the end nv, (n + 1)
+        mass              [kg/m]   masses; infinite for a fixed body without a mass of its own, (n)
+        inertia           [kg m]   moments of inertia about the centres of mass; infinite likewise, (n)
+        number            [1]      number of the frame in the run, from 0
+
+    Everything else is computed from these when it is first asked for.
+    """
+
+    step: int
+    time: float
+    id: npt.NDArray[np.integer[Any]]
+    fixed: npt.NDArray[np.bool_]
+    position: FloatArray
+    angle: FloatArray
+    velocity: FloatArray
+    angular_velocity: FloatArray
+    shape: FloatArray
+    vertex_start: npt.NDArray[np.integer[Any]]
+    mass: FloatArray
+    inertia: FloatArray
+    number: int = 0
+    _source: FrameSource | None = field(default=None)
+
+    def __len__(self) -> int:
+        """Number of bodies."""
+        return len(self.id)
+
+    def __repr__(self) -> str:
+        """Number, time, step and bodies."""
+        return (f"<Frame {self.number}: t = {self.time:.6g} s, step {self.step}, {len(self)} bodies "
+                f"({int(self.free.sum())} free)>")
+
+    @classmethod
+    def from_polygons(cls, outlines: list[Any], *, fixed: Any = None, velocity: Any = None,
+                      angular_velocity: Any = None, density: float = 2500.0, time: float = 0.0) -> Frame:
+        """A frame of bodies with the given outlines in the world [m], each (k, 2); identifiers are 1 to n.
+
+        For analyses of data of other programs. `fixed` has a truth value per body, `velocity` [m/s] is (n, 2),
+        `angular_velocity` [rad/s] is (n); without them all bodies are free and at rest. Masses and inertias follow from
+        the density [kg/m3]; those of fixed bodies are infinite. `time` is in s.
+        """
+        vertex, start = join([np.asarray(outline, dtype=float) for outline in outlines])
+        area, centre, second = moments(vertex, start)
+        n = len(outlines)
+        held = np.zeros(n, dtype=bool) if fixed is None else np.asarray(fixed, dtype=bool)
+        return cls(
+            step=0, time=time, id=np.arange(1, n + 1), fixed=held, position=centre, angle=np.zeros(n),
+            velocity=np.zeros((n, 2)) if velocity is None else np.asarray(velocity, dtype=float),
+            angular_velocity=np.zeros(n) if angular_velocity is None else np.asarray(angular_velocity, dtype=float),
+            shape=vertex - np.repeat(centre, np.diff(start), axis=0), vertex_start=start,
+            mass=np.where(held, np.inf, density * np.abs(area)),
+            inertia=np.where(held, np.inf, density * np.abs(second)))
+
+    def with_contacts(self, first: Any, second: Any, force: Any, point: Any, normal: Any = None,
+                      area: Any = None) -> Frame:
+        """The same frame with contacts of these identifiers, (m) each.
+
+        `force` on the first body [N/m] and `point` [m] are (m, 2). `normal` [m], (m, 2), is the unit vector of the line
+        of centres and `area` [m2], (m), is 0, unless they are given.
+        """
+        names = np.asarray(first), np.asarray(second)
+        index = [_index_of(self, each) for each in names]
+        line = self.position[index[1]] - self.position[index[0]]
+        unit = line / np.hypot(line[:, 0], line[:, 1])[:, None]
+        contacts = find_contacts(self, {
+            "first": names[0], "second": names[1], "force": np.asarray(force, dtype=float).reshape(-1, 2),
+            "point": np.asarray(point, dtype=float).reshape(-1, 2),
+            "normal": unit if normal is None else np.asarray(normal, dtype=float).reshape(-1, 2),
+            "area": np.zeros(len(names[0])) if area is None else np.asarray(area, dtype=float)})
+        return replace(self, _source=_Given(contacts))
+
+    @cached_property
+    def contacts(self) -> Contacts:
+        """The contacts of this frame, m rows; the run needs output.contacts = .true. Read when first asked for."""
+        return self._given_source("contacts").contacts_of(self)
+
+    @cached_property
+    def walls(self) -> Walls:
+        """Forces and torques on the fixed bodies, w rows. Read when first asked for."""
+        return self._given_source("walls").walls_of(self)
+
+    def _given_source(self, what: str) -> FrameSource:
+        if self._source is None:
+            raise ResultError(f"this frame was made without {what}")
+        return self._source
+
+    @property
+    def free(self) -> npt.NDArray[np.bool_]:
+        """Whether each body is free, moved by forces [1], (n)."""
+        return ~self.fixed
+
+    @cached_property
+    def driven(self) -> npt.NDArray[np.bool_]:
+        """Whether each body is fixed and has a prescribed motion (scene.motion of the stored namelist) [1], (n)."""
+        return self._given_source("prescribed motions").driven_of(self)
+
+    @property
+    def static(self) -> npt.NDArray[np.bool_]:
+        """Whether each body is fixed without a prescribed motion [1], (n)."""
+        return self.fixed & ~self.driven
+
+    @cached_property
+    def vertex(self) -> FloatArray:
+        """Vertices of all bodies in the world, anticlockwise; rows as in `shape` [m], (nv, 2)."""
+        count = np.diff(self.vertex_start)
+        cosine = np.repeat(np.cos(self.angle), count)
+        sine = np.repeat(np.sin(self.angle), count)
+        x, y = self.shape[:, 0], self.shape[:, 1]
+        turned = np.column_stack([cosine * x - sine * y, sine * x + cosine * y])
+        return turned + np.repeat(self.position, count, axis=0)
+
+    @cached_property
+    def vertices(self) -> list[FloatArray]:
+        """Outline of each body in the world, anticlockwise: a list of (k, 2) arrays [m]."""
+        return np.split(self.vertex, self.vertex_start[1:-1])
+
+    @property
+    def corners(self) -> IntArray:
+        """Number of vertices of each body [1], (n)."""
+        return np.diff(self.vertex_start).astype(np.int64)
+
+    @cached_property
+    def area(self) -> FloatArray:
+        """Area of each polygon [m2], (n)."""
+        return moments(self.shape, self.vertex_start)[0]
+
+    @cached_property
+    def density(self) -> FloatArray:
+        """Density of each body: mass over area; infinite where the mass is [kg/m3], (n)."""
+        return self.mass / self.area
+
+    @property
+    def material(self) -> IntArray:
+        """Number of the material of each body [1], (n). A run has one material, number 0; densities may differ."""
+        return np.zeros(len(self), dtype=np.int64)
+
+    @cached_property
+    def radius(self) -> FloatArray:
+        """Distance of the farthest vertex of each body from its centre of mass [m], (n)."""
+        size = np.hypot(self.shape[:, 0], self.shape[:, 1])
+        return np.maximum.reduceat(size, self.vertex_start[:-1]) if len(self) else np.empty(0)
+
+    @cached_property
+    def thickness(self) -> FloatArray:
+        """Twice the smallest distance of an edge of each body from its centre of mass [m], (n)."""
+        after = self.shape[following(self.vertex_start)]
+        edge = after - self.shape
+        cross = self.shape[:, 0] * after[:, 1] - self.shape[:, 1] * after[:, 0]
+        distance = cross / np.hypot(edge[:, 0], edge[:, 1])
+        return 2.0 * np.minimum.reduceat(distance, self.vertex_start[:-1]) if len(self) else np.empty(0)
+
+    @cached_property
+    def diameter(self) -> FloatArray:
+        """Largest distance between two vertices of each body [m], (n)."""
+        largest = np.empty(len(self))
+        for corners in np.unique(self.corners):
+            rows = np.flatnonzero(self.corners == corners)
+            most = max(1, MOST_DISTANCES // int(corners) ** 2)
+            for part in np.array_split(rows, -(-len(rows) // most)):
+                points = self.shape[self.vertex_start[part][:, None] + np.arange(corners)]
+                apart = points[:, :, None, :] - points[:, None, :, :]
+                largest[part] = np.sqrt((apart**2).sum(-1).max(axis=(1, 2)))
+        return largest
+
+    @property
+    def equivalent_diameter(self) -> FloatArray:
+        """Diameter of the circle with the area of each body [m], (n)."""
+        return np.sqrt(4.0 * self.area / np.pi)
+
+    @cached_property
+    def bounds(self) -> FloatArray:
+        """Bounding box of each body: least x, least y, greatest x, greatest y [m], (n, 4)."""
+        if len(self) == 0:
+            return np.empty((0, 4))
+        low = np.minimum.reduceat(self.vertex, self.vertex_start[:-1], axis=0)
+        high = np.maximum.reduceat(self.vertex, self.vertex_start[:-1], axis=0)
+        return np.column_stack([low, high])
+
+    @property
+    def speed(self) -> FloatArray:
+        """Magnitude of each velocity [m/s], (n)."""
+        return np.hypot(self.velocity[:, 0], self.velocity[:, 1])
+
+    @property
+    def kinetic_energy(self) -> FloatArray:
+        """Kinetic energy of each free body, translation and rotation [J/m], (n); 0 for fixed bodies."""
+        mass, inertia = (np.where(self.free, each, 0.0) for each in (self.mass, self.inertia))
+        return 0.5 * (mass * self.speed**2 + inertia * self.angular_velocity**2)
+
+    @cached_property
+    def force(self) -> FloatArray:
+        """Sum of the contact forces on each body, without gravity [N/m], (n, 2).
+
+        Of free bodies it is the sum over the stored contacts, which the run must have written; of fixed bodies the
+        stored load of walls. Torques of free bodies are not stored, and do not follow from the contacts alone: with
+        tilt damping or the conservative law a contact has a torque of its own.
+        """
+        total = np.zeros((len(self), 2))
+        np.add.at(total, self.contacts.first_index, self.contacts.force)
+        np.subtract.at(total, self.contacts.second_index, self.contacts.force)
+        total[_index_of(self, self.walls.id)] = self.walls.force
+        return total
+
+    @cached_property
+    def coordination(self) -> IntArray:
+        """Number of contacts of each body [1], (n); the run must have written contacts."""
+        n = len(self)
+        return (np.bincount(self.contacts.first_index, minlength=n)
+                + np.bincount(self.contacts.second_index, minlength=n)).astype(np.int64)
+
+    def index_of(self, identifiers: Any) -> IntArray:
+        """Indices of bodies in the columns of this frame from their k identifiers [1], (k)."""
+        return _index_of(self, np.atleast_1d(identifiers))
+
+    def write_bodies(self, path: str | PathLike[str], *, overwrite: bool = False) -> int:
+        """Write the bodies as a bodies file, from which a run can start; return their number.
+
+        In the namelist: &scene name = 'file', bodies_file = the path. The file has vertices in the world, identifiers,
+        fixed bodies, velocities, angular velocities, masses and moments of inertia, all to the last bit; the centres of
+        mass of the run follow from the vertices, within rounding. Angles and time begin at 0, and friction begins
+        without history: to continue a run to the same bits, use its checkpoints. Fixed bodies have no velocity in the
+        file: give `motion` in the namelist. `bodies_file.write_bodies` writes other outlines and columns.
+        """
+        return write_frame(self, path, self._source.origin_for(self) if self._source else (0.0, 0.0), overwrite)
+
+    def to_pandas(self) -> Any:
+        """The bodies as a pandas table with the identifiers as index; vectors become two columns (position_x)."""
+        return body_table(self)
+
+
+@dataclass(frozen=True)
+class _Given:
+    """Contacts that are given with a frame; there are no walls and no motions."""
+
+    contacts: Contacts
+
+    def contacts_of(self, frame: Frame) -> Contacts:
+        return self.contacts
+
+    def walls_of(self, frame: Frame) -> Walls:
+        return Walls(np.empty(0, dtype=np.int64), np.empty((0, 2)), np.empty(0))
+
+    def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
+        return np.zeros(len(frame), dtype=bool)
+
+    def origin_for(self, frame: Frame) -> tuple[float, float]:
+        return 0.0, 0.0
+
+
+def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:
+    """Contacts from their own columns (CONTACT_FIELDS) and the bodies of the frame; indices count from 0."""
+    first, second = (_index_of(frame, columns[name]) for name in ("first", "second"))
+    return Contacts(
+        **{name: columns[name] for name in CONTACT_FIELDS}, first_index=first, second_index=second,
+        branch=frame.position[first] - frame.position[second], first_arm=columns["point"] - frame.position[first],
+        second_arm=columns["point"] - frame.position[second], with_fixed=frame.fixed[first] | frame.fixed[second])
+
+
+def _index_of(frame: Frame, identifiers: npt.NDArray[np.integer[Any]]) -> IntArray:
+    index = np.minimum(np.searchsorted(frame.id, identifiers), max(len(frame) - 1, 0)).astype(np.int64)
+    if len(identifiers) and (len(frame) == 0 or np.any(frame.id[index] != identifiers)):
+        raise ResultError(f"unknown bodies are named at step {frame.step}")
+    return index
+
+
+def sound_frame(path: Path, frame: Frame) -> Frame:
+    """The frame, if its arrays fit together."""
+    n, vertices = len(np.atleast_1d(frame.id)), len(np.atleast_1d(frame.shape))
+    names = ("id", "fixed", "position", "angle", "velocity", "angular_velocity", "shape", "vertex_start")
+    arrays = {name: getattr(frame, name) for name in names}
+    shapes: dict[str, tuple[int, ...]] = {
+        "position": (n, 2), "velocity": (n, 2), "shape": (vertices, 2), "vertex_start": (n + 1,)}
+    insist(path, "frame", arrays, {name: shapes.get(name, (n,)) for name in arrays})
+    masses = {"mass": frame.mass, "inertia": frame.inertia}
+    insist(path, "bodies", masses, dict.fromkeys(masses, (n,)), finite=False)
+    if np.isnan(frame.mass).any() or np.isnan(frame.inertia).any() or np.any(np.diff(frame.id) <= 0):
+        raise ResultError(f"{path}: bodies holds masses that are not numbers, or identifiers that do not ascend")
+    start = frame.vertex_start
+    if start[0] != 0 or start[-1] != vertices or np.any(np.diff(start) < 3):
+        raise ResultError(f"{path}: bodies/vertex_start does not fit the vertices")
+    return frame
