@@ -20,7 +20,7 @@ SCENES = {
 /
 &forces
    gravity = 0, 0 stiffness = 2e5
-   law = 'conservative' damping = 'hunt_crossley' damping_coefficient = 300
+   law = 'conservative' damping = 'hunt_crossley' damping_coefficient = 1
 /
 &integrate fraction = 0.1 duration = 0.012 /
 """,

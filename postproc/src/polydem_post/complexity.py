@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from .emit import Table
@@ -87,6 +88,7 @@ def sources_of(finder: str, folder: Path) -> list[Path]:
     return found
 
 
+@cache
 def procedures_of(path: Path) -> list[Procedure]:
     """The procedures of a file, included ones not among them."""
     tool = counter()
