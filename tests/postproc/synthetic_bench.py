@@ -1,9 +1,13 @@
 """Writes bench folders whose truth is known: every time and count follows a law that a test can choose."""
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 import h5py
 import numpy as np
+import pytest
+from polydem_lab.bench import samples
+from polydem_lab.bench.samples import Sample
 
 PHASES = ("structure", "search", "filter", "order", "merge", "waiting")
 COUNTS = (
@@ -76,6 +80,10 @@ def _named_input(name, boxes):
     return input_of(NAMED.get(first, first), boxes, *numbers[:1]) if first in ENTRIES or first in NAMED else ""
 
 
+#: Samples by path while they are kept in memory
+IN_MEMORY = None
+
+
 @dataclass
 class Truth:
     """Time per step of one finder: 1e-9 * time * boxes**exponent seconds."""
@@ -126,7 +134,6 @@ def write_sample(
     made_by=None,
 ):
     """Write one sample; `made_by` is the recorded input: by the name of the scene if absent, none if False."""
-    (folder / "samples").mkdir(parents=True, exist_ok=True)
     random = np.random.default_rng([boxes, repeat, threads, *map(ord, finder + name)])
     step = 1e-9 * truth.time * machine.slowness * float(boxes) ** truth.exponent / (truth.gain if threads > 1 else 1.0)
     turn = (repeat + threads) % 3 - 1
@@ -134,70 +141,86 @@ def write_sample(
     shares = np.array(truth.shares) * [(1.0 + truth.structure_sway) ** turn, *np.ones(len(PHASES) - 1)]
     elapsed = step * random.lognormal(0.0, noise) * np.ones(steps)
     elapsed[0] *= first
-    with h5py.File(folder / "samples" / f"{name}-{finder}-{threads}-{repeat}.h5", "w") as file:
+    facts = {
+        "scene": name,
+        "mode": mode,
+        "finder": finder,
+        "threads": threads,
+        "repeat": repeat,
+        "boxes": boxes,
+        "fixed": boxes // 10,
+        "bodies": bodies or boxes,
+        "steps": steps,
+        "dt": 2.5e-5,
+        "load": 0.1,
+        "time_utc": "2026-01-01T00:00:00Z",
+        "pair_hash": pair_hash,
+        "pairs_total": 2 * boxes * steps,
+        "checked": checked,
+        "trace": f"traces/{name}/trace.h5",
+    }
+    if made_by is not False:
+        facts["input"] = (_named_input(name, boxes) if made_by is None else made_by).strip()
+    provenance = {
+        "host": machine.host,
+        "processor": machine.processor,
+        "options": machine.options,
+        "caches": machine.caches,
+        "clock": machine.clock,
+        "precision": "double",
+        "build_type": "Release",
+        "processors": 4,
+        "revision": "abc",
+    }
+    phases = dict(zip(PHASES, np.outer(elapsed, shares).T))
+    stages = dict(zip(STAGES, np.outer(elapsed, (0.1, 1.0, 3.0, 1.0, 0.5, 0.0)).T)) if mode == "live" else {}
+    counts = {}
+    if repeat == 0:
+        counts = {count: np.full(steps, round(boxes * truth.counts.get(count, 0.0))) for count in COUNTS}
+        counts["depth"] = np.full(steps, truth.counts.get("depth", 0))
+        for count, value in (first_counts or {}).items():
+            counts[count][0] = value
+    path = folder / "samples" / f"{name}-{finder}-{threads}-{repeat}.h5"
+    pairs = np.full(steps, 2 * boxes, dtype=np.int32)
+    sample = Sample(path, facts, provenance, elapsed, elapsed, pairs, phases, counts, stages)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if IN_MEMORY is None:
+        write_file(sample)
+    else:
+        path.touch()
+        IN_MEMORY[path] = sample
+
+
+def write_file(sample):
+    """Write a sample as the program writes it."""
+    with h5py.File(sample.path, "w") as file:
         file.attrs["content"] = "sample of a bench by polydem"
         file.attrs["schema_version"] = 1
-        facts = {
-            "scene": name,
-            "mode": mode,
-            "finder": finder,
-            "threads": threads,
-            "repeat": repeat,
-            "boxes": boxes,
-            "fixed": boxes // 10,
-            "bodies": bodies or boxes,
-            "steps": steps,
-            "dt": 2.5e-5,
-            "load": 0.1,
-            "time_utc": "2026-01-01T00:00:00Z",
-            "pair_hash": pair_hash,
-            "pairs_total": 2 * boxes * steps,
-            "checked": checked,
-            "trace": f"traces/{name}/trace.h5",
-        }
-        if made_by is not False:
-            facts["input"] = _named_input(name, boxes) if made_by is None else made_by
-        write_facts(file, "case", facts)
-        write_facts(
-            file,
-            "provenance",
-            {
-                "host": machine.host,
-                "processor": machine.processor,
-                "options": machine.options,
-                "caches": machine.caches,
-                "clock": machine.clock,
-                "precision": "double",
-                "build_type": "Release",
-                "processors": 4,
-                "revision": "abc",
-            },
-        )
-        file["steps/elapsed"] = elapsed
-        file["steps/processor"] = elapsed
-        file["steps/pairs"] = np.full(steps, 2 * boxes, dtype=np.int32)
-        write_columns(file, "phase", PHASES, np.outer(elapsed, shares))
-        if mode == "live":
-            write_columns(file, "stage", STAGES, np.outer(elapsed, (0.1, 1.0, 3.0, 1.0, 0.5, 0.0)))
-        if repeat == 0:
-            values = np.array([round(boxes * truth.counts.get(count, 0.0)) for count in COUNTS])
-            values[COUNTS.index("depth")] = truth.counts.get("depth", 0)
-            table = np.tile(values, (steps, 1))
-            for count, value in (first_counts or {}).items():
-                table[0, COUNTS.index(count)] = value
-            write_columns(file, "count", COUNTS, table)
+        write_facts(file, "case", sample.case)
+        write_facts(file, "provenance", sample.provenance)
+        for name in ("elapsed", "processor", "pairs"):
+            file[f"steps/{name}"] = getattr(sample, name)
+        for what, columns in (("phase", sample.phases), ("count", sample.counts), ("stage", sample.stages)):
+            if columns:
+                file[f"steps/{what}_name"] = np.array([name.ljust(12).encode() for name in columns])
+                file[f"steps/{what}"] = np.array(list(columns.values())).T
+
+
+@contextmanager
+def kept_in_memory():
+    """Meanwhile samples are not written as files but kept, and read from memory: hundreds of times as fast."""
+    global IN_MEMORY  # noqa: PLW0603
+    IN_MEMORY = {}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(samples, "read_sample", lambda path: IN_MEMORY[path])
+        yield
+    IN_MEMORY = None
 
 
 def write_facts(file, group, facts):
     """Texts as the Fortran program writes them, of fixed length, and numbers."""
     for name, value in facts.items():
         file[f"{group}/{name}"] = np.bytes_(value or " ") if isinstance(value, str) else value
-
-
-def write_columns(file, what, names, table):
-    """A table with the names of its columns."""
-    file[f"steps/{what}_name"] = np.array([name.ljust(12).encode() for name in names])
-    file[f"steps/{what}"] = table
 
 
 def truths():

@@ -12,7 +12,7 @@ from polydem_lab.bench.samples import build_label, read_bench
 from polydem_lab.bench.scene_kinds import OTHER, kind_of, settings_of
 from polydem_lab.bench.statistics import median
 from polydem_post.base.result_file import ResultError
-from synthetic_bench import ENTRIES, Machine, Truth, input_of, truths, write_drums, write_sample
+from synthetic_bench import ENTRIES, Machine, Truth, input_of, kept_in_memory, truths, write_drums, write_sample
 
 TRUTH = Truth(40.0, counts={"swaps": 0.25})
 
@@ -257,3 +257,14 @@ def test_the_scenes_of_the_benches_are_of_their_kinds(name, kind):
     told = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     assert kind_of(settings_of(told)) == kind
     assert sorted(path.stem for path in scene.parent.glob("*.nml")) == sorted(SCENES_OF_BENCHES)
+
+
+@pytest.mark.parametrize("options", [{"repeat": 0, "first_counts": {"swaps": 7}}, {"mode": "live"}, {"made_by": False}])
+def test_a_sample_kept_in_memory_is_the_one_of_the_file(tmp_path, options):
+    def sample(folder):
+        write_sample(folder, "drum_2522", "quadtree", truths()["quadtree"], 2522, **options)
+        return [each for case in read_bench([folder]).cases for each in case.samples][0]
+
+    with kept_in_memory():
+        kept = sample(tmp_path)
+    np.testing.assert_equal(vars(sample(tmp_path)), vars(kept))

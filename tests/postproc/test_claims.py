@@ -22,7 +22,7 @@ from polydem_lab.claims.verdicts import (
     verdict_table,
 )
 from polydem_lab.costs import complexity
-from synthetic_bench import Machine, input_of, truths, write_drums, write_hard_scenes, write_sample
+from synthetic_bench import Machine, input_of, kept_in_memory, truths, write_drums, write_hard_scenes, write_sample
 
 SIZES = (2522, 5058, 12651, 100000)
 SLOWER = Machine("beta", "AMD EPYC", clock="3.3 GHz", slowness=1.3)
@@ -53,6 +53,13 @@ def changed(finder, **changes):
     counts = changes.pop("counts", {})
     finders[finder] = replace(finders[finder], counts={**finders[finder].counts, **counts}, **changes)
     return finders
+
+
+@pytest.fixture(scope="module", autouse=True)
+def in_memory():
+    """Benches of hundreds of samples; that those of files are the same, test_bench.py shows."""
+    with kept_in_memory():
+        yield
 
 
 @pytest.fixture(scope="module")

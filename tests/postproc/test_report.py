@@ -18,7 +18,7 @@ from polydem_lab.report.style import LOOKS
 from polydem_lab.tables import bench_tables, paper_tables
 from polydem_lab.tables.slope_tables import slopes
 from polydem_post.command_line.main import main
-from synthetic_bench import Machine, input_of, truths, write_drums, write_hard_scenes, write_sample
+from synthetic_bench import Machine, input_of, kept_in_memory, truths, write_drums, write_hard_scenes, write_sample
 
 FIGURES = (
     "all_scenes",
@@ -63,6 +63,13 @@ CACHE = """scene,boxes,finder,few,more,instructions,accesses,first_level,last_le
 drum_2522,2522,quadtree,2,12,200.0,90.0,2.9,0.2,-1.0,"D1 32 KiB 8-way, LL 1 MiB 16-way",not available
 drum_5058,5058,quadtree,2,12,200.0,90.0,3.1,0.9,-1.0,"D1 32 KiB 8-way, LL 1 MiB 16-way",not available
 """
+
+
+@pytest.fixture(scope="module", autouse=True)
+def in_memory():
+    """The samples; test_bench.py reads those of files."""
+    with kept_in_memory():
+        yield
 
 
 @pytest.fixture(scope="module")

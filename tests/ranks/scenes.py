@@ -18,7 +18,7 @@ SCENES = {
 &motion name = 'turn' kind = 'rotation' bodies = 122, 123 rate = 2.0 ramp = 5e-3 /
 &forces
    gravity = 0, 0 stiffness = 2e5
-   law = 'conservative' damping = 'hunt_crossley' damping_coefficient = 300
+   law = 'conservative' damping = 'hunt_crossley' damping_coefficient = 1
 /
 &integrate fraction = 0.1 duration = 0.012 /
 """,

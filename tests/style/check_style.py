@@ -1,314 +1,254 @@
-"""The rules of this project that a machine can check; .fortitude.toml and .ruff.toml have the generic ones.
+"""The rules of this project that fortitude, ruff and the compiler do not have.
 
 usage: check_style.py ROOT      prints file:line: what is wrong, and ends with code 1 if anything is
 """
 
-import os
 import re
+import subprocess
 import sys
+from pathlib import Path
 
-from fortran_source import Source, split_commas
-from tracked_files import tracked_files
+LONGEST_FILE, LONGEST_PROCEDURE = 400, 60
+#: Columns by suffix; 124 is what pFUnit can take
+WIDEST = {".pf": 124, **dict.fromkeys((".js", ".css", ".html", ".sh", ""), 120)}
+TEXTS = {".f90", ".in", ".pf", ".py", ".cmake", ".txt", ".md", ".json", ".toml", ".nml", ".cff", ".yaml"} | set(WIDEST)
+FOLDERS = {"src", "tests", "postproc", "inputs"}
+TOP_LEVEL = FOLDERS | {".ci", ".editorconfig", ".fortitude.toml", ".fprettify.rc", ".gitignore", ".ruff.toml",
+                       "CITATION.cff", "CMakeLists.txt", "CMakePresets.json", "LICENSE", "README.md", "polydem"}
 
-WIDEST = {".pf": 124, **dict.fromkeys((".js", ".css", ".html", ".sh", ""), 120)}  # columns; 124: what pFUnit can take
-LONGEST_FILE = 400
-LONGEST_PROCEDURE = 60
-TEXTS = (".f90", ".in", ".pf", ".py", ".cmake", ".txt", ".md", ".json", ".toml", ".nml", ".cff", ".js", ".css", ".html",
-         ".sh", ".yaml")
-TREES = ("src", "tests", "postproc", "inputs")
-REAL_LITERAL = re.compile(r"(?<![\w.])(?:\d+\.\d*|\.\d+)(?:[ed][+-]?\d+)?(?![\w.])|(?<![\w.])\d+[ed][+-]?\d+\b")
-KIND_OF_NUMBER = re.compile(r"(?<!\w)(?:\d+\.?\d*|\.\d+)(?:[ed][+-]?\d+)?_(?=[a-z])")
+#: What no statement may have: pattern, path of files that may have it, message
+FORBIDDEN = [(re.compile(pattern), re.compile(allowed), message) for pattern, allowed, message in (
+    (r"^(if *\(.*\) *)?((error +)?stop\b(?! *[=%(])|call +(exit|abort)\b)", "^src/app/",
+     "only the program in src/app stops"),
+    (r"\bcall +omp_set_num_threads\b", "^src/(app|laboratory|run)/",
+     "the layers app, laboratory and run set the threads"),
+    (r"^(save|data)\b(?! *[=%(])|^[^:]*, *save\b[^:]*::", "^$", "no save, no data: state lives in arguments"),
+    (r"^#", "^$", "no preprocessor: CMake chooses files"),
+    (r"\bgo *to\b", "^$", "go to is not used here"),
+    (r"^(?!!).*(?<![\w.])(\d+\.\d*|\.\d+|\d+(?=[ed][+-]?\d))([ed][+-]?\d+)?(?![\w.])", "^$",
+     "a real number without a kind"),
+    (r"%(law|damping|friction) *(==|/=)", "/force_law.f90$",
+     "only `choose_parts` of force_law.f90 knows these words"),
+    (r"(?<![%\w])(a?(sin|cos|tan)h?|atan2|exp|log|log10|(log_)?gamma|hypot|norm2|erf(c(_scaled)?)?|bessel_[jy].) *\(",
+     "/elementary.f90$", "the bits of this intrinsic depend on the machine; see base/arithmetic/elementary.f90"),
+    (r"\*\* *\(? *[-+]? *(\d+\.|\.\d|sqrt\b|real\b)", "^$",
+     "the bits of a power with a real exponent depend on the machine"),
+    (r"^!\$omp (parallel|task|teams)\b(?!.*\bdefault *\( *none *\))", "^$", "an OpenMP region without default(none)"),
+    (r"^!\$omp.*\breduction *\( *[-+*]", "^$", "a sum by reduction depends on the number of threads"),
+    (r"^!\$omp (atomic|critical|ordered)\b", "^$", "write disjointly and sum in a fixed order"),
+    (r"^!\$omp parallel.*\bnum_threads\b", "^$",
+     "a smaller team ends threads, which the next one starts again; use if"),
+)]
+DECLARATION = re.compile(r"(integer|real|logical|complex|character|type|class|procedure)\b[^:]*::")
+OPENING = [(kind, re.compile(pattern)) for kind, pattern in (
+    ("module", r"module +(?!procedure\b)(\w+)$"),
+    ("program", r"program +(\w+)$"),
+    ("module", r"submodule *\([^)]*\) *(\w+)$"),
+    ("interface", r"(?:abstract +)?interface\b *(.*)$"),
+    ("type", r"type *(?:,[^:]*)?(?::: *| )(\w+)$"),
+    ("procedure", r"(?:(?:[a-z]\w*|[a-z]\w* *\([^()]*(?:\([^()]*\)[^()]*)*\)) +)*(?:subroutine|function) +(\w+)"),
+)]
+ENDING = re.compile(r"end *(module|submodule|program|type|interface|subroutine|function)\b")
 
-#: Functions whose bits depend on the processor and its library
-INTRINSIC = re.compile(r"(?<![%\w])(a?(?:sin|cos|tan)h?|atan2|exp|log|log10|log_gamma|gamma|hypot|norm2|erfc?|"
-                       r"erfc_scaled|bessel_[jy][01n])\s*\(")
-REAL_POWER = re.compile(r"\*\*\s*\(?\s*[-+]?\s*(?:\d+\.|\.\d|sqrt\b|real\b)")
 
-# --- rules of one line -------------------------------------------------------------------------------------------
+class Scope:
+    """A module, interface, type or procedure, with the statements that stand directly in it."""
+
+    def __init__(self, kind="file", name="", line=0, code="", outer=None):
+        self.kind, self.name, self.line, self.code, self.outer = kind, name, line, code, outer
+        self.length, self.statements = 0, []
+
+    def declarations(self):
+        """Line, code, and names of the declarations that stand directly in it, before its `contains`."""
+        for line, code in self.statements:
+            if code == "contains":
+                return
+            if DECLARATION.match(code):
+                yield line, code, [re.match(r"\w*", part.strip())[0] for part in split_commas(code.split("::", 1)[1])]
+
+
+def statements_of(lines):
+    """Line and code of each statement: joined, in lower case, strings empty, comments gone but those of OpenMP."""
+    code, first = "", 0
+    for number, line in enumerate(lines, 1):
+        text = re.sub(r"'[^']*'|\"[^\"]*\"", "''", line.strip().lower())
+        text = "!$omp " + text[5:].lstrip(" &") if text.startswith("!$omp") else text.partition("!")[0].strip()
+        if not text or (code and code.startswith("!$omp") != text.startswith("!$omp")):
+            continue
+        first = first if code else number
+        code = code + " " + text.removeprefix("!$omp ").lstrip("& ") if code else text
+        if code.endswith("&"):
+            code = code.rstrip("& ")
+            continue
+        yield first, code
+        code = ""
+
+
+def scopes_of(statements):
+    """All scopes, the file itself first."""
+    scopes = [Scope()]
+    stack = list(scopes)
+    for line, code in statements:
+        if ENDING.match(code) and len(stack) > 1:
+            scope = stack.pop()
+            scope.length = line - scope.line + 1
+            continue
+        opened = next(((kind, match[1]) for kind, pattern in OPENING if (match := pattern.match(code))), None)
+        if opened and not code.startswith("!"):
+            stack.append(Scope(*opened, line, code, stack[-1]))
+            scopes.append(stack[-1])
+        else:
+            stack[-1].statements.append((line, code))
+    return scopes
+
+
+def split_commas(text):
+    """Split at commas that stand outside parentheses."""
+    while (inner := re.sub(r"[(\[][^()\[\]]*[)\]]", "", text)) != text:
+        text = inner
+    return text.split(",")
+
+
+# --- rules --------------------------------------------------------------------------------------------------------
 
 def check_lines(path, lines):
     """Rules of every text file."""
-    widest = WIDEST.get(os.path.splitext(path)[1])
+    widest = WIDEST.get(Path(path).suffix, 10000)
     for number, text in enumerate(lines, 1):
-        if text != text.rstrip():
-            yield number, "blanks at the end of the line"
-        if "\t" in text:
-            yield number, "a tabulator"
+        if text != text.rstrip() or "\t" in text:
+            yield number, "blanks at the end of the line, or a tabulator"
         if re.search(r"\b(TO" r"DO|FIX" r"ME|X" r"XX)\b", text):
             yield number, "an open issue belongs to the issues, not to the sources"
-        if widest and len(text) > widest:
+        if len(text) > widest:
             yield number, f"{len(text)} columns, more than {widest}"
     if lines[-1] != "" or lines[-2:] == ["", ""]:
         yield len(lines), "the file must end with one newline"
 
 
-# --- rules of one statement --------------------------------------------------------------------------------------
-
-def check_statements(source, layer):
-    """Rules that need to see a statement and its scopes."""
-    for statement in source.statements:
-        if os.path.basename(source.path) != "elementary.f90":
-            for name in INTRINSIC.findall(statement.code):
-                yield statement.line, (f"{name}: the bits of this intrinsic depend on the machine; "
-                                       "see base/arithmetic/elementary.f90")
-        if REAL_POWER.search(statement.code):
-            yield statement.line, "the bits of a power with a real exponent depend on the machine"
-        for message in [*of_any(statement, layer), *of_declaration(statement), *of_directive(statement)]:
-            yield statement.line, message
-        if is_pointer(statement) and not any("c_f_pointer" in other.code
-                                             for other in source.inside(statement.scopes[-1])):
-            yield statement.line, "no pointers: use allocatables and integer links (only c_f_pointer needs one)"
-
-
-def is_pointer(statement):
-    """Whether a statement declares a pointer."""
-    return statement.is_declaration and statement.scopes and re.search(r",\s*pointer\b", statement.attributes)
-
-
-#: Arguments that are named by a shorter form of the name of their type
-SHORT_NAMES = {"communicator": "comm"}
-
-#: Stages that have the name of a namelist group, not that of the layer that does the work
-STAGES_OF_LAYERS = {"output": "io"}
-#: Table of namelist entries, which names the groups
-TABLE = os.path.join("src", "config", "entries.txt")
+def check_source(path, lines):
+    """Rules of a Fortran source of src."""
+    statements = list(statements_of(lines))
+    scopes = scopes_of(statements)
+    for line, code in statements:
+        yield from ((line, message) for pattern, allowed, message in FORBIDDEN
+                    if pattern.search(code) and not allowed.search(path))
+    if len(lines) - 1 > LONGEST_FILE:
+        yield len(lines) - 1, f"{len(lines) - 1} lines, more than {LONGEST_FILE}"
+    makes_pointers = any("c_f_pointer" in code for _, code in statements)
+    for scope in scopes:
+        if scope.kind == "procedure" and scope.length > LONGEST_PROCEDURE:
+            yield scope.line, f"{scope.name} has {scope.length} lines, more than {LONGEST_PROCEDURE}"
+        for line, code, _ in scope.declarations():
+            attributes = code.split("::")[0]
+            if scope.kind == "module" and not re.search(r"\bparameter\b|^procedure", attributes):
+                yield line, "a variable of a module: state lives in arguments"
+            if re.search(r", *pointer\b", attributes) and not makes_pointers:
+                yield line, "no pointers: use allocatables and integer links (only c_f_pointer needs one)"
+        module, stem = f"{scope.name}_", f"polydem_{Path(path).stem}_"
+        if scope.kind == "module" and scope.code.startswith("module ") and not stem.startswith(module):
+            yield scope.line, f"module {scope.name} is not named as its file"
+    yield from check_imports(statements)
+    yield from check_comments(scopes, lines)
 
 
-def of_any(statement, layer):
-    """Statements that are nowhere allowed, or only in one layer."""
-    code = statement.code
-    if re.match(r"use\b.*\b(hdf5|h5lt|h5ds)\b\s*,", code) and layer != "hdf5":
-        yield "the library HDF5 is used in the layer hdf5 only"
-    if re.match(r"use\b.*\bmpi(_f08)?\b\s*,", code) and layer not in ("hdf5", "communicator"):
-        yield "MPI is used in the layers communicator and hdf5 only"
-    if re.match(r"(if\s*\(.*\)\s*)?(error\s+)?stop\b(?!\s*[=%(])", code) and layer != "app":
-        yield "only the program in src/app stops"
-    if re.search(r"\bcall\s+omp_set_num_threads\b", code) and layer not in ("app", "laboratory", "run"):
-        yield "the number of threads is set in the layers app, laboratory and run only"
-    if re.match(r"(if\s*\(.*\)\s*)?call\s+(exit|abort)\b", code) and layer != "app":
-        yield "only the program in src/app stops"
-    if re.match(r"(save|data|include)\b(?!\s*[=%(])", code) or re.match(r"save\s*/", code):
-        yield f"{code.split()[0]} is not used here"
-    if code.startswith("#"):
-        yield "no preprocessor: CMake chooses files"
-    if re.search(r"\bgo\s*to\b", code):
-        yield "go to is not used here"
-    if not code.startswith("!$omp"):
-        for literal in REAL_LITERAL.findall(code):
-            yield f"the real number {literal} has no kind"
-    if re.search(r"%(law|damping|friction)\s*(==|/=)", code) and statement.scopes[-1].name != "choose_parts":
-        yield "only `choose_parts` of the factory knows the words of force parts in the namelist"
-
-
-def of_declaration(statement):
-    """Declarations: no hidden or shared state."""
-    if not statement.is_declaration or not statement.scopes:
-        return
-    attributes, scope = statement.attributes, statement.scopes[-1]
-    if re.search(r",\s*save\b", attributes):
-        yield "no save: state lives in arguments"
-    elif scope.kind in ("module", "submodule") and not (
-            "parameter" in attributes or attributes.startswith("procedure")):
-        yield "a variable of a module: state lives in arguments"
-
-
-def of_directive(statement):
-    """OpenMP: everything said, nothing that depends on the number of threads."""
-    code = statement.code
-    if not code.startswith("!$omp"):
-        return
-    if re.match(r"!\$omp (parallel|task|teams)\b", code) and not re.search(r"default\s*\(\s*none\s*\)", code):
-        yield "an OpenMP region without default(none)"
-    if re.search(r"\breduction\s*\(\s*[-+*]", code):
-        yield "a sum by reduction depends on the number of threads"
-    if re.match(r"!\$omp (atomic|critical|ordered)\b", code):
-        yield f"{code.split()[1]}: write disjointly and sum in a fixed order"
-    if code.startswith("!$omp parallel") and re.search(r"\bnum_threads\b", code):
-        yield "num_threads: a smaller team ends threads, and the next team starts them again; use if"
-
-
-# --- rules of one file -------------------------------------------------------------------------------------------
-
-def check_scopes(source):
-    """Rules of modules and procedures."""
-    if len(source.lines) - 1 > LONGEST_FILE:
-        yield len(source.lines) - 1, f"{len(source.lines) - 1} lines, more than {LONGEST_FILE}"
-    for scope in source.scopes:
-        if not scope.first.scopes and not source.has_comment_above(scope.first):
-            yield scope.first.line, f"no comment !> above {scope.kind} {scope.name}"
-        length = scope.last.line - scope.first.line + 1 if scope.last else 0
-        if scope.kind == "procedure" and length > LONGEST_PROCEDURE:
-            yield scope.first.line, f"{scope.name} has {length} lines, more than {LONGEST_PROCEDURE}"
-
-
-def check_imports(source):
+def check_imports(statements):
     """Every name of a use statement occurs elsewhere, alone or as the kind of a number such as 1.0_wp."""
-    imports, others = [], []
-    for statement in source.statements:
-        match = re.match(r"use\b.*\bonly\s*:(.*)", statement.code)
-        if match:
-            imports.extend((statement.line, name.split("=>")[0].strip()) for name in split_commas(match.group(1)))
-        else:
-            others.append(statement.code)
-    words = {word for code in others for word in re.findall(r"[a-z]\w*", KIND_OF_NUMBER.sub(" ", code))}
-    for line, name in imports:
-        if re.fullmatch(r"\w+", name) and name not in words:
-            yield line, f"{name} is not used"
+    others = " ".join(code for _, code in statements if not re.match(r"use\b", code))
+    words = set(re.findall(r"[a-z]\w*", re.sub(r"(?<!\w)(\d+\.?\d*|\.\d+)([ed][+-]?\d+)?_(?=[a-z])", " ", others)))
+    for line, code in statements:
+        match = re.match(r"use\b.*\bonly *:(.*)", code)
+        for name in match[1].split(",") if match else ():
+            name = name.split("=>")[0].strip()
+            if re.fullmatch(r"\w+", name) and name not in words:
+                yield line, f"{name} is not used"
 
 
-def check_documentation(source):
-    """A comment !> above what others see."""
-    public = public_names(source)
-    inherited = bound_names(source, extending=True)
-    for scope in source.scopes:
-        outer = scope.first.scopes[-1] if scope.first.scopes else None
-        in_interface = outer is not None and outer.kind == "interface"
-        if scope.kind == "type":
-            if not source.has_comment_above(scope.first):
-                yield scope.first.line, f"no comment !> above type {scope.name}"
-            yield from undocumented(source, scope, None)
-        elif scope.kind == "procedure" and (scope.name in public or in_interface):
-            if not source.has_comment_above(scope.first):
-                yield scope.first.line, f"no comment !> above {scope.name}"
-            # The arguments are explained once: by the manual of a C function, by the abstract type of an extension.
-            if "bind(c" not in scope.first.code.replace(" ", "") and scope.name not in inherited:
-                yield from undocumented(source, scope, arguments_of(scope.first.code))
+def check_comments(scopes, lines):
+    """A comment !> above modules, types, their components, and what others call with its arguments."""
+    public, inherited = public_names(scopes)
+    for scope in scopes[1:]:
+        in_interface = scope.outer.kind == "interface"
+        is_called = scope.kind == "procedure" and (scope.name in public or in_interface)
+        if (is_called or scope.kind in ("type", "module")) and not is_explained(lines, scope.line):
+            yield scope.line, f"no comment !> above {scope.name}"
+        # Arguments are explained once: by the manual of a C function, by the abstract type of an extension.
+        explained = "bind(c" in scope.code.replace(" ", "") or scope.name in inherited
+        arguments = re.search(r"\w+ *\(([^)]*)\)(?: *result|$| *bind)", scope.code) if is_called else None
+        arguments = {name.strip() for name in arguments[1].split(",")} if arguments else set()
+        hides = any(code == "private" for _, code in scope.statements)
+        for line, code, names in scope.declarations():
+            if scope.kind == "type":
+                wanted = not hides and not re.search(r", *private\b", code.split("::")[0])
+            else:
+                wanted = is_called and not explained and arguments & set(names) and names != ["self"] and not (
+                    is_named_as_its_type(code, names))
+            if wanted and not is_explained(lines, line):
+                yield line, f"no comment !> above {', '.join(names)}"
 
 
-def undocumented(source, scope, wanted):
-    """Components of a type, or arguments (`wanted`) of a procedure, without a comment."""
-    in_bindings = False
-    for statement in source.inside(scope):
-        in_bindings = in_bindings or statement.code == "contains"
-        if in_bindings or not statement.is_declaration:
-            continue
-        names = [name for name in statement.names if wanted is None or name in wanted]
-        hidden = wanted is None and re.search(r",\s*private\b", statement.attributes)
-        hidden = hidden or any(inner.code == "private" for inner in source.inside(scope) if wanted is None)
-        explained = names == ["self"] or (wanted is not None and is_named_as_its_type(statement))
-        if names and not explained and not hidden and not source.has_comment_above(statement):
-            yield statement.line, f"no comment !> above {', '.join(names)}"
+def is_explained(lines, number):
+    """Whether a comment that begins with !> ends on the line above."""
+    above = number - 2
+    while lines[above].strip().startswith("!") and not lines[above].strip().startswith("!>"):
+        above -= 1
+    return re.match(r" *!> *\S", lines[above]) is not None
 
 
-def is_named_as_its_type(statement):
+def is_named_as_its_type(code, names):
     """Whether an argument has the name of its derived type, or its last words: `guard` of motion_guard_t."""
-    match = re.match(r"(?:type|class)\s*\(\s*(\w+)_t\s*\)", statement.code)
-    if not match or len(statement.names) != 1:
-        return False
-    return f"_{SHORT_NAMES.get(match.group(1), match.group(1))}".endswith(f"_{statement.names[0]}")
+    match = re.match(r"(?:type|class) *\( *(\w+)_t *\)", code)
+    return bool(match) and len(names) == 1 and f"_{match[1]}".replace("communicator", "comm").endswith(f"_{names[0]}")
 
 
-def arguments_of(code):
-    """Names of the dummy arguments in the first statement of a procedure."""
-    match = re.search(r"(?:subroutine|function)\s+\w+\s*\(([^)]*)\)", code)
-    return [name.strip() for name in match.group(1).split(",")] if match else []
-
-
-def public_names(source):
-    """Procedures that others can call: by name or bound to a type; of a generic the first, which speaks for all."""
-    names = bound_names(source)
-    for statement in source.statements:
-        if re.match(r"public\s*::", statement.code):
-            names.update(statement.names)
-    for statement in source.statements:
-        match = re.match(r"module\s+procedure\s*(?:::)?\s*(.*)", statement.code)
-        if match and statement.scopes and statement.scopes[-1].name in names:
-            names.add(match.group(1).split(",")[0].strip())
-        match = re.match(r"generic\b[^:]*::[^=]*=>\s*(\w+)", statement.code)
-        if match:
-            names.add(match.group(1))
-    return names
-
-
-def bound_names(source, extending=False):
-    """Procedures that are publicly bound to a type, or to a type that extends another."""
-    names = set()
-    for statement in source.statements:
-        scope = statement.scopes[-1] if statement.scopes else None
-        if not scope or scope.kind != "type" or not re.match(r"procedure\b.*::", statement.code):
-            continue
-        if scope.contains and "private" not in statement.attributes and (
-                not extending or "extends" in scope.first.code):
-            names.update(target.split("=>")[-1].strip() for target in split_commas(statement.code.split("::", 1)[1]))
-    return names
-
-
-# --- rules of the tree -------------------------------------------------------------------------------------------
-
-def check_names(sources):
-    """Module polydem_x stands in x.f90; where CMake chooses between files, in x_*.f90."""
-    found = []
-    for source in sources:
-        units = [scope for scope in source.scopes if scope.kind == "module" and not scope.first.scopes]
-        found.extend((unit.name, os.path.dirname(source.path), source, unit.first.line) for unit in units)
-    for name, folder, source, line in found:
-        stem = os.path.splitext(os.path.basename(source.path))[0]
-        twins = sum((name, folder) == (other, there) for other, there, _, _ in found)
-        if name != f"polydem_{stem}" and not (twins > 1 and f"polydem_{stem}".startswith(name + "_")):
-            yield source.path, line, f"module {name} should be polydem_{stem}, as its file"
-
-
-def check_stages(sources, groups):
-    """Timed stages are folders of src and groups of the namelist."""
-    folders = {name for source in sources for name in source.path.split(os.sep)} | set(STAGES_OF_LAYERS)
-    for source in sources:
-        if not source.path.endswith(os.path.join("base", "timers.f90")):
-            continue
-        match = re.search(r"stage_names\(n_stages\)[^\[]*\[([^\]]*)\]", "\n".join(source.lines))
-        for name in re.findall(r"'(\w+)'", match.group(1)) if match else ["(none found)"]:
-            if name not in folders:
-                yield source.path, 1, f"stage {name} is not a folder of src"
-            if groups and name not in groups:
-                yield source.path, 1, f"stage {name} is not a group of the namelist"
-
-
-def check_source(path, layer, text):
-    """All rules of one Fortran source of src."""
-    source = Source(path, text)
-    return sorted({*check_statements(source, layer), *check_scopes(source), *check_imports(source),
-                   *check_documentation(source)})
-
-
-def layer_of(root, name):
-    """The layer of a source: the name of the deepest folder above it that CMake knows."""
-    folder = os.path.dirname(name)
-    while os.sep in folder and not os.path.exists(os.path.join(root, folder, "CMakeLists.txt")):
-        folder = os.path.dirname(folder)
-    return os.path.basename(folder if os.sep in folder else os.path.dirname(name))
+def public_names(scopes):
+    """Procedures that others call, by name or bound to a type; and those bound to an extension of another type."""
+    public, inherited, generics = set(), set(), []
+    for scope in scopes:
+        is_bound = False
+        for _, code in scope.statements:
+            is_bound = is_bound or (scope.kind == "type" and code == "contains")
+            attributes, _, names = code.partition("::")
+            names = [name.split("=>")[-1].strip() for name in names.split(",")]
+            if attributes.startswith("public"):
+                public.update(names)
+            elif is_bound and attributes.startswith("procedure") and "private" not in attributes:
+                public.update(names)
+                inherited.update(names if "extends" in scope.code else ())
+            elif attributes.startswith("generic"):
+                public.add(names[0])
+            elif scope.kind == "interface" and code.startswith("module procedure"):
+                generics.append((scope.name, re.findall(r"\w+", code)[2]))
+    return public | {first for name, first in generics if name in public}, inherited
 
 
 def check_tree(root):
     """All rules: file, line and message of each breach."""
-    sources, groups = [], set()
-    for path in text_files(root):
-        name = os.path.relpath(path, root)
-        if path.endswith((".F90", ".f", ".F", ".for")):
-            yield name, 1, "free-form .f90 without preprocessor only"
-        with open(path, encoding="utf-8", newline="") as file:
-            text = file.read()
-        if name == TABLE:
-            groups.update(re.findall(r"^group (\w+)", text, re.MULTILINE))
-        yield from ((name, *found) for found in check_lines(name, text.split("\n")))
-        if name.startswith("src" + os.sep) and name.endswith(".f90"):
-            sources.append(Source(name, text))
-            yield from ((name, *found) for found in check_source(name, layer_of(root, name), text))
-    if not sources:
+    names, is_repository = files_of(root)
+    if not any(name.startswith("src/") for name in names):
         yield "src", 1, "no sources found"
-    yield from check_names(sources)
-    yield from check_stages(sources, groups)
+    for name in sorted({name.split("/")[0] for name in names} - TOP_LEVEL if is_repository else ()):
+        yield name, 1, "this file or folder does not belong at the top level"
+    for name in names:
+        suffix = Path(name).suffix
+        if suffix in (".F90", ".F", ".f", ".for"):
+            yield name, 1, "free-form .f90 without preprocessor only"
+        if suffix in TEXTS and not name.startswith("."):
+            lines = (Path(root) / name).read_bytes().decode().split("\n")
+            yield from ((name, *found) for found in check_lines(name, lines))
+            if name.startswith("src/") and suffix == ".f90":
+                yield from ((name, *found) for found in check_source(name, lines))
 
 
-def text_files(root):
-    """Paths of the files that the rules are for."""
-    paths = [os.path.join(root, name) for name in os.listdir(root) if name.endswith(TEXTS) or name == "polydem"]
-    for tree in TREES:
-        for folder, folders, names in os.walk(os.path.join(root, tree)):
-            folders[:] = [name for name in folders if name != "__pycache__" and not name.startswith(".")
-                          and not name.endswith(".egg-info")]
-            paths += [os.path.join(folder, name) for name in names
-                      if name.endswith(TEXTS) or name.endswith((".F90", ".f", ".F", ".for"))]
-    tracked = tracked_files(root)
-    return sorted(path for path in paths if tracked is None or os.path.relpath(path, root) in tracked)
+def files_of(root):
+    """Names of the tracked files that exist, and whether git says so; in an archive all of the folders with sources."""
+    root = Path(root)
+    if (root / ".git").exists():
+        listed = subprocess.run(["git", "-C", root, "ls-files", "-z"], capture_output=True, text=True, check=True)
+        names = [name for name in listed.stdout.split("\0") if (root / name).is_file()]
+    else:
+        names = [str(path.relative_to(root)) for path in root.rglob("*")
+                 if path.is_file() and path.relative_to(root).parts[0] in FOLDERS]
+    return sorted(names), (root / ".git").exists()
 
 
 def main():

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 from polydem_post.base.emit import Table
@@ -88,6 +89,7 @@ def sources_of(finder: str, folder: Path) -> list[Path]:
     return found
 
 
+@cache
 def procedures_of(path: Path) -> list[Procedure]:
     """The procedures of a file, included ones not among them."""
     tool = counter()
