@@ -77,8 +77,6 @@ module polydem_run
       character(len=:), allocatable :: lock_note
       !> Lock of the result folder; the root rank acquires it
       type(folder_lock_t) :: lock
-      !> Whether another run has taken over the result folder; the same on all ranks
-      logical :: has_lost_folder = .false.
       !> Steps between frames, not always a whole number; 0: no interval
       real(dp) :: frame_steps = 0.0_dp
       !> Steps between lines of the log, not always a whole number

@@ -56,7 +56,7 @@ contains
       end if
       if (.not. allocated(error)) call open_output(run, error)
       if (.not. allocated(error)) call run_steps(run, error)
-      if (run%lock%is_held() .and. allocated(error) .and. .not. run%has_lost_folder) call restore_replaced(run%folder)
+      if (run%lock%is_held() .and. allocated(error)) call restore_replaced(run%folder)
       call run%lock%release()
    end subroutine run_simulation
 
@@ -90,24 +90,20 @@ contains
       !> Whether a checkpoint is due, and whether the run must end after it; the same on all ranks
       logical, intent(out) :: is_due, must_stop
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp) :: flags(7)
+      integer(lp) :: flags(6)
 
       is_due = .false.
-      if (run%comm%is_root()) then
-         call run%checkpoints%decide(run%simulation%step, is_due, run%reason)
-         call run%lock%check(run%has_lost_folder, error)
-      end if
+      if (run%comm%is_root()) call run%checkpoints%decide(run%simulation%step, is_due, run%reason)
       must_stop = allocated(run%reason)
       call run%log%check(error)
       if (run%comm%size == 1_ip) return
-      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), merge(1_lp, 0_lp, run%has_lost_folder), &
+      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), &
                merge(1_lp, 0_lp, finds_stiff(run%monitor, run%simulation)), warning_counts(run%monitor, run%simulation)]
       call run%comm%all_reduce_error(error, flags)
       is_due = flags(1) == 1_lp
       must_stop = flags(2) == 1_lp
-      run%has_lost_folder = flags(3) == 1_lp
-      run%monitor%has_stiff = flags(4) == 1_lp
-      call set_warning_counts(run%monitor, run%simulation, flags(5:))
+      run%monitor%has_stiff = flags(3) == 1_lp
+      call set_warning_counts(run%monitor, run%simulation, flags(4:))
       call run%simulation%timers%lap(stage_decomposition)
    end subroutine synchronise_ranks
 
