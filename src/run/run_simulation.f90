@@ -10,7 +10,6 @@ module polydem_run_simulation
    use polydem_monitor, only: finds_stiff, set_warning_counts, report_pending_warnings, warning_counts
    use polydem_oversubscription, only: oversubscription
    use polydem_prepare, only: build_and_lock, prepare
-   use polydem_replacement, only: remove_replaced, restore_replaced
    use polydem_run, only: attempt_t, run_t, result_folder
    use polydem_run_output, only: choose_tables, end_step, finish
    use polydem_settings, only: settings_t
@@ -45,18 +44,13 @@ contains
       if (run%attempt%continues) call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return
       call check_ranks(settings, run%comm, error)
-      if (.not. allocated(error)) call build_and_lock(settings, force, run, last_state, error)
+      if (.not. allocated(error)) call build_and_lock(settings, force, run, error)
       if (.not. allocated(error)) then
-         if (is_finished(run, last_state)) then
-            call run%lock%release()
-            return
-         end if
          run%oversubscription = oversubscription(run%comm)
          call prepare(settings, force, run, error)
       end if
       if (.not. allocated(error)) call open_output(run, error)
       if (.not. allocated(error)) call run_steps(run, error)
-      if (run%lock%is_held() .and. allocated(error)) call restore_replaced(run%folder)
       call run%lock%release()
    end subroutine run_simulation
 
@@ -66,10 +60,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: is_due, must_stop
 
-      if (run%earlier%checkpoint == 0_ip) then
-         call end_step(run, error)
-         if (.not. allocated(error)) call remove_replaced(run, error)
-      end if
+      if (run%earlier%checkpoint == 0_ip) call end_step(run, error)
       do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
          call choose_tables(run)
          call advance(run%simulation, error)

@@ -128,11 +128,14 @@ contains
    end function is_held
 
    !> Release the lock; nothing happens if it is not held.
-   subroutine release(self)
+   subroutine release(self, folder)
       class(folder_lock_t), intent(inout) :: self
+      !> Folder of the lock, if it was renamed since
+      character(len=*), intent(in), optional :: folder
       type(error_t), allocatable :: ignored
 
       if (allocated(self%path)) then
+         if (present(folder)) self%path = lock_path(folder)
          if (is_name_of(self%path, self%descriptor)) call remove_file(self%path, ignored)
          deallocate (self%path)
       end if
@@ -150,7 +153,7 @@ contains
       character(len=:), allocatable :: path
       type(owner_t) :: owner
       integer :: answer
-      logical :: is_new
+      logical :: is_mine, is_new
 
       path = lock_path(folder)
       call open_lock(path, self%descriptor, is_new, error)
@@ -164,7 +167,9 @@ contains
          return
       end if
       if (.not. is_name_of(path, self%descriptor)) return
-      if (.not. is_new .and. .not. may_take(owner, answer)) then
+      is_mine = is_new
+      if (.not. is_new) is_mine = may_take(owner, answer)
+      if (.not. is_mine) then
          call raise(error, input_error, folder//': another run ('//name_of(owner)//') may write to this folder; if '// &
                     'it has ended, remove '//path//' and run again, or choose another folder with --set '// &
                     'output.folder=NAME')
@@ -243,10 +248,12 @@ contains
       type(owner_t), intent(in) :: owner
       !> Answer of the kernel: is_granted or is_unsupported
       integer, intent(in) :: answer
+      character(len=:), allocatable :: host, kernel
 
-      may_take = answer == is_granted .and. &
-                 (owner%is_empty .or. (owner%kernel == boot_identity() .and. owner%kernel /= '-') &
-                  .or. owner%host == host_name())
+      host = host_name()
+      kernel = boot_identity()
+      may_take = answer == is_granted .and. (owner%is_empty .or. owner%host == host .or. &
+                                             (owner%kernel == kernel .and. kernel /= '-'))
    end function may_take
 
    !> Write process and machine into the file.
