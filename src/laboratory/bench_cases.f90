@@ -115,7 +115,6 @@ contains
       type(sample_t) :: sample
       type(provenance_t) :: provenance
       character(len=:), allocatable :: path
-      logical :: is_lost
 
       sample%case = subject%case
       call omp_set_num_threads(int(sample%case%threads))
@@ -129,9 +128,7 @@ contains
       if (allocated(error)) return
       if (sample%case%threads > 1_ip) call measure_waiting(sample%barrier_cost, sample%region_cost)
       call take_sample(subject, sample, error)
-      call bench%lock%check(is_lost, error)
-      if (allocated(error)) return
-      call write_sample(path, sample, phase_names, count_names, provenance, error)
+      if (.not. allocated(error)) call write_sample(path, sample, phase_names, count_names, provenance, error)
       if (allocated(error)) return
       bench%n_taken = bench%n_taken + 1
       call show_progress(bench, sample%case)

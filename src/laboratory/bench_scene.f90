@@ -4,8 +4,7 @@ module polydem_bench_scene
    use polydem_file_system, only: exists
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_read_settings, only: read_settings
-   use polydem_replaced_result, only: holds_result
-   use polydem_result_files, only: profile_name, trace_name
+   use polydem_result_files, only: manifest_name, profile_name, trace_name
    use polydem_run, only: attempt_t, result_folder
    use polydem_run_simulation, only: run_simulation
    use polydem_settings, only: settings_t
@@ -116,7 +115,7 @@ contains
       logical :: is_old
 
       if (allocated(error)) return
-      is_old = holds_result(result_folder(settings), error)
+      is_old = exists(result_folder(settings)//'/'//manifest_name, error)
       if (.not. allocated(error)) call run_simulation(settings, is_old, error, attempt_t(is_brief=.true.))
    end subroutine begin_run
 

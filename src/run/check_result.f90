@@ -9,7 +9,6 @@ module polydem_check_result
    use polydem_log, only: log_t
    use polydem_manifest, only: manifest_t
    use polydem_manifest_lines, only: entry_t
-   use polydem_replaced_result, only: replaced_name
    use polydem_result_files, only: checkpoint_path, complete_name, forms_of, manifest_name, n_checkpoints, name_in, &
       overlaps_name, profile_name, segment_number, steps_name, trace_name
    use polydem_strings, only: to_text, counted
@@ -88,12 +87,6 @@ contains
       integer(ip) :: k
 
       name = trim(entry%name)
-      if (name == replaced_name) then
-         problem = 'a run with --force was interrupted; the next run in this folder restores the previous result, '// &
-            'or removes its remains'
-         call report_file(findings, name, problem, '')
-         return
-      end if
       call check_unfinished(folder, name, findings, error)
       if (entry%is_closed) then
          call find_problem(folder, entry, problem, failure)

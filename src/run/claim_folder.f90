@@ -2,12 +2,12 @@
 module polydem_claim_folder
    use polydem_checked_files, only: check_free
    use polydem_errors, only: error_t
-   use polydem_folder_lock, only: lock_path
+   use polydem_folder_lock, only: folder_lock_t, lock_path
    use polydem_kinds, only: ip
    use polydem_manifest, only: manifest_t
-   use polydem_replaced_result, only: check_inputs, move_to_replaced, replaced_name
    use polydem_result_files, only: checkpoint_path, log_name, n_checkpoints, name_in, overlaps_name, profile_name, &
       steps_name, trace_name
+   use polydem_set_aside, only: set_aside
    use polydem_settings, only: output_settings_t, settings_t
    implicit none
    private
@@ -18,8 +18,8 @@ module polydem_claim_folder
 
 contains
 
-   !> Begin the manifest of a run, or continue that of earlier attempts. A result to be replaced is moved aside.
-   subroutine claim_folder(settings, has_deep_contacts, folder, force, is_restart, manifest, error)
+   !> Begin the manifest of a run, or continue that of earlier attempts. The folder of a result to be replaced is renamed.
+   subroutine claim_folder(settings, has_deep_contacts, folder, force, is_restart, shares, lock, note, manifest, error)
       type(settings_t), intent(in) :: settings
       !> Whether the run writes a table of deep contacts
       logical, intent(in) :: has_deep_contacts
@@ -29,32 +29,36 @@ contains
       logical, intent(in) :: force
       !> Whether the run keeps the files of earlier attempts
       logical, intent(in) :: is_restart
+      !> Whether other ranks of the run share the lock
+      logical, intent(in) :: shares
+      !> Lock of the folder
+      type(folder_lock_t), intent(inout) :: lock
+      !> Sentence for the log about a result that was set aside
+      character(len=:), allocatable, intent(inout) :: note
       !> On entry the valid manifest of the folder, or none; on return that of this run
       type(manifest_t), intent(inout) :: manifest
       !> Allocated if a file is in the way; names the file. The folder is then unchanged
       type(error_t), allocatable, intent(inout) :: error
       character(len=longest), allocatable :: names(:)
-      character(len=longest) :: lock
+      character(len=longest) :: lock_name
       integer :: k
 
       call list_output_names(settings%output, has_deep_contacts, names)
-      call check_free(manifest, folder, names, error)
-      lock = name_in(lock_path(''))
+      lock_name = name_in(lock_path(''))
+      if (force .and. manifest%is_found) then
+         call set_aside(folder, input_paths(settings), shares, lock, note, error)
+         manifest%is_found = .false.
+      end if
+      if (.not. allocated(error)) call check_free(manifest, folder, names, error)
       if (.not. manifest%is_found) then
-         if (.not. allocated(error)) call manifest%begin(folder, [lock, names], error)
-      else if (force) then
-         call check_inputs(manifest, folder, input_paths(settings), error)
-         call manifest%continue_writing()
-         if (.not. allocated(error)) call move_to_replaced(manifest, folder, error)
-         names = [character(len=longest) :: lock, names, replaced_name]
-         if (.not. allocated(error)) call manifest%begin(folder, names, error)
+         if (.not. allocated(error)) call manifest%begin(folder, [lock_name, names], error)
       else
          call manifest%continue_writing()
          do k = 1, size(names)
             call manifest%add_file(trim(names(k)), error)
          end do
          do k = 1, merge(0, manifest%n, is_restart)
-            if (manifest%entry(k)%name /= lock .and. .not. allocated(error)) &
+            if (manifest%entry(k)%name /= lock_name .and. .not. allocated(error)) &
                call manifest%remove_file(trim(manifest%entry(k)%name), error)
          end do
       end if

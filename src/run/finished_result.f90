@@ -9,7 +9,6 @@ module polydem_finished_result
    use polydem_manifest, only: manifest_t
    use polydem_profile_file, only: read_final_status
    use polydem_provenance, only: origin_of
-   use polydem_replaced_result, only: replaced_name
    use polydem_result_files, only: name_in, profile_name
    use polydem_run, only: run_t
    use polydem_settings, only: settings_t
@@ -31,7 +30,7 @@ contains
       if (run%comm%is_root() .and. run%attempt%continues) then
          call run%manifest%read(run%folder)
          k = run%manifest%place_of(profile_name)
-         if (k > 0 .and. .not. allocated(run%manifest%problem) .and. .not. run%manifest%owns(replaced_name)) &
+         if (k > 0 .and. .not. allocated(run%manifest%problem)) &
             found = merge(1_lp, 0_lp, run%manifest%entry(max(1, k))%is_closed)
       end if
       call run%comm%broadcast(found)

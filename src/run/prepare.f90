@@ -8,14 +8,11 @@ module polydem_prepare
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: make_folder
-   use polydem_finished_result, only: find_finished_result
    use polydem_kinds, only: ip, lp
    use polydem_log_tables, only: write_header
    use polydem_monitor, only: new_monitor
    use polydem_provenance, only: collect_provenance
    use polydem_recorder, only: check_recording
-   use polydem_replaced_result, only: recover, replaced_name
-   use polydem_replacement, only: say
    use polydem_restart, only: remove_surplus_files, find_restart
    use polydem_result_files, only: overlaps_name
    use polydem_run, only: run_t
@@ -28,45 +25,25 @@ module polydem_prepare
 
 contains
 
-   !> Build the scene, lock the folder, and find out whether its result is finished already. Collective; all ranks get
-   !> the same error.
-   subroutine build_and_lock(settings, force, run, last_state, error)
+   !> Build the scene and lock the folder. Collective; all ranks get the same error.
+   subroutine build_and_lock(settings, force, run, error)
       type(settings_t), intent(in) :: settings
       !> Whether to replace an existing result
       logical, intent(in) :: force
       type(run_t), intent(inout) :: run
-      !> Hash of the last state; allocated on the root rank if the run is finished
-      character(len=:), allocatable, intent(inout) :: last_state
       !> Allocated if the run cannot start
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: recovery_note
-      integer(lp) :: is_recovered(1)
 
       if (run%comm%is_root()) call check_overwrite(run, force, error)
       call run%comm%all_reduce_error(error)
       if (.not. allocated(error)) call build_start(settings, run, error)
       if (allocated(error)) return
-      if (run%comm%is_root()) call lock_folder(run, recovery_note, error)
+      if (run%comm%is_root()) then
+         call make_folder(run%folder, error)
+         if (.not. allocated(error)) call run%lock%acquire(run%folder, run%folder_note, error, run%comm%size > 1_ip)
+      end if
       call run%comm%all_reduce_error(error)
-      if (allocated(error)) return
-      is_recovered = merge(1_lp, 0_lp, allocated(recovery_note))
-      call run%comm%broadcast(is_recovered)
-      if (is_recovered(1) == 1_lp .and. run%attempt%continues) &
-         call find_finished_result(settings, run, last_state, error)
    end subroutine build_and_lock
-
-   !> Lock the result folder, and restore a result that an interrupted --force moved aside.
-   subroutine lock_folder(run, recovery_note, error)
-      type(run_t), intent(inout) :: run
-      !> Allocated if a result was restored
-      character(len=:), allocatable, intent(out) :: recovery_note
-      type(error_t), allocatable, intent(inout) :: error
-
-      call make_folder(run%folder, error)
-      if (.not. allocated(error)) call run%lock%acquire(run%folder, run%lock_note, error, run%comm%size > 1_ip)
-      if (.not. allocated(error)) call recover(run%folder, recovery_note, error)
-      if (allocated(recovery_note) .and. .not. allocated(error)) call say(recovery_note)
-   end subroutine lock_folder
 
    !> Open the log, describe the run, and restore the state of earlier attempts, in a folder that this run has locked.
    !> Collective; all ranks get the same error.
@@ -104,10 +81,8 @@ contains
       call run%manifest%read(run%folder)
       call check_manifest(run%manifest, error)
       if (force .or. run%attempt%continues .or. .not. run%manifest%is_found) return
-      ! `recover` first restores the result that an interrupted --force moved aside.
-      if (run%manifest%owns(replaced_name)) return
       call raise(error, input_error, run%folder//' already holds a result; add --continue '// &
-                 'to resume it or --force to overwrite it, or choose another folder with --set output.folder=NAME')
+                 'to resume it or --force to set it aside and start again, or choose another folder with --set output.folder=NAME')
    end subroutine check_overwrite
 
    !> Find the state of earlier attempts, claim the folder, open the log and describe the run.
@@ -130,13 +105,14 @@ contains
          call find_restart(run%folder, run%manifest, settings, run%scene_hash, run%attempt%may_change, run%earlier, &
                            error)
       if (allocated(error)) return
-      call claim_folder(settings, run%measures%deep > 0_lp, run%folder, force, is_restart(run), run%manifest, error)
+      call claim_folder(settings, run%measures%deep > 0_lp, run%folder, force, is_restart(run), &
+                        run%comm%size > 1_ip, run%lock, run%folder_note, run%manifest, error)
       if (.not. allocated(error)) call run%log%open(run%folder, error, appended=is_restart(run), &
          brief=run%attempt%is_brief)
       if (allocated(error)) return
       call write_header(run%log, run%provenance, run%folder)
       if (run%oversubscription /= '') call run%log%write_line(run%oversubscription)
-      if (allocated(run%lock_note)) call run%log%write_line(run%lock_note)
+      if (allocated(run%folder_note)) call run%log%write_line(run%folder_note)
       call describe(run%simulation, run%measures, run%log)
    end subroutine open_log
 

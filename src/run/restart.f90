@@ -85,8 +85,7 @@ contains
                     to_text(earlier%step))
       else if (former /= scene) then
          call raise(error, input_error, folder//' holds the result of another run: '// &
-                    why_other(settings, changes)//'. Restore it, or use --force instead of --continue to overwrite '// &
-                    'the result')
+                    why_other(settings, changes)//'. Restore it, or use --force instead of --continue to start again')
       end if
       if (allocated(error)) return
       if (changes /= '') earlier%remark = earlier%remark//new_line('a')//'changed    '//changes
@@ -138,7 +137,7 @@ contains
       else
          call raise(error, input_error, folder//' has no checkpoint from which a run with other settings could '// &
                     'continue: '//changes//'. Choose another folder with --set output.folder=NAME, or use --force '// &
-                    'instead of --continue to overwrite it')
+                    'instead of --continue to start again')
       end if
    end subroutine restart_without_checkpoint
 

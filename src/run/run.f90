@@ -75,12 +75,10 @@ module polydem_run
       character(len=:), allocatable :: folder
       !> Manifest of the result; only the root rank writes it
       type(manifest_t) :: manifest
-      !> Remark on how the folder was locked; unallocated if there is none
-      character(len=:), allocatable :: lock_note
+      !> Remark on how the folder was locked or where its former result is; unallocated if there is none
+      character(len=:), allocatable :: folder_note
       !> Lock of the result folder; the root rank acquires it
       type(folder_lock_t) :: lock
-      !> Whether another run has taken over the result folder; the same on all ranks
-      logical :: has_lost_folder = .false.
       !> Steps between frames, not always a whole number; 0: no interval
       real(dp) :: frame_steps = 0.0_dp
       !> Steps between lines of the log, not always a whole number

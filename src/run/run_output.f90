@@ -129,7 +129,6 @@ contains
    end subroutine write_last_frame
 
    !> End a run, also after a failure: close the trajectory, write the profile and the summary of the log; collective.
-   !> Nothing is written if another run has taken over the folder.
    subroutine finish(run, seconds, error)
       type(run_t), intent(inout) :: run
       !> Elapsed time of all attempts [s]
@@ -141,7 +140,6 @@ contains
       character(len=:), allocatable :: status
       integer(lp) :: hash, memory
 
-      if (run%has_lost_folder) return
       memory = resident_memory()
       status = 'finished'
       if (allocated(error)) status = error%message

@@ -10,7 +10,6 @@ module polydem_run_simulation
    use polydem_monitor, only: finds_stiff, set_warning_counts, report_pending_warnings, warning_counts
    use polydem_oversubscription, only: oversubscription
    use polydem_prepare, only: build_and_lock, prepare
-   use polydem_replacement, only: remove_replaced, restore_replaced
    use polydem_run, only: attempt_t, run_t, result_folder
    use polydem_run_output, only: end_step, finish, needs_table
    use polydem_settings, only: settings_t
@@ -45,18 +44,13 @@ contains
       if (run%attempt%continues) call find_finished_result(settings, run, last_state, error)
       if (is_finished(run, last_state)) return
       call check_ranks(settings, run%comm, error)
-      if (.not. allocated(error)) call build_and_lock(settings, force, run, last_state, error)
+      if (.not. allocated(error)) call build_and_lock(settings, force, run, error)
       if (.not. allocated(error)) then
-         if (is_finished(run, last_state)) then
-            call run%lock%release()
-            return
-         end if
          run%oversubscription = oversubscription(run%comm)
          call prepare(settings, force, run, error)
       end if
       if (.not. allocated(error)) call open_output(run, error)
       if (.not. allocated(error)) call run_steps(run, error)
-      if (run%lock%is_held() .and. allocated(error) .and. .not. run%has_lost_folder) call restore_replaced(run%folder)
       call run%lock%release()
    end subroutine run_simulation
 
@@ -66,10 +60,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       logical :: is_due, must_stop
 
-      if (run%earlier%checkpoint == 0_ip) then
-         call end_step(run, error)
-         if (.not. allocated(error)) call remove_replaced(run, error)
-      end if
+      if (run%earlier%checkpoint == 0_ip) call end_step(run, error)
       do while (run%simulation%step < run%simulation%n_steps .and. .not. allocated(error))
          call advance(run%simulation, error, needs_table(run))
          call synchronise_ranks(run, is_due, must_stop, error)
@@ -89,24 +80,20 @@ contains
       !> Whether a checkpoint is due, and whether the run must end after it; the same on all ranks
       logical, intent(out) :: is_due, must_stop
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp) :: flags(7)
+      integer(lp) :: flags(6)
 
       is_due = .false.
-      if (run%comm%is_root()) then
-         call run%checkpoints%decide(run%simulation%step, is_due, run%reason)
-         call run%lock%check(run%has_lost_folder, error)
-      end if
+      if (run%comm%is_root()) call run%checkpoints%decide(run%simulation%step, is_due, run%reason)
       must_stop = allocated(run%reason)
       call run%log%check(error)
       if (run%comm%size == 1_ip) return
-      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), merge(1_lp, 0_lp, run%has_lost_folder), &
+      flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), &
                merge(1_lp, 0_lp, finds_stiff(run%monitor, run%simulation)), warning_counts(run%monitor, run%simulation)]
       call run%comm%all_reduce_error(error, flags)
       is_due = flags(1) == 1_lp
       must_stop = flags(2) == 1_lp
-      run%has_lost_folder = flags(3) == 1_lp
-      run%monitor%has_stiff = flags(4) == 1_lp
-      call set_warning_counts(run%monitor, run%simulation, flags(5:))
+      run%monitor%has_stiff = flags(3) == 1_lp
+      call set_warning_counts(run%monitor, run%simulation, flags(4:))
       call run%simulation%timers%lap(stage_decomposition)
    end subroutine synchronise_ranks
 

@@ -149,21 +149,6 @@ def test_ranks_that_outlive_their_leader_keep_others_out(whole, tmp_path):
     assert f"took over {folder}/running.lock of process {leader}, which has ended" in finish(whole, folder, None)
 
 
-def test_ranks_whose_folder_was_taken_over_end_and_write_nothing_more(whole, tmp_path):
-    folder = tmp_path / "result"
-    options = ("integrate.duration=1000", "checkpoint.steps=0", "output.frame_interval=0", "output.log_interval=900",
-               "guards.overlap=off", "guards.passing=off", "guards.step=off")
-    process = start(whole / "scene.nml", folder, 2, 1, [word for option in options for word in ("--set", option)])
-    # Once the first frame has its file, the run writes nothing for a long time.
-    wait_for(lambda: any(folder.glob("trajectory_*")), process)
-    folder.joinpath("running.lock").unlink()
-    folder.joinpath("running.lock").write_text("1 far.away\nkey 0123456789abcdef\n", encoding="utf-8")
-    before = {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix != ".open"}
-    _, message = process.communicate(timeout=600)
-    assert process.returncode == NO_FILE and message.count("is gone or belongs to another run") == 1, message
-    assert {path.name: path.read_bytes() for path in folder.iterdir() if path.suffix != ".open"} == before
-
-
 @pytest.mark.parametrize("number", (signal.SIGKILL, signal.SIGTERM))
 def test_without_mpirun_the_ranks_end_and_leave_a_good_checkpoint(number, whole, tmp_path):
     folder = tmp_path / "result"

@@ -1,26 +1,12 @@
 /* A library for LD_PRELOAD that disturbs processes competing for locks. POLYDEM_HOSTILE selects its behaviour:
  *
  *   locks   no file can be locked, as on some network file systems
- *   haste   the monotonic clock runs 20 times as fast
  *   slow    each call to a file first waits a short time, sometimes 30 ms, so that processes interleave
  *
  * POLYDEM_KILL_AT=n kills the process before its n-th call to a file or folder whose path contains POLYDEM_KILL_IN. With
  * n = 0 the process ends with a line on standard error that gives the number of these calls.
  */
 #include "system_calls.h"
-
-int clock_gettime(clockid_t clock, struct timespec *now)
-{
-   int status = REAL(int, "clock_gettime", clockid_t, struct timespec *)(clock, now);
-
-   if (status == 0 && clock == CLOCK_MONOTONIC && does("haste")) {
-      long long nanoseconds = 20 * (now->tv_sec * 1000000000LL + now->tv_nsec);
-
-      now->tv_sec = nanoseconds / 1000000000;
-      now->tv_nsec = nanoseconds % 1000000000;
-   }
-   return status;
-}
 
 /* Number of calls to the files in question */
 static long asked = 0;
@@ -40,7 +26,7 @@ static void ask(const char *path)
    if (does("slow")) {
       struct timespec now;
 
-      REAL(int, "clock_gettime", clockid_t, struct timespec *)(CLOCK_MONOTONIC, &now);
+      clock_gettime(CLOCK_MONOTONIC, &now);
       usleep(now.tv_nsec / 64 % 10 == 0 ? 30000 : now.tv_nsec / 64 % 500);
    }
    if (word == NULL || when == NULL || strstr(path, word) == NULL) return;

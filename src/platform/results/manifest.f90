@@ -15,8 +15,7 @@
 !> `owns` is on disk before the file is created. It also covers the temporary names NAME.unfinished and NAME.open.
 !> `closed` is written after the file has its final name. A killed program may therefore leave a file with its final
 !> name that is not closed, but never an unlisted file of the result. Segments, profile.h5, trace.h5, steps.h5 and
-!> overlaps.csv are closed. log.txt, running.lock, the folder `replaced` (polydem_replaced_result) and the checkpoints,
-!> which have their own checksums, are not.
+!> overlaps.csv are closed. log.txt, running.lock and the checkpoints, which have their own checksums, are not.
 !>
 !> Each line is written with one call and flushed to disk at once. A killed program may leave an incomplete last line.
 !> A reader ignores it, and the next writer cuts it off.
@@ -81,17 +80,14 @@ module polydem_manifest
 contains
 
    !> Read the manifest of a folder, if there is one. No file is changed.
-   subroutine read_manifest(self, folder, name)
+   subroutine read_manifest(self, folder)
       class(manifest_t), intent(inout) :: self
       !> Folder of the result
       character(len=*), intent(in) :: folder
-      !> Name of the file; default: manifest.txt
-      character(len=*), intent(in), optional :: name
       character(len=:), allocatable :: path, text, problem
       type(error_t), allocatable :: error
 
       path = folder//'/'//manifest_name
-      if (present(name)) path = folder//'/'//name
       call clear(self, folder)
       self%is_found = link_exists(path, error)
       if (self%is_found) call read_bytes(path, text, error)

@@ -10,8 +10,6 @@
 !>     checkpoint_1.h5, _2.h5     the last two checkpoints, written alternately
 !>     manifest.txt               list of these files with checksums (polydem_manifest)
 !>     running.lock               lock that identifies the writing process (polydem_folder_lock)
-!>     replaced                   old result that `--force` replaces, until the new result has a frame
-!>                                (polydem_replaced_result)
 module polydem_result_files
    use polydem_errors, only: error_t
    use polydem_file_system, only: exists

@@ -6,12 +6,12 @@ module polydem_folders
    use polydem_errors, only: error_t, raise_unread
    use polydem_file_system, only: decide_existence, find_length, last_failure
    use polydem_kinds, only: lp
-   use polydem_posix, only: c_closedir, c_faccessat, c_opendir, c_readdir, c_realpath, c_rmdir, clear_error_number, &
+   use polydem_posix, only: c_closedir, c_faccessat, c_opendir, c_readdir, c_realpath, clear_error_number, &
       error_number, existence, text_at
    use polydem_posix_processes, only: c_free
    implicit none
    private
-   public :: link_exists, list_names, read_bytes, remove_folder, canonical_path
+   public :: link_exists, list_names, read_bytes, canonical_path
 
    !> AT_FDCWD of openat(2): paths are relative to the working directory
    integer(c_int), parameter :: working_directory = -100_c_int
@@ -99,15 +99,6 @@ contains
       end if
       if (status /= 0) call raise_unread(error, path, reason)
    end subroutine read_bytes
-
-   !> Remove an empty folder. A folder that is not empty is kept.
-   subroutine remove_folder(path)
-      !> Path of the folder
-      character(len=*), intent(in) :: path
-      integer(c_int) :: ignored
-
-      ignored = c_rmdir(path//c_null_char)
-   end subroutine remove_folder
 
    !> Canonical path of a file or folder, without links, '.' and '..'; empty if it does not exist
    function canonical_path(path, error) result(resolved)

@@ -4,7 +4,7 @@ module polydem_posix
    implicit none
    private
    public :: c_access, c_close, c_closedir, c_creat, c_faccessat, c_fallocate, c_flock, c_fsync, c_lseek, c_mkdir, &
-      c_open, c_opendir, c_pread, c_pwrite, c_readdir, c_realpath, c_rename, c_rmdir, c_strerror, c_strlen, &
+      c_open, c_opendir, c_pread, c_pwrite, c_readdir, c_realpath, c_rename, c_strerror, c_strlen, &
       c_unlink, c_write, clear_error_number, error_number, is_written, text_at
    public :: close_on_exec, existence, read_and_write, read_only, standard_error, standard_output, write_only
 
@@ -131,12 +131,6 @@ module polydem_posix
          import :: c_int, c_ptr
          type(c_ptr), value :: stream
       end function c_closedir
-
-      !> POSIX rmdir(2)
-      integer(c_int) function c_rmdir(path) bind(C, name='rmdir')
-         import :: c_char, c_int
-         character(kind=c_char), intent(in) :: path(*)
-      end function c_rmdir
 
       !> POSIX realpath(3), which allocates its result if `resolved` is null
       type(c_ptr) function c_realpath(path, resolved) bind(C, name='realpath')

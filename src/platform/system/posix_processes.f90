@@ -4,8 +4,8 @@ module polydem_posix_processes
    use, intrinsic :: iso_c_binding, only: c_char, c_funptr, c_int, c_int64_t, c_intptr_t, c_long, c_ptr, c_size_t
    implicit none
    private
-   public :: c_attributes_init, c_attributes_stack, c_exit, c_exit_now, c_free, c_getaffinity, c_getpid, c_getrandom, &
-      c_getrlimit, c_kill, c_malloc, c_pipe2, c_poll, c_read, c_sigaction, c_strdup, c_time, c_umask, &
+   public :: c_attributes_init, c_attributes_stack, c_exit, c_exit_now, c_free, c_getaffinity, c_getpid, &
+      c_getrlimit, c_pipe2, c_poll, c_read, c_sigaction, c_strdup, c_time, c_umask, &
       c_user, event_t, gethostname, gmtime, isatty, limit_t, pthread_create, pthread_join, pthread_sigmask, strftime, &
       sysconf, timer_create, timer_delete, timer_settime, times_t
 
@@ -80,12 +80,6 @@ module polydem_posix_processes
          integer(c_int), value :: flags
       end function c_pipe2
 
-      !> C malloc
-      type(c_ptr) function c_malloc(size) bind(C, name='malloc')
-         import :: c_ptr, c_size_t
-         integer(c_size_t), value :: size
-      end function c_malloc
-
       !> POSIX gethostname(2)
       integer(c_int) function gethostname(name, length) bind(C, name='gethostname')
          import :: c_char, c_int, c_size_t
@@ -125,14 +119,6 @@ module polydem_posix_processes
          character(kind=c_char), intent(in) :: form(*)
          type(c_ptr), value :: broken_down
       end function strftime
-
-      !> getrandom(2)
-      integer(c_size_t) function c_getrandom(word, length, flags) bind(C, name='getrandom')
-         import :: c_int, c_int64_t, c_size_t
-         integer(c_int64_t), intent(inout) :: word
-         integer(c_size_t), value :: length
-         integer(c_int), value :: flags
-      end function c_getrandom
 
       !> POSIX getrlimit(2) with 64-bit limits
       integer(c_int) function c_getrlimit(resource, limit) bind(C, name='getrlimit64')
@@ -174,12 +160,6 @@ module polydem_posix_processes
       integer(c_int) function c_getpid() bind(C, name='getpid')
          import :: c_int
       end function c_getpid
-
-      !> POSIX kill(2)
-      integer(c_int) function c_kill(process, signal) bind(C, name='kill')
-         import :: c_int
-         integer(c_int), value :: process, signal
-      end function c_kill
 
       !> POSIX poll(2), here without files; nfds_t is as wide as size_t on Linux
       integer(c_int) function c_poll(files, n, milliseconds) bind(C, name='poll')
