@@ -4,14 +4,12 @@
 !> (functions of time), contacts (computed by the next step) or the state of neighbour finders. After a restart the
 !> first search starts without pairs. The pairs that it finds again get their contact history.
 module polydem_checkpoint_fields
-   use polydem_bodies, only: bodies_t, state_hash, turn_bodies
+   use polydem_bodies, only: turn_bodies
    use polydem_body_fields, only: serialize_bodies
    use polydem_contact_history, only: contact_history_t
    use polydem_energy_balance, only: serialize_contributions, serialize_balance
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_sums, only: total_forces
-   use polydem_global_hash, only: hash_scene
-   use polydem_hash, only: mix_word
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_local_bodies, only: fit_to_bodies
    use polydem_monitor, only: serialize_monitor, monitor_t
@@ -20,14 +18,14 @@ module polydem_checkpoint_fields
    use polydem_simulation, only: simulation_t
    implicit none
    private
-   public :: attempts_t, serialize_run, serialize_progress, hash_scene_of, scene_hash
+   public :: attempts_t, serialize_run, serialize_progress
 
    !> Number of pairs that are read at a time
    integer(lp), parameter :: most_rows = 65536_lp
 
    !> Hash of the initial scene, and counts of all attempts of a run
    type :: attempts_t
-      !> `scene_hash` of the bodies at time 0
+      !> `hash_scene` of the bodies at time 0
       integer(lp) :: scene = 0_lp
       !> Number of attempts, including the present one
       integer(lp) :: attempts = 1_lp
@@ -223,38 +221,5 @@ contains
          end if
       end do
    end subroutine check_pairs
-
-   !> Compute the hash of the initial bodies of all ranks. Collective; all ranks get the same hash.
-   subroutine hash_scene_of(simulation, hash)
-      !> A simulation at time 0
-      type(simulation_t), intent(inout) :: simulation
-      !> The value of `scene_hash` on a rank that had all bodies
-      integer(lp), intent(out) :: hash
-
-      if (simulation%comm%size > 1_ip) then
-         call hash_scene(simulation%comm, simulation%bodies, hash)
-      else
-         hash = scene_hash(simulation%bodies)
-      end if
-   end subroutine hash_scene_of
-
-   !> Hash of the initial bodies: their state, and their constant properties (fixed or free, mass, inertia, shape)
-   pure integer(lp) function scene_hash(bodies)
-      !> Bodies at time 0
-      type(bodies_t), intent(in) :: bodies
-      integer(ip) :: s, v
-
-      scene_hash = state_hash(bodies)
-      do s = 1_ip, bodies%n
-         scene_hash = mix_word(scene_hash, merge(1_lp, 0_lp, bodies%fixed(s)))
-         scene_hash = mix_word(scene_hash, transfer(real(bodies%mass(s), dp), 0_lp))
-         scene_hash = mix_word(scene_hash, transfer(real(bodies%inertia(s), dp), 0_lp))
-         scene_hash = mix_word(scene_hash, int(bodies%vertex_start(s + 1_ip), lp))
-      end do
-      do v = 1_ip, size(bodies%shape, 2, kind=ip)
-         scene_hash = mix_word(scene_hash, transfer(real(bodies%shape(1, v), dp), 0_lp))
-         scene_hash = mix_word(scene_hash, transfer(real(bodies%shape(2, v), dp), 0_lp))
-      end do
-   end function scene_hash
 
 end module polydem_checkpoint_fields

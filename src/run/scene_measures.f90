@@ -6,6 +6,7 @@ module polydem_scene_measures
    use polydem_contact_depth, only: deepest_contact, depth_share, depth_text
    use polydem_elementary, only: hypotenuse
    use polydem_energy_guard, only: find_stored_energy
+   use polydem_global_reductions, only: keep_greatest, reduce_to_greatest, reduce_to_least, sum_exactly
    use polydem_guards, only: greatest_displacement, place_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_body, owns_pair
@@ -13,7 +14,6 @@ module polydem_scene_measures
    use polydem_stability_check, only: find_stable_step
    use polydem_strings, only: to_text
    use polydem_wall, only: greatest_wall_speed
-   use polydem_whole_run, only: keep_greatest, reduce_to_greatest, reduce_to_least, sum_exactly
    implicit none
    private
    public :: scene_measures_t, measure_scene

@@ -2,10 +2,10 @@
 module polydem_start
    use omp_lib, only: omp_get_thread_limit, omp_set_num_threads
    use polydem_broadcaster, only: broadcaster_t
-   use polydem_checkpoint_fields, only: hash_scene_of
    use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_errors, only: error_t
    use polydem_force_law, only: check_law
+   use polydem_global_hash, only: hash_scene
    use polydem_hash, only: hexadecimal
    use polydem_kinds, only: dp, ip
    use polydem_restart, only: restore, serialize_earlier
@@ -82,7 +82,7 @@ contains
       call new_simulation(settings, run%simulation, error, run%comm, run%attempt%threads)
       if (allocated(error)) return
       call measure_scene(run%simulation, run%measures)
-      call hash_scene_of(run%simulation, run%attempts%scene)
+      call hash_scene(run%comm, run%simulation%bodies, run%attempts%scene)
       run%scene_hash = hexadecimal(run%attempts%scene)
    end subroutine build_start
 

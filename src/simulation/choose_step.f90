@@ -2,13 +2,13 @@
 module polydem_choose_step
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_law, only: choose_parts, force_law_t
+   use polydem_global_reductions, only: keep_greatest, reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
    use polydem_origin, only: overrides_of, place_of
    use polydem_simulation, only: simulation_t
    use polydem_expected_speed, only: find_expected_speed
    use polydem_stable_step, only: stable_step_of_shapes
    use polydem_strings, only: to_text
-   use polydem_whole_run, only: keep_greatest, reduce_to_greatest
    implicit none
    private
    public :: choose_step

@@ -10,13 +10,13 @@ module polydem_energy_guard
    use polydem_communicator, only: communicator_t
    use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
+   use polydem_global_reductions, only: sum_exactly
    use polydem_guards, only: shorter_step
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: owns_pair
    use polydem_simulation, only: simulation_t, compute_balance
    use polydem_strings, only: to_text
    use polydem_warning, only: warning_t
-   use polydem_whole_run, only: sum_exactly
    implicit none
    private
    public :: energy_guard_t, open_energy_guard, check_energy, find_stored_energy

@@ -6,10 +6,10 @@
 !> reference.
 module polydem_expected_speed
    use polydem_elementary, only: hypotenuse
+   use polydem_global_reductions, only: reduce_to_greatest, reduce_to_least
    use polydem_kinds, only: ip, wp
    use polydem_simulation, only: simulation_t
    use polydem_wall, only: greatest_wall_speed
-   use polydem_whole_run, only: reduce_to_greatest, reduce_to_least
    implicit none
    private
    public :: find_expected_speed

@@ -15,6 +15,7 @@ module polydem_relaxation
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_find_contacts, only: find_contacts
+   use polydem_global_reductions, only: reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
    use polydem_local_bodies, only: fit_to_bodies
    use polydem_neighbours, only: neighbours_t, new_neighbours
@@ -23,7 +24,6 @@ module polydem_relaxation
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers
    use polydem_strings, only: to_text
-   use polydem_whole_run, only: reduce_to_greatest
    implicit none
    private
    public :: relax_bodies

@@ -2,12 +2,12 @@
 module polydem_stability_check
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, raise, run_error
+   use polydem_global_reductions, only: reduce_to_greatest, reduce_to_least
    use polydem_guards, only: check_step
    use polydem_kinds, only: dp, ip, wp
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers, stable_step_alone, stable_step_of_contacts
    use polydem_strings, only: to_text
-   use polydem_whole_run, only: reduce_to_greatest, reduce_to_least
    implicit none
    private
    public :: check_stability, check_suspects, find_stable_step, greatest_share

@@ -8,6 +8,7 @@ module polydem_start_simulation
    use polydem_energy_balance, only: start_energy_balance
    use polydem_errors, only: error_t
    use polydem_force_law, only: check_law
+   use polydem_global_reductions, only: find_median, reduce_to_least
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, wp
    use polydem_local_bodies, only: fit_to_bodies
@@ -18,7 +19,6 @@ module polydem_start_simulation
    use polydem_simulation, only: simulation_t
    use polydem_time_step, only: compute_forces
    use polydem_timers, only: timers_t
-   use polydem_whole_run, only: find_median, reduce_to_least
    implicit none
    private
    public :: start_with_bodies

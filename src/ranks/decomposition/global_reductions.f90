@@ -1,6 +1,6 @@
 !> Measures of the whole run from values of the bodies or contacts of each rank. All results are the same on all ranks
 !> and do not depend on their number. Collective.
-module polydem_whole_run
+module polydem_global_reductions
    use polydem_communicator, only: communicator_t
    use polydem_exact_all_reduce, only: all_reduce_exact_sums
    use polydem_exact_sum, only: exact_sum_t
@@ -107,4 +107,4 @@ contains
       if (median <= -huge(1.0_wp)) median = huge(1.0_wp)
    end subroutine find_median
 
-end module polydem_whole_run
+end module polydem_global_reductions
