@@ -155,7 +155,7 @@ def _parser(words: list[str]) -> argparse.ArgumentParser:
     add_picture_verbs(verbs)
     add_data_verbs(verbs)
     add_sweep(verbs)
-    laboratory = [path.stem for path in LAB_HELP.glob("*.txt")]
+    laboratory = sorted(path.stem for path in LAB_HELP.glob("*.txt"))
     if not set(laboratory).isdisjoint(words):
         import_module(LAB).add_verbs(verbs)
     else:
