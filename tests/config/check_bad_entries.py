@@ -103,11 +103,13 @@ def contexts(row):
     elif row.group == "scene" and not key:
         scenes = list(SCENES)
     elif row.group == "motion":
-        others = [{entry_of("motion", "name"): f"'{NAME}'", entry_of("motion", "kind"): word,
-                   **{entry_of("motion", key.removeprefix("motion_")): value for key, value in MOTIONS[word].items()}}
+        others = [{entry_of("motion", "kind"): word, **{
+            entry_of("motion", key.removeprefix("motion_")): value for key, value in MOTIONS[word].items()}}
                   for word in words.split() or MOTIONS]
     elif key:
         others = [{entry_of(row.group, key): word} for word in words.split()]
+    if row.group in REPEATABLE:
+        others = [{entry_of(row.group, "name"): f"'{NAME}'", **other} for other in others]
     for scene, other in itertools.product(scenes, others):
         yield {"scene.name": scene, **{f"scene.{key}": value for key, value in SCENES[scene].items()}, **other,
                "integrate.duration": "1e-3"}
