@@ -259,6 +259,15 @@ def test_the_scenes_of_the_benches_are_of_their_kinds(name, kind):
     assert sorted(path.stem for path in scene.parent.glob("*.nml")) == sorted(SCENES_OF_BENCHES)
 
 
+def test_a_fact_that_is_a_list_is_an_error(tmp_path):
+    write_sample(tmp_path, "drum_1000", "quadtree", TRUTH, 1000)
+    with h5py.File(next(tmp_path.rglob("*.h5")), "a") as file:
+        del file["case/bodies"]
+        file["case/bodies"] = [0.0]
+    with pytest.raises(ResultError, match="case/bodies is not one text or number"):
+        read_bench([tmp_path])
+
+
 @pytest.mark.parametrize("options", [{"repeat": 0, "first_counts": {"swaps": 7}}, {"mode": "live"}, {"made_by": False}])
 def test_a_sample_kept_in_memory_is_the_one_of_the_file(tmp_path, options):
     def sample(folder):

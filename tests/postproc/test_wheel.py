@@ -47,8 +47,7 @@ def test_an_installed_wheel_reads_and_exports(wheel, tmp_path, heap_with_contact
     subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(tmp_path / "venv")], check=True)
     python = tmp_path / "venv" / "bin" / "python"
     packages = next((tmp_path / "venv" / "lib").glob("python*")) / "site-packages"
-    subprocess.run([sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index",
-                    "--disable-pip-version-check", "--target", str(packages), str(wheel)], check=True)
+    zipfile.ZipFile(wheel).extractall(packages)
     (packages / "dependencies.pth").write_text("\n".join(path for path in sys.path if path.endswith("-packages")))
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
 

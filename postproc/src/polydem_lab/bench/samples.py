@@ -352,7 +352,9 @@ def _facts(group: h5py.Group) -> dict:
         value = entry[()]
         if isinstance(value, bytes):
             value = value.decode("utf-8", errors="replace").strip()
-        elif np.ndim(value) == 0:
+        elif np.ndim(value) == 0 and hasattr(value, "item"):
             value = value.item()
+        else:
+            raise ResultError(f"{group.file.filename}: {group.name[1:]}/{name} is not one text or number")
         facts[name] = value
     return facts
