@@ -126,4 +126,7 @@ def test_a_run_goes_on_with_another_number_of_ranks(scene, ranks, restarts, tmp_
     assert f"step {steps[1]}\n" in output
     assert state_hash(output) == state_hash(whole)
     assert differences(frames(tmp_path / "whole"), frames(folder)) == []
+    # No file keeps disk space that was reserved for the writes of several ranks.
+    sizes = {path.name: (512*path.stat().st_blocks, path.stat().st_size) for path in folder.iterdir()}
+    assert all(on_disk <= size + 65536 for on_disk, size in sizes.values()), sizes
     restarts.append((scene, ranks, steps))

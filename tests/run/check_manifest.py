@@ -198,6 +198,40 @@ def files_of_somebody_else_stay(program):
                 assert program.check(folder)[0] == 0, (name, ending, way)
 
 
+def nothing_is_written_through_links(program):
+    """Files of a result that are links, or have a second name as in a copy made with `cp -al`."""
+    code, _, message = program.run("linkable")
+    assert code == 0, message
+    names = sorted(name for name in os.listdir("linkable"))
+    for way in "hard", "soft", "nowhere":
+        for chosen in [*([name] for name in names), names]:
+            if way == "nowhere" and chosen == names:
+                continue
+            shutil.rmtree("snapshot", ignore_errors=True)
+            folder = copy("linked", "linkable")
+            os.makedirs("snapshot")
+            before = contents(folder)
+            for name in chosen:
+                if way == "hard":
+                    os.link(f"{folder}/{name}", f"snapshot/{name}")
+                else:
+                    os.rename(f"{folder}/{name}", f"snapshot/{name}")
+                    os.symlink(f"../snapshot/{name}" if way == "soft" else f"../absent/{name}", f"{folder}/{name}")
+            code, _, message = program.run(folder, "--continue", "--changed", "--set", "integrate.duration=2.4e-4")
+            assert way == "nowhere" or code == 0, (way, chosen, message)
+            assert contents("snapshot") == {name: before[name] for name in chosen}, (way, chosen)
+            assert not os.path.exists("absent"), (way, chosen)
+    # Names of files that a run has not made yet
+    for name in ("log.txt", "profile.h5", "checkpoint_1.h5", "trajectory_0001.h5", "overlaps.csv"):
+        for ending in ENDINGS:
+            shutil.rmtree("linked")
+            os.makedirs("linked")
+            os.symlink("../absent", f"linked/{name}{ending}")
+            code, _, message = program.run("linked", "--force")
+            assert code == BAD_INPUT and f"linked/{name}{ending} blocks" in message, (name, ending, code, message)
+            assert not os.path.exists("absent")
+
+
 def a_result_without_a_manifest_is_left_alone(program):
     folder = copy("older")
     os.remove(f"{folder}/manifest.txt")
@@ -323,9 +357,9 @@ def main():
         program = Program(program_path, library)
         tests = (every_file_is_listed_with_its_checksum, flipped_bits_are_found,
                  missing_cut_and_exchanged_files_are_found, files_of_somebody_else_stay,
-                 a_result_without_a_manifest_is_left_alone, force_does_not_replace_its_own_input,
-                 other_bodies_are_not_taken_for_the_finished_run, force_renames_the_folder_with_all_files,
-                 a_disturbed_force_leaves_a_whole_result)
+                 nothing_is_written_through_links, a_result_without_a_manifest_is_left_alone,
+                 force_does_not_replace_its_own_input, other_bodies_are_not_taken_for_the_finished_run,
+                 force_renames_the_folder_with_all_files, a_disturbed_force_leaves_a_whole_result)
         for test in tests:
             began = time.monotonic()
             test(program, *([thoroughly] if test is a_disturbed_force_leaves_a_whole_result else []))

@@ -6,7 +6,8 @@ module polydem_hdf5_handle
       h5pcreate_f, h5pset_istore_k_f, h5pset_libver_bounds_f, h5pset_link_phase_change_f, h5pset_userblock_f, hid_t, &
       hsize_t
    use polydem_errors, only: error_t, input_error, io_error, raise, raise_unread
-   use polydem_file_system, only: check_access, disk_hint, errno_message, exists, is_folder
+   use polydem_file_status, only: is_shared
+   use polydem_file_system, only: check_access, disk_hint, errno_message, exists, is_folder, remove_file
    use polydem_hdf5_access, only: enable_parallel_access, barrier, abort_all
    use polydem_hdf5_dataset, only: has_link, start_library
    use polydem_hdf5_location, only: dataset_location_t, system_error
@@ -80,6 +81,7 @@ contains
       integer(c_int) :: cause
       integer :: status, ignored
 
+      if (is_shared(path)) call remove_file(path, error)
       call start_library(error)
       if (allocated(error)) return
       self%path = path

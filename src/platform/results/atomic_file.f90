@@ -7,7 +7,7 @@ module polydem_atomic_file
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t
    use polydem_file_checksum, only: append_checksum, checksum_length
-   use polydem_file_system, only: exists, folder_of, remove_file, rename_file, reserve_space, sync_file
+   use polydem_file_system, only: exists, folder_of, remove_file, release_space, rename_file, reserve_space, sync_file
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: ip, lp
    use polydem_result_files, only: unfinished
@@ -118,6 +118,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(hdf5_file_t) :: file
 
+      if (.not. allocated(error)) call release_space(from, error)
       if (.not. allocated(error)) call sync_file(from, error)
       if (.not. allocated(error)) call file%open(from, error)
       call file%close(error)

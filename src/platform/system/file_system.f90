@@ -4,13 +4,14 @@ module polydem_file_system
    use, intrinsic :: iso_fortran_env, only: file_storage_size
    use polydem_errors, only: error_t, io_error, raise, raise_unread
    use polydem_kinds, only: lp
-   use polydem_posix, only: c_access, c_close, c_fallocate, c_fsync, c_lseek, c_mkdir, c_open, c_rename, c_strerror, &
-      c_unlink, error_number, existence, is_written, read_and_write, read_only, text_at, write_only
+   use polydem_posix, only: c_access, c_close, c_fallocate, c_fsync, c_ftruncate, c_lseek, c_mkdir, c_open, c_rename, &
+      c_strerror, c_unlink, error_number, existence, is_written, read_and_write, read_only, text_at, write_only
    use polydem_posix_processes, only: c_umask, c_user
    implicit none
    private
-   public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_space, sync_file, overwrite_start
-   public :: check_access, decide_existence, find_length, folder_of, last_failure, errno_message, disk_hint
+   public :: make_folder, exists, is_folder, rename_file, remove_file, reserve_space, release_space, sync_file
+   public :: overwrite_start, check_access, decide_existence, find_length, folder_of, last_failure, errno_message
+   public :: disk_hint
 
    !> Hint for messages about files that cannot be written
    character(len=*), parameter :: disk_hint = &
@@ -193,6 +194,25 @@ contains
       end if
       if (c_close(descriptor) /= 0_c_int) call raise(error, io_error, path//': '//last_failure()//disk_hint)
    end subroutine reserve_space
+
+   !> Give back the disk space that was reserved after the end of a file, once no process writes to it.
+   subroutine release_space(path, error)
+      !> Path of the file
+      character(len=*), intent(in) :: path
+      !> Allocated if the file cannot be written
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: reason
+      integer(c_int) :: descriptor
+
+      descriptor = c_open(path//c_null_char, write_only, 0_c_int)
+      if (descriptor < 0_c_int) then
+         reason = last_failure()
+      else
+         if (c_ftruncate(descriptor, c_lseek(descriptor, 0_c_int64_t, to_end)) /= 0_c_int) reason = last_failure()
+         if (c_close(descriptor) /= 0_c_int .and. .not. allocated(reason)) reason = last_failure()
+      end if
+      if (allocated(reason)) call raise(error, io_error, path//': cannot be written: '//reason//disk_hint)
+   end subroutine release_space
 
    !> Check that a file can be opened for reading and writing.
    subroutine check_access(path, error)

@@ -6,7 +6,9 @@ module polydem_line_writer
    use, intrinsic :: iso_c_binding, only: c_int, c_new_line, c_null_char
    use, intrinsic :: iso_fortran_env, only: output_unit
    use polydem_errors, only: error_t, io_error, raise
-   use polydem_file_system, only: exists, last_failure
+   use polydem_file_status, only: is_shared
+   use polydem_file_system, only: exists, last_failure, remove_file, rename_file, sync_file
+   use polydem_folders, only: read_bytes
    use polydem_posix, only: c_close, c_creat, c_open, error_number, is_written, standard_error, &
       standard_output
    implicit none
@@ -37,13 +39,16 @@ module polydem_line_writer
    integer(c_int), parameter :: broken_pipe = 32_c_int
    !> Permissions of a new file before umask: rw-rw-rw-
    integer(c_int), parameter :: read_and_write = int(o'666', c_int)
+   !> Suffix of the temporary name of a copy, one of those that files of a result have
+   character(len=*), parameter :: temporary = '.unfinished'
    !> O_WRONLY and O_APPEND of Linux
    integer(c_int), parameter :: write_and_append = int(o'2001', c_int)
 
 contains
 
-   !> Open a file for writing. An existing file is replaced unless `appended` is true.
-   subroutine open_writer(self, path, error, appended)
+   !> Open a file for writing. An existing file is replaced unless `appended` is true. What other names of the file show
+   !> does not change: a link, or a file with several names, is first replaced by a new file.
+   recursive subroutine open_writer(self, path, error, appended)
       class(line_writer_t), intent(inout) :: self
       !> Path of the file
       character(len=*), intent(in) :: path
@@ -57,10 +62,31 @@ contains
       appends = exists(path)
       if (appends) appends = present(appended)
       if (appends) appends = appended
+      if (is_shared(path)) then
+         if (appends) call copy_file(path, error)
+         if (.not. appends) call remove_file(path, error)
+         if (allocated(error)) return
+      end if
       if (appends) self%descriptor = c_open(path//c_null_char, write_and_append, 0_c_int)
       if (.not. appends) self%descriptor = c_creat(path//c_null_char, read_and_write)
       if (self%descriptor < 0_c_int) call raise(error, io_error, path//': cannot be written: '//last_failure())
    end subroutine open_writer
+
+   !> Replace a file by a copy of it, atomically.
+   recursive subroutine copy_file(path, error)
+      character(len=*), intent(in) :: path
+      type(error_t), allocatable, intent(inout) :: error
+      type(line_writer_t) :: copy
+      character(len=:), allocatable :: text
+
+      call read_bytes(path, text, error)
+      if (allocated(error)) return
+      call copy%open(path//temporary, error)
+      call copy%put(text)
+      call copy%close(error)
+      if (.not. allocated(error)) call sync_file(path//temporary, error)
+      if (.not. allocated(error)) call rename_file(path//temporary, path, error)
+   end subroutine copy_file
 
    !> Open standard output. Its previous Fortran output is flushed before each write.
    subroutine open_screen(self, errors)

@@ -3,9 +3,9 @@ module polydem_posix
    use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_int, c_int64_t, c_ptr, c_size_t
    implicit none
    private
-   public :: c_access, c_close, c_closedir, c_creat, c_faccessat, c_fallocate, c_flock, c_fsync, c_lseek, c_mkdir, &
-      c_open, c_opendir, c_pread, c_pwrite, c_readdir, c_realpath, c_rename, c_strerror, c_strlen, &
-      c_unlink, c_write, clear_error_number, error_number, is_written, text_at
+   public :: c_access, c_close, c_closedir, c_creat, c_faccessat, c_fallocate, c_flock, c_fsync, c_ftruncate, c_lseek, &
+      c_mkdir, c_open, c_opendir, c_pread, c_pwrite, c_readdir, c_realpath, c_rename, c_strerror, c_strlen, c_unlink, &
+      c_write, clear_error_number, error_number, is_written, text_at
    public :: close_on_exec, existence, read_and_write, read_only, standard_error, standard_output, write_only
 
    !> Descriptors of standard output and standard error
@@ -92,6 +92,13 @@ module polydem_posix
          integer(c_int64_t), value :: offset
          integer(c_int), value :: from
       end function c_lseek
+
+      !> POSIX ftruncate(2) with 64-bit lengths (GNU C library)
+      integer(c_int) function c_ftruncate(descriptor, length) bind(C, name='ftruncate64')
+         import :: c_int, c_int64_t
+         integer(c_int), value :: descriptor
+         integer(c_int64_t), value :: length
+      end function c_ftruncate
 
       !> Linux fallocate(2) with 64-bit offsets
       integer(c_int) function c_fallocate(descriptor, mode, offset, length) bind(C, name='fallocate64')
