@@ -1,15 +1,13 @@
 """Damaged files end every verb with an exit code and one sentence, never with a traceback.
 
 Every verb that reads files gets every kind of damage in every file that it reads; beyond that files with some flipped
-bytes. Of the damages of single cells and data sets one in twenty is tried, for the time it takes, other ones in each
-call: the name of a test shows POLYDEM_SEED, which tries the same again. POLYDEM_FUZZ=50 tries all of them, and 50
-files of flipped bytes for each file.
+bytes. Of the damages of single cells and data sets one in twenty is tried, for the time it takes: POLYDEM_SEED=1 to 19
+chooses others, POLYDEM_FUZZ=50 tries all of them, and 50 files of flipped bytes for each file.
 """
 
 import csv
 import json
 import os
-import random
 import shutil
 import subprocess
 import sys
@@ -33,7 +31,7 @@ FLIPPED = int(os.environ.get("POLYDEM_FUZZ", "3"))
 
 #: Of the damages of cells and data sets every so many is tried, another one for each file; all if more bits are flipped
 EVERY = 20 if FLIPPED <= 3 else 1
-SEED = int(os.environ.get("POLYDEM_SEED", random.randrange(EVERY)))
+SEED = int(os.environ.get("POLYDEM_SEED", "0"))
 
 
 def chosen(damages, salt, seed):
