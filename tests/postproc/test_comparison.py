@@ -62,6 +62,14 @@ def samples_of(output):
     return {path: path.stat().st_mtime_ns for path in sorted((output / "quick").glob("*/samples/*.h5"))}
 
 
+def small_plan(folder):
+    """A plan of two pieces."""
+    shutil.copytree(PLAN.parent, folder)
+    few = {"gases": {"bench": "bench_gases.nml"}, "verification": {"kind": "verify", "options": ["B2"]}}
+    (folder / "plan.json").write_text(json.dumps(few), encoding="utf-8")
+    return folder / "plan.json"
+
+
 @pytest.fixture(scope="module")
 def output(tmp_path_factory):
     """A finished comparison, and what was said."""
@@ -159,22 +167,19 @@ def test_what_is_there_is_not_made_again(output):
 
 
 def test_another_program_or_machine_makes_all_again_and_a_changed_setting_one_piece(tmp_path):
-    folder, plan = tmp_path / "paper", tmp_path / "plan"
-    shutil.copytree(PLAN.parent, plan)
-    few = {"gases": {"bench": "bench_gases.nml"}, "verification": {"kind": "verify", "options": ["B2"]}}
-    (plan / "plan.json").write_text(json.dumps(few), encoding="utf-8")
-    assert call(folder, plan=plan / "plan.json")[0] == 0
-    gases = plan / "bench_gases.nml"
+    folder, plan = tmp_path / "paper", small_plan(tmp_path / "plan")
+    assert call(folder, plan=plan)[0] == 0
+    gases = plan.parent / "bench_gases.nml"
     gases.write_text(gases.read_text(encoding="utf-8").replace("repeats = 2", "repeats = 1"), encoding="utf-8")
-    code, said = call(folder, "--dry-run", plan=plan / "plan.json")
+    code, said = call(folder, "--dry-run", plan=plan)
     assert code == 0 and "gases: its settings changed, so it is made again" in said, said
     assert said.count(" is there (") == 1 and (folder / "quick" / "gases").exists(), "a dry run changes nothing"
-    code, said = call(folder, plan=plan / "plan.json")
+    code, said = call(folder, plan=plan)
     assert code == 0 and {path.name[-5:] for path in samples_of(folder)} == {"-0.h5", "-1.h5"}
     state = folder / "quick" / "state.json"
     state.write_text(state.read_text(encoding="utf-8").replace('"digest": "', '"digest": "0'), encoding="utf-8")
     before = samples_of(folder)
-    code, said = call(folder, plan=plan / "plan.json")
+    code, said = call(folder, plan=plan)
     assert code == 0 and "made by another program or machine" in said and " is there (" not in said, said
     after = samples_of(folder)
     assert set(after) == set(before) and not set(after.items()) & set(before.items())
@@ -201,11 +206,11 @@ def test_what_is_published_is_one_page_that_its_tables_confirm_of_other_machines
 
 
 def test_a_comparison_that_was_killed_goes_on_where_it_was(tmp_path):
-    folder = tmp_path / "paper"
+    folder, plan = tmp_path / "paper", small_plan(tmp_path / "plan")
     environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
-    with subprocess.Popen(command(folder), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+    with subprocess.Popen(command(folder, plan=plan), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
                           env=environment) as process:
-        while not list((folder / "quick" / "drums" / "samples").glob("*-1-2.h5")):
+        while not list((folder / "quick" / "gases" / "samples").glob("*-1-2.h5")):
             assert process.poll() is None
             time.sleep(0.02)
         process.send_signal(signal.SIGTERM)
@@ -213,24 +218,24 @@ def test_a_comparison_that_was_killed_goes_on_where_it_was(tmp_path):
     assert process.returncode == 75 and "the same command goes on" in said, said
     before = samples_of(folder)
     assert before
-    code, said = call(folder)
+    code, said = call(folder, plan=plan)
     assert code == 0, said
     after = samples_of(folder)
     assert {path: after[path] for path in before} == before and len(after) > len(before)
 
 
 def test_nothing_goes_on_beside_a_call_after_one_that_was_killed_at_once(tmp_path):
-    folder = tmp_path / "paper"
+    folder, plan = tmp_path / "paper", small_plan(tmp_path / "plan")
     environment = {**os.environ, "OMP_WAIT_POLICY": "passive"}
-    with subprocess.Popen(command(folder), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    with subprocess.Popen(command(folder, plan=plan), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
                           env=environment) as process:
-        while not list((folder / "quick" / "drums" / "samples").glob("*-1-0.h5")):
+        while not list((folder / "quick" / "gases" / "samples").glob("*-1-0.h5")):
             assert process.poll() is None
             time.sleep(0.02)
         process.kill()
     before = samples_of(folder)
-    code, said = call(folder)
-    assert code == 0 and said.count(" finished after ") == 4, said
+    code, said = call(folder, plan=plan)
+    assert code == 0 and said.count(" finished after ") == 2, said
     after = samples_of(folder)
     assert {path: after[path] for path in before} == before and len(after) > len(before)
 

@@ -58,7 +58,6 @@ def has_mpi():
 
 def complaints(sources, entries, folder, target="all"):
     """What the compiler says of the sources with these entries: lines with warnings and errors."""
-    shutil.rmtree(folder, ignore_errors=True)
     options = [f"-D{name}={value}" for name, value in entries.items()]
     configured = subprocess.run([CMAKE, "-S", str(sources), "-B", str(folder), "-G", "Ninja", *options, *ONLY_CHECK],
                                 capture_output=True, text=True, check=False)
@@ -71,7 +70,6 @@ def complaints(sources, entries, folder, target="all"):
         return [built.stdout[-2000:] + built.stderr]
     for line in found:
         print(built.stdout[max(0, built.stdout.find(line) - 400):][:500 + len(line)])
-    shutil.rmtree(folder)
     return found
 
 
@@ -83,7 +81,9 @@ class Presets(unittest.TestCase):
                 if entries.get("POLYDEM_MPI") == "ON" and not has_mpi():
                     print("no MPI: not tried")
                     continue
+                shutil.rmtree(FOLDER / names[0], ignore_errors=True)
                 self.assertEqual(complaints(SOURCES, entries, FOLDER / names[0]), [])
+                shutil.rmtree(FOLDER / names[0])
 
     def test_every_preset_can_be_built_and_is_named_in_the_manual(self):
         listed = json.loads((SOURCES / "CMakePresets.json").read_text(encoding="utf-8"))
@@ -94,7 +94,8 @@ class Presets(unittest.TestCase):
 
     def test_planted_faults_are_found(self):
         copy = FOLDER / "copy"
-        shutil.rmtree(copy, ignore_errors=True)
+        for folder in (copy, FOLDER / "planted"):
+            shutil.rmtree(folder, ignore_errors=True)
         shutil.copytree(SOURCES / "src", copy / "src")
         shutil.copy(SOURCES / "CMakeLists.txt", copy)
         kinds = copy / "src/base/kinds.f90"

@@ -134,6 +134,8 @@ class _Extent:
             if not np.all(np.isfinite(self.low)):
                 raise ResultError("there are no bodies to draw")
             margin = 0.02 * max(self.high - self.low)
+            if not 0.0 < margin < np.inf:
+                raise ResultError("the bodies have no extent that can be drawn")
             limits = (self.low[0] - margin, self.high[0] + margin, self.low[1] - margin, self.high[1] + margin)
         elif np.any(self.high < limits[::2]) or np.any(self.low > limits[1::2]):
             spans = (f"{axis} {low:.4g} to {high:.4g} m" for axis, low, high in zip("xy", self.low, self.high))
