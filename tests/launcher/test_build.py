@@ -1,5 +1,6 @@
 """Builds and tests of the toy."""
 
+import fcntl
 import os
 import re
 import shutil
@@ -250,3 +251,21 @@ class Build(Toy):
         os.remove(os.path.join(self.folder, "asked"))
         self.assertEqual(self.call("test", "fine")[0], 0)
         self.assertFalse(os.path.exists(os.path.join(self.folder, "asked")))
+
+    def test_a_plan_waits_for_nobody(self):
+        self.write_python()
+        os.makedirs(os.path.join(self.folder, "build"), exist_ok=True)
+        lock = os.path.join(self.folder, "build", ".lock")
+        said = "polydem: another call of ./polydem builds"
+        for is_built in (False, True):
+            if is_built:
+                self.assertEqual(self.call("--version")[0], 0)
+            with open(lock, "w", encoding="utf-8") as held:
+                fcntl.flock(held, fcntl.LOCK_EX)
+                for option in ("--dry-run", "--report-only"):
+                    code, output, messages = self.call("paper", option)
+                    self.assertEqual((code, output.startswith("-m\npolydem_post\npaper\n")), (1 - is_built, is_built))
+                    self.assertEqual(messages, said + (": this is for the program as it is\n" if is_built else
+                                                       "; call again when it has ended\n"))
+        code, _, messages = self.call("paper", "--dry-run")
+        self.assertEqual((code, messages), (0, ""))
