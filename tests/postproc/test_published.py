@@ -35,6 +35,7 @@ OTHERS = {
     "inputs/glossary.md",
     "inputs/log.md",
     "src/README.md",
+    "src/recipes.md",
     "src/algorithms.md",
     "src/packaging/README.md",
     "src/theory.md",

@@ -1,4 +1,4 @@
-"""Build and run the recipes of src/README.md: a new force part and a new finder.
+"""Build and run the recipes of src/recipes.md: a new force part and a new finder.
 
 usage: check_recipes.py ROOT BUILD NINJA
 
@@ -58,7 +58,7 @@ def changed(text, lines):
 def apply_recipes(root, copy):
     """Apply the recipes of the guide to a copy of the sources, and check which files each of them changes."""
     found, new = {}, None
-    with open(os.path.join(root, "src", "README.md"), encoding="utf-8") as page:
+    with open(os.path.join(root, "src", "recipes.md"), encoding="utf-8") as page:
         text = page.read()
     for language, path, lines in blocks_of(text):
         target = os.path.join(copy, path)
