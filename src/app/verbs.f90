@@ -15,7 +15,7 @@ module polydem_verbs
    use polydem_read_settings, only: read_settings
    use polydem_replay, only: replay_trace
    use polydem_result_info, only: describe_program, describe_result
-   use polydem_run, only: attempt_t
+   use polydem_run, only: run_options_t
    use polydem_run_simulation, only: run_simulation
    use polydem_screen, only: print_line, warn
    use polydem_settings, only: bench_settings_t, settings_t
@@ -48,7 +48,7 @@ contains
       if (command%verb == 'run') then
          if (.not. allocated(error)) call read_settings(command%file, command%overrides, settings, error)
          call comm%all_reduce_error(error)
-         if (.not. allocated(error)) call run_simulation(settings, command%force, error, attempt_t( &
+         if (.not. allocated(error)) call run_simulation(settings, command%force, error, run_options_t( &
             continues=command%continues, may_change=command%may_change, limit=real(command%limit, dp), &
             threads=threads), comm)
          return

@@ -2,7 +2,7 @@
 module polydem_check_bench
    use polydem_errors, only: error_t, input_error, raise
    use polydem_namelist_entries, only: bench_group
-   use polydem_origin, only: overrides_of, place_of
+   use polydem_source_locations, only: overrides_of, place_of
    use polydem_settings, only: bench_settings_t
    use polydem_strings, only: to_text, quoted, text_t
    implicit none

@@ -150,9 +150,10 @@ def settings_module(groups, rows):
         components = "\n".join(component(row) for row in first_rows(rows, group))
         comment = textwrap.fill(f"Group &{group}" + (f": {meaning}" if meaning else ""), 110,
                                 initial_indent="   !> ", subsequent_indent="   !> ")
-        base = ", extends(origin_t)" if group == BENCH else ""
+        base = ", extends(source_locations_t)" if group == BENCH else ""
         body += f"{comment}\n   type{base} :: {group}_settings_t\n{components}\n   end type {group}_settings_t\n\n"
-    body += "   !> All settings of a run. They do not change after reading\n   type, extends(origin_t) :: settings_t\n"
+    body += "   !> All settings of a run. They do not change after reading\n"
+    body += "   type, extends(source_locations_t) :: settings_t\n"
     for group, (_, is_repeatable) in groups.items():
         if group != BENCH:
             kind, shape = (", allocatable", "(:)") if is_repeatable else ("", "")
@@ -160,7 +161,7 @@ def settings_module(groups, rows):
                      f"      type({group}_settings_t){kind} :: {group}{shape}\n")
     body += "   end type settings_t\n"
     return module("settings", "Settings of a run and of a bench: one type per namelist group.",
-                  ["kinds, only: ip, wp", "origin, only: origin_t", "strings, only: text_t"],
+                  ["kinds, only: ip, wp", "origin, only: source_locations_t", "strings, only: text_t"],
                   ["settings_t", *(f"{group}_settings_t" for group in groups)], body)
 
 

@@ -12,7 +12,7 @@ module polydem_read_settings
    use polydem_group_instances, only: full_name, index_of_instance, instance_t, row_of
    use polydem_namelist_entries, only: bench_group, key_length, keys_of
    use polydem_namelist_tokens, only: source_t
-   use polydem_origin, only: origin_t
+   use polydem_source_locations, only: source_locations_t
    use polydem_resolve_entries, only: resolve_entries, resolved_text
    use polydem_settings, only: bench_settings_t, settings_t
    use polydem_text_file, only: read_text_file
@@ -30,7 +30,7 @@ contains
       !> applies
       character(len=*), intent(in) :: overrides(:)
       !> Complete, checked settings: `settings_t` of a run, or `bench_settings_t`
-      class(origin_t), intent(inout) :: settings
+      class(source_locations_t), intent(inout) :: settings
       !> Error in the file or an override; its message starts with file:line or --set group.key=value
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
@@ -50,20 +50,20 @@ contains
       !> applies
       character(len=*), intent(in) :: overrides(:)
       !> Complete, checked settings: `settings_t` of a run, or `bench_settings_t`
-      class(origin_t), intent(inout) :: settings
+      class(source_locations_t), intent(inout) :: settings
       !> Error in the text or an override
       type(error_t), allocatable, intent(inout) :: error
       type(instance_t), allocatable :: instances(:)
 
       select type (settings)
       type is (settings_t)
-         call read_values(file_name, text, overrides, .false., settings%origin_t, instances, error)
+         call read_values(file_name, text, overrides, .false., settings%source_locations_t, instances, error)
          if (allocated(error)) return
          call fill_groups(instances, settings)
          call check_settings(settings, instances, error)
          call expand_short_motion(settings)
       type is (bench_settings_t)
-         call read_values(file_name, text, overrides, .true., settings%origin_t, instances, error)
+         call read_values(file_name, text, overrides, .true., settings%source_locations_t, instances, error)
          if (allocated(error)) return
          call fill_bench(instances(index_of_instance(instances, bench_group)), settings)
          call check_bench(settings, error)
@@ -75,7 +75,7 @@ contains
       character(len=*), intent(in) :: file_name, text, overrides(:)
       !> Whether the text describes a bench
       logical, intent(in) :: of_bench
-      type(origin_t), intent(inout) :: origin
+      type(source_locations_t), intent(inout) :: origin
       !> Instances of all groups with their values
       type(instance_t), allocatable, intent(out) :: instances(:)
       type(error_t), allocatable, intent(inout) :: error
@@ -96,7 +96,7 @@ contains
    !> List where the entries were given.
    pure subroutine list_places(instances, origin)
       type(instance_t), intent(in) :: instances(:)
-      type(origin_t), intent(inout) :: origin
+      type(source_locations_t), intent(inout) :: origin
       character(len=key_length), allocatable :: keys(:)
       integer :: i, k, n
 

@@ -10,7 +10,7 @@ module polydem_convex_overlap
    use polydem_lens_search, only: cross_at, search_pair
    use polydem_overlap_batch, only: add_lane, overlap_batch_t, overlap_columns_t
    use polydem_overlap_integrals, only: overlap_t
-   use polydem_pair_memory, only: most_lens_corners, unpack_edge
+   use polydem_feature_cache, only: most_lens_corners, unpack_edge
    use polydem_polygon, only: greatest_radius
    use polydem_separation, only: remembered_edge, test_separation
    implicit none

@@ -9,7 +9,7 @@ module polydem_edge_kernel
    use polydem_kinds, only: ip, wp
    use polydem_overlap_batch, only: column_length, overlap_batch_t
    use polydem_overlap_tolerances, only: far, surely_apart
-   use polydem_pair_memory, only: edge_bits
+   use polydem_feature_cache, only: edge_bits
    implicit none
    private
    public :: find_separated, lead

@@ -31,7 +31,7 @@ module polydem_lens_kernel
    use polydem_lens_work, only: centre_of, cross, edge, from_centre, lens_work_t, placed
    use polydem_overlap_batch, only: column_length, overlap_batch_t, overlap_columns_t
    use polydem_overlap_tolerances, only: far, sure_at_edge, sure_in_fan
-   use polydem_pair_memory, only: lens_bits, most_lens_corners
+   use polydem_feature_cache, only: lens_bits, most_lens_corners
    implicit none
    private
    public :: evaluate_batch

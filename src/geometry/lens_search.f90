@@ -1,8 +1,8 @@
-!> Search without memory for what `polydem_pair_memory` can remember of two polygons: a lens or a separating edge.
+!> Search without memory for what `polydem_feature_cache` can remember of two polygons: a lens or a separating edge.
 module polydem_lens_search
    use polydem_kinds, only: ip, wp
    use polydem_overlap_tolerances, only: far, sure, surely_apart
-   use polydem_pair_memory, only: lens_bits, most_lens_corners, packed_edge, packed_lens
+   use polydem_feature_cache, only: lens_bits, most_lens_corners, packed_edge, packed_lens
    implicit none
    private
    public :: search_pair, cross_at

@@ -32,7 +32,7 @@ module polydem_overlap_batch
 
    !> A batch of pairs, one lane each. Its numbers are not initialised. Last indices (2) are P and Q.
    type :: overlap_batch_t
-      !> What is remembered, see `polydem_pair_memory`; any integer
+      !> What is remembered, see `polydem_feature_cache`; any integer
       integer(ip) :: memory(column_length)
       !> Places of the first vertices in the array of vertices that `evaluate_batch` gets
       integer(ip) :: start(column_length, 2)

@@ -7,7 +7,7 @@ module polydem_separation
    use polydem_kinds, only: ip, wp
    use polydem_overlap_batch, only: column_length, lanes, overlap_batch_t
    use polydem_overlap_tolerances, only: far, surely_apart
-   use polydem_pair_memory, only: packed_edge, unpack_edge
+   use polydem_feature_cache, only: packed_edge, unpack_edge
    implicit none
    private
    public :: test_separation, test_edges, remembered_edge

@@ -17,7 +17,7 @@ module polydem_checkpoint_file
    use polydem_communicator, only: choose_communicator, communicator_t
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_checksum, only: verify_checksum
-   use polydem_global_order, only: component, global_order_t
+   use polydem_row_distribution, only: component, row_distribution_t
    use polydem_hdf5_file, only: hdf5_file_t, part_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_provenance, only: provenance_t, write_provenance, schema_version
@@ -41,7 +41,7 @@ module polydem_checkpoint_file
       !> Communicator of the ranks that write it
       class(communicator_t), allocatable :: comm
       !> Distribution of the rows of each group over ranks
-      type(global_order_t) :: rows(size(groups))
+      type(row_distribution_t) :: rows(size(groups))
       !> Whether the rows of each group are distributed; otherwise each column is complete on one rank
       logical :: is_spread(size(groups)) = .false.
       !> Rows of each group to read: number of rows before them, and their number; negative: all rows
@@ -94,7 +94,7 @@ contains
       !> /bodies/ or /pairs/
       character(len=*), intent(in) :: group
       !> Global order of the rows
-      type(global_order_t), intent(in) :: rows
+      type(row_distribution_t), intent(in) :: rows
       integer :: k
 
       k = place_of(group)

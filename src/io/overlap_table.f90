@@ -5,7 +5,7 @@ module polydem_overlap_table
    use polydem_contact_depth, only: depth_share
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t
-   use polydem_global_order, only: global_order_t
+   use polydem_row_distribution, only: row_distribution_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_line_writer, only: line_writer_t
    use polydem_ownership, only: order_pairs
@@ -71,7 +71,7 @@ contains
       class(communicator_t), intent(inout) :: comm
       !> Identifiers, position, area, depth, and depth over thickness, (7, row)
       real(dp), allocatable, intent(out) :: block(:, :)
-      type(global_order_t) :: rows
+      type(row_distribution_t) :: rows
       real(dp), allocatable :: values(:, :)
       logical, allocatable :: is_deep(:)
       integer(ip), allocatable :: deep(:)

@@ -18,7 +18,7 @@ module polydem_trajectory_segment
    use polydem_communicator, only: communicator_t
    use polydem_contacts, only: contact_force, contacts_t
    use polydem_errors, only: error_t
-   use polydem_global_order, only: component, global_order_t, vector
+   use polydem_row_distribution, only: component, row_distribution_t, vector
    use polydem_hdf5_file, only: hdf5_file_t, many_rows, one_row, part_t
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_named_values, only: named_values_t
@@ -38,7 +38,7 @@ contains
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
       type(error_t), allocatable, intent(inout) :: error
-      type(global_order_t) :: blocks
+      type(row_distribution_t) :: blocks
       type(part_t) :: part
       integer(lp), allocatable :: numbers(:, :), block(:, :)
       integer(ip) :: s
@@ -68,7 +68,7 @@ contains
       type(hdf5_file_t), intent(inout) :: file
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
-      type(global_order_t), intent(in) :: blocks
+      type(row_distribution_t), intent(in) :: blocks
       type(error_t), allocatable, intent(inout) :: error
       real(dp), allocatable :: masses(:, :), block(:, :)
       type(part_t) :: part
@@ -95,7 +95,7 @@ contains
       !> Block of bodies of this rank
       type(part_t), intent(in) :: part
       type(error_t), allocatable, intent(inout) :: error
-      type(global_order_t) :: blocks
+      type(row_distribution_t) :: blocks
       integer(ip), allocatable :: body(:), start(:)
       real(dp), allocatable :: vertices(:, :)
       character(len=*), parameter :: about_start = &
@@ -144,7 +144,7 @@ contains
       real(dp), intent(in) :: time
       type(bodies_t), intent(in) :: bodies
       type(error_t), allocatable, intent(inout) :: error
-      type(global_order_t) :: blocks
+      type(row_distribution_t) :: blocks
       type(part_t) :: part
       real(dp), allocatable :: state(:, :), block(:, :)
       integer(ip) :: s
@@ -205,7 +205,7 @@ contains
       !> Contacts with their forces
       type(contacts_t), intent(in) :: contacts
       type(error_t), allocatable, intent(inout) :: error
-      type(global_order_t) :: blocks
+      type(row_distribution_t) :: blocks
       type(part_t) :: part
       integer(lp), allocatable :: ids(:, :), pairs(:, :)
       real(dp), allocatable :: values(:, :), block(:, :)

@@ -16,7 +16,7 @@ module polydem_bench
    use polydem_finder_variants, only: new_finder_or_variant
    use polydem_host, only: load_average
    use polydem_kinds, only: dp, ip
-   use polydem_origin, only: place_of
+   use polydem_source_locations, only: place_of
    use polydem_oversubscription, only: oversubscription_text
    use polydem_provenance, only: threads_are_bound
    use polydem_result_files, only: default_folder

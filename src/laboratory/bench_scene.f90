@@ -5,7 +5,7 @@ module polydem_bench_scene
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_read_settings, only: read_settings
    use polydem_result_files, only: manifest_name, profile_name, trace_name
-   use polydem_run, only: attempt_t, result_folder
+   use polydem_run, only: run_options_t, result_folder
    use polydem_run_simulation, only: run_simulation
    use polydem_settings, only: settings_t
    use polydem_strings, only: quoted
@@ -116,7 +116,7 @@ contains
 
       if (allocated(error)) return
       is_old = exists(result_folder(settings)//'/'//manifest_name, error)
-      if (.not. allocated(error)) call run_simulation(settings, is_old, error, attempt_t(is_brief=.true.))
+      if (.not. allocated(error)) call run_simulation(settings, is_old, error, run_options_t(is_brief=.true.))
    end subroutine begin_run
 
    !> Check that an existing result has the same settings.

@@ -11,7 +11,7 @@ module polydem_checkpoint_fields
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_sums, only: total_forces
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_local_bodies, only: fit_to_bodies
+   use polydem_local_data, only: rebuild_local_data
    use polydem_monitor, only: serialize_monitor, monitor_t
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
    use polydem_serializer, only: serializer_t
@@ -61,7 +61,7 @@ contains
          if (serializer%is_reading) call read_pairs(serializer, s)
          if (.not. serializer%is_reading .or. allocated(serializer%error)) return
          call turn_bodies(s%bodies, s%moving)
-         call fit_to_bodies(s, serializer%error, s%domain%median_diameter)
+         call rebuild_local_data(s, serializer%error, s%domain%median_diameter)
       end associate
    end subroutine serialize_run
 

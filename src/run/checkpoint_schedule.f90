@@ -7,7 +7,7 @@ module polydem_checkpoint_schedule
    use polydem_clock, only: wall_seconds
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t
-   use polydem_global_order, only: global_order_t
+   use polydem_row_distribution, only: row_distribution_t
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_monitor, only: monitor_t
@@ -158,7 +158,7 @@ contains
       class(communicator_t), intent(inout) :: comm
       type(simulation_t), intent(in) :: simulation
       type(checkpoint_file_t), intent(inout) :: file
-      type(global_order_t) :: rows
+      type(row_distribution_t) :: rows
 
       associate (bodies => simulation%bodies, pairs => simulation%neighbours%pairs)
          call order_bodies(comm, bodies, rows)

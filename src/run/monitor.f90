@@ -233,10 +233,10 @@ contains
       share = 0.0_dp
       associate (s => simulation, settings => simulation%settings%guards, &
                  thickness => simulation%bodies%thickness)
-         if (any_deeper(s%walk%suspects, thickness, settings%overlap_limit)) then
-            worst = deepest_contact(s%walk%suspects, thickness)
-            text = depth_text(s%bodies, s%walk%suspects, thickness, worst)
-            share = real(depth_share(s%walk%suspects, thickness, worst), dp)
+         if (any_deeper(s%walk%flagged, thickness, settings%overlap_limit)) then
+            worst = deepest_contact(s%walk%flagged, thickness)
+            text = depth_text(s%bodies, s%walk%flagged, thickness, worst)
+            share = real(depth_share(s%walk%flagged, thickness, worst), dp)
          end if
          if (settings%overlap == 'stop') call s%comm%all_reduce_text(text, share)
          if (.not. allocated(text)) return
@@ -255,10 +255,10 @@ contains
       integer(lp) :: place
 
       associate (s => simulation)
-         found = findloc(s%walk%suspects%pair(:s%walk%suspects%n), s%walk%passing_pair, dim=1)
-         place = place_of(s%bodies, s%walk%suspects%first(found), s%walk%suspects%second(found))
+         found = findloc(s%walk%flagged%pair(:s%walk%flagged%n), s%walk%passing_pair, dim=1)
+         place = place_of(s%bodies, s%walk%flagged%first(found), s%walk%flagged%second(found))
          call monitor%passing%respond(s%settings%guards%passing, 'step '//to_text(s%step)//': '// &
-                                    passing_text(s%bodies, s%walk%suspects, s%bodies%radius, found, &
+                                    passing_text(s%bodies, s%walk%flagged, s%bodies%radius, found, &
                                                  shorter_step(s%settings%integrate)), error, &
                                     -real(place, dp))
          if (allocated(error)) error%place = place
@@ -271,7 +271,7 @@ contains
       type(simulation_t), intent(in) :: simulation
 
       finds_stiff = .false.
-      if (simulation%settings%guards%step == 'off' .or. simulation%walk%suspects%n == 0_ip) return
+      if (simulation%settings%guards%step == 'off' .or. simulation%walk%flagged%n == 0_ip) return
       finds_stiff = greatest_share(simulation) > max(warn_share, 1.1_wp*monitor%warned)
    end function finds_stiff
 

@@ -7,7 +7,7 @@ module polydem_restart
    use polydem_domain, only: new_domain
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_system, only: exists
-   use polydem_global_order, only: global_order_t
+   use polydem_row_distribution, only: row_distribution_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_log, only: log_t
    use polydem_manifest, only: manifest_t
@@ -22,10 +22,10 @@ module polydem_restart
    use polydem_timers, only: timers_t
    implicit none
    private
-   public :: earlier_attempts_t, find_restart, restore, remove_surplus_files, serialize_earlier
+   public :: restart_state_t, find_restart, restore, remove_surplus_files, serialize_earlier
 
    !> State of the result folder after earlier attempts
-   type :: earlier_attempts_t
+   type :: restart_state_t
       !> Number of the checkpoint to restart from; 0: there is none, the run starts at step 0
       integer(ip) :: checkpoint = 0_ip
       !> Step of the checkpoint
@@ -45,7 +45,7 @@ module polydem_restart
       integer(lp), private :: segments_at_checkpoint = 0_lp
       !> Commit of the program that wrote the checkpoint, and its resolved settings
       character(len=:), allocatable, private :: revision, former_settings
-   end type earlier_attempts_t
+   end type restart_state_t
 
    !> Message about a different scene
    character(len=*), parameter :: other_bodies = 'the initial bodies differ'
@@ -64,7 +64,7 @@ contains
       !> Whether the settings may differ from those of the checkpoint
       logical, intent(in) :: may_change
       !> State of the folder after earlier attempts
-      type(earlier_attempts_t), intent(out) :: earlier
+      type(restart_state_t), intent(out) :: earlier
       !> Allocated if the run cannot restart
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: changes, former
@@ -119,7 +119,7 @@ contains
       character(len=*), intent(in) :: folder, scene
       type(manifest_t), intent(in) :: manifest
       type(settings_t), intent(in) :: settings
-      type(earlier_attempts_t), intent(inout) :: earlier
+      type(restart_state_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path, changes, former, former_settings
 
@@ -145,17 +145,17 @@ contains
    !> good and newer, so it is an error.
    subroutine choose_checkpoint(folder, earlier, error)
       character(len=*), intent(in) :: folder
-      type(earlier_attempts_t), intent(inout) :: earlier
+      type(restart_state_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: problem
-      type(earlier_attempts_t) :: candidate
+      type(restart_state_t) :: candidate
       character(len=:), allocatable :: damage
       integer(ip) :: k
 
       damage = ''
       do k = 1_ip, n_checkpoints
          if (.not. exists(checkpoint_path(folder, k), error)) cycle
-         candidate = earlier_attempts_t(checkpoint=k)
+         candidate = restart_state_t(checkpoint=k)
          call read_progress(checkpoint_path(folder, k), candidate, problem)
          if (allocated(problem)) then
             if (problem%is_unread) then
@@ -184,7 +184,7 @@ contains
    !> Read step, attempts and settings of a checkpoint.
    subroutine read_progress(path, earlier, error)
       character(len=*), intent(in) :: path
-      type(earlier_attempts_t), intent(inout) :: earlier
+      type(restart_state_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
       type(attempts_t) :: attempts
@@ -202,7 +202,7 @@ contains
       character(len=*), intent(in) :: folder, scene
       type(manifest_t), intent(in) :: manifest
       logical, intent(in) :: is_changed
-      type(earlier_attempts_t), intent(inout) :: earlier
+      type(restart_state_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path, problem
       integer, allocatable :: places(:)
@@ -243,7 +243,7 @@ contains
       character(len=*), intent(in) :: folder, scene
       type(manifest_t), intent(in) :: manifest
       integer, intent(in) :: places(:)
-      type(earlier_attempts_t), intent(inout) :: earlier
+      type(restart_state_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: path, former
       integer(lp) :: last
@@ -271,7 +271,7 @@ contains
       !> Manifest of the folder, which is updated
       type(manifest_t), intent(inout) :: manifest
       !> State of the folder after earlier attempts
-      type(earlier_attempts_t), intent(in) :: earlier
+      type(restart_state_t), intent(in) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: number
       integer :: k
@@ -295,7 +295,7 @@ contains
    subroutine serialize_earlier(serializer, earlier)
       class(serializer_t), intent(inout) :: serializer
       !> State of the folder after earlier attempts
-      type(earlier_attempts_t), intent(inout) :: earlier
+      type(restart_state_t), intent(inout) :: earlier
       integer(ip) :: numbers(2)
 
       numbers = [earlier%checkpoint, earlier%segments]
@@ -311,7 +311,7 @@ contains
       !> Result folder
       character(len=*), intent(in) :: folder
       !> State of the folder, with a checkpoint
-      type(earlier_attempts_t), intent(in) :: earlier
+      type(restart_state_t), intent(in) :: earlier
       !> Commit of this program
       character(len=*), intent(in) :: revision
       !> A simulation of the same scene at time 0
@@ -324,7 +324,7 @@ contains
       !> Allocated if the checkpoint does not fit this run
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
-      type(global_order_t) :: rows
+      type(row_distribution_t) :: rows
 
       call file%open(checkpoint_path(folder, earlier%checkpoint), error, simulation%comm)
       if (allocated(error)) return

@@ -12,7 +12,7 @@ module polydem_run
    use polydem_named_values, only: named_values_t
    use polydem_provenance, only: provenance_t
    use polydem_recorder, only: recorder_t
-   use polydem_restart, only: earlier_attempts_t
+   use polydem_restart, only: restart_state_t
    use polydem_result_files, only: default_folder
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
@@ -21,10 +21,10 @@ module polydem_run
    use polydem_trajectory_writer, only: trajectory_writer_t
    implicit none
    private
-   public :: run_t, attempt_t, result_folder
+   public :: run_t, run_options_t, result_folder
 
    !> Options of an attempt: how to use the result of earlier attempts, and the time limit
-   type :: attempt_t
+   type :: run_options_t
       !> Whether to restart from the last checkpoint (--continue)
       logical :: continues = .false.
       !> Whether the settings may differ from those of that checkpoint (--changed)
@@ -35,20 +35,20 @@ module polydem_run
       logical :: is_brief = .false.
       !> How the number of threads is determined
       type(thread_choice_t) :: threads
-   end type attempt_t
+   end type run_options_t
 
    !> State of a run
    type :: run_t
       !> Communicator of the run
       class(communicator_t), allocatable :: comm
       !> Options of this attempt
-      type(attempt_t) :: attempt
+      type(run_options_t) :: attempt
       !> Warning if the ranks have more threads than there are processors; else empty
       character(len=:), allocatable :: oversubscription
       !> Start of the attempt, from `wall_seconds` [s]
       real(dp) :: began = 0.0_dp
       !> State of the result folder after earlier attempts
-      type(earlier_attempts_t) :: earlier
+      type(restart_state_t) :: earlier
       !> Scene hash and counts of all attempts
       type(attempts_t) :: attempts
       !> Schedule of checkpoints

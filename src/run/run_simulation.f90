@@ -10,7 +10,7 @@ module polydem_run_simulation
    use polydem_monitor, only: finds_stiff, set_warning_counts, report_pending_warnings, warning_counts
    use polydem_oversubscription, only: oversubscription
    use polydem_prepare, only: build_and_lock, prepare
-   use polydem_run, only: attempt_t, run_t, result_folder
+   use polydem_run, only: run_options_t, run_t, result_folder
    use polydem_run_output, only: end_step, finish, needs_table
    use polydem_settings, only: settings_t
    use polydem_start, only: open_output
@@ -31,7 +31,7 @@ contains
       !> Allocated if the run fails, or if a signal or the time limit ends it early
       type(error_t), allocatable, intent(inout) :: error
       !> Options of this attempt; absent: a new run without a time limit
-      type(attempt_t), intent(in), optional :: attempt
+      type(run_options_t), intent(in), optional :: attempt
       !> Communicator of the run, absent: a serial one. Only its root rank writes files that the ranks do not share
       class(communicator_t), intent(in), optional :: comm
       type(run_t) :: run

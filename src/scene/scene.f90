@@ -18,7 +18,7 @@ module polydem_scene
    use polydem_hopper, only: list_hopper
    use polydem_incline, only: list_incline
    use polydem_kinds, only: ip, lp, wp
-   use polydem_origin, only: overrides_of, place_of
+   use polydem_source_locations, only: overrides_of, place_of
    use polydem_prescribed_motion, only: motion_t
    use polydem_settings, only: motion_settings_t, settings_t
    use polydem_stack, only: list_stack

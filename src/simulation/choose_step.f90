@@ -4,7 +4,7 @@ module polydem_choose_step
    use polydem_force_law, only: choose_parts, force_law_t
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
-   use polydem_origin, only: overrides_of, place_of
+   use polydem_source_locations, only: overrides_of, place_of
    use polydem_simulation, only: simulation_t
    use polydem_expected_speed, only: find_expected_speed
    use polydem_stable_step, only: stable_step_of_shapes

@@ -78,7 +78,7 @@ contains
       call balance_ranges(self%walk%elapsed(:n), self%walk%upto)
       call gather_results(self, n)
       if (tabulate) call index_contacts(self%bodies%n, self%contacts, self%walk%incidence)
-      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%walk%suspects, self%step, error)
+      call check_contacts(self%settings%overlap%degenerate, self%bodies, self%walk%flagged, self%step, error)
    end subroutine walk_contacts
 
    !> Make room for the results of n ranges.
@@ -88,9 +88,9 @@ contains
 
       if (allocated(walk%ranges)) then
          if (size(walk%ranges) >= n) return
-         deallocate (walk%ranges, walk%all_of, walk%walls_of, walk%suspects_of, walk%elapsed)
+         deallocate (walk%ranges, walk%all_of, walk%walls_of, walk%flagged_of, walk%elapsed)
       end if
-      allocate (walk%ranges(n), walk%all_of(n), walk%walls_of(n), walk%suspects_of(n), walk%elapsed(n))
+      allocate (walk%ranges(n), walk%all_of(n), walk%walls_of(n), walk%flagged_of(n), walk%elapsed(n))
    end subroutine reserve_ranges
 
    !> Walk over the pairs of one range in descending order.
@@ -152,7 +152,7 @@ contains
       type(walk_results_t), intent(inout) :: walk
 
       call start_rows(contacts, merge(walk%ranges(r)%n_contacts, 0_ip, walk%has_table), walk%all_of(r))
-      call start_rows(contacts, 0_ip, walk%suspects_of(r))
+      call start_rows(contacts, 0_ip, walk%flagged_of(r))
       walk%walls_of(r)%n = 0_ip
       associate (results => walk%ranges(r))
          results%late%n = 0_ip
@@ -177,7 +177,7 @@ contains
          call append_walls(self%bodies%fixed, block, terms, walk%walls_of(r))
          call test_block(walk%contact_guard, self%bodies, block, self%history, suspect, some, &
                          walk%ranges(r)%passing_pair)
-         if (some) call append_rows(block, walk%suspects_of(r), with_forces=.true., chosen=suspect)
+         if (some) call append_rows(block, walk%flagged_of(r), with_forces=.true., chosen=suspect)
       end associate
    end subroutine keep_contacts
 
@@ -218,14 +218,14 @@ contains
          if (walk%has_table) call gather_rows(walk%all_of(:n), self%contacts)
          ! Most tables are for a frame. Then the memory of the rows serves better elsewhere.
          if (walk%has_table .and. .not. allocated(self%law%constraint)) call release_rows(walk%all_of)
-         call gather_rows(walk%suspects_of(:n), walk%suspects)
+         call gather_rows(walk%flagged_of(:n), walk%flagged)
       end associate
-      associate (suspects => self%walk%suspects)
-         suspects%n_degenerate = 0_ip
-         do c = 1_ip, suspects%n
-            if (is_degenerate(suspects, c)) suspects%n_degenerate = suspects%n_degenerate + 1_ip
+      associate (flagged => self%walk%flagged)
+         flagged%n_degenerate = 0_ip
+         do c = 1_ip, flagged%n
+            if (is_degenerate(flagged, c)) flagged%n_degenerate = flagged%n_degenerate + 1_ip
          end do
-         self%contacts%n_degenerate = suspects%n_degenerate
+         self%contacts%n_degenerate = flagged%n_degenerate
       end associate
       self%sums(sum_contacts_own) = self%sums(sum_contacts_own) + int(self%n_contacts, lp)
       self%sums(sum_degenerate) = self%sums(sum_degenerate) + int(n_degenerate, lp)

@@ -28,7 +28,7 @@ module polydem_passing
 
    !> Guard of the contacts
    type :: contact_guard_t
-      !> Contacts deeper than this fraction of the thickness of the thinner body are suspects; huge: only degenerate
+      !> Contacts deeper than this fraction of the thickness of the thinner body are flagged; huge: only degenerate
       !> ones
       real(wp) :: least_depth = huge(1.0_wp)
       !> Contacts that are not deeper than this are surely none [m]

@@ -13,7 +13,7 @@ module polydem_redistribution
    use polydem_guards, only: greatest_displacement
    use polydem_halo, only: new_halo
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_local_bodies, only: fit_to_bodies
+   use polydem_local_data, only: rebuild_local_data
    use polydem_migration_buffer, only: migration_buffer_t
    use polydem_packed_bodies, only: packed_bodies_t, all_to_all_bodies, copy_packed, join_packed, pack_bodies, &
       unpack_bodies
@@ -156,7 +156,7 @@ contains
       end do
       call self%domain%halo%follow(self%comm, self%bodies)
       call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
-      call fit_to_bodies(self, error, self%domain%median_diameter)
+      call rebuild_local_data(self, error, self%domain%median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
       call self%domain%set_reference(self%boxes%bounds(:, :self%boxes%n), self%step)

@@ -17,9 +17,9 @@ module polydem_relaxation
    use polydem_find_contacts, only: find_contacts
    use polydem_global_reductions, only: reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp, min_parallel_size
-   use polydem_local_bodies, only: fit_to_bodies
+   use polydem_local_data, only: rebuild_local_data
    use polydem_neighbours, only: neighbours_t, new_neighbours
-   use polydem_origin, only: place_of
+   use polydem_source_locations, only: place_of
    use polydem_redistribution, only: have_boxes_left, redistribute
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers
@@ -76,7 +76,7 @@ contains
       end do
       self%relaxation%move = greatest_displacement(self)
       deallocate (self%relaxation%from)
-      call fit_to_bodies(self, error, self%domain%median_diameter)
+      call rebuild_local_data(self, error, self%domain%median_diameter)
    end subroutine relax_bodies
 
    !> Greatest displacement of a body since the start of the relaxation [m]. Collective.

@@ -38,7 +38,7 @@ contains
       end if
    end subroutine check_stability
 
-   !> Greatest dt / stable dt of the suspects of this rank, each contact alone; 0 if there is none
+   !> Greatest dt / stable dt of the flagged contacts of this rank, each contact alone; 0 if there is none
    real(wp) function greatest_share(self)
       type(simulation_t), intent(in) :: self
       integer(ip) :: worst
@@ -51,18 +51,18 @@ contains
       type(simulation_t), intent(in) :: self
       !> Greatest dt / stable dt, 0 if there is no suspect
       real(wp), intent(out) :: share
-      !> Its index among the suspects, 0 if there is none
+      !> Its index among the flagged contacts, 0 if there is none
       integer(ip), intent(out) :: worst
       real(wp) :: this
       integer(ip) :: c
 
       share = 0.0_wp
       worst = 0_ip
-      associate (suspects => self%walk%suspects, bodies => self%bodies)
-         do c = 1_ip, suspects%n
-            if (.not. suspects%length(c)*suspects%inverse_length(c)*(bodies%inverse_mass(suspects%first(c)) &
-                + bodies%inverse_mass(suspects%second(c))) > self%walk%contact_guard%soft) cycle
-            this = self%dt/stable_step_alone(self%law, self%integrator%stability(), bodies, suspects, c)
+      associate (flagged => self%walk%flagged, bodies => self%bodies)
+         do c = 1_ip, flagged%n
+            if (.not. flagged%length(c)*flagged%inverse_length(c)*(bodies%inverse_mass(flagged%first(c)) &
+                + bodies%inverse_mass(flagged%second(c))) > self%walk%contact_guard%soft) cycle
+            this = self%dt/stable_step_alone(self%law, self%integrator%stability(), bodies, flagged, c)
             if (this <= share) cycle
             share = this
             worst = c
@@ -75,7 +75,7 @@ contains
    !> Collective.
    subroutine check_suspects(self, share, warning, error)
       type(simulation_t), intent(inout) :: self
-      !> Greatest dt / stable dt of the suspects of all ranks
+      !> Greatest dt / stable dt of the flagged contacts of all ranks
       real(wp), intent(out) :: share
       !> Allocated if dt is large, or if it is unstable and `step` of &guards is not 'stop'
       character(len=:), allocatable, intent(out) :: warning
@@ -86,8 +86,8 @@ contains
       integer(ip) :: worst
 
       call find_stiffest(self, share, worst)
-      if (worst > 0_ip) call check_step(self%bodies, self%walk%suspects, self%step, self%dt, self%dt/share, worst, &
-                                        remedy_text(self, self%walk%suspects, worst), warning, failure)
+      if (worst > 0_ip) call check_step(self%bodies, self%walk%flagged, self%step, self%dt, self%dt/share, worst, &
+                                        remedy_text(self, self%walk%flagged, worst), warning, failure)
       if (allocated(failure)) warning = failure%message
       call self%comm%all_reduce_text(warning, real(share, dp))
       greatest = share

@@ -11,7 +11,7 @@ module polydem_start_simulation
    use polydem_global_reductions, only: find_median, reduce_to_least
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, wp
-   use polydem_local_bodies, only: fit_to_bodies
+   use polydem_local_data, only: rebuild_local_data
    use polydem_prediction, only: move_walls
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
@@ -47,7 +47,7 @@ contains
       if (allocated(error)) return
       call find_median(self%comm, self%bodies%diameter(self%bodies%free), median_diameter)
       call new_domain(self%domain, settings%decomposition, median_diameter, self%comm)
-      if (.not. allocated(error)) call fit_to_bodies(self, error, median_diameter)
+      if (.not. allocated(error)) call rebuild_local_data(self, error, median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
       limit = self%guard%limit

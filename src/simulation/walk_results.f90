@@ -31,8 +31,8 @@ module polydem_walk_results
       logical :: has_table = .false.
       !> Results of the ranges of pairs, one per thread
       type(range_results_t), allocatable :: ranges(:)
-      !> Their contacts, if the table is asked for, and those of them that are suspects
-      type(contact_rows_t), allocatable :: all_of(:), suspects_of(:)
+      !> Their contacts, if the table is asked for, and those of them that are flagged
+      type(contact_rows_t), allocatable :: all_of(:), flagged_of(:)
       !> Their contacts with fixed bodies
       type(wall_terms_t), allocatable :: walls_of(:)
       !> Time of the walk over each range [s]
@@ -46,7 +46,7 @@ module polydem_walk_results
       !> Guard of the contacts
       type(contact_guard_t) :: contact_guard
       !> Contacts that are deep, degenerate or stiff
-      type(contacts_t) :: suspects
+      type(contacts_t) :: flagged
       !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none
       integer(ip) :: passing_pair = 0_ip
       !> Contacts of each body, if the table of contacts is kept

@@ -14,7 +14,7 @@ program write_together
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t, io_error, raise, run_error
    use polydem_global_hash, only: hash_all_bodies, hash_scene
-   use polydem_global_order, only: global_order_t
+   use polydem_row_distribution, only: row_distribution_t
    use polydem_hdf5_file, only: start_library
    use polydem_kinds, only: ip, lp, wp
    use polydem_named_values, only: named_values_t
@@ -125,7 +125,7 @@ contains
       type(world_t), intent(inout) :: world
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
-      type(global_order_t) :: rows
+      type(row_distribution_t) :: rows
       integer(lp) :: sums(2)
 
       call file%create(folder//'/checkpoint_1.h5', provenance, comm)
@@ -173,7 +173,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: expected
       type(checkpoint_file_t) :: file
-      type(global_order_t) :: rows
+      type(row_distribution_t) :: rows
       type(world_t) :: world, whole
       real(wp), allocatable :: position(:, :), angle(:), force(:, :)
       integer(lp) :: n, second(1)

@@ -6,7 +6,7 @@
 module polydem_area_law
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
-   use polydem_contact_element, only: contact_element_t
+   use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_history, only: contact_history_t
    use polydem_elementary, only: hypotenuse
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
@@ -85,7 +85,7 @@ contains
    subroutine stiffen(self, element)
       class(area_law_t), intent(in) :: self
       !> The contact; its normal stiffness changes, and its ratio if it is an expected contact
-      type(contact_element_t), intent(inout) :: element
+      type(linearised_contact_t), intent(inout) :: element
 
       if (element%is_expected) element%ratio = element%edge_ratio
       element%normal_stiffness = element%normal_stiffness + self%stiffness*element%ratio

@@ -23,7 +23,7 @@
 module polydem_conservative_law
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: contact_block_t
-   use polydem_contact_element, only: contact_element_t, face_tilt_stiffness
+   use polydem_linearised_contact, only: linearised_contact_t, face_tilt_stiffness
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
    use polydem_kinds, only: ip, wp
@@ -135,7 +135,7 @@ contains
    subroutine stiffen(self, element)
       class(conservative_law_t), intent(in) :: self
       !> The contact; stiffness against approach and tilts changes, and its ratio if it is an expected contact
-      type(contact_element_t), intent(inout) :: element
+      type(linearised_contact_t), intent(inout) :: element
 
       if (element%is_expected) then
          element%ratio = element%square_ratio

@@ -14,7 +14,7 @@
 module polydem_cundall_strack
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
-   use polydem_contact_element, only: contact_element_t
+   use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
@@ -118,7 +118,7 @@ contains
    subroutine stiffen(self, element)
       class(cundall_strack_t), intent(in) :: self
       !> The contact; tangential stiffness and dashpot change
-      type(contact_element_t), intent(inout) :: element
+      type(linearised_contact_t), intent(inout) :: element
 
       element%tangential_stiffness = element%tangential_stiffness + self%stiffness
       element%tangential_dashpot = element%tangential_dashpot &

@@ -36,7 +36,7 @@ module polydem_exact_friction
    use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_friction_network, only: build_network, free_velocities, friction_network_t, within
    use polydem_kinds, only: ip, lp, wp
-   use polydem_origin, only: place_of
+   use polydem_source_locations, only: place_of
    use polydem_settings, only: forces_settings_t, settings_t
    use polydem_strings, only: to_text
    use polydem_velocity_constraint, only: velocity_constraint_t

@@ -8,7 +8,7 @@
 !> deep into it; the frequency of both is less than with the equal body.
 module polydem_expected_contact
    use polydem_bodies, only: bodies_t
-   use polydem_contact_element, only: contact_element_t
+   use polydem_linearised_contact, only: linearised_contact_t
    use polydem_force_law, only: force_law_t
    use polydem_kinds, only: ip, wp
    implicit none
@@ -44,7 +44,7 @@ contains
       !> Speed of approach [m/s]
       real(wp), intent(in) :: speed
       !> The contact, without springs and dashpots
-      type(contact_element_t), intent(out) :: element
+      type(linearised_contact_t), intent(out) :: element
       !> Length of the outline [m]
       real(wp), intent(out) :: outline
       type(cut_t) :: cut
@@ -71,7 +71,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: speed
-      type(contact_element_t), intent(out) :: element
+      type(linearised_contact_t), intent(out) :: element
       !> Length of the outline [m], and area of the body [m2]
       real(wp), intent(out) :: outline, area
       real(wp) :: length, distance
@@ -109,7 +109,7 @@ contains
       !> Area of the body [m2]
       real(wp), intent(in) :: area
       !> Expected contact of the body so far
-      type(contact_element_t), intent(in) :: element
+      type(linearised_contact_t), intent(in) :: element
       type(cut_t), intent(out) :: cut
       real(wp) :: energy, ratio, distance
       integer :: k
@@ -137,11 +137,11 @@ contains
    real(wp) function spring_of(law, element, cut, area)
       type(force_law_t), intent(in) :: law
       !> Masses, speed and radius
-      type(contact_element_t), intent(in) :: element
+      type(linearised_contact_t), intent(in) :: element
       type(cut_t), intent(in) :: cut
       !> Area of the body [m2]
       real(wp), intent(in) :: area
-      type(contact_element_t) :: edge
+      type(linearised_contact_t) :: edge
 
       edge = element
       edge%speed = 0.0_wp

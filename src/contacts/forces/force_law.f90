@@ -8,7 +8,7 @@ module polydem_force_law
    use polydem_bodies, only: bodies_t
    use polydem_conservative_law, only: conservative_law_t
    use polydem_contact_block, only: contact_block_t
-   use polydem_contact_element, only: contact_element_t
+   use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_cundall_strack, only: cundall_strack_t
    use polydem_damping_onset, only: damping_onset_t
@@ -261,7 +261,7 @@ contains
    subroutine stiffen(law, element)
       class(force_law_t), intent(in) :: law
       !> The contact; masses and geometry are set
-      type(contact_element_t), intent(inout) :: element
+      type(linearised_contact_t), intent(inout) :: element
       integer :: k
 
       do k = 1, size(law%parts)

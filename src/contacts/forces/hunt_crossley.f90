@@ -6,7 +6,7 @@
 !> u - ln(1 + u) = -e u - ln(1 - e u), e = 1 - 2u/3 + ...
 module polydem_hunt_crossley
    use polydem_contact_block, only: block_size, contact_block_t
-   use polydem_contact_element, only: contact_element_t
+   use polydem_linearised_contact, only: linearised_contact_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
    use polydem_settings, only: forces_settings_t
@@ -68,7 +68,7 @@ contains
    subroutine stiffen(self, element)
       class(hunt_crossley_t), intent(in) :: self
       !> The contact; normal stiffness and dashpot change
-      type(contact_element_t), intent(inout) :: element
+      type(linearised_contact_t), intent(inout) :: element
       real(wp) :: share
 
       share = self%coefficient*sqrt(1.0_wp/(element%normal_mobility*self%stiffness))*element%ratio &

@@ -6,7 +6,7 @@
 !> fit.
 module polydem_law_part
    use polydem_bodies, only: bodies_t
-   use polydem_contact_element, only: contact_element_t
+   use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_history, only: history_kind_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip
@@ -74,7 +74,7 @@ contains
    subroutine stiffen(self, element)
       class(law_part_t), intent(in) :: self
       !> The contact; masses and geometry are set
-      type(contact_element_t), intent(inout) :: element
+      type(linearised_contact_t), intent(inout) :: element
 
       associate (unused_self => self, unused => element)
       end associate

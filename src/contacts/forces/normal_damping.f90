@@ -5,7 +5,7 @@
 module polydem_normal_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
-   use polydem_contact_element, only: contact_element_t
+   use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, stage_damping
    use polydem_kinds, only: ip, wp
@@ -101,7 +101,7 @@ contains
    subroutine stiffen(self, element)
       class(normal_damping_t), intent(in) :: self
       !> The contact; its normal dashpot changes
-      type(contact_element_t), intent(inout) :: element
+      type(linearised_contact_t), intent(inout) :: element
 
       element%normal_dashpot = element%normal_dashpot &
          + self%coefficient*sqrt(element%normal_mass*self%stiffness)*element%ratio

@@ -14,7 +14,7 @@
 !> that of a central impact; eccentric impacts lose more energy.
 module polydem_restitution_damping
    use polydem_contact_block, only: block_size, contact_block_t
-   use polydem_contact_element, only: contact_element_t
+   use polydem_linearised_contact, only: linearised_contact_t
    use polydem_elementary, only: arc_cosine, exponential, logarithm
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
@@ -86,7 +86,7 @@ contains
    subroutine stiffen(self, element)
       class(restitution_damping_t), intent(in) :: self
       !> The contact; its normal dashpot changes
-      type(contact_element_t), intent(inout) :: element
+      type(linearised_contact_t), intent(inout) :: element
 
       element%normal_dashpot = element%normal_dashpot &
          + 2.0_wp*self%ratio*sqrt(element%normal_mass*self%stiffness)*sqrt(element%ratio)

@@ -12,7 +12,7 @@
 !> Before bodies touch, the contacts of a body are expected ones (`expected_contact`).
 module polydem_stable_step
    use polydem_bodies, only: bodies_t
-   use polydem_contact_element, only: contact_element_t
+   use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_incidence, only: incidence_t
    use polydem_contacts, only: contacts_t
    use polydem_expected_contact, only: expect_contact
@@ -122,7 +122,7 @@ contains
       real(wp), intent(out) :: step
       !> Depth and length of the contact [m], and its stable step over that without dashpots
       real(wp), intent(out) :: found(3)
-      type(contact_element_t) :: element
+      type(linearised_contact_t) :: element
       real(wp) :: g(4), outline, share
 
       call expect_contact(law, bodies, s, speed, element, outline)
@@ -167,7 +167,7 @@ contains
       real(wp), intent(in) :: numbers(2)
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: c
-      type(contact_element_t) :: element
+      type(linearised_contact_t) :: element
       real(wp) :: g(4), alone(4)
 
       g = 0.0_wp
@@ -258,7 +258,7 @@ contains
       !> Whether the step is stable for a contact of unit arms and of twice their length
       logical function is_stable(mobility, ratio)
          real(wp), intent(in) :: mobility, ratio
-         type(contact_element_t) :: element
+         type(linearised_contact_t) :: element
          real(wp) :: g(4)
 
          element%ratio = ratio
@@ -293,7 +293,7 @@ contains
    pure real(wp) function step_of_element(table, element, g)
       type(stability_table_t), intent(in) :: table
       !> Springs and dashpots
-      type(contact_element_t), intent(in) :: element
+      type(linearised_contact_t), intent(in) :: element
       !> Mobilities: normal, tangential, mixed [m/kg], rotational [1/(kg m)]
       real(wp), intent(in) :: g(4)
       real(wp) :: a, b, tilt(2), frequency, damping

@@ -11,7 +11,7 @@
 module polydem_tilt_damping
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: contact_block_t
-   use polydem_contact_element, only: contact_element_t
+   use polydem_linearised_contact, only: linearised_contact_t
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
@@ -68,7 +68,7 @@ contains
    subroutine stiffen(self, element)
       class(tilt_damping_t), intent(in) :: self
       !> The contact with its normal dashpot; the dashpot against tilts changes
-      type(contact_element_t), intent(inout) :: element
+      type(linearised_contact_t), intent(inout) :: element
 
       element%tilt_dashpot = element%tilt_dashpot &
          + self%share*element%normal_dashpot*element%length**2/12.0_wp

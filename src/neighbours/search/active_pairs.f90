@@ -1,4 +1,4 @@
-!> Active candidates: those that are compared in every step of an interval (`polydem_line_filter`).
+!> Active candidates: those that are compared in every step of an interval (`polydem_inner_list`).
 module polydem_active_pairs
    use polydem_candidates, only: candidates_t
    use polydem_index_list, only: index_list_t

@@ -2,7 +2,7 @@
 !>
 !> In an *interval* of T steps a side has the line p + v s, its predicted position at step s, s = 0..T. A box is *on its
 !> lines* while no side is farther from its line than the tolerance. Lines are numbers of single precision, and places
-!> count from an origin. `polydem_line_filter` explains what follows for pairs of boxes, and bounds the rounding errors.
+!> count from an origin. `polydem_inner_list` explains what follows for pairs of boxes, and bounds the rounding errors.
 module polydem_box_lines
    use polydem_index_list, only: index_list_t
    use polydem_instruction_set, only: isa_avx2, isa_base
@@ -24,7 +24,7 @@ module polydem_box_lines
    !> All velocities are reduced by this multiple of the tolerance. So those of boxes at rest become zero, and not
    !> numbers so small that arithmetic with them is slow
    real(wp), parameter :: least_speed = 2.0_wp**(-40)
-   !> 20 u as in the head of `polydem_line_filter`
+   !> 20 u as in the head of `polydem_inner_list`
    real(sp), parameter :: rounding = 10.0_sp*epsilon(1.0_sp)
    !> Least tolerance for which lines are used [m]; below it, products could underflow
    real(sp), parameter :: least_tolerance = 2.0_sp**(-60)
@@ -43,7 +43,7 @@ module polydem_box_lines
       real(sp) :: tolerance = 0.0_sp
       !> Origin of the places: a median of lower corners [m]
       real(wp) :: origin(2) = 0.0_wp
-      !> L as in the head of `polydem_line_filter`; negative if no lines are used [m]
+      !> L as in the head of `polydem_inner_list`; negative if no lines are used [m]
       real(sp) :: limit = -1.0_sp
       !> Typical side of a box [m]
       real(wp) :: side = 0.0_wp

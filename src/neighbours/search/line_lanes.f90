@@ -1,7 +1,7 @@
 !> Passes over all boxes or over many candidates: a kernel, compiled for several instruction sets
-!> (`cmake/polydem_kernel.cmake`). `polydem_line_filter` explains what they compute.
+!> (`cmake/polydem_kernel.cmake`). `polydem_inner_list` explains what they compute.
 !>
-!> Lines are numbers of single precision, with places relative to an origin; `polydem_line_filter` bounds the rounding
+!> Lines are numbers of single precision, with places relative to an origin; `polydem_inner_list` bounds the rounding
 !> errors. The lines of two boxes fill one register of AVX2. Lists are written without branches: an entry is always
 !> written, and counted only if it belongs there. All comparisons are false for NaN, so a box that is nowhere is off its
 !> lines.

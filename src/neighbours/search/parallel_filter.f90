@@ -1,4 +1,4 @@
-!> Filter of candidates (`polydem_line_filter`) by several threads. Each thread works on parts of the boxes, of the
+!> Filter of candidates (`polydem_inner_list`) by several threads. Each thread works on parts of the boxes, of the
 !> candidates or of the active candidates. The results do not depend on the number of threads.
 module polydem_parallel_filter
    use polydem_active_pairs, only: active_pairs_t
@@ -7,7 +7,7 @@ module polydem_parallel_filter
    use polydem_candidates, only: candidates_t
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: ip, lp, sp, wp, min_parallel_size
-   use polydem_line_filter, only: line_filter_t
+   use polydem_inner_list, only: inner_list_t
    use polydem_thread_changes, only: part, thread_changes_t
    implicit none
    private
@@ -35,7 +35,7 @@ module polydem_parallel_filter
    end type worker_t
 
    !> Filter with the results of its threads
-   type, extends(line_filter_t) :: parallel_filter_t
+   type, extends(inner_list_t) :: parallel_filter_t
       !> Changes that were recorded in each part
       type(thread_changes_t) :: changes
       !> Results of each part, (part)

@@ -2,7 +2,7 @@
 module polydem_global_hash
    use polydem_bodies, only: bodies_t, state_words
    use polydem_communicator, only: communicator_t
-   use polydem_global_order, only: global_order_t
+   use polydem_row_distribution, only: row_distribution_t
    use polydem_hash, only: mix_word
    use polydem_kinds, only: dp, ip, lp
    use polydem_ownership, only: order_bodies, order_parts
@@ -18,7 +18,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> The hash, equal on all ranks
       integer(lp), intent(out) :: hash
-      type(global_order_t) :: blocks
+      type(row_distribution_t) :: blocks
       integer(lp), allocatable :: words(:, :), block(:, :)
       integer(ip) :: k
 
@@ -40,7 +40,7 @@ contains
       type(bodies_t), intent(in) :: bodies
       !> The hash, equal on all ranks
       integer(lp), intent(out) :: hash
-      type(global_order_t) :: blocks
+      type(row_distribution_t) :: blocks
       integer(lp), allocatable :: words(:, :), block(:, :), counts_of_ranks(:)
       integer(ip), allocatable :: body(:), counts(:)
       integer(ip) :: k

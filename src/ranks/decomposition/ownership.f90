@@ -6,7 +6,7 @@
 module polydem_ownership
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_global_order, only: global_order_t, row_key
+   use polydem_row_distribution, only: row_distribution_t, row_key
    use polydem_kinds, only: ip, lp
    implicit none
    private
@@ -55,7 +55,7 @@ contains
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
       !> Destination of each row
-      type(global_order_t), intent(inout) :: blocks
+      type(row_distribution_t), intent(inout) :: blocks
       integer(ip) :: s
 
       call order_parts(comm, bodies, [(s, s=1_ip, bodies%n)], blocks)
@@ -68,7 +68,7 @@ contains
       !> Slot of the body of each part, ascending; the parts of one body have the same order on all ranks
       integer(ip), intent(in) :: body(:)
       !> Destination of each row
-      type(global_order_t), intent(inout) :: blocks
+      type(row_distribution_t), intent(inout) :: blocks
       integer(lp), allocatable :: key(:)
       integer(ip), allocatable :: slot(:)
       integer(ip) :: k, n
@@ -94,7 +94,7 @@ contains
       !> Slots of the two bodies of each pair, in ascending order
       integer(ip), intent(in) :: first(:), second(:)
       !> Destination of each row
-      type(global_order_t), intent(inout) :: blocks
+      type(row_distribution_t), intent(inout) :: blocks
       integer(lp), allocatable :: key(:)
       integer(ip), allocatable :: slot(:)
       integer(ip) :: k, n

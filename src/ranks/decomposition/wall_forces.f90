@@ -3,7 +3,7 @@ module polydem_wall_forces
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
    use polydem_force_sums, only: n_terms, set_force
-   use polydem_global_order, only: row_key
+   use polydem_row_distribution, only: row_key
    use polydem_kinds, only: ip, lp, wp
    use polydem_sort, only: ascending_order
    use polydem_wall_terms, only: wall_terms_t

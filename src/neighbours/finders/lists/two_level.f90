@@ -1,9 +1,9 @@
 !> Two-level list: a Verlet list with wide margins, and a filter that compares only pairs whose state can change.
 !>
-!> `polydem_fat_candidates` holds the candidates, the pairs of boxes whose fat boxes overlap. As long as all boxes lie
+!> `polydem_outer_list` holds the candidates, the pairs of boxes whose fat boxes overlap. As long as all boxes lie
 !> inside their fat boxes, only candidates can overlap.
 !>
-!> `polydem_line_filter` predicts straight lines for all sides and divides time into intervals. At the start of an
+!> `polydem_inner_list` predicts straight lines for all sides and divides time into intervals. At the start of an
 !> interval it classifies all candidates, and in each step it finds the boxes that are off their lines. Only the active
 !> candidates are compared, a tenth of all in a drum. No box on its lines can leave its fat box, because this is tested
 !> when the lines are drawn.
@@ -13,13 +13,13 @@
 module polydem_two_level
    use polydem_boxes, only: boxes_t
    use polydem_candidate_rows, only: lies_inside
-   use polydem_fat_candidates, only: fat_candidates_t
+   use polydem_outer_list, only: outer_list_t
    use polydem_finder, only: finder_t
    use polydem_finder_statistics, only: count_bytes, count_candidates, count_depth, count_nodes, count_passes, &
       count_rebuilds, count_searches, count_tests, count_visits, phase_filter, phase_search, phase_structure
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: dp, ip, lp
-   use polydem_line_filter, only: class_cost
+   use polydem_inner_list, only: class_cost
    use polydem_pair_changes, only: pair_changes_t
    use polydem_parallel_filter, only: parallel_filter_t
    implicit none
@@ -33,7 +33,7 @@ module polydem_two_level
    type, extends(finder_t) :: two_level_t
       private
       !> Candidates
-      type(fat_candidates_t) :: list
+      type(outer_list_t) :: list
       !> Lines, intervals and active candidates
       type(parallel_filter_t) :: filter
    contains

@@ -1,4 +1,4 @@
-!> Candidates under a filter: only those whose state can change are compared (`polydem_line_filter`).
+!> Candidates under a filter: only those whose state can change are compared (`polydem_inner_list`).
 !>
 !> Candidates can be added and removed in every step. New ones are compared until the next interval.
 module polydem_filtered_candidates

@@ -1,7 +1,7 @@
 !> Minimal quadtree under a filter.
 !>
-!> Only candidates whose state can change are compared (`polydem_line_filter`), and only boxes that can leave their leaf
-!> are tested (`polydem_leaf_watch`). The rest of a step forms two chains. One repairs the tree and searches
+!> Only candidates whose state can change are compared (`polydem_inner_list`), and only boxes that can leave their leaf
+!> are tested (`polydem_leaf_exits`). The rest of a step forms two chains. One repairs the tree and searches
 !> (`polydem_quadtree`). The other one replaces candidates according to the search of the last step, reviews the
 !> candidates of the boxes that left their lines, and compares the active ones.
 !>
@@ -14,7 +14,7 @@ module polydem_filtered_quadtree
    use polydem_finder_statistics, only: count_bytes, count_passes, count_tests, phase_filter, phase_search, &
       phase_structure
    use polydem_kinds, only: dp, ip, lp, wp, min_parallel_size
-   use polydem_leaf_watch, only: leaf_watch_t
+   use polydem_leaf_exits, only: leaf_exits_t
    use polydem_pair_changes, only: pair_changes_t
    use polydem_quadtree, only: quadtree_t
    use polydem_quadtree_measures, only: measure_reaches
@@ -34,7 +34,7 @@ module polydem_filtered_quadtree
    !> Finder that stores a tree and lines
    type, extends(quadtree_t) :: filtered_quadtree_t
       !> Boxes that can leave their leaf
-      type(leaf_watch_t), private :: watch
+      type(leaf_exits_t), private :: watch
    contains
       procedure :: find
       procedure :: survey

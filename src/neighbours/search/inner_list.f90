@@ -36,7 +36,7 @@
 !>
 !> The tolerance and the length of the intervals follow from exact counts of comparisons, never from a clock, so runs
 !> are reproducible. Both are set where two costs are equal (`adapt`).
-module polydem_line_filter
+module polydem_inner_list
    use polydem_active_pairs, only: active_pairs_t
    use polydem_box_lines, only: box_lines_t, list_differences, trust
    use polydem_candidates, only: candidates_t
@@ -46,7 +46,7 @@ module polydem_line_filter
    use polydem_pair_changes, only: pair_changes_t
    implicit none
    private
-   public :: line_filter_t, class_cost
+   public :: inner_list_t, class_cost
 
    !> Costs in units of a comparison of two boxes (measured): new lines of a box, classification or review of a
    !> candidate, a box that leaves its lines
@@ -62,7 +62,7 @@ module polydem_line_filter
    integer(bp), parameter :: often = 6_bp
 
    !> Lines of all boxes, and active candidates
-   type, extends(box_lines_t) :: line_filter_t
+   type, extends(box_lines_t) :: inner_list_t
       !> Active candidates
       type(active_pairs_t) :: active
       !> Boxes that are off in this interval
@@ -94,13 +94,13 @@ module polydem_line_filter
       procedure :: surplus
       procedure :: count_step
       procedure :: bytes
-   end type line_filter_t
+   end type inner_list_t
 
 contains
 
    !> Start without candidates; all velocities are zero.
    subroutine start(self, n_boxes, side)
-      class(line_filter_t), intent(inout) :: self
+      class(inner_list_t), intent(inout) :: self
       !> Number of boxes
       integer(ip), intent(in) :: n_boxes
       !> Typical side of a box [m]
@@ -119,7 +119,7 @@ contains
    !> Whether an interval should begin: there was none, the last one is over, or the comparisons that boxes off their
    !> lines cost exceed the cost of a new interval
    pure logical function is_due(self, n_candidates)
-      class(line_filter_t), intent(in) :: self
+      class(inner_list_t), intent(in) :: self
       !> Number of candidates
       integer(ip), intent(in) :: n_candidates
 
@@ -129,7 +129,7 @@ contains
 
    !> Cost of the start of an interval [comparisons]
    pure real(dp) function interval_cost(self, n_candidates)
-      class(line_filter_t), intent(in) :: self
+      class(inner_list_t), intent(in) :: self
       !> Number of candidates
       integer(ip), intent(in) :: n_candidates
 
@@ -138,7 +138,7 @@ contains
 
    !> Cost of the boxes that left their lines in this interval [comparisons]
    pure real(dp) function extra_cost(self)
-      type(line_filter_t), intent(in) :: self
+      type(inner_list_t), intent(in) :: self
 
       extra_cost = real(self%n_extra, dp) + leave_cost*real(self%n_left, dp) + class_cost*real(self%n_reviewed, dp)
    end function extra_cost
@@ -146,7 +146,7 @@ contains
    !> Set tolerance and length of a new interval. Then call `draw_lines`, and `classify` and `collect` when the
    !> candidates are complete.
    pure subroutine begin_interval(self, candidates)
-      class(line_filter_t), intent(inout) :: self
+      class(inner_list_t), intent(inout) :: self
       !> All candidates; the states of the active ones are written back
       class(candidates_t), intent(inout) :: candidates
 
@@ -174,7 +174,7 @@ contains
    !> The new length makes I/T equal to B + X, the new tolerance makes C equal to X; both change slowly. The first
    !> interval has no velocities, so its X says nothing about the tolerance.
    pure subroutine adapt(self, n_candidates)
-      type(line_filter_t), intent(inout) :: self
+      type(inner_list_t), intent(inout) :: self
       integer(ip), intent(in) :: n_candidates
       real(dp) :: steps, intervals, moving, touching, off, factor
 
@@ -195,7 +195,7 @@ contains
    !> Classify a range of candidates at the start of an interval. The present boxes are those of `draw_lines`. If the
    !> states of the candidates are not known, those of the active ones remain so.
    pure subroutine classify(self, low, high, body, known, candidates, found, changes)
-      class(line_filter_t), intent(in) :: self
+      class(inner_list_t), intent(in) :: self
       !> First and last candidate
       integer(ip), intent(in) :: low, high
       !> Body of each box, (box)
@@ -242,7 +242,7 @@ contains
 
    !> Make the active candidates of the interval from those that the threads found.
    pure subroutine collect(self, n_candidates, found)
-      class(line_filter_t), intent(inout) :: self
+      class(inner_list_t), intent(inout) :: self
       !> Number of candidates
       integer(ip), intent(in) :: n_candidates
       !> Active candidates of each thread, (thread)
@@ -275,7 +275,7 @@ contains
 
    !> Draw new lines through a box that left its lines in this step, and count this.
    pure subroutine leave_lines(self, i, box)
-      class(line_filter_t), intent(inout) :: self
+      class(inner_list_t), intent(inout) :: self
       !> Box
       integer(ip), intent(in) :: i
       !> Its bounds [m]
@@ -287,7 +287,7 @@ contains
 
    !> Whether a box that is not off has left its lines so often that it must be marked as off
    pure logical function leaves_often(self, i)
-      class(line_filter_t), intent(in) :: self
+      class(inner_list_t), intent(in) :: self
       !> Box
       integer(ip), intent(in) :: i
 
@@ -296,7 +296,7 @@ contains
 
    !> Mark a box as off; all its candidates must be activated.
    pure subroutine mark_off(self, i)
-      class(line_filter_t), intent(inout) :: self
+      class(inner_list_t), intent(inout) :: self
       !> Box that is not off
       integer(ip), intent(in) :: i
 
@@ -306,7 +306,7 @@ contains
 
    !> Whether a box is off
    pure logical function is_off(self, i)
-      class(line_filter_t), intent(in) :: self
+      class(inner_list_t), intent(in) :: self
       !> Box
       integer(ip), intent(in) :: i
 
@@ -316,7 +316,7 @@ contains
    !> Reduce a list of candidates to those that must become active: candidates that are not active, and whose state is
    !> not sure from this step to the end of the interval or one of whose boxes is off.
    pure subroutine review(self, candidates, list, n_reviewed)
-      class(line_filter_t), intent(in) :: self
+      class(inner_list_t), intent(in) :: self
       !> All candidates; the states of those that are not active are valid
       class(candidates_t), intent(in) :: candidates
       !> Numbers of candidates
@@ -355,21 +355,21 @@ contains
 
    !> Work in this interval on candidates that were separate when it began [comparisons]
    pure real(dp) function surplus(self)
-      class(line_filter_t), intent(in) :: self
+      class(inner_list_t), intent(in) :: self
 
       surplus = real(self%n_extra, dp) + class_cost*real(self%n_reviewed, dp)
    end function surplus
 
    !> Add the comparisons of this step to the cost of the interval.
    pure subroutine count_step(self)
-      class(line_filter_t), intent(inout) :: self
+      class(inner_list_t), intent(inout) :: self
 
       self%n_extra = self%n_extra + max(0_lp, int(self%active%n - self%n_first, lp))
    end subroutine count_step
 
    !> Allocated memory [B]
    pure integer(lp) function bytes(self)
-      class(line_filter_t), intent(in) :: self
+      class(inner_list_t), intent(in) :: self
 
       bytes = 0_lp
       if (.not. allocated(self%place)) return
@@ -379,4 +379,4 @@ contains
                int(storage_size(self%left), lp)*(size(self%left, kind=lp) + size(self%active%overlap, kind=lp)))/8_lp
    end function bytes
 
-end module polydem_line_filter
+end module polydem_inner_list

@@ -1,16 +1,16 @@
-!> Guests of cells: boxes that are registered in every cell that they cover, wherever they were binned.
+!> Late insertions into cells: boxes that are registered in every cell that they cover, wherever they were binned.
 !>
-!> A counting sort bins all boxes at once. Boxes that are fixed, or that changed after the sort, become guests instead.
-!> A search meets a guest once in each of its cells. A box that covers very many cells, or none because it is
+!> A counting sort bins all boxes at once. Boxes that are fixed, or that changed after the sort, are inserted late.
+!> A search meets a late insertion once in each of its cells. A box that covers very many cells, or none because it is
 !> nowhere, is registered in no cell, and every search meets it.
-module polydem_cell_guests
+module polydem_late_insertions
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: ip, lp, wp
    implicit none
    private
-   public :: cell_guests_t, cell_block_t
+   public :: late_insertions_t, cell_block_t
 
-   !> Largest number of cells in which a guest is registered
+   !> Largest number of cells in which a late insertion is registered
    integer(ip), parameter :: most_cells = 16_ip
 
    !> Cells that a window covers in a grid
@@ -23,14 +23,14 @@ module polydem_cell_guests
       integer(ip) :: stride = 1_ip
    end type cell_block_t
 
-   !> Guests of all cells
-   type :: cell_guests_t
+   !> Late insertions into all cells
+   type :: late_insertions_t
       private
       !> First entry of each cell, (cell); 0: none
       integer(ip), allocatable :: first(:)
       !> Box of each entry, and next entry of the same cell, (entry); 0: none
       type(index_list_t) :: box, next
-      !> Guests that cover very many cells or none
+      !> Late insertions that cover very many cells or none
       type(index_list_t) :: wide
    contains
       procedure :: clear
@@ -39,13 +39,13 @@ module polydem_cell_guests
       procedure :: append_wide
       procedure :: n_wide
       procedure :: bytes
-   end type cell_guests_t
+   end type late_insertions_t
 
 contains
 
-   !> Remove all guests.
+   !> Remove all late insertions.
    pure subroutine clear(self, n_cells)
-      class(cell_guests_t), intent(inout) :: self
+      class(late_insertions_t), intent(inout) :: self
       !> Number of cells
       integer(ip), intent(in) :: n_cells
 
@@ -61,7 +61,7 @@ contains
 
    !> Register a box in the cells that it covers.
    pure subroutine add(self, i, cells)
-      class(cell_guests_t), intent(inout) :: self
+      class(late_insertions_t), intent(inout) :: self
       !> Box
       integer(ip), intent(in) :: i
       !> Cells that it covers
@@ -82,9 +82,9 @@ contains
       end do
    end subroutine add
 
-   !> Append the guests of some cells that overlap a window to a list. A guest can be appended several times.
+   !> Append the late insertions of some cells that overlap a window to a list, some of them several times.
    pure subroutine append_near(self, cells, window, bounds, near, n_tests)
-      class(cell_guests_t), intent(in) :: self
+      class(late_insertions_t), intent(in) :: self
       !> Cells that the window covers
       type(cell_block_t), intent(in) :: cells
       !> Bounds xmin, ymin, xmax, ymax of the window [m]
@@ -109,9 +109,9 @@ contains
       end do
    end subroutine append_near
 
-   !> Append the guests that cover very many cells or none, and overlap a window, to a list.
+   !> Append the late insertions that cover very many cells or none, and overlap a window, to a list.
    pure subroutine append_wide(self, window, bounds, near, n_tests)
-      class(cell_guests_t), intent(in) :: self
+      class(late_insertions_t), intent(in) :: self
       !> Bounds xmin, ymin, xmax, ymax of the window [m]
       real(wp), intent(in) :: window(4)
       !> Present bounds of all boxes, (4, box) [m]
@@ -136,16 +136,16 @@ contains
       meet = min(min(b(3) - a(1), a(3) - b(1)), min(b(4) - a(2), a(4) - b(2))) >= 0.0_wp
    end function meet
 
-   !> Number of guests that every search meets
+   !> Number of late insertions that every search meets
    pure integer(ip) function n_wide(self)
-      class(cell_guests_t), intent(in) :: self
+      class(late_insertions_t), intent(in) :: self
 
       n_wide = self%wide%n
    end function n_wide
 
    !> Allocated memory [B]
    pure integer(lp) function bytes(self)
-      class(cell_guests_t), intent(in) :: self
+      class(late_insertions_t), intent(in) :: self
 
       bytes = 0_lp
       if (.not. allocated(self%first)) return
@@ -155,4 +155,4 @@ contains
       bytes = bytes*int(storage_size(self%first)/8, lp)
    end function bytes
 
-end module polydem_cell_guests
+end module polydem_late_insertions

@@ -4,18 +4,18 @@
 !> Pairs of boxes whose fat boxes overlap are candidates. `search_all` makes all fat boxes and finds all candidates in
 !> cells (`polydem_cell_grids`); they form rows. `search_single` makes a new fat box for one box, finds its new
 !> candidates in the cells of the last `search_all`, and appends them behind the rows. Boxes with such a fat box are
-!> *moved*; the cells contain their former fat boxes, so they are guests of the cells that the new ones cover.
+!> *moved*; the cells contain their former fat boxes, so they are inserted late into the cells that the new ones cover.
 !>
 !> The margin is set where two costs are equal: the searches, and the work that is done on candidates that are separate.
 !> Both are counted, so runs are reproducible. `must_search` asks for a search of all boxes when single searches have
 !> cost as much.
-module polydem_fat_candidates
+module polydem_outer_list
    use omp_lib, only: omp_get_max_threads
    use polydem_box_lines, only: box_lines_t
    use polydem_boxes, only: boxes_t
    use polydem_candidate_rows, only: candidate_rows_t
    use polydem_candidates, only: overlapping
-   use polydem_cell_windows, only: cell_windows_t
+   use polydem_grid_query, only: grid_query_t
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: bp, dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
@@ -23,7 +23,7 @@ module polydem_fat_candidates
    use polydem_thread_changes, only: part
    implicit none
    private
-   public :: fat_candidates_t
+   public :: outer_list_t
 
    !> Costs in units of a comparison of two boxes (measured): a search for all boxes, per box and per candidate; a
    !> search for a single box without its comparisons
@@ -34,11 +34,11 @@ module polydem_fat_candidates
    real(wp), parameter :: most_stretch = 4.0_wp
 
    !> Rows of the last search for all boxes, and behind them the candidates of single searches
-   type, extends(candidate_rows_t) :: fat_candidates_t
+   type, extends(candidate_rows_t) :: outer_list_t
       !> Fat boxes, (4, box) [m]
       real(wp), allocatable :: fat(:, :)
       !> Grids of the fat boxes of the last search for all boxes
-      type(cell_windows_t) :: grids
+      type(grid_query_t) :: grids
       !> Typical side of a box [m]
       real(wp) :: side = 0.0_wp
       !> Number of steps since the last search for all boxes, and between the last two
@@ -78,13 +78,13 @@ module polydem_fat_candidates
       procedure :: append_candidates_of
       procedure :: append_candidates_of_all
       procedure :: bytes => bytes_of_all
-   end type fat_candidates_t
+   end type outer_list_t
 
 contains
 
    !> Choose margin and grids, and make an empty list; no box is inside its fat box.
    subroutine prepare(self, boxes)
-      class(fat_candidates_t), intent(inout) :: self
+      class(outer_list_t), intent(inout) :: self
       !> Boxes of the first step
       type(boxes_t), intent(in) :: boxes
       integer(ip), allocatable :: level(:)
@@ -106,7 +106,7 @@ contains
 
    !> Whether all boxes must be searched: single searches cost as much, or the margin is much too wide
    pure logical function must_search(self)
-      class(fat_candidates_t), intent(in) :: self
+      class(outer_list_t), intent(in) :: self
 
       must_search = .not. self%searched .or. self%singles > cost_of_all(self) .or. &
          (self%surplus > 4.0_dp*cost_of_all(self) .and. self%margin > least_margin*self%side)
@@ -115,7 +115,7 @@ contains
    !> Whether it is best to search all boxes now: single searches in the next interval would cost more per step than all
    !> searches since the last one for all boxes, or more than another one
    pure logical function should_search(self, n_strays, steps)
-      class(fat_candidates_t), intent(in) :: self
+      class(outer_list_t), intent(in) :: self
       !> Number of boxes that need a single search now
       integer(ip), intent(in) :: n_strays
       !> Length of the interval
@@ -130,25 +130,25 @@ contains
 
    !> Cost of a search for all boxes [comparisons]
    pure real(dp) function cost_of_all(self)
-      type(fat_candidates_t), intent(in) :: self
+      type(outer_list_t), intent(in) :: self
 
       cost_of_all = box_cost*real(size(self%is_moved), dp) + candidate_cost*real(self%n, dp)
    end function cost_of_all
 
    !> Cost of single searches [comparisons]
    pure real(dp) function cost_of_singles(self, n_strays)
-      class(fat_candidates_t), intent(in) :: self
+      class(outer_list_t), intent(in) :: self
       !> Number of boxes
       integer(ip), intent(in) :: n_strays
 
       cost_of_singles = real(n_strays, dp)* &
-         (single_cost + real(self%grids%guests%n_wide(), dp))
+         (single_cost + real(self%grids%late%n_wide(), dp))
    end function cost_of_singles
 
    !> Set the margin, make all fat boxes, and search for all candidates. Their states are not found. The number of
    !> candidates of the first search shows how much a wider margin costs: little where boxes are far apart.
    subroutine search_all(self, boxes, lines, n_wanted, changes)
-      class(fat_candidates_t), intent(inout) :: self
+      class(outer_list_t), intent(inout) :: self
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
       !> Lines of the boxes in this step
@@ -178,7 +178,7 @@ contains
 
    !> Make all fat boxes, and find the pairs of those that overlap.
    subroutine find_candidates(self, boxes, lines)
-      type(fat_candidates_t), intent(inout) :: self
+      type(outer_list_t), intent(inout) :: self
       type(boxes_t), intent(in) :: boxes
       class(box_lines_t), intent(in) :: lines
       integer(ip) :: low, high
@@ -199,7 +199,7 @@ contains
    !> Set the margin from the costs of the last list. The first list was made without velocities, so its life says
    !> nothing.
    pure subroutine adapt_margin(self, n_boxes, n_wanted)
-      type(fat_candidates_t), intent(inout) :: self
+      type(outer_list_t), intent(inout) :: self
       integer(ip), intent(in) :: n_boxes, n_wanted
       real(dp) :: searches, factor
 
@@ -212,7 +212,7 @@ contains
 
    !> Begin the counts of a new list; no box has moved.
    pure subroutine reset(self)
-      type(fat_candidates_t), intent(inout) :: self
+      type(outer_list_t), intent(inout) :: self
       integer(ip) :: k
 
       self%life = self%age
@@ -227,7 +227,7 @@ contains
 
    !> Make the fat boxes low to high.
    pure subroutine fatten(self, low, high, bounds, lines)
-      type(fat_candidates_t), intent(inout) :: self
+      type(outer_list_t), intent(inout) :: self
       integer(ip), intent(in) :: low, high
       real(wp), intent(in), contiguous :: bounds(:, :)
       class(box_lines_t), intent(in) :: lines
@@ -245,7 +245,7 @@ contains
 
    !> Make room for the links of n candidates behind the rows.
    pure subroutine reserve_links(self, n)
-      type(fat_candidates_t), intent(inout) :: self
+      type(outer_list_t), intent(inout) :: self
       integer(ip), intent(in) :: n
       integer(ip), allocatable :: longer(:, :)
 
@@ -257,7 +257,7 @@ contains
 
    !> Give a box a new fat box, and append its new candidates.
    subroutine search_single(self, i, boxes, lines, changes)
-      class(fat_candidates_t), intent(inout) :: self
+      class(outer_list_t), intent(inout) :: self
       !> Box
       integer(ip), intent(in) :: i
       !> Boxes of this step
@@ -279,12 +279,12 @@ contains
          if (self%is_moved(j) == 0_bp) call add_candidate(self, i, j, boxes, changes)
       end do
       self%near%n = 0_ip
-      call self%grids%search_guests(self%fat(:, i), self%fat, self%near)
+      call self%grids%search_late(self%fat(:, i), self%fat, self%near)
       do k = 1_ip, self%near%n
          call add_candidate(self, i, self%near%at(k), boxes, changes)
       end do
       self%singles = self%singles + single_cost + real(self%grids%total%tests - tests, dp)
-      call self%grids%add_guest(i, self%fat(:, i))
+      call self%grids%add_late(i, self%fat(:, i))
       if (self%is_moved(i) /= 0_bp) return
       self%is_moved(i) = 1_bp
       call self%moved%push(i)
@@ -292,7 +292,7 @@ contains
 
    !> Mark a box and the boxes of its candidates as met.
    subroutine meet_candidates(self, i)
-      type(fat_candidates_t), intent(inout) :: self
+      type(outer_list_t), intent(inout) :: self
       integer(ip), intent(in) :: i
       integer(ip) :: k
 
@@ -312,7 +312,7 @@ contains
 
    !> Append the candidates of a box to a list.
    pure subroutine append_candidates_of(self, i, list)
-      class(fat_candidates_t), intent(in) :: self
+      class(outer_list_t), intent(in) :: self
       !> Box
       integer(ip), intent(in) :: i
       !> Numbers of candidates
@@ -324,7 +324,7 @@ contains
 
    !> Append the candidates of several boxes to a list.
    pure subroutine append_candidates_of_all(self, boxes, list)
-      class(fat_candidates_t), intent(in) :: self
+      class(outer_list_t), intent(in) :: self
       !> The boxes
       type(index_list_t), intent(in) :: boxes
       !> Numbers of candidates
@@ -339,7 +339,7 @@ contains
 
    !> Append the candidates of a box behind the rows to a list.
    pure subroutine append_linked(self, i, list)
-      type(fat_candidates_t), intent(in) :: self
+      type(outer_list_t), intent(in) :: self
       integer(ip), intent(in) :: i
       type(index_list_t), intent(inout) :: list
       integer(ip) :: link, k
@@ -354,7 +354,7 @@ contains
 
    !> Append a candidate, unless it is one already or no pair is possible.
    subroutine add_candidate(self, i, j, boxes, changes)
-      type(fat_candidates_t), intent(inout) :: self
+      type(outer_list_t), intent(inout) :: self
       integer(ip), intent(in) :: i, j
       type(boxes_t), intent(in) :: boxes
       type(pair_changes_t), intent(inout) :: changes
@@ -377,7 +377,7 @@ contains
 
    !> Allocated memory [B]
    pure integer(lp) function bytes_of_all(self) result(bytes)
-      class(fat_candidates_t), intent(in) :: self
+      class(outer_list_t), intent(in) :: self
 
       bytes = 0_lp
       if (.not. allocated(self%fat)) return
@@ -386,4 +386,4 @@ contains
           (2_lp*size(self%first_link, kind=lp) + size(self%next_link, kind=lp)))/8_lp
    end function bytes_of_all
 
-end module polydem_fat_candidates
+end module polydem_outer_list

@@ -1,6 +1,6 @@
 !> Boxes that can leave their leaf in an interval of the filter.
 !>
-!> A box on its lines (`polydem_line_filter`) is inside straight tubes. If they keep its centre in its leaf, and its
+!> A box on its lines (`polydem_inner_list`) is inside straight tubes. If they keep its centre in its leaf, and its
 !> sides below the largest one for which its reach is sufficient, until the end of the interval, the box need not be
 !> tested as long as it is on its lines. All others are *watched*: a step tests only these. A box is judged when an
 !> interval begins, when it gets new lines or is marked as off, and when its leaf changes. Boxes that are off are always
@@ -9,15 +9,15 @@
 !> A tube bounds each side within its half width, so it bounds the sum of two opposite sides, twice the centre, and
 !> their difference, the length of a side, within twice the half width. The path is straight: its ends bound it. The
 !> slack of the tree covers the rounding errors of coordinates in finest cells.
-module polydem_leaf_watch
+module polydem_leaf_exits
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_line_filter, only: line_filter_t
+   use polydem_inner_list, only: inner_list_t
    use polydem_quadtree_nodes, only: tree_t
    use polydem_thread_changes, only: part
    implicit none
    private
-   public :: leaf_watch_t
+   public :: leaf_exits_t
 
    !> Watched boxes of one part
    type :: watched_part_t
@@ -30,7 +30,7 @@ module polydem_leaf_watch
    end type watched_part_t
 
    !> Watched boxes, in parts for several threads
-   type :: leaf_watch_t
+   type :: leaf_exits_t
       private
       !> Parts of equal numbers of boxes, (part)
       type(watched_part_t), allocatable :: watched(:)
@@ -42,13 +42,13 @@ module polydem_leaf_watch
       procedure :: judge
       procedure :: find_outside
       procedure :: bytes
-   end type leaf_watch_t
+   end type leaf_exits_t
 
 contains
 
    !> Set the number of parts. If it changes, all boxes must be judged.
    pure subroutine set_parts(self, n_parts, n_boxes, changed)
-      class(leaf_watch_t), intent(inout) :: self
+      class(leaf_exits_t), intent(inout) :: self
       !> Number of parts
       integer, intent(in) :: n_parts
       !> Number of boxes
@@ -74,11 +74,11 @@ contains
 
    !> Judge all boxes of a part at the start of an interval.
    pure subroutine judge_part(self, w, filter, tree, greatest_side)
-      class(leaf_watch_t), intent(inout) :: self
+      class(leaf_exits_t), intent(inout) :: self
       !> Number of the part
       integer, intent(in) :: w
       !> Lines of the boxes
-      class(line_filter_t), intent(in) :: filter
+      class(inner_list_t), intent(in) :: filter
       !> Tree with the leaves
       type(tree_t), intent(in) :: tree
       !> Largest side of each box for which its reach is sufficient, (box) [m]
@@ -96,11 +96,11 @@ contains
 
    !> Judge a box that has new lines or a new leaf.
    pure subroutine judge(self, i, filter, tree, greatest_side)
-      class(leaf_watch_t), intent(inout) :: self
+      class(leaf_exits_t), intent(inout) :: self
       !> Box
       integer(ip), intent(in) :: i
       !> Lines of the boxes
-      class(line_filter_t), intent(in) :: filter
+      class(inner_list_t), intent(in) :: filter
       !> Tree with the leaves
       type(tree_t), intent(in) :: tree
       !> Largest side of each box for which its reach is sufficient, (box) [m]
@@ -134,7 +134,7 @@ contains
 
    !> List the watched boxes of a part whose centre is not in its leaf or whose side exceeds the largest one.
    pure subroutine find_outside(self, w, tree, bounds, outside)
-      class(leaf_watch_t), intent(in) :: self
+      class(leaf_exits_t), intent(in) :: self
       !> Number of the part
       integer, intent(in) :: w
       !> Tree with the leaves
@@ -166,7 +166,7 @@ contains
 
    !> Allocated memory [B]
    pure integer(lp) function bytes(self)
-      class(leaf_watch_t), intent(in) :: self
+      class(leaf_exits_t), intent(in) :: self
 
       bytes = 0_lp
       if (allocated(self%place)) bytes = size(self%place, kind=lp)* &
@@ -176,7 +176,7 @@ contains
    !> Whether a box surely stays in its leaf, and its sides small enough, from this step to the end of the interval
    !> while it is on its lines
    pure logical function stays(filter, tree, greatest_side, i)
-      class(line_filter_t), intent(in) :: filter
+      class(inner_list_t), intent(in) :: filter
       type(tree_t), intent(in) :: tree
       real(wp), intent(in), contiguous :: greatest_side(:)
       integer(ip), intent(in) :: i
@@ -204,4 +204,4 @@ contains
       stays = stays .and. side + 2.0_wp*widths(1) <= greatest_side(i)
    end function stays
 
-end module polydem_leaf_watch
+end module polydem_leaf_exits

@@ -5,7 +5,7 @@
 !> line. Zero is nothing. Edges and corners count from 0; edge k begins at corner k. Any integer is safe: the numbers
 !> that it stands for are compared with the numbers of corners before they are used, and what they say is tested
 !> before it is believed.
-module polydem_pair_memory
+module polydem_feature_cache
    use polydem_kinds, only: ip
    implicit none
    private
@@ -54,4 +54,4 @@ contains
       corner = ibits(not(memory), 1 + edge_bits, edge_bits)
    end subroutine unpack_edge
 
-end module polydem_pair_memory
+end module polydem_feature_cache

@@ -3,17 +3,17 @@
 !> A row has a key: the global index of its body, and the number of the row among the rows of that body. The block of
 !> rank r of P contains the rows of bodies n r/P + 1 to n (r + 1)/P in ascending order of keys, where n is the number of
 !> bodies of the run. The blocks of all ranks, one after the other, are equal to the table of a serial run.
-module polydem_global_order
+module polydem_row_distribution
    use polydem_communicator, only: communicator_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_rank_order, only: sort_by_rank
    use polydem_sort, only: ascending_order
    implicit none
    private
-   public :: global_order_t, row_key, component, vector
+   public :: row_distribution_t, row_key, component, vector
 
    !> Communication plan that brings rows into blocks; `to_blocks` applies it to a column
-   type :: global_order_t
+   type :: row_distribution_t
       !> Number of rows in the block of this rank
       integer(ip) :: n = 0_ip
       !> Number of rows in the blocks of all lower ranks
@@ -38,7 +38,7 @@ module polydem_global_order
       generic :: to_blocks => longs_to_blocks, doubles_to_blocks
       procedure :: from_blocks
       procedure, private :: longs_to_blocks, doubles_to_blocks
-   end type global_order_t
+   end type row_distribution_t
 
 contains
 
@@ -54,7 +54,7 @@ contains
 
    !> Set up the communication plan; collective.
    subroutine lay_out(self, comm, n_bodies, n_known, key, slot)
-      class(global_order_t), intent(inout) :: self
+      class(row_distribution_t), intent(inout) :: self
       class(communicator_t), intent(inout) :: comm
       !> Number of bodies of the run
       integer(ip), intent(in) :: n_bodies
@@ -94,7 +94,7 @@ contains
 
    !> Bring a column of integers into blocks; collective.
    subroutine longs_to_blocks(self, comm, values, block)
-      class(global_order_t), intent(in) :: self
+      class(row_distribution_t), intent(in) :: self
       class(communicator_t), intent(inout) :: comm
       !> The local column, (width, n_known)
       integer(lp), intent(in) :: values(:, :)
@@ -121,7 +121,7 @@ contains
 
    !> Bring the blocks of a column back to the ranks that own the rows: the inverse of `to_blocks`. Collective.
    subroutine from_blocks(self, comm, block, values)
-      class(global_order_t), intent(in) :: self
+      class(row_distribution_t), intent(in) :: self
       class(communicator_t), intent(inout) :: comm
       !> The block of this rank, (width, n)
       integer(lp), intent(in) :: block(:, :)
@@ -149,7 +149,7 @@ contains
 
    !> Bring a column of real numbers into blocks without changing a bit; collective.
    subroutine doubles_to_blocks(self, comm, values, block)
-      class(global_order_t), intent(in) :: self
+      class(row_distribution_t), intent(in) :: self
       class(communicator_t), intent(inout) :: comm
       !> The local column, (width, n_known)
       real(dp), intent(in) :: values(:, :)
@@ -207,4 +207,4 @@ contains
       destination_of = int((shiftr(key, 32)*int(n_ranks, lp) - 1_lp)/int(n_bodies, lp), ip)
    end function destination_of
 
-end module polydem_global_order
+end module polydem_row_distribution

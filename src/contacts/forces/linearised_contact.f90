@@ -1,13 +1,13 @@
 !> Springs and dashpots of a contact, from which the stable time step is computed. The parts of a force law add theirs.
-module polydem_contact_element
+module polydem_linearised_contact
    use polydem_kinds, only: wp
    implicit none
    private
-   public :: contact_element_t, face_tilt_stiffness
+   public :: linearised_contact_t, face_tilt_stiffness
 
    !> Springs and dashpots of one contact. An *expected contact* is not in the table of contacts; it is derived from the
    !> shape of a free body and has no forces
-   type :: contact_element_t
+   type :: linearised_contact_t
       !> Whether the contact is expected
       logical :: is_expected = .false.
       !> Ratio L/l of the length of the contact to the characteristic length; the elastic part sets that of an expected
@@ -35,7 +35,7 @@ module polydem_contact_element
       real(wp) :: normal_stiffness = 0.0_wp, tangential_stiffness = 0.0_wp, tilt_stiffness = 0.0_wp
       !> Dashpot against approach and against slip [N s/m2], and against tilts [N s]
       real(wp) :: normal_dashpot = 0.0_wp, tangential_dashpot = 0.0_wp, tilt_dashpot = 0.0_wp
-   end type contact_element_t
+   end type linearised_contact_t
 
 contains
 
@@ -44,9 +44,9 @@ contains
       !> Young's modulus in two dimensions E [N/m2]
       real(wp), intent(in) :: stiffness
       !> The contact with its length
-      type(contact_element_t), intent(in) :: element
+      type(linearised_contact_t), intent(in) :: element
 
       face_tilt_stiffness = stiffness*element%length**3*element%inverse_length/12.0_wp
    end function face_tilt_stiffness
 
-end module polydem_contact_element
+end module polydem_linearised_contact

@@ -1,8 +1,8 @@
 !> Where settings come from: the base of the types that `make_entries.py` makes of the table of entries.
-module polydem_origin
+module polydem_source_locations
    implicit none
    private
-   public :: origin_t, overrides_of, place_of
+   public :: source_locations_t, overrides_of, place_of
 
    !> Beginning of the place of an override of the command line
    character(len=*), parameter :: option = '--set '
@@ -16,7 +16,7 @@ module polydem_origin
    end type entry_place_t
 
    !> Origin of settings
-   type :: origin_t
+   type :: source_locations_t
       !> Path of the namelist file, for messages
       character(len=:), allocatable :: file
       !> Text of the namelist file, with a line end after each line
@@ -25,14 +25,14 @@ module polydem_origin
       character(len=:), allocatable :: resolved
       !> Where each entry was given, (any); not allocated in settings that no text gave
       type(entry_place_t), allocatable :: places(:)
-   end type origin_t
+   end type source_locations_t
 
 contains
 
    !> Where an entry was given, for the beginning of a message: file:line, --set group.key=value, or the file alone
    pure function place_of(settings, group, key) result(place)
       !> Settings of a run or a bench
-      class(origin_t), intent(in) :: settings
+      class(source_locations_t), intent(in) :: settings
       !> Namelist group; a repeatable group with its name, such as 'motion.turn'
       character(len=*), intent(in) :: group
       !> Key in the group
@@ -51,7 +51,7 @@ contains
    !> ' (with --set group.key=value, ...)'; empty if there are none
    pure function overrides_of(settings, group) result(text)
       !> Settings of a run or a bench
-      class(origin_t), intent(in) :: settings
+      class(source_locations_t), intent(in) :: settings
       !> Namelist group
       character(len=*), intent(in) :: group
       character(len=:), allocatable :: text
@@ -68,4 +68,4 @@ contains
       if (text /= '') text = text//')'
    end function overrides_of
 
-end module polydem_origin
+end module polydem_source_locations

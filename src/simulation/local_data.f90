@@ -1,5 +1,5 @@
 !> Parts of a simulation that depend on the bodies of a rank: force law, boxes, pair list with contact history, guards.
-module polydem_local_bodies
+module polydem_local_data
    use polydem_box_maker, only: new_box_maker
    use polydem_contact_history, only: add_column, column_of, contact_history_t
    use polydem_contact_incidence, only: incidence_t
@@ -16,12 +16,12 @@ module polydem_local_bodies
    use polydem_stable_step, only: stiffest_product
    implicit none
    private
-   public :: fit_to_bodies
+   public :: rebuild_local_data
 
 contains
 
    !> Rebuild the parts that depend on the bodies: force law, boxes, an empty pair list with contact history, guards.
-   subroutine fit_to_bodies(self, error, median_diameter)
+   subroutine rebuild_local_data(self, error, median_diameter)
       !> The simulation, with its bodies and walls set
       type(simulation_t), intent(inout) :: self
       !> Allocated if the bodies or the settings are invalid
@@ -33,7 +33,7 @@ contains
       call fit_table(self%law, self%contacts)
       self%walk%walls%n = 0_ip
       self%walk%walls%energy_is_quadratic = self%law%energy_is_quadratic
-      call fit_table(self%law, self%walk%suspects)
+      call fit_table(self%law, self%walk%flagged)
       self%n_contacts = 0_ip
       self%walk%passing_pair = 0_ip
       call start_sums(self%bodies%n, self%force_sums)
@@ -52,7 +52,7 @@ contains
                              column_of(self%history, 'direction'))
       if (self%settings%guards%step /= 'off') self%walk%contact_guard%soft = &
          stiffest_product(self%law, self%integrator%stability(), self%bodies, self%dt/warn_share)
-   end subroutine fit_to_bodies
+   end subroutine rebuild_local_data
 
    !> Empty a table of contacts, and give it the columns that the law needs.
    subroutine fit_table(law, contacts)
@@ -99,7 +99,7 @@ contains
       integer :: k
 
       self%history = contact_history_t()
-      allocate (self%history%memory(0))
+      allocate (self%history%cache(0))
       do k = 1, size(self%law%history_kinds)
          call add_column(self%history, self%law%history_kinds(k), 0_ip)
       end do
@@ -119,4 +119,4 @@ contains
       self%moving = [self%moving, pack([(s, s=1_ip, self%bodies%n)], self%bodies%in_halo)]
    end subroutine list_moving
 
-end module polydem_local_bodies
+end module polydem_local_data

@@ -1,52 +1,52 @@
-!> Boxes in cells (`polydem_cell_grids`), and the search for the boxes in a window. It finds guests of the cells
-!> (`polydem_cell_guests`) in addition: fixed boxes, and boxes that changed after they were binned.
-module polydem_cell_windows
+!> Boxes in cells (`polydem_cell_grids`), and the search for the boxes in a window. It finds late insertions into the cells
+!> (`polydem_late_insertions`) in addition: fixed boxes, and boxes that changed after they were binned.
+module polydem_grid_query
    use polydem_cell_grid, only: cell_grid_t
    use polydem_cell_grids, only: cell_grids_t, column, row
-   use polydem_cell_guests, only: cell_block_t, cell_guests_t
+   use polydem_late_insertions, only: cell_block_t, late_insertions_t
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: ip, lp, wp
    implicit none
    private
-   public :: cell_windows_t
+   public :: grid_query_t
 
-   !> Grids with guests
-   type, extends(cell_grids_t) :: cell_windows_t
+   !> Grids with late insertions
+   type, extends(cell_grids_t) :: grid_query_t
       !> Boxes registered in cells after the sort
-      type(cell_guests_t) :: guests
+      type(late_insertions_t) :: late
    contains
       procedure :: receive_fixed
-      procedure :: add_guest
+      procedure :: add_late
       procedure :: search_window
-      procedure :: search_guests
+      procedure :: search_late
       procedure :: bytes
-   end type cell_windows_t
+   end type grid_query_t
 
 contains
 
-   !> Remove all guests, and make all fixed boxes guests, after `build`.
+   !> Remove all late insertions, and insert all fixed boxes, after `build`.
    pure subroutine receive_fixed(self, bounds)
-      class(cell_windows_t), intent(inout) :: self
+      class(grid_query_t), intent(inout) :: self
       !> Bounds of the boxes, (4, box) [m]
       real(wp), intent(in), contiguous :: bounds(:, :)
       integer(ip) :: k
 
-      call self%guests%clear(self%n_cells)
+      call self%late%clear(self%n_cells)
       do k = self%grid(self%n_levels + 1)%first_box, self%grid(self%n_levels + 1)%last_box
-         call self%add_guest(self%order%box(k), bounds(:, self%order%box(k)))
+         call self%add_late(self%order%box(k), bounds(:, self%order%box(k)))
       end do
    end subroutine receive_fixed
 
    !> Register a box in the cells of its grid that it covers, a fixed box in the coarsest grid.
-   pure subroutine add_guest(self, i, bounds)
-      class(cell_windows_t), intent(inout) :: self
+   pure subroutine add_late(self, i, bounds)
+      class(grid_query_t), intent(inout) :: self
       !> Box
       integer(ip), intent(in) :: i
       !> Its bounds xmin, ymin, xmax, ymax [m]
       real(wp), intent(in) :: bounds(4)
 
-      call self%guests%add(i, cells_of(self%grid(min(self%level(i), int(self%n_levels, ip))), bounds))
-   end subroutine add_guest
+      call self%late%add(i, cells_of(self%grid(min(self%level(i), int(self%n_levels, ip))), bounds))
+   end subroutine add_late
 
    !> Cells that a window covers; none if its bounds are not numbers
    pure type(cell_block_t) function cells_of(grid, window)
@@ -60,9 +60,9 @@ contains
                               row(grid, window(4)) - low + 1_ip, grid%stride)
    end function cells_of
 
-   !> List the guests that overlap a window.
-   pure subroutine search_guests(self, window, bounds, near)
-      class(cell_windows_t), intent(inout) :: self
+   !> List the late insertions that overlap a window.
+   pure subroutine search_late(self, window, bounds, near)
+      class(grid_query_t), intent(inout) :: self
       !> Bounds xmin, ymin, xmax, ymax of the window [m]
       real(wp), intent(in) :: window(4)
       !> Present bounds of the boxes, (4, box) [m]
@@ -72,14 +72,14 @@ contains
       integer :: l
 
       do l = 1, self%n_levels
-         call self%guests%append_near(cells_of(self%grid(l), window), window, bounds, near, self%total%tests)
+         call self%late%append_near(cells_of(self%grid(l), window), window, bounds, near, self%total%tests)
       end do
-      call self%guests%append_wide(window, bounds, near, self%total%tests)
-   end subroutine search_guests
+      call self%late%append_wide(window, bounds, near, self%total%tests)
+   end subroutine search_late
 
    !> List the boxes that were not fixed and overlapped a window when they were binned.
    subroutine search_window(self, window, near)
-      class(cell_windows_t), intent(inout) :: self
+      class(grid_query_t), intent(inout) :: self
       !> Bounds xmin, ymin, xmax, ymax of the window [m]
       real(wp), intent(in) :: window(4)
       !> List to which the boxes are appended
@@ -110,9 +110,9 @@ contains
 
    !> Allocated memory [B]
    pure integer(lp) function bytes(self)
-      class(cell_windows_t), intent(in) :: self
+      class(grid_query_t), intent(in) :: self
 
-      bytes = self%cell_grids_t%bytes() + self%guests%bytes()
+      bytes = self%cell_grids_t%bytes() + self%late%bytes()
    end function bytes
 
-end module polydem_cell_windows
+end module polydem_grid_query
