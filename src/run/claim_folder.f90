@@ -18,7 +18,8 @@ module polydem_claim_folder
 
 contains
 
-   !> Begin the manifest of a run, or continue that of earlier attempts. The folder of a result to be replaced is renamed.
+   !> Begin the manifest of a run, or continue that of earlier attempts. The folder of a result to be replaced is
+   !> renamed.
    subroutine claim_folder(settings, has_deep_contacts, folder, force, is_restart, shares, lock, note, manifest, error)
       type(settings_t), intent(in) :: settings
       !> Whether the run writes a table of deep contacts

@@ -82,7 +82,8 @@ contains
       call check_manifest(run%manifest, error)
       if (force .or. run%attempt%continues .or. .not. run%manifest%is_found) return
       call raise(error, input_error, run%folder//' already holds a result; add --continue '// &
-                 'to resume it or --force to set it aside and start again, or choose another folder with --set output.folder=NAME')
+                 'to resume it or --force to set it aside and start again, or choose another folder with '// &
+                 '--set output.folder=NAME')
    end subroutine check_overwrite
 
    !> Find the state of earlier attempts, claim the folder, open the log and describe the run.

@@ -1,5 +1,5 @@
-!> Replacement of a result by `--force`: the result folder NAME is renamed to NAME.1, or the next number that is free, with
-!> everything in it. The run then starts in a new folder. Nothing is removed, and one atomic call separates the states
+!> Replacement of a result by `--force`: the result folder NAME is renamed to NAME.1, or the next number that is free,
+!> with everything in it. The run then starts in a new folder. Nothing is removed, and one atomic call separates the states
 !> before and after.
 module polydem_set_aside
    use polydem_errors, only: error_t, input_error, raise
@@ -14,7 +14,8 @@ module polydem_set_aside
 
 contains
 
-   !> Rename a result folder, and make and lock a new one of the same name. A link to a folder stays; its target is renamed.
+   !> Rename a result folder, and make and lock a new one of the same name. A link to a folder stays; its target is
+   !> renamed.
    subroutine set_aside(folder, inputs, shares, lock, note, error)
       !> Result folder
       character(len=*), intent(in) :: folder
@@ -60,8 +61,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer :: k
 
-      if (is_inside('.')) call raise(error, input_error, '--force would rename '//folder//', which holds the working '// &
-                                     'directory. Call the program elsewhere, or choose another folder with --set '// &
+      if (is_inside('.')) call raise(error, input_error, '--force would rename '//folder//', which holds the '// &
+                                     'working directory. Call the program elsewhere, or choose another folder with --set '// &
                                      'output.folder=NAME')
       do k = 1, size(inputs)
          if (inputs(k) == '') cycle

@@ -1,4 +1,4 @@
-!> Boxes in cells (`polydem_cell_grids`), and the search for the boxes in a window. It finds late insertions into the cells
+!> Boxes in cells (`polydem_cell_grids`), and the search for the boxes in a window. It finds late insertions
 !> (`polydem_late_insertions`) in addition: fixed boxes, and boxes that changed after they were binned.
 module polydem_grid_query
    use polydem_cell_grid, only: cell_grid_t
