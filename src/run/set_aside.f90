@@ -1,6 +1,6 @@
 !> Replacement of a result by `--force`: the result folder NAME is renamed to NAME.1, or the next number that is free,
-!> with everything in it. The run then starts in a new folder. Nothing is removed, and one atomic call separates the states
-!> before and after.
+!> with everything in it. The run then starts in a new folder. Nothing is removed, and one atomic call separates the
+!> states before and after.
 module polydem_set_aside
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: folder_of, make_folder, rename_file, sync_file
@@ -62,8 +62,8 @@ contains
       integer :: k
 
       if (is_inside('.')) call raise(error, input_error, '--force would rename '//folder//', which holds the '// &
-                                     'working directory. Call the program elsewhere, or choose another folder with --set '// &
-                                     'output.folder=NAME')
+                                     'working directory. Call the program elsewhere, or choose another folder '// &
+                                     'with --set output.folder=NAME')
       do k = 1, size(inputs)
          if (inputs(k) == '') cycle
          if (is_inside(trim(inputs(k)))) call raise(error, input_error, '--force would rename '//folder// &
