@@ -6,7 +6,7 @@
 8100 squares of 0.2 m tumble in a ring of 36 segments with four paddles, which turns by 25 degrees per second. Geometry,
 density, friction coefficient and gravity are those of Box2D. Its restitution is 0; here collisions are damped, but not
 without any rebound. Stiffness and time step have no counterpart: at rest, the weight of forty squares presses two of
-them together by a depth of about 1 % of their side (reckoned); Box2D accepts a penetration of 2.5 %. When the block of
+them together by a depth of about 1 % of their side (computed); Box2D accepts a penetration of 2.5 %. When the block of
 squares falls on the ring at the start, some contacts are deeper.
 """
 

@@ -161,7 +161,7 @@ def settings_module(groups, rows):
                      f"      type({group}_settings_t){kind} :: {group}{shape}\n")
     body += "   end type settings_t\n"
     return module("settings", "Settings of a run and of a bench: one type per namelist group.",
-                  ["kinds, only: ip, wp", "origin, only: source_locations_t", "strings, only: text_t"],
+                  ["kinds, only: ip, wp", "source_locations, only: source_locations_t", "strings, only: text_t"],
                   ["settings_t", *(f"{group}_settings_t" for group in groups)], body)
 
 

@@ -99,7 +99,7 @@ contains
       integer :: k
 
       self%history = contact_history_t()
-      allocate (self%history%cache(0))
+      allocate (self%history%memory(0))
       do k = 1, size(self%law%history_kinds)
          call add_column(self%history, self%law%history_kinds(k), 0_ip)
       end do

@@ -174,7 +174,7 @@ contains
       integer :: k
 
       associate (pairs => self%neighbours%pairs, history => self%history)
-         call pairs%carry(history%cache, 0_ip)
+         call pairs%carry(history%memory, 0_ip)
          if (.not. allocated(history%column)) return
          do k = 1, size(history%column)
             call pairs%carry(history%column(k)%value, 0.0_wp)

@@ -172,9 +172,9 @@ contains
       next = n
       tested = n + 1_ip
       associate (mine => shares%mine((low - 1_ip)/block_size + 1_ip))
-         if (allocated(history%cache)) then
+         if (allocated(history%memory)) then
             do c = 1_ip, n
-               mine%memory(c) = history%cache(shares%pair(low + c - 1_ip))
+               mine%memory(c) = history%memory(shares%pair(low + c - 1_ip))
             end do
          else
             mine%memory(:n) = 0_ip

@@ -215,7 +215,7 @@ def test_the_slope_of_a_series_and_its_counts_are_those_of_the_truth(tmp_path):
     assert series.count_slope(cases, "tests", "swaps") == pytest.approx(1.0, abs=1e-3)
 
 
-def test_a_tree_that_is_deeper_than_any_is_refused_and_not_reckoned_with(tmp_path):
+def test_a_tree_that_is_deeper_than_any_is_refused(tmp_path):
     write_sample(tmp_path, "drum_1000", "quadtree", Truth(40.0, counts={"depth": 65}), 1000, repeat=0)
     with pytest.raises(ResultError, match="no tree has more than 64 levels"):
         read_bench([tmp_path])

@@ -117,7 +117,7 @@ def test_the_command_prints_markdown(tmp_path, capsys):
     path = write(tmp_path / "a.csv", [counted(16), counted(64)])
     assert main(["scale", str(path), "--body", "1.5e-6", "--bodies", "1e6", "--shape", "drum"]) == 0
     printed = capsys.readouterr().out
-    assert "### Time of a step of 1e+06 bodies, reckoned" in printed and "| 4096 |" in printed
+    assert "### Time of a step of 1e+06 bodies, predicted" in printed and "| 4096 |" in printed
     assert "1.5 us per body" in printed and "| drum | 0.2 | 2 |" in printed
     assert main(["scale", str(path), "--body", "1e-6", "--bodies", "1e6", "--margin", "0.3"]) == 2
     assert "nothing was counted" in capsys.readouterr().err

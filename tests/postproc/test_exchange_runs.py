@@ -130,7 +130,7 @@ def test_the_command_takes_folders_and_saved_files(shared, alone, tmp_path, caps
     saved = str(tmp_path / "saved.csv")
     assert main(["scale", str(shared), str(alone), "--save", saved]) == 0
     printed = capsys.readouterr().out
-    assert "### Exact counts of runs, means of a step" in printed and "reckoned" not in printed
+    assert "### Exact counts of runs, means of a step" in printed and "predicted" not in printed
     assert main(["scale", saved, "--body", "1e-6", "--bodies", "1e5,1e6"]) == 0
     again = capsys.readouterr().out
     assert again.startswith(printed) and again.count("| 4096 |") == 2

@@ -78,11 +78,11 @@ contains
       do while (next >= low .and. block%n < block_size)
          if (next < tested) then
             tested = max(low, next - ahead + 1_ip)
-            if (allocated(history%cache)) call forget_edges(bodies, tested, next, first, second, &
-                                                                    history%cache)
+            if (allocated(history%memory)) call forget_edges(bodies, tested, next, first, second, &
+                                                                    history%memory)
          end if
-         if (allocated(history%cache)) then
-            call select_in_range(tested, next, history%cache(tested:next), block, batch)
+         if (allocated(history%memory)) then
+            call select_in_range(tested, next, history%memory(tested:next), block, batch)
          else
             nothing = 0_ip
             call select_in_range(tested, next, nothing(:next - tested + 1_ip), block, batch)
@@ -228,12 +228,12 @@ contains
       integer :: k
 
       rejected = 0_ip
-      if (allocated(history%cache)) rejected = max(0_ip, history%cache(block%pair(c)))
+      if (allocated(history%memory)) rejected = max(0_ip, history%memory(block%pair(c)))
       associate (start => bodies%vertex_start, turned => bodies%turned, radius => bodies%radius, i => block%first(c), &
                  j => block%second(c), p => block%pair(c))
          call find_overlap(turned(:, start(i):start(i + 1_ip) - 1_ip), turned(:, start(j):start(j + 1_ip) - 1_ip), &
                            offset_of(bodies, i, j), radius(i), radius(j), effective, overlap, memory, rejected)
-         if (allocated(history%cache)) history%cache(p) = merge(rejected, memory, memory == 0_ip)
+         if (allocated(history%memory)) history%memory(p) = merge(rejected, memory, memory == 0_ip)
          exists = overlap%area > 0.0_wp
          if (.not. exists) then
             if (.not. allocated(history%column)) return

@@ -56,7 +56,7 @@ contains
       n_columns = 0
       if (allocated(history%column)) n_columns = size(history%column)
       packed%key = pair_key(id(first(:n)), id(second(:n)))
-      packed%memory = history%cache(:n)
+      packed%memory = history%memory(:n)
       allocate (packed%value(max(1, n_columns), n), source=0.0_wp)
       do j = 1, n_columns
          packed%value(j, :) = history%column(j)%value(:n)
@@ -203,7 +203,7 @@ contains
          if (k > size(packed%key)) return
          if (packed%key(k) /= key) cycle
          n_known = n_known + 1_ip
-         history%cache(p) = packed%memory(k)
+         history%memory(p) = packed%memory(k)
          do j = 1, n_columns
             history%column(j)%value(p) = packed%value(j, k)
          end do

@@ -1,4 +1,4 @@
-"""Time of a step on many ranks, reckoned from counts.
+"""Time of a step on many ranks, predicted from counts.
 
 What ranks tell each other is counted exactly, on any machine, by runs of the program (exchange_runs.py) and, in still
 packings, by `count_exchange` (tests/ranks/partition). A rank has halo bodies in a strip around its region. If n grains
@@ -224,7 +224,7 @@ def scale_table(law: Law, machine: Machine, bodies: float, ranks=RANKS) -> Table
     """Time of a step against the number of ranks, with all that is assumed."""
     heading = ("ranks", "bodies per rank", "halo bodies per body", "bodies [us]", "halo bodies [us]", "neighbours [us]",
                "everyone [us]", "redistributing [us]", "step [us]", "speed-up", "efficiency [%]")
-    table = Table("scale", f"Time of a step of {bodies:g} bodies, reckoned", heading, texts=0)
+    table = Table("scale", f"Time of a step of {bodies:g} bodies, predicted", heading, texts=0)
     alone = predict(law, machine, bodies, 1).total
     for size in ranks:
         step = predict(law, machine, bodies, size)
@@ -240,7 +240,7 @@ def scale_table(law: Law, machine: Machine, bodies: float, ranks=RANKS) -> Table
 def _assumptions(law: Law, machine: Machine) -> str:
     """What the table stands on, in words."""
     return "\n".join((
-        "Reckoned, not measured. Counted: "
+        "Predicted, not measured. Counted: "
         f"a strip of halo bodies {law.strip:.2f} mean distances wide ({law.spread[0]:.2f} to {law.spread[1]:.2f} in "
         f"{law.counts} counts), {law.messages} messages in a step, {law.halo_bytes:.3g} bytes per halo body, "
         f"{law.rectangles:.1f} rectangles per rank.",
