@@ -97,4 +97,4 @@ class Names:
 BASE = Names()
 
 #: What the present tree calls what the base revision called otherwise
-PRESENT = Names()
+PRESENT = Names(entries={"decomposition.partition": None})
