@@ -97,4 +97,6 @@ class Names:
 BASE = Names()
 
 #: What the present tree calls what the base revision called otherwise
-PRESENT = Names(entries={"decomposition.partition": None})
+PRESENT = Names(entries={"decomposition.partition": None},
+                # The settings of a sample, as text
+                data={"sample/case/input": None})
