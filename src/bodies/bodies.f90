@@ -1,22 +1,18 @@
 !> The bodies of a simulation as a structure of arrays.
 !>
-!> A body is a convex polygon, free or fixed. Its *slot* is its index in the arrays, which may change. Its
-!> *identifier* never changes. Slots are in ascending order of identifiers. Fixed bodies are on every rank; a free
-!> body is on the rank that moves it and, as a halo body, on ranks nearby.
+!> A body moves, freely or as prescribed. Its outline is a convex polygon, a piece (`polydem_pieces`). Its *slot* is its
+!> index in the arrays, which may change. Its *identifier* never changes. Slots are in ascending order of identifiers.
+!> Fixed bodies are on every rank; a free body is on the rank that moves it and, as a halo body, on ranks nearby.
 !>
-!> Vertices are packed: body `s` owns the columns `vertex_start(s) : vertex_start(s + 1) - 1`,
-!> anticlockwise, of two arrays:
-!>
-!>     shape(:, k)    in the body frame: relative to the centre of mass, at angle 0; never changes
-!>     turned(:, k)   shape turned by the angle, still relative to the centre of mass
-!>
-!> World coordinates are `position + turned`. They are not stored. Vectors between two near bodies start from the
-!> difference of their positions, which is exact; the precision is then independent of the distance from the origin.
+!> World coordinates of a vertex are `position + turned`. They are not stored. Vectors between two near bodies start
+!> from the difference of their positions, which is exact; the precision is then independent of the distance from the
+!> origin.
 module polydem_bodies
    use polydem_elementary, only: sines_and_cosines
    use polydem_hash, only: mix_word
    use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp, wp, dp, min_parallel_size
+   use polydem_pieces, only: pieces_t
    use polydem_polygon, only: diameter, greatest_radius, thickness
    implicit none
    private
@@ -68,18 +64,14 @@ module polydem_bodies
       real(wp), allocatable :: force(:, :)
       !> Sum of the torques about the centre of mass, likewise [N]
       real(wp), allocatable :: torque(:)
-      !> First vertex of each body, (n + 1)
-      integer(ip), allocatable :: vertex_start(:)
-      !> Vertices in the body frame, (2, vertex) [m]
-      real(wp), allocatable :: shape(:, :)
+      !> Polygons of the bodies: piece s belongs to slot s
+      type(pieces_t) :: pieces
       !> Greatest distance of a vertex from the centre of mass [m]
       real(wp), allocatable :: radius(:)
       !> Greatest distance between two vertices [m]
       real(wp), allocatable :: diameter(:)
       !> Twice the least distance of an edge from the centre of mass [m]
       real(wp), allocatable :: thickness(:)
-      !> Vertices turned by the angle, relative to the centre of mass, (2, vertex) [m]
-      real(wp), allocatable :: turned(:, :)
    end type bodies_t
 
 contains
@@ -89,19 +81,19 @@ contains
       type(bodies_t), intent(out) :: bodies
       !> Number of bodies
       integer(ip), intent(in) :: n
-      !> Number of vertices for which `shape` has memory; `turned` is not allocated
+      !> Number of vertices for which `pieces%vertex` has memory; `pieces%turned` is not allocated
       integer(ip), intent(in) :: n_vertices
 
       bodies%n = n
       allocate (bodies%id(n), bodies%global_index(n), source=0_ip)
-      allocate (bodies%vertex_start(n + 1_ip), source=1_ip)
+      allocate (bodies%pieces%vertex_start(n + 1_ip), source=1_ip)
       allocate (bodies%fixed(n), bodies%in_halo(n), source=.false.)
       allocate (bodies%mass(n), bodies%inertia(n), bodies%inverse_mass(n), bodies%inverse_inertia(n), &
                 bodies%radius(n), bodies%diameter(n), bodies%thickness(n), bodies%angle(n), &
                 bodies%angular_velocity(n), bodies%angular_acceleration(n), bodies%torque(n), source=0.0_wp)
       allocate (bodies%position(2, n), bodies%velocity(2, n), bodies%acceleration(2, n), bodies%force(2, n), &
                 source=0.0_wp)
-      allocate (bodies%shape(2, n_vertices))
+      allocate (bodies%pieces%vertex(2, n_vertices))
    end subroutine allocate_bodies
 
    !> Update `turned` of the given bodies to their angles.
@@ -129,7 +121,7 @@ contains
 
       !$omp parallel do if (bodies%n > min_parallel_size) schedule(static) default(none) shared(bodies) private(s)
       do s = 1_ip, bodies%n
-         associate (shape => bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))
+         associate (shape => bodies%pieces%polygon(s))
             bodies%radius(s) = greatest_radius(shape)
             bodies%diameter(s) = diameter(shape)
             bodies%thickness(s) = thickness(shape)
@@ -152,9 +144,10 @@ contains
 
       call find_directions(bodies, slots, direction)
       do k = 1_ip, size(slots, kind=ip)
-         associate (first => bodies%vertex_start(slots(k)), last => bodies%vertex_start(slots(k) + 1_ip) - 1_ip)
-            call turn_vertices(last - first + 1_ip, bodies%shape(:, first:last), direction(1, k), direction(2, k), &
-                               bodies%turned(:, first:last), extent(:, k))
+         associate (pieces => bodies%pieces, first => bodies%pieces%vertex_start(slots(k)), &
+                    last => bodies%pieces%vertex_start(slots(k) + 1_ip) - 1_ip)
+            call turn_vertices(last - first + 1_ip, pieces%vertex(:, first:last), direction(1, k), direction(2, k), &
+                               pieces%turned(:, first:last), extent(:, k))
          end associate
       end do
    end subroutine turn_block

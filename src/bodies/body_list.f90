@@ -30,7 +30,7 @@ module polydem_body_list
    end type given_body_t
 
    !> A growing list of bodies before their mass properties are computed. One of several ranks keeps all fixed bodies
-   !> and its share of the free ones; the shares of the ranks are pieces of `piece` bodies in turn.
+   !> and its share of the free ones; the shares of the ranks are `share` consecutive bodies in turn.
    type :: body_list_t
       !> Number of bodies in the list, including those that the rank leaves to others
       integer(ip) :: n = 0_ip
@@ -49,7 +49,7 @@ module polydem_body_list
    end type body_list_t
 
    !> Number of consecutive bodies of a share
-   integer(ip), parameter :: piece = 256_ip
+   integer(ip), parameter :: share = 256_ip
 
 contains
 
@@ -103,7 +103,7 @@ contains
    pure logical function leaves_next(self)
       class(body_list_t), intent(in) :: self
 
-      leaves_next = modulo(self%n/piece, self%n_ranks) /= self%rank
+      leaves_next = modulo(self%n/share, self%n_ranks) /= self%rank
    end function leaves_next
 
    !> Count a body that the rank does not keep.
@@ -218,11 +218,11 @@ contains
       if (.not. bodies%fixed(s) .and. bodies%inertia(s) <= 0.0_wp) &
          bodies%inertia(s) = bodies%mass(s)*(second_moment/area)
       call check_mass('moment of inertia', bodies%inertia(s), bodies%id(s), bodies%fixed(s), error)
-      call reserve_vertices(bodies, bodies%vertex_start(s), size(cleaned, 2, kind=ip))
+      call reserve_vertices(bodies, bodies%pieces%vertex_start(s), size(cleaned, 2, kind=ip))
       do v = 1_ip, size(cleaned, 2, kind=ip)
-         bodies%shape(:, bodies%vertex_start(s) + v - 1_ip) = cleaned(:, v) - centroid
+         bodies%pieces%vertex(:, bodies%pieces%vertex_start(s) + v - 1_ip) = cleaned(:, v) - centroid
       end do
-      bodies%vertex_start(s + 1_ip) = bodies%vertex_start(s) + size(cleaned, 2, kind=ip)
+      bodies%pieces%vertex_start(s + 1_ip) = bodies%pieces%vertex_start(s) + size(cleaned, 2, kind=ip)
    end subroutine place
 
    !> Reject a mass so small or large that its inverse or products leave the range of normal numbers. 0 is infinite and
@@ -247,10 +247,10 @@ contains
       integer(ip), intent(in) :: first, more
       real(wp), allocatable :: longer(:, :)
 
-      if (first + more - 1_ip <= size(bodies%shape, 2)) return
+      if (first + more - 1_ip <= size(bodies%pieces%vertex, 2)) return
       allocate (longer(2, 2_ip*(first + more)))
-      longer(:, 1:first - 1_ip) = bodies%shape(:, 1:first - 1_ip)
-      call move_alloc(longer, bodies%shape)
+      longer(:, 1:first - 1_ip) = bodies%pieces%vertex(:, 1:first - 1_ip)
+      call move_alloc(longer, bodies%pieces%vertex)
    end subroutine reserve_vertices
 
    subroutine finish(bodies)
@@ -258,10 +258,10 @@ contains
       real(wp), allocatable :: shape(:, :)
       integer(ip) :: s, n_vertices
 
-      n_vertices = bodies%vertex_start(bodies%n + 1_ip) - 1_ip
-      allocate (shape(2, n_vertices), bodies%turned(2, n_vertices))
-      shape(:, :) = bodies%shape(:, :n_vertices)
-      call move_alloc(shape, bodies%shape)
+      n_vertices = bodies%pieces%vertex_start(bodies%n + 1_ip) - 1_ip
+      allocate (shape(2, n_vertices), bodies%pieces%turned(2, n_vertices))
+      shape(:, :) = bodies%pieces%vertex(:, :n_vertices)
+      call move_alloc(shape, bodies%pieces%vertex)
       call measure_sizes(bodies)
       where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass
       where (bodies%inertia > 0.0_wp) bodies%inverse_inertia = 1.0_wp/bodies%inertia

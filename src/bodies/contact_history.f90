@@ -1,4 +1,4 @@
-!> Contact history: the values that force parts, the search for contacts and the guards store per pair of bodies.
+!> Contact history: the values that force parts, the search for contacts and the guards store per pair of pieces.
 !>
 !> The history follows the list of pairs: entry `p` belongs to pair `p`, moves with it when the list changes, and is set
 !> to zero when the polygons separate. Force parts and guards declare the columns that they need; there are no others.
@@ -23,7 +23,7 @@ module polydem_contact_history
    type :: history_column_t
       !> Description
       type(history_kind_t) :: kind
-      !> Value of each pair, zero if its bodies do not overlap, (pair)
+      !> Value of each pair, zero if its pieces do not overlap, (pair)
       real(wp), allocatable :: value(:)
    end type history_column_t
 

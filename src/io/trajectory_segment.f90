@@ -50,7 +50,7 @@ contains
       do s = 1_ip, bodies%n
          numbers(1, s) = int(bodies%id(s), lp)
          numbers(2, s) = merge(1_lp, 0_lp, bodies%fixed(s))
-         numbers(3, s) = int(bodies%vertex_start(s + 1_ip) - bodies%vertex_start(s), lp)
+         numbers(3, s) = int(bodies%pieces%vertex_start(s + 1_ip) - bodies%pieces%vertex_start(s), lp)
       end do
       call blocks%to_blocks(comm, numbers, block)
       deallocate (numbers)
@@ -103,13 +103,13 @@ contains
          about_vertex = 'vertices relative to the centre of mass at angle 0, anticlockwise'
       integer(ip) :: k, n, s
 
-      n = bodies%vertex_start(bodies%n + 1_ip) - 1_ip
+      n = bodies%pieces%vertex_start(bodies%n + 1_ip) - 1_ip
       if (comm%size == 1_ip) then
          ! One rank has all rows in order. It needs no memory for a plan.
-         call file%write('/bodies/vertex_start', bodies%vertex_start - 1_ip, error, '1', about_start)
+         call file%write('/bodies/vertex_start', bodies%pieces%vertex_start - 1_ip, error, '1', about_start)
          do k = 1_ip, max(n, 1_ip), vertices_at_once
             associate (last => min(n, k + (vertices_at_once - 1_ip)))
-               call file%write('/bodies/vertex', real(bodies%shape(:, k:last), dp), error, 'm', about_vertex, &
+               call file%write('/bodies/vertex', real(bodies%pieces%vertex(:, k:last), dp), error, 'm', about_vertex, &
                                part_t(int(k, lp) - 1_lp, int(n, lp)))
             end associate
          end do
@@ -117,10 +117,10 @@ contains
       end if
       allocate (body(n), start(size(n_vertices) + 1))
       do s = 1_ip, bodies%n
-         body(bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip) = s
+         body(bodies%pieces%vertex_start(s):bodies%pieces%vertex_start(s + 1_ip) - 1_ip) = s
       end do
       call order_parts(comm, bodies, body, blocks)
-      call blocks%to_blocks(comm, real(bodies%shape(:, :n), dp), vertices)
+      call blocks%to_blocks(comm, real(bodies%pieces%vertex(:, :n), dp), vertices)
       start(1) = int(blocks%first, ip)
       do k = 1_ip, size(n_vertices, kind=ip)
          start(k + 1) = start(k) + n_vertices(k)

@@ -79,7 +79,7 @@ contains
          case%mode = 'replay'
          case%boxes = boxes%n
          case%fixed = count(boxes%fixed, kind=ip)
-         case%bodies = boxes%n_bodies
+         case%bodies = boxes%n_pieces
          case%steps = trace%n_steps
          case%dt = trace%dt
          case%input = trace%input

@@ -128,8 +128,9 @@ contains
       type(boxes_t), intent(out) :: boxes
 
       boxes%n = size(trace%fixed, kind=ip)
-      boxes%n_bodies = trace%body(boxes%n)
-      boxes%one_to_one = boxes%n_bodies == boxes%n
+      boxes%n_pieces = trace%body(boxes%n)
+      boxes%one_to_one = boxes%n_pieces == boxes%n
+      boxes%piece = trace%body
       boxes%body = trace%body
       boxes%fixed = trace%fixed
       boxes%passive = trace%fixed

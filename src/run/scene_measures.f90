@@ -137,7 +137,7 @@ contains
          counts(1) = size(bodies%free, kind=lp)
          do k = 1_ip, bodies%n
             if (owns_body(simulation%comm%is_root(), bodies%in_halo(k), bodies%fixed(k))) &
-               counts(2) = counts(2) + int(bodies%vertex_start(k + 1_ip) - bodies%vertex_start(k), lp)
+               counts(2) = counts(2) + int(bodies%pieces%vertex_start(k + 1_ip) - bodies%pieces%vertex_start(k), lp)
          end do
          counts(3) = count(.not. boxes%passive(:boxes%n), kind=lp)
          do c = 1_ip, contacts%n
@@ -222,9 +222,9 @@ contains
       integer(ip), intent(in) :: s
       integer(ip) :: v
 
-      do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-         extent(:, 1) = min(extent(:, 1), bodies%position(:, s) + bodies%turned(:, v))
-         extent(:, 2) = max(extent(:, 2), bodies%position(:, s) + bodies%turned(:, v))
+      do v = bodies%pieces%vertex_start(s), bodies%pieces%vertex_start(s + 1_ip) - 1_ip
+         extent(:, 1) = min(extent(:, 1), bodies%position(:, s) + bodies%pieces%turned(:, v))
+         extent(:, 2) = max(extent(:, 2), bodies%position(:, s) + bodies%pieces%turned(:, v))
       end do
    end subroutine extend_extent
 
@@ -247,7 +247,7 @@ contains
       measures%density(1) = huge(1.0_wp)
       do k = 1_ip, size(bodies%free, kind=ip)
          s = bodies%free(k)
-         associate (shape => bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))
+         associate (shape => bodies%pieces%polygon(s))
             density = bodies%mass(s)/area_of(shape)
          end associate
          speed = hypotenuse(bodies%velocity(1, s), bodies%velocity(2, s))

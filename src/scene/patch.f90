@@ -77,7 +77,7 @@ contains
       do k = 1_ip, size(chosen, kind=ip)
          patch%centres(:, k) = centres(:, chosen(k)) - low
          associate (s => bodies%free(chosen(k)))
-            patch%grains(k)%corners = bodies%turned(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip)
+            patch%grains(k)%corners = bodies%pieces%turned_polygon(s)
          end associate
          associate (corners => patch%grains(k)%corners)
             patch%grains(k)%length = 2.0_wp*maxval(hypotenuse(corners(1, :), corners(2, :)))

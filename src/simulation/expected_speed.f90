@@ -78,8 +78,8 @@ contains
          highest = -huge(1.0_wp)
          lowest = huge(1.0_wp)
          do s = 1_ip, bodies%n
-            do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-               height = sum(up*(bodies%position(:, s) + bodies%turned(:, v)))
+            do v = bodies%pieces%vertex_start(s), bodies%pieces%vertex_start(s + 1_ip) - 1_ip
+               height = sum(up*(bodies%position(:, s) + bodies%pieces%turned(:, v)))
                lowest = min(lowest, height)
                if (.not. bodies%fixed(s) .or. size(self%walls) > 0) highest = max(highest, height)
             end do

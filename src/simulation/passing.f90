@@ -188,10 +188,10 @@ contains
       y = bodies%position(2, s) - bodies%position(2, other)
       centre_inside = x*x + y*y < radius(other)*radius(other)
       if (.not. centre_inside) return
-      w = bodies%vertex_start(other + 1_ip) - 1_ip
-      do v = bodies%vertex_start(other), bodies%vertex_start(other + 1_ip) - 1_ip
-         cross = (bodies%turned(1, v) - bodies%turned(1, w))*(y - bodies%turned(2, w)) &
-            - (bodies%turned(2, v) - bodies%turned(2, w))*(x - bodies%turned(1, w))
+      w = bodies%pieces%vertex_start(other + 1_ip) - 1_ip
+      do v = bodies%pieces%vertex_start(other), bodies%pieces%vertex_start(other + 1_ip) - 1_ip
+         cross = (bodies%pieces%turned(1, v) - bodies%pieces%turned(1, w))*(y - bodies%pieces%turned(2, w)) &
+            - (bodies%pieces%turned(2, v) - bodies%pieces%turned(2, w))*(x - bodies%pieces%turned(1, w))
          centre_inside = cross > 0.0_wp
          if (.not. centre_inside) return
          w = v

@@ -36,8 +36,8 @@ contains
       bodies%n_all = 3_ip
       bodies%mass = [0.0_wp, 2.0_wp, 4.0_wp]
       bodies%inertia = [0.0_wp, 0.5_wp, 0.25_wp]
-      bodies%vertex_start = [1_ip, 5_ip, 8_ip, 12_ip]
-      bodies%shape = reshape([-1.0_wp, -1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp, &
+      bodies%pieces%vertex_start = [1_ip, 5_ip, 8_ip, 12_ip]
+      bodies%pieces%vertex = reshape([-1.0_wp, -1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp, &
                               -1.0_wp, -1.0_wp, 2.0_wp, -1.0_wp, -1.0_wp, 2.0_wp, &
                               -0.5_wp, -0.5_wp, 0.5_wp, -0.5_wp, 0.5_wp, 0.5_wp, -0.5_wp, 0.5_wp], [2, 11])
       bodies%position = reshape([0.0_wp, 0.0_wp, -t, 3.0_wp, t, 0.5_wp], [2, 3])
@@ -46,7 +46,7 @@ contains
       bodies%angular_velocity = [(real(k, wp) + t/4.0_wp, k=1_ip, 3_ip)]
       bodies%force = reshape([t, 2.0_wp*t, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], [2, 3])
       bodies%torque = [-t, 0.0_wp, 0.0_wp]
-      allocate (bodies%turned(2, 11))
+      allocate (bodies%pieces%turned(2, 11))
       call turn_bodies(bodies, [1_ip, 2_ip, 3_ip])
    end subroutine sample_bodies
 

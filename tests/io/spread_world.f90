@@ -107,20 +107,20 @@ contains
       bodies%angle = some_number(step, bodies%global_index, 1_ip)
       bodies%angular_velocity = some_number(step, bodies%global_index, 2_ip)
       allocate (bodies%position(2, bodies%n), bodies%velocity(2, bodies%n), bodies%force(2, bodies%n), &
-                bodies%torque(bodies%n), bodies%vertex_start(bodies%n + 1), bodies%radius(bodies%n), &
+                bodies%torque(bodies%n), bodies%pieces%vertex_start(bodies%n + 1), bodies%radius(bodies%n), &
                 bodies%diameter(bodies%n), bodies%thickness(bodies%n))
-      bodies%vertex_start(1) = 1_ip
+      bodies%pieces%vertex_start(1) = 1_ip
       do s = 1_ip, bodies%n
          bodies%position(:, s) = some_number(step, bodies%global_index(s), [3_ip, 4_ip])
          bodies%velocity(:, s) = some_number(step, bodies%global_index(s), [5_ip, 6_ip])
-         bodies%vertex_start(s + 1) = bodies%vertex_start(s) + 3_ip + mod(bodies%global_index(s), 4_ip)
+         bodies%pieces%vertex_start(s + 1) = bodies%pieces%vertex_start(s) + 3_ip + mod(bodies%global_index(s), 4_ip)
       end do
-      v = bodies%vertex_start(bodies%n + 1) - 1_ip
-      allocate (bodies%shape(2, v), bodies%turned(2, v))
+      v = bodies%pieces%vertex_start(bodies%n + 1) - 1_ip
+      allocate (bodies%pieces%vertex(2, v), bodies%pieces%turned(2, v))
       do s = 1_ip, bodies%n
-         do v = bodies%vertex_start(s), bodies%vertex_start(s + 1) - 1_ip
-            bodies%shape(:, v) = some_number(0_lp, bodies%global_index(s), &
-                                             [7_ip, 8_ip]*(v - bodies%vertex_start(s) + 1_ip))
+         do v = bodies%pieces%vertex_start(s), bodies%pieces%vertex_start(s + 1) - 1_ip
+            bodies%pieces%vertex(:, v) = some_number(0_lp, bodies%global_index(s), &
+                                             [7_ip, 8_ip]*(v - bodies%pieces%vertex_start(s) + 1_ip))
          end do
       end do
       call measure_sizes(bodies)

@@ -60,11 +60,11 @@ contains
       real(wp), allocatable, intent(out) :: vertices(:, :)
       integer :: k, first, n
 
-      first = bodies%vertex_start(slot)
-      n = bodies%vertex_start(slot + 1) - first
+      first = bodies%pieces%vertex_start(slot)
+      n = bodies%pieces%vertex_start(slot + 1) - first
       allocate (vertices(2, n))
       do k = 1, n
-         vertices(:, k) = bodies%turned(:, first + k - 1) + bodies%position(:, slot)
+         vertices(:, k) = bodies%pieces%turned(:, first + k - 1) + bodies%position(:, slot)
       end do
    end subroutine find_vertices
 
@@ -118,7 +118,7 @@ contains
 
       allocate (reach(bodies%n))
       do i = 1_ip, bodies%n
-         associate (v => bodies%turned(:, bodies%vertex_start(i):bodies%vertex_start(i + 1) - 1))
+         associate (v => bodies%pieces%turned(:, bodies%pieces%vertex_start(i):bodies%pieces%vertex_start(i + 1) - 1))
             reach(i) = sqrt(maxval(v(1, :)**2 + v(2, :)**2))
          end associate
       end do
@@ -157,8 +157,8 @@ contains
       type(bodies_t), intent(in) :: b
 
       count_differences = -1
-      if (a%n /= b%n .or. size(a%shape, 2) /= size(b%shape, 2)) return
-      count_differences = count(abs(a%shape - b%shape) > 0.0_wp) &
+      if (a%n /= b%n .or. size(a%pieces%vertex, 2) /= size(b%pieces%vertex, 2)) return
+      count_differences = count(abs(a%pieces%vertex - b%pieces%vertex) > 0.0_wp) &
                                    + count(abs(a%position - b%position) > 0.0_wp) &
                                    + count(abs(a%velocity - b%velocity) > 0.0_wp)
    end function count_differences

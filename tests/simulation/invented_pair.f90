@@ -24,7 +24,7 @@ contains
       type(pair_changes_t), intent(inout) :: changes
 
       self%work%thorough = .false.
-      call changes%record(1_ip, boxes%n_bodies, -2_ip)
+      call changes%record(1_ip, boxes%n_pieces, -2_ip)
    end subroutine find
 
    !> There is nothing to count.

@@ -83,9 +83,11 @@ contains
       integer(ip) :: v, w
 
       area_of = 0.0_wp
-      w = bodies%vertex_start(s + 1_ip) - 1_ip
-      do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-         area_of = area_of + 0.5_wp*(bodies%shape(1, w)*bodies%shape(2, v) - bodies%shape(2, w)*bodies%shape(1, v))
+      w = bodies%pieces%vertex_start(s + 1_ip) - 1_ip
+      do v = bodies%pieces%vertex_start(s), bodies%pieces%vertex_start(s + 1_ip) - 1_ip
+         associate (from => bodies%pieces%vertex(:, w), to => bodies%pieces%vertex(:, v))
+            area_of = area_of + 0.5_wp*(from(1)*to(2) - from(2)*to(1))
+         end associate
          w = v
       end do
    end function area_of

@@ -51,12 +51,12 @@ contains
       real(wp) :: area
       integer(ip) :: v, w, low, high
 
-      low = bodies%vertex_start(s)
-      high = bodies%vertex_start(s + 1_ip) - 1_ip
+      low = bodies%pieces%vertex_start(s)
+      high = bodies%pieces%vertex_start(s + 1_ip) - 1_ip
       call start_contact(bodies, s, speed, element, outline, area)
       do v = low, high, 1_ip + (high - low)/most_cuts
          w = merge(high, v - 1_ip, v == low)
-         call find_depth(law, bodies%shape(:, low:high), w - low + 1_ip, v - low + 1_ip, area, element, cut)
+         call find_depth(law, bodies%pieces%vertex(:, low:high), w - low + 1_ip, v - low + 1_ip, area, element, cut)
          element%edge_ratio = max(element%edge_ratio, cut%widest/(2.0_wp*cut%distance))
          element%square_ratio = max(element%square_ratio, cut%widest**2/area)
          if (cut%widest >= element%length) then
@@ -84,12 +84,12 @@ contains
       element%normal_mobility = 2.0_wp*bodies%inverse_mass(s)
       area = 0.0_wp
       outline = 0.0_wp
-      w = bodies%vertex_start(s + 1_ip) - 1_ip
-      do v = bodies%vertex_start(s), bodies%vertex_start(s + 1_ip) - 1_ip
-         call measure_edge(bodies%shape(:, w), bodies%shape(:, v), length, distance)
+      w = bodies%pieces%vertex_start(s + 1_ip) - 1_ip
+      do v = bodies%pieces%vertex_start(s), bodies%pieces%vertex_start(s + 1_ip) - 1_ip
+         call measure_edge(bodies%pieces%vertex(:, w), bodies%pieces%vertex(:, v), length, distance)
          area = area + 0.5_wp*length*distance
          outline = outline + length
-         element%radius_square = max(element%radius_square, bodies%shape(1, v)**2 + bodies%shape(2, v)**2)
+         element%radius_square = max(element%radius_square, sum(bodies%pieces%vertex(:, v)**2))
          element%length = max(element%length, length)
          element%edge_ratio = max(element%edge_ratio, length/(2.0_wp*distance))
          w = v

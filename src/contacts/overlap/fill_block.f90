@@ -52,9 +52,9 @@ contains
       logical :: all_certified
 
       call select_pairs(bodies, first, second, low, next, tested, history, block, batch)
-      call describe_pairs(block%n, block%pair, first, second, bodies%radius, bodies%vertex_start, bodies%position, &
-                          block%first, block%second, batch)
-      call evaluate_batch(batch, block%n, bodies%turned, effective, bodies%isa, block%overlap_columns_t)
+      call describe_pairs(block%n, block%pair, first, second, bodies%radius, bodies%pieces%vertex_start, &
+                          bodies%position, block%first, block%second, batch)
+      call evaluate_batch(batch, block%n, bodies%pieces%turned, effective, bodies%isa, block%overlap_columns_t)
       block%degenerate(:block%n) = 0.0_wp
       all_certified = count(batch%certified(:block%n) > 0.0_wp) == block%n
       if (.not. all_certified) call search_others(bodies, effective, batch%certified, history, block)
@@ -108,12 +108,12 @@ contains
       end do
       do done = 0_ip, n_found - 1_ip, block_size
          n = min(block_size, n_found - done)
-         call describe_pairs(n, found(done + 1:done + n), first, second, bodies%radius, bodies%vertex_start, &
+         call describe_pairs(n, found(done + 1:done + n), first, second, bodies%radius, bodies%pieces%vertex_start, &
                              bodies%position, i, j, batch)
          do k = 1_ip, n
             batch%memory(k) = memory(found(done + k))
          end do
-         call test_edges(batch, n, size(bodies%turned, 2, kind=ip), bodies%turned, bodies%isa, apart)
+         call test_edges(batch, n, size(bodies%pieces%turned, 2, kind=ip), bodies%pieces%turned, bodies%isa, apart)
          do k = 1_ip, n
             memory(found(done + k)) = merge(batch%memory(k), 0_ip, apart(k))
          end do
@@ -229,8 +229,8 @@ contains
 
       rejected = 0_ip
       if (allocated(history%memory)) rejected = max(0_ip, history%memory(block%pair(c)))
-      associate (start => bodies%vertex_start, turned => bodies%turned, radius => bodies%radius, i => block%first(c), &
-                 j => block%second(c), p => block%pair(c))
+      associate (start => bodies%pieces%vertex_start, turned => bodies%pieces%turned, radius => bodies%radius, &
+                 i => block%first(c), j => block%second(c), p => block%pair(c))
          call find_overlap(turned(:, start(i):start(i + 1_ip) - 1_ip), turned(:, start(j):start(j + 1_ip) - 1_ip), &
                            offset_of(bodies, i, j), radius(i), radius(j), effective, overlap, memory, rejected)
          if (allocated(history%memory)) history%memory(p) = merge(rejected, memory, memory == 0_ip)

@@ -38,10 +38,8 @@ contains
       if (size(slot) < 2) return
       allocate (low(2, size(slot)), high(2, size(slot)), ranked(size(slot)))
       do k = 1_ip, size(slot, kind=ip)
-         associate (from => bodies%vertex_start(slot(k)), to => bodies%vertex_start(slot(k) + 1_ip) - 1_ip)
-            low(:, k) = bodies%position(:, slot(k)) + minval(bodies%turned(:, from:to), dim=2)
-            high(:, k) = bodies%position(:, slot(k)) + maxval(bodies%turned(:, from:to), dim=2)
-         end associate
+         low(:, k) = bodies%position(:, slot(k)) + minval(bodies%pieces%turned_polygon(slot(k)), dim=2)
+         high(:, k) = bodies%position(:, slot(k)) + maxval(bodies%pieces%turned_polygon(slot(k)), dim=2)
       end do
       call sort_reals(low(1, :), ranked)
       ! Boxes in ascending order of their left ends: those that begin before a box ends may overlap it.
@@ -81,12 +79,9 @@ contains
       p = smaller_of(bodies, i, j)
       q = i + j - p
       rejected = 0_ip
-      associate (start => bodies%vertex_start)
-         call find_overlap(bodies%turned(:, start(p):start(p + 1_ip) - 1_ip), &
-                           bodies%turned(:, start(q):start(q + 1_ip) - 1_ip), &
-                           bodies%position(:, q) - bodies%position(:, p), bodies%radius(p), bodies%radius(q), .false., &
-                           overlap, memory, rejected)
-      end associate
+      call find_overlap(bodies%pieces%turned_polygon(p), bodies%pieces%turned_polygon(q), &
+                        bodies%position(:, q) - bodies%position(:, p), bodies%radius(p), bodies%radius(q), .false., &
+                        overlap, memory, rejected)
    end function overlap_of
 
    !> Area of a body [m2]
@@ -95,7 +90,7 @@ contains
       integer(ip), intent(in) :: s
       real(wp) :: centroid(2), second
 
-      call mass_properties(bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip), area_of, &
+      call mass_properties(bodies%pieces%polygon(s), area_of, &
                            centroid, second)
    end function area_of
 

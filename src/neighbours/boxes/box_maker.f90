@@ -1,18 +1,18 @@
 !> Bounding boxes of bodies.
 !>
 !> A body of common size has one box, the bounds of its turned vertices. The box of a much larger body, such as a long
-!> wall, would overlap half the scene. A large body is therefore cut into pieces (`polydem_body_pieces`), and each piece
+!> wall, would overlap half the scene. A large body is therefore cut into tiles (`polydem_body_tiles`), and each tile
 !> has its own box. The body itself remains one polygon.
 !>
 !> If two polygons share a point, their boxes share a point. For whole bodies this follows from the monotonicity of
-!> rounding. Boxes of pieces are padded by a few rounding errors of the size of the body: no gap opens between them when
+!> rounding. Boxes of tiles are padded by a few rounding errors of the size of the body: no gap opens between them when
 !> the body turns.
 !>
 !> For interactions with a range, all boxes can be padded by a margin. If the distance of two bodies is less than twice
 !> the margin, their boxes overlap.
 module polydem_box_maker
    use polydem_bodies, only: block_size, bodies_t, turn_block
-   use polydem_body_pieces, only: cut_body
+   use polydem_body_tiles, only: cut_body
    use polydem_body_sizes, only: median_of_diameters
    use polydem_box_placement, only: extent_of, place_box, place_whole, turn
    use polydem_boxes, only: boxes_t
@@ -29,20 +29,20 @@ module polydem_box_maker
 
    !> Allowance for rounding, in units of epsilon times the diameter of a body
    real(wp), parameter :: roundings = 64.0_wp
-   !> Greatest number of pieces of all cut bodies together
-   integer(ip), parameter :: most_pieces = 200000_ip
+   !> Greatest number of tiles of all cut bodies together
+   integer(ip), parameter :: most_tiles = 200000_ip
 
-   !> A body that is cut into pieces
+   !> A body that is cut into tiles
    type :: cut_body_t
-      !> Its first box and its first piece; the others follow
-      integer(ip) :: first_box, first_piece
-      !> Number of its pieces
+      !> Its first box and its first tile; the others follow
+      integer(ip) :: first_box, first_tile
+      !> Number of its tiles
       integer(ip) :: n
       !> Padding of its boxes on each side [m]
       real(wp) :: padding
    end type cut_body_t
 
-   !> Constant data for the boxes of bodies: pieces and paddings
+   !> Constant data for the boxes of bodies: tiles and paddings
    type :: box_maker_t
       private
       !> Median diameter of the free bodies; huge if there is none [m]
@@ -53,13 +53,13 @@ module polydem_box_maker
       integer(ip), allocatable :: box(:)
       !> Bodies that are cut
       type(cut_body_t), allocatable :: cut(:)
-      !> Pieces of these bodies in the body frame
-      type(polygon_list_t) :: pieces
+      !> Tiles of these bodies in the body frame
+      type(polygon_list_t) :: tiles
    end type box_maker_t
 
 contains
 
-   !> Cut large bodies into pieces, and make the boxes of all bodies.
+   !> Cut large bodies into tiles, and make the boxes of all bodies.
    subroutine new_box_maker(maker, bodies, largest_ratio, margin, boxes, error, median_diameter)
       !> Data for `update_boxes`
       type(box_maker_t), intent(out) :: maker
@@ -71,7 +71,7 @@ contains
       real(wp), intent(in) :: margin
       !> Boxes of all bodies
       type(boxes_t), intent(out) :: boxes
-      !> Allocated if a body is so large that it would need too many pieces
+      !> Allocated if a body is so large that it would need too many tiles
       type(error_t), allocatable, intent(inout) :: error
       !> Median diameter of the free bodies of the run, for ranks with a part of the bodies; by default that of `bodies`
       !> [m]
@@ -83,17 +83,17 @@ contains
       maker%margin = margin
       call cut_bodies(maker, bodies, largest_ratio, boxes%n, error)
       if (allocated(error)) return
-      boxes%n_bodies = bodies%n
-      boxes%one_to_one = boxes%n == bodies%n
-      allocate (boxes%bounds(4, boxes%n), boxes%body(boxes%n), boxes%fixed(boxes%n), boxes%passive(boxes%n), &
-                boxes%reach(boxes%n))
+      boxes%n_pieces = bodies%n
+      boxes%one_to_one = boxes%n == boxes%n_pieces
+      allocate (boxes%bounds(4, boxes%n), boxes%piece(boxes%n), boxes%body(boxes%n), boxes%fixed(boxes%n), &
+                boxes%passive(boxes%n), boxes%reach(boxes%n))
       do s = 1_ip, bodies%n
          call describe_boxes(maker, bodies, s, boxes)
          call update_box(maker, bodies, s, boxes)
       end do
    end subroutine new_box_maker
 
-   !> Cut the bodies that are too large. Each of the others has one box and no piece.
+   !> Cut the bodies that are too large. Each of the others has one box and no tile.
    subroutine cut_bodies(maker, bodies, largest_ratio, n_boxes, error)
       type(box_maker_t), intent(inout) :: maker
       type(bodies_t), intent(in) :: bodies
@@ -102,41 +102,41 @@ contains
       integer(ip), intent(out) :: n_boxes
       type(error_t), allocatable, intent(inout) :: error
       type(cut_body_t), allocatable :: longer(:)
-      integer(ip) :: s, room, n_cut, n_pieces, known
+      integer(ip) :: s, room, n_cut, n_tiles, known
       logical :: fits
 
-      room = most_pieces
+      room = most_tiles
       n_boxes = 0_ip
       n_cut = 0_ip
       allocate (maker%box(bodies%n), maker%cut(8))
       do s = 1_ip, bodies%n
-         known = maker%pieces%n
+         known = maker%tiles%n
          fits = .true.
          ! A body of small radius is small enough for certain.
          if (2.0_wp*bodies%radius(s)*(1.0_wp + roundings*epsilon(1.0_wp))/maker%median_diameter > largest_ratio) &
-            call cut_body(bodies%shape(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip), &
-                          maker%median_diameter, largest_ratio, room, maker%pieces, fits)
-         n_pieces = maker%pieces%n - known
+            call cut_body(bodies%pieces%polygon(s), &
+                          maker%median_diameter, largest_ratio, room, maker%tiles, fits)
+         n_tiles = maker%tiles%n - known
          if (.not. fits) then
             call refuse(bodies%id(s), bodies%diameter(s)/maker%median_diameter, error)
             return
          end if
-         if (n_pieces == 0_ip) then
+         if (n_tiles == 0_ip) then
             n_boxes = n_boxes + 1_ip
             maker%box(s) = n_boxes
             cycle
          end if
-         room = room - n_pieces
+         room = room - n_tiles
          n_cut = n_cut + 1_ip
          if (n_cut > size(maker%cut)) then
             allocate (longer(2_ip*n_cut))
             longer(:n_cut - 1_ip) = maker%cut
             call move_alloc(longer, maker%cut)
          end if
-         maker%cut(n_cut) = cut_body_t(first_box=n_boxes + 1_ip, first_piece=known + 1_ip, n=n_pieces, &
+         maker%cut(n_cut) = cut_body_t(first_box=n_boxes + 1_ip, first_tile=known + 1_ip, n=n_tiles, &
                                        padding=maker%margin + roundings*epsilon(1.0_wp)*bodies%diameter(s))
          maker%box(s) = -n_cut
-         n_boxes = n_boxes + n_pieces
+         n_boxes = n_boxes + n_tiles
       end do
    end subroutine cut_bodies
 
@@ -148,8 +148,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       call raise(error, input_error, 'body '//to_text(id)//' is '//to_text(ratio)//' times as long as the '// &
-                 'median diameter of the free bodies; cut into pieces of that size, it and the bodies before it '// &
-                 'need more than '//to_text(most_pieces)//' boxes; set largest_ratio in &boxes above this ratio '// &
+                 'median diameter of the free bodies; cut into tiles of that size, it and the bodies before it '// &
+                 'need more than '//to_text(most_tiles)//' boxes; set largest_ratio in &boxes above this ratio '// &
                  'to keep it whole')
    end subroutine refuse
 
@@ -166,11 +166,11 @@ contains
          call describe_box(bodies, s, bodies%diameter(s), maker%margin, b, boxes)
          return
       end if
-      associate (cut => maker%cut(-b), pieces => maker%pieces)
+      associate (cut => maker%cut(-b), tiles => maker%tiles)
          do b = 0_ip, cut%n - 1_ip
-            first = pieces%first(cut%first_piece + b)
-            last = pieces%first(cut%first_piece + b + 1_ip) - 1_ip
-            call describe_box(bodies, s, diameter(pieces%vertex(:, first:last)), cut%padding, cut%first_box + b, boxes)
+            first = tiles%first(cut%first_tile + b)
+            last = tiles%first(cut%first_tile + b + 1_ip) - 1_ip
+            call describe_box(bodies, s, diameter(tiles%vertex(:, first:last)), cut%padding, cut%first_box + b, boxes)
          end do
       end associate
    end subroutine describe_boxes
@@ -179,12 +179,13 @@ contains
    pure subroutine describe_box(bodies, s, length, padding, b, boxes)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
-      !> Diameter of the body or piece, and padding of the box [m]
+      !> Diameter of the body or tile, and padding of the box [m]
       real(wp), intent(in) :: length, padding
       !> Index of the box
       integer(ip), intent(in) :: b
       type(boxes_t), intent(inout) :: boxes
 
+      boxes%piece(b) = s
       boxes%body(b) = s
       boxes%fixed(b) = bodies%fixed(s)
       boxes%passive(b) = bodies%fixed(s) .or. bodies%in_halo(s)
@@ -348,7 +349,7 @@ contains
       type(boxes_t), intent(inout) :: boxes
       real(wp) :: extent(4), direction(2)
 
-      extent = extent_of(bodies%turned(:, bodies%vertex_start(s):bodies%vertex_start(s + 1_ip) - 1_ip))
+      extent = extent_of(bodies%pieces%turned_polygon(s))
       direction = 0.0_wp
       if (maker%box(s) < 0_ip) call sine_and_cosine(bodies%angle(s), direction(2), direction(1))
       call bound_body(maker, bodies%position(:, s), s, extent, direction, boxes)
@@ -373,11 +374,11 @@ contains
          call place_box(extent, maker%margin, position, boxes%bounds(:, b))
          return
       end if
-      associate (cut => maker%cut(-b), pieces => maker%pieces)
+      associate (cut => maker%cut(-b), tiles => maker%tiles)
          do b = 0_ip, cut%n - 1_ip
-            first = pieces%first(cut%first_piece + b)
-            last = pieces%first(cut%first_piece + b + 1_ip) - 1_ip
-            call place_box(extent_of(turn(pieces%vertex(:, first:last), direction)), cut%padding, position, &
+            first = tiles%first(cut%first_tile + b)
+            last = tiles%first(cut%first_tile + b + 1_ip) - 1_ip
+            call place_box(extent_of(turn(tiles%vertex(:, first:last), direction)), cut%padding, position, &
                            boxes%bounds(:, cut%first_box + b))
          end do
       end associate

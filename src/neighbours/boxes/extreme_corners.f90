@@ -144,9 +144,9 @@ contains
       integer(ip), intent(inout) :: place(4)
       type(known_corners_t), intent(inout) :: known
 
-      associate (first => bodies%vertex_start(s), last => bodies%vertex_start(s + 1_ip) - 1_ip)
-         call find_corners(last - first + 1_ip, bodies%shape(:, first:last), bodies%radius(s), bodies%angle(s), &
-                           direction, place, known)
+      associate (first => bodies%pieces%vertex_start(s), last => bodies%pieces%vertex_start(s + 1_ip) - 1_ip)
+         call find_corners(last - first + 1_ip, bodies%pieces%vertex(:, first:last), bodies%radius(s), &
+                           bodies%angle(s), direction, place, known)
       end associate
    end subroutine update_corners
 

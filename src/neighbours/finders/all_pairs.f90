@@ -67,7 +67,7 @@ contains
       call self%list(self%now)%gather(self%found)
       call self%work%add(count_tests, int(boxes%n, lp)*int(boxes%n - 1_ip, lp)/2_lp)
       call self%work%lap(phase_search)
-      call record_differences(self%list(before), self%list(self%now), 1_ip, boxes%n, boxes%body, changes)
+      call record_differences(self%list(before), self%list(self%now), 1_ip, boxes%n, boxes%piece, changes)
       call self%work%lap(phase_filter)
    end subroutine find
 
@@ -90,7 +90,7 @@ contains
             end do
          end do
       end do
-      call mine%remove_invalid_pairs(boxes%body, boxes%passive)
+      call mine%remove_invalid_pairs(boxes)
       call move_alloc(mine%box, found%box)
       found%n = mine%n
    end subroutine search_strips

@@ -1,4 +1,4 @@
-!> Neighbour stage of the time step. Its input are the boxes; its output is the ascending list of pairs of bodies whose
+!> Neighbour stage of the time step. Its input are the boxes; its output is the ascending list of pairs of pieces whose
 !> boxes overlap.
 module polydem_neighbours
    use polydem_boxes, only: boxes_t
@@ -16,7 +16,7 @@ module polydem_neighbours
 
    !> Finder, list of changes, and list of pairs
    type :: neighbours_t
-      !> Pairs of bodies whose boxes overlap
+      !> Pairs of pieces whose boxes overlap
       type(pair_list_t) :: pairs
       !> Finder of changes
       class(finder_t), allocatable :: finder
@@ -24,8 +24,8 @@ module polydem_neighbours
       type(pair_changes_t) :: changes
       !> Copy of the finder in its initial state
       class(finder_t), allocatable, private :: unused
-      !> Number of boxes and bodies of the last step
-      integer(ip), private :: n_boxes = 0_ip, n_bodies = 0_ip
+      !> Number of boxes and pieces of the last step
+      integer(ip), private :: n_boxes = 0_ip, n_pieces = 0_ip
    contains
       procedure :: update
       procedure :: find
@@ -43,7 +43,7 @@ contains
       type(neighbours_t), intent(out) :: self
       !> Name of the finder
       character(len=*), intent(in) :: finder_name
-      !> Boxes of the first step; only their number and bodies are used
+      !> Boxes of the first step; only their number, pieces and bodies are used
       type(boxes_t), intent(in) :: boxes
       !> Allocated if there is no such finder
       type(error_t), allocatable, intent(inout) :: error
@@ -65,14 +65,14 @@ contains
       type(neighbours_t), intent(out) :: self
       !> Finder in its initial state
       class(finder_t), intent(in) :: finder
-      !> Boxes of the first step; only their number and bodies are used
+      !> Boxes of the first step; only their number, pieces and bodies are used
       type(boxes_t), intent(in) :: boxes
 
       allocate (self%unused, source=finder)
       allocate (self%finder, source=finder)
       self%n_boxes = boxes%n
-      self%n_bodies = boxes%n_bodies
-      call self%pairs%start(boxes%one_to_one, boxes%n_bodies)
+      self%n_pieces = boxes%n_pieces
+      call self%pairs%start(boxes%one_to_one, boxes%n_pieces)
    end subroutine start_neighbours
 
    !> Update the list of pairs to the boxes of a step.
@@ -86,21 +86,21 @@ contains
       call self%merge()
    end subroutine update
 
-   !> First part of `update`: the finder records the changes. If the number of boxes or bodies has changed, slots may
-   !> belong to other bodies; all pairs then end, and the finder starts again.
+   !> First part of `update`: the finder records the changes. If the number of boxes or pieces has changed, slots may
+   !> belong to other pieces; all pairs then end, and the finder starts again.
    subroutine find(self, boxes)
       class(neighbours_t), intent(inout) :: self
       !> Boxes of this step
       type(boxes_t), intent(in) :: boxes
 
       call self%finder%work%start()
-      if (boxes%n /= self%n_boxes .or. boxes%n_bodies /= self%n_bodies) then
+      if (boxes%n /= self%n_boxes .or. boxes%n_pieces /= self%n_pieces) then
          deallocate (self%finder)
          allocate (self%finder, source=self%unused)
          call self%finder%work%start()
          self%n_boxes = boxes%n
-         self%n_bodies = boxes%n_bodies
-         call self%pairs%forget(boxes%one_to_one, boxes%n_bodies)
+         self%n_pieces = boxes%n_pieces
+         call self%pairs%forget(boxes%one_to_one, boxes%n_pieces)
       end if
       call self%changes%clear()
       call self%finder%find(boxes, self%changes)

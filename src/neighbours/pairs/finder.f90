@@ -4,7 +4,7 @@
 !> the previous step: the pairs of boxes that began to overlap and those that ceased to. Boxes of the same body and
 !> boxes of two passive bodies form no pairs. Changes may be in any order. A change and its reverse in one step cancel
 !> and are allowed. No other change may be missing or recorded twice. Before the first step no boxes overlap.
-!> `pair_list_t` turns the changes of boxes into the ascending list of pairs of bodies.
+!> `pair_list_t` turns the changes of boxes into the ascending list of pairs of pieces.
 !>
 !> A finder may keep any internal state between steps. Boxes may move anywhere between steps; their number, their bodies
 !> and the passive flags are constant.

@@ -1,6 +1,6 @@
 !> The changes of one step: pairs of boxes that began or ceased to overlap.
 !>
-!> Finders record changes in any order. `order` then sorts them and adds up those of the same pair of bodies, as
+!> Finders record changes in any order. `order` then sorts them and adds up those of the same pair of pieces, as
 !> `pair_list_t` requires. A few hundred changes are sorted instead of the whole list of pairs.
 module polydem_pair_changes
    use polydem_kinds, only: ip, lp
@@ -9,13 +9,13 @@ module polydem_pair_changes
    private
    public :: pair_changes_t, pair_key
 
-   !> A growing list of changes, keyed by the pair of bodies
+   !> A growing list of changes, keyed by the pair of pieces
    type :: pair_changes_t
       !> Number of changes recorded
       integer(ip) :: n = 0_ip
       !> `pair_key` of each change
       integer(lp), allocatable :: key(:)
-      !> +1: two boxes began to overlap, -1: they ceased to; after `order` the sum over the boxes of the two bodies
+      !> +1: two boxes began to overlap, -1: they ceased to; after `order` the sum over the boxes of the two pieces
       integer(ip), allocatable :: step(:)
       !> Work space of `order`
       integer(lp), allocatable, private :: spare_key(:)
@@ -31,11 +31,11 @@ module polydem_pair_changes
 
 contains
 
-   !> One integer that orders pairs of bodies: by the lower slot, then by the higher
+   !> One integer that orders pairs of pieces: by the lower index, then by the higher
    pure integer(lp) function pair_key(a, b)
-      !> Slot of one body
+      !> Index of one piece
       integer(ip), intent(in) :: a
-      !> Slot of the other body
+      !> Index of the other piece
       integer(ip), intent(in) :: b
 
       pair_key = ior(shiftl(int(min(a, b), lp), 32), int(max(a, b), lp))
@@ -51,9 +51,9 @@ contains
    !> Record one change.
    pure subroutine record(self, a, b, step)
       class(pair_changes_t), intent(inout) :: self
-      !> Slot of one body
+      !> Index of one piece
       integer(ip), intent(in) :: a
-      !> Slot of the other body
+      !> Index of the other piece
       integer(ip), intent(in) :: b
       !> +1: began to overlap, -1: ceased to
       integer(ip), intent(in) :: step
@@ -77,7 +77,7 @@ contains
       self%n = self%n + other%n
    end subroutine append
 
-   !> Sort by key, and replace the changes of each pair of bodies by their sum. Sums of zero are dropped.
+   !> Sort by key, and replace the changes of each pair of pieces by their sum. Sums of zero are dropped.
    pure subroutine order(self)
       class(pair_changes_t), intent(inout) :: self
       integer(lp) :: key

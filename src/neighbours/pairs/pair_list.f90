@@ -1,4 +1,4 @@
-!> List of the pairs of bodies whose boxes overlap. The list persists, and each step changes it in place.
+!> List of the pairs of pieces whose boxes overlap. The list persists, and each step changes it in place.
 !>
 !> Pairs are in ascending order of (first, second). `apply` takes the ordered changes of a step and finds each by
 !> bisection. It then moves the blocks of pairs between the changes, each block once and only if its position changes. A
@@ -29,17 +29,17 @@ module polydem_pair_list
       integer(ip) :: n_ended = 0_ip
       !> Their indices in the previous list, ascending
       integer(ip), allocatable :: ended(:)
-      !> Number of pairs of each body, (slot)
+      !> Number of pairs of each piece, (piece)
       integer(ip), allocatable :: pairs_of(:)
-      !> Number of bodies with pairs
+      !> Number of pieces with pairs
       integer(ip) :: n_paired = 0_ip
-      !> Number of bodies without a pair, or whose pairs all ended in the last step, of which a pair began in that step
+      !> Number of pieces without a pair, or whose pairs all ended in the last step, of which a pair began in that step
       integer(ip) :: n_joined = 0_ip
       !> Their slots, each once; may be longer than `n_joined`
       integer(ip), allocatable :: joined(:)
       !> Number of changes so far that contradict the list; greater than 0 only if a finder broke its contract
       integer(lp) :: contradictions = 0_lp
-      !> Number of overlapping pairs of boxes of each pair; all 1, and not stored, if every body has one box
+      !> Number of overlapping pairs of boxes of each pair; all 1, and not stored, if every piece has one box
       integer(ip), allocatable, private :: overlaps(:)
       !> Whether `overlaps` is stored
       logical, private :: counted = .false.
@@ -63,15 +63,15 @@ module polydem_pair_list
 contains
 
    !> Start with an empty list.
-   pure subroutine start(self, one_to_one, n_bodies)
+   pure subroutine start(self, one_to_one, n_pieces)
       class(pair_list_t), intent(inout) :: self
-      !> Whether every body has one box; then overlaps of boxes need not be counted
+      !> Whether every piece has one box; then overlaps of boxes need not be counted
       logical, intent(in) :: one_to_one
-      !> Number of bodies
-      integer(ip), intent(in) :: n_bodies
+      !> Number of pieces
+      integer(ip), intent(in) :: n_pieces
 
       if (allocated(self%pairs_of)) deallocate (self%pairs_of)
-      allocate (self%pairs_of(n_bodies), source=0_ip)
+      allocate (self%pairs_of(n_pieces), source=0_ip)
       self%n = 0_ip
       self%n_began = 0_ip
       self%n_paired = 0_ip
@@ -88,18 +88,18 @@ contains
    end subroutine start
 
    !> Empty the list, because the set of bodies has changed. The next `apply` reports all its pairs as ended.
-   pure subroutine forget(self, one_to_one, n_bodies)
+   pure subroutine forget(self, one_to_one, n_pieces)
       class(pair_list_t), intent(inout) :: self
-      !> Whether every body has one box
+      !> Whether every piece has one box
       logical, intent(in) :: one_to_one
-      !> Number of bodies
-      integer(ip), intent(in) :: n_bodies
+      !> Number of pieces
+      integer(ip), intent(in) :: n_pieces
       integer(ip) :: n
       integer(lp) :: contradictions
 
       n = self%n
       contradictions = self%contradictions
-      call self%start(one_to_one, n_bodies)
+      call self%start(one_to_one, n_pieces)
       self%n_forgotten = n
       self%contradictions = contradictions
    end subroutine forget
@@ -180,26 +180,26 @@ contains
       self%n = self%n + displacement
    end subroutine plan
 
-   !> Count a pair of a body that begins.
-   pure subroutine join(self, body)
+   !> Count a pair of a piece that begins.
+   pure subroutine join(self, piece)
       type(pair_list_t), intent(inout) :: self
-      integer(ip), intent(in) :: body
+      integer(ip), intent(in) :: piece
 
-      if (self%pairs_of(body) == 0_ip) then
+      if (self%pairs_of(piece) == 0_ip) then
          self%n_paired = self%n_paired + 1_ip
          self%n_joined = self%n_joined + 1_ip
-         self%joined(self%n_joined) = body
+         self%joined(self%n_joined) = piece
       end if
-      self%pairs_of(body) = self%pairs_of(body) + 1_ip
+      self%pairs_of(piece) = self%pairs_of(piece) + 1_ip
    end subroutine join
 
-   !> Count a pair of a body that ends.
-   pure subroutine leave(self, body)
+   !> Count a pair of a piece that ends.
+   pure subroutine leave(self, piece)
       type(pair_list_t), intent(inout) :: self
-      integer(ip), intent(in) :: body
+      integer(ip), intent(in) :: piece
 
-      self%pairs_of(body) = self%pairs_of(body) - 1_ip
-      if (self%pairs_of(body) == 0_ip) self%n_paired = self%n_paired - 1_ip
+      self%pairs_of(piece) = self%pairs_of(piece) - 1_ip
+      if (self%pairs_of(piece) == 0_ip) self%n_paired = self%n_paired - 1_ip
    end subroutine leave
 
    !> Least index, not below `from`, of a pair whose key is not below `key`

@@ -6,6 +6,7 @@
 !> because rows are short. It also joins the pairs of all threads, and the list does not depend on the number of
 !> threads.
 module polydem_box_pairs
+   use polydem_boxes, only: boxes_t
    use polydem_kinds, only: ip, lp
    use polydem_pair_changes, only: pair_changes_t
    use polydem_sort, only: sort_keys
@@ -61,13 +62,11 @@ contains
       call move_alloc(longer, self%box)
    end subroutine reserve_found
 
-   !> Remove pairs of the same body and pairs of two passive bodies.
-   pure subroutine remove_invalid_pairs(self, body, passive)
+   !> Remove pairs of boxes that cannot form a pair.
+   pure subroutine remove_invalid_pairs(self, boxes)
       class(found_pairs_t), intent(inout) :: self
-      !> Body of each box, (box)
-      integer(ip), intent(in), contiguous :: body(:)
-      !> Whether the body of each box is passive, (box)
-      logical, intent(in), contiguous :: passive(:)
+      !> All boxes
+      type(boxes_t), intent(in) :: boxes
       integer(ip) :: k, kept, a, b
 
       kept = 0_ip
@@ -76,7 +75,7 @@ contains
          b = self%box(2, k)
          self%box(1, kept + 1_ip) = a
          self%box(2, kept + 1_ip) = b
-         kept = kept + merge(1_ip, 0_ip, body(a) /= body(b) .and. .not. (passive(a) .and. passive(b)))
+         kept = kept + merge(1_ip, 0_ip, boxes%may_meet(a, b))
       end do
       self%n = kept
    end subroutine remove_invalid_pairs
@@ -180,7 +179,7 @@ contains
    end subroutine sort_long
 
    !> Compare a range of rows of two lists and record the pairs that only one of them contains.
-   pure subroutine record_differences(before, now, low, high, body, changes)
+   pure subroutine record_differences(before, now, low, high, piece, changes)
       !> List of the previous step
       type(box_pairs_t), intent(in) :: before
       !> List of this step
@@ -190,7 +189,7 @@ contains
       !> Last row
       integer(ip), intent(in) :: high
       !> Body of each box, (box)
-      integer(ip), intent(in) :: body(:)
+      integer(ip), intent(in) :: piece(:)
       !> List of changes; the new changes are appended
       type(pair_changes_t), intent(inout) :: changes
       integer(ip) :: row, a, b, end_a, end_b, order
@@ -208,8 +207,8 @@ contains
             else
                order = before%partner(a) - now%partner(b)
             end if
-            if (order < 0_ip) call changes%record(body(row), body(before%partner(a)), -1_ip)
-            if (order > 0_ip) call changes%record(body(row), body(now%partner(b)), 1_ip)
+            if (order < 0_ip) call changes%record(piece(row), piece(before%partner(a)), -1_ip)
+            if (order > 0_ip) call changes%record(piece(row), piece(now%partner(b)), 1_ip)
             if (order <= 0_ip) a = a + 1_ip
             if (order >= 0_ip) b = b + 1_ip
          end do

@@ -71,7 +71,7 @@ contains
       !$omp    shared(self, boxes, padded, changes) private(w, low, high, i)
       do w = 1, size(changes)
          call part(self%n, size(changes), w, low, high)
-         call self%compare(low, high, boxes%bounds, boxes%body, changes(w))
+         call self%compare(low, high, boxes%bounds, boxes%piece, changes(w))
          call part(boxes%n, size(changes), w, low, high)
          do i = low, high
             self%outside(i) = merge(0_bp, 1_bp, lies_inside(boxes%bounds(:, i), padded(:, i)))
@@ -143,7 +143,7 @@ contains
             if (any(sum(self%box(:, known%at(1:known%n)), 1) == i + j .and. &
                     abs(self%box(1, known%at(1:known%n)) - self%box(2, known%at(1:known%n))) == abs(i - j))) cycle
          end if
-         call changes%record(boxes%body(i), boxes%body(j), 1_ip)
+         call changes%record(boxes%piece(i), boxes%piece(j), 1_ip)
       end do
    end subroutine record_begun
 

@@ -153,14 +153,14 @@ contains
    end subroutine tidy
 
    !> Compare the boxes of a range of candidates and record the pairs that begin or cease to overlap.
-   subroutine compare(self, low, high, bounds, body, changes)
+   subroutine compare(self, low, high, bounds, piece, changes)
       class(candidates_t), intent(inout) :: self
       !> First and last candidate
       integer(ip), intent(in) :: low, high
       !> Bounds of the boxes, (4, box) [m]
       real(wp), intent(in), contiguous :: bounds(:, :)
       !> Body of each box, (box)
-      integer(ip), intent(in) :: body(:)
+      integer(ip), intent(in) :: piece(:)
       !> List of changes; the new changes are appended
       type(pair_changes_t), intent(inout) :: changes
       integer(ip) :: from, to, k
@@ -175,7 +175,7 @@ contains
          do k = from, to
             if (state(k - from + 1_ip) == 0_bp .or. self%box(1, k) == self%box(2, k)) cycle
             self%overlap(k) = 1_bp - self%overlap(k)
-            call changes%record(body(self%box(1, k)), body(self%box(2, k)), &
+            call changes%record(piece(self%box(1, k)), piece(self%box(2, k)), &
                                 2_ip*int(self%overlap(k), ip) - 1_ip)
          end do
       end do

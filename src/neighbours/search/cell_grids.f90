@@ -175,7 +175,7 @@ contains
       !$omp    shared(self, boxes, tally, all_valid) private(w)
       do w = 1, size(self%found)
          call search_part(self, w, size(self%found), self%found(w), tally(w))
-         if (.not. all_valid) call self%found(w)%remove_invalid_pairs(boxes%body, boxes%passive)
+         if (.not. all_valid) call self%found(w)%remove_invalid_pairs(boxes)
       end do
       !$omp end parallel do
       self%total%tests = self%total%tests + sum(tally%tests)

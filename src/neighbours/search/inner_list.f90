@@ -194,12 +194,12 @@ contains
 
    !> Classify a range of candidates at the start of an interval. The present boxes are those of `draw_lines`. If the
    !> states of the candidates are not known, those of the active ones remain so.
-   pure subroutine classify(self, low, high, body, known, candidates, found, changes)
+   pure subroutine classify(self, low, high, piece, known, candidates, found, changes)
       class(inner_list_t), intent(in) :: self
       !> First and last candidate
       integer(ip), intent(in) :: low, high
       !> Body of each box, (box)
-      integer(ip), intent(in) :: body(:)
+      integer(ip), intent(in) :: piece(:)
       !> Whether the states of the candidates are known; else no change is recorded
       logical, intent(in) :: known
       !> Candidates; the states of those that are not active are set
@@ -226,7 +226,7 @@ contains
             if (candidates%box(1, k) == candidates%box(2, k)) cycle
             if (kind(listed(m)) /= active) then
                candidates%overlap(k) = kind(listed(m))
-               call changes%record(body(candidates%box(1, k)), body(candidates%box(2, k)), &
+               call changes%record(piece(candidates%box(1, k)), piece(candidates%box(2, k)), &
                                    2_ip*int(candidates%overlap(k), ip) - 1_ip)
                cycle
             end if

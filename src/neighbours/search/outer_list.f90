@@ -363,9 +363,9 @@ contains
 
       if (self%met_by(j) == self%n_single) return
       self%met_by(j) = self%n_single
-      if (boxes%body(i) == boxes%body(j) .or. (boxes%passive(i) .and. boxes%passive(j))) return
+      if (.not. boxes%may_meet(i, j)) return
       overlap = overlapping(boxes%bounds(:, i), boxes%bounds(:, j))
-      if (overlap) call changes%record(boxes%body(i), boxes%body(j), 1_ip)
+      if (overlap) call changes%record(boxes%piece(i), boxes%piece(j), 1_ip)
       call self%append(min(i, j), max(i, j), overlap)
       k = self%n - self%n_listed
       call reserve_links(self, k)

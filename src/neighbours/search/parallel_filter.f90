@@ -312,7 +312,7 @@ contains
       !$omp    shared(self, boxes, candidates, known) private(w, low, high)
       do w = 1, size(self%worker)
          call part(candidates%n, size(self%worker), w, low, high)
-         call self%classify(low, high, boxes%body, known, candidates, self%worker(w)%active, self%changes%of(w))
+         call self%classify(low, high, boxes%piece, known, candidates, self%worker(w)%active, self%changes%of(w))
       end do
       !$omp end parallel do
       call self%collect(candidates%n, self%worker%active)
@@ -368,7 +368,7 @@ contains
       integer(ip) :: low, high
 
       call part(self%active%n - self%n_compared, size(self%worker), w, low, high)
-      call self%active%compare(self%n_compared + low, self%n_compared + high, boxes%bounds, boxes%body, &
+      call self%active%compare(self%n_compared + low, self%n_compared + high, boxes%bounds, boxes%piece, &
                                self%changes%of(w))
    end subroutine compare_part
 

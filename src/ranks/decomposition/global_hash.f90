@@ -51,7 +51,7 @@ contains
       do k = 1_ip, bodies%n
          words(2:3, k) = transfer(real([bodies%mass(k), bodies%inertia(k)], dp), 0_lp, 2)
       end do
-      words(4, :) = int(bodies%vertex_start(2:) - bodies%vertex_start(:bodies%n), lp)
+      words(4, :) = int(bodies%pieces%vertex_start(2:) - bodies%pieces%vertex_start(:bodies%n), lp)
       call order_bodies(comm, bodies, blocks)
       call blocks%to_blocks(comm, words, block)
       ! The start of the vertices of the next body takes the place of the number of vertices.
@@ -62,12 +62,12 @@ contains
       end do
       call mix_blocks(comm, block, hash)
       deallocate (words)
-      allocate (words(2, size(bodies%shape, 2)), body(size(bodies%shape, 2)))
+      allocate (words(2, size(bodies%pieces%vertex, 2)), body(size(bodies%pieces%vertex, 2)))
       do k = 1_ip, bodies%n
-         body(bodies%vertex_start(k):bodies%vertex_start(k + 1_ip) - 1_ip) = k
+         body(bodies%pieces%vertex_start(k):bodies%pieces%vertex_start(k + 1_ip) - 1_ip) = k
       end do
       do k = 1_ip, size(body, kind=ip)
-         words(:, k) = transfer(real(bodies%shape(:, k), dp), 0_lp, 2)
+         words(:, k) = transfer(real(bodies%pieces%vertex(:, k), dp), 0_lp, 2)
       end do
       call order_parts(comm, bodies, body, blocks)
       call blocks%to_blocks(comm, words, block)

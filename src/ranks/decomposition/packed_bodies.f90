@@ -43,16 +43,16 @@ contains
          packed%list%room = room
          packed%constants%room = room
          ! As many vertices as other bodies have, and at most as many as there are. More can be joined.
-         packed%vertices%room = int(min(int(room, lp)*int(size(bodies%shape, 2)/max(1_ip, bodies%n) + 1, lp), &
-                                        size(bodies%shape, 2, kind=lp)), ip)
+         packed%vertices%room = int(min(int(room, lp)*int(size(bodies%pieces%vertex, 2)/max(1_ip, bodies%n) + 1, lp), &
+                                        size(bodies%pieces%vertex, 2, kind=lp)), ip)
       end if
       packed%isa = bodies%isa
-      corners = bodies%vertex_start(2:) - bodies%vertex_start(:bodies%n)
+      corners = bodies%pieces%vertex_start(2:) - bodies%pieces%vertex_start(:bodies%n)
       packed%list%slots = slots
       call serialize_list(packed%list, bodies%global_index, corners)
       packed%constants%slots = slots
       call serialize_constants(packed%constants, bodies)
-      packed%vertices%slots = vertices_of(bodies%vertex_start(slots), corners(slots))
+      packed%vertices%slots = vertices_of(bodies%pieces%vertex_start(slots), corners(slots))
       call serialize_shapes(packed%vertices, bodies)
    end subroutine pack_bodies
 
@@ -71,7 +71,7 @@ contains
       class(serializer_t), intent(inout) :: serializer
       type(bodies_t), intent(inout) :: bodies
 
-      call serializer%field('/bodies/shape', bodies%shape, 'm', 'vertices in the body frame')
+      call serializer%field('/bodies/shape', bodies%pieces%vertex, 'm', 'vertices in the body frame')
    end subroutine serialize_shapes
 
    !> Indices of the vertices of some bodies
@@ -181,17 +181,17 @@ contains
       call allocate_bodies(bodies, n, sum(corners))
       bodies%n_all = n_all
       bodies%isa = packed%isa
-      allocate (bodies%turned(2, size(bodies%shape, 2)), source=0.0_wp)
+      allocate (bodies%pieces%turned(2, size(bodies%pieces%vertex, 2)), source=0.0_wp)
       order = ascending_order(int(global_index, lp))
       allocate (slots(n))
       slots(order) = [(s, s=1_ip, n)]
       do s = 1_ip, n
-         bodies%vertex_start(s + 1_ip) = bodies%vertex_start(s) + corners(order(s))
+         bodies%pieces%vertex_start(s + 1_ip) = bodies%pieces%vertex_start(s) + corners(order(s))
       end do
       call packed%constants%restore_to(slots)
       call serialize_constants(packed%constants, bodies)
       bodies%global_index = global_index(order)
-      call packed%vertices%restore_to(vertices_of(bodies%vertex_start(slots), corners))
+      call packed%vertices%restore_to(vertices_of(bodies%pieces%vertex_start(slots), corners))
       call serialize_shapes(packed%vertices, bodies)
       bodies%free = pack([(s, s=1_ip, n)],.not. bodies%fixed)
    end subroutine unpack_bodies

@@ -117,11 +117,11 @@ contains
       allocate (boxes(4, size(slots)))
       do k = 1_ip, size(slots, kind=ip)
          s = slots(k)
-         low = bodies%turned(:, bodies%vertex_start(s))
+         low = bodies%pieces%turned(:, bodies%pieces%vertex_start(s))
          high = low
-         do v = bodies%vertex_start(s) + 1_ip, bodies%vertex_start(s + 1_ip) - 1_ip
-            low = min(low, bodies%turned(:, v))
-            high = max(high, bodies%turned(:, v))
+         do v = bodies%pieces%vertex_start(s) + 1_ip, bodies%pieces%vertex_start(s + 1_ip) - 1_ip
+            low = min(low, bodies%pieces%turned(:, v))
+            high = max(high, bodies%pieces%turned(:, v))
          end do
          room = margin + rounding*(sum(high - low) + abs(bodies%position(1, s)) + abs(bodies%position(2, s)))
          boxes(1:2, k) = bodies%position(:, s) + (low - room)

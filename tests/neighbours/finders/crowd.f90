@@ -13,16 +13,17 @@ module crowd
 
 contains
 
-   !> Boxes with given bounds, one per body, all free.
+   !> Boxes with given bounds, one per piece and body, all free.
    subroutine new_boxes(boxes, bounds)
       type(boxes_t), intent(out) :: boxes
       real(wp), intent(in) :: bounds(:, :)
       integer(ip) :: k
 
       boxes%n = size(bounds, 2, kind=ip)
-      boxes%n_bodies = boxes%n
+      boxes%n_pieces = boxes%n
       boxes%bounds = bounds
-      boxes%body = [(k, k=1_ip, boxes%n)]
+      boxes%piece = [(k, k=1_ip, boxes%n)]
+      boxes%body = boxes%piece
       allocate (boxes%fixed(boxes%n), boxes%passive(boxes%n), source=.false.)
       boxes%reach = 0.5_wp*max(bounds(3, :) - bounds(1, :), bounds(4, :) - bounds(2, :))
    end subroutine new_boxes
@@ -57,19 +58,20 @@ contains
       end do
    end subroutine scatter
 
-   !> Overlapping pairs of bodies in ascending order, as keys first*(bodies + 1) + second.
+   !> Overlapping pairs of pieces of different bodies in ascending order, as keys first*(pieces + 1) + second.
    subroutine direct_pairs(boxes, keys)
       type(boxes_t), intent(in) :: boxes
       integer(ip), allocatable, intent(out) :: keys(:)
       logical, allocatable :: touch(:, :)
       integer(ip) :: i, j, a, b, n
 
-      allocate (touch(boxes%n_bodies, boxes%n_bodies), source=.false.)
+      allocate (touch(boxes%n_pieces, boxes%n_pieces), source=.false.)
       do j = 1_ip, boxes%n
          do i = 1_ip, boxes%n
-            a = boxes%body(i)
-            b = boxes%body(j)
-            if (a >= b .or. (boxes%passive(i) .and. boxes%passive(j))) cycle
+            a = boxes%piece(i)
+            b = boxes%piece(j)
+            if (a >= b .or. boxes%body(i) == boxes%body(j)) cycle
+            if (boxes%passive(i) .and. boxes%passive(j)) cycle
             if (boxes%bounds(1, i) > boxes%bounds(3, j) .or. boxes%bounds(1, j) > boxes%bounds(3, i)) cycle
             if (boxes%bounds(2, i) > boxes%bounds(4, j) .or. boxes%bounds(2, j) > boxes%bounds(4, i)) cycle
             touch(b, a) = .true.
@@ -78,11 +80,11 @@ contains
       n = count(touch, kind=ip)
       allocate (keys(n))
       n = 0_ip
-      do a = 1_ip, boxes%n_bodies
-         do b = a + 1_ip, boxes%n_bodies
+      do a = 1_ip, boxes%n_pieces
+         do b = a + 1_ip, boxes%n_pieces
             if (.not. touch(b, a)) cycle
             n = n + 1_ip
-            keys(n) = a*(boxes%n_bodies + 1_ip) + b
+            keys(n) = a*(boxes%n_pieces + 1_ip) + b
          end do
       end do
    end subroutine direct_pairs
@@ -124,16 +126,16 @@ contains
          if (present(threads)) call omp_set_num_threads(threads(1 + modulo(int(s), size(threads))))
          call neighbours%update(now)
          call direct_pairs(now, expected)
-         if (.not. as_expected(neighbours, now%n_bodies, expected, before, rider)) &
+         if (.not. as_expected(neighbours, now%n_pieces, expected, before, rider)) &
             count_wrong = count_wrong + 1_ip
          before = expected
       end do
    end function count_wrong
 
    !> Whether the list and its changes are as expected, and carried values stayed with their pairs.
-   logical function as_expected(neighbours, n_bodies, expected, before, rider)
+   logical function as_expected(neighbours, n_pieces, expected, before, rider)
       type(neighbours_t), intent(in) :: neighbours
-      integer(ip), intent(in) :: n_bodies
+      integer(ip), intent(in) :: n_pieces
       integer(ip), intent(in) :: expected(:), before(:)
       !> Value carried with each pair: the key of the pair, set when the pair began
       integer(ip), allocatable, intent(inout) :: rider(:)
@@ -142,7 +144,7 @@ contains
 
       associate (pairs => neighbours%pairs)
          n = pairs%n
-         keys = pairs%first(1:n)*(n_bodies + 1_ip) + pairs%second(1:n)
+         keys = pairs%first(1:n)*(n_pieces + 1_ip) + pairs%second(1:n)
          as_expected = size(expected) == n .and. pairs%contradictions == 0
          if (as_expected) as_expected = all(keys == expected)
          as_expected = as_expected .and. size(before) + pairs%n_began - pairs%n_ended == n

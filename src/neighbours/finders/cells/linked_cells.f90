@@ -75,7 +75,7 @@ contains
       do w = 1, self%part_changes%n_threads()
          call part(boxes%n, self%part_changes%n_threads(), w, low, high)
          call self%list(self%now)%sort_rows(low, high)
-         call record_differences(self%list(3 - self%now), self%list(self%now), low, high, boxes%body, &
+         call record_differences(self%list(3 - self%now), self%list(self%now), low, high, boxes%piece, &
                                  self%part_changes%of(w))
       end do
       !$omp end parallel do

@@ -200,7 +200,7 @@ contains
       !$omp    shared(self, boxes) private(w, low, high)
       do w = 1, self%changes%n_threads()
          call part(self%candidates%n, self%changes%n_threads(), w, low, high)
-         call self%candidates%compare(low, high, boxes%bounds, boxes%body, self%changes%of(w))
+         call self%candidates%compare(low, high, boxes%bounds, boxes%piece, self%changes%of(w))
       end do
       !$omp end parallel do
       call self%work%add(count_tests, int(self%candidates%n, lp))

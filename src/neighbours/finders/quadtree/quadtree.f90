@@ -167,7 +167,7 @@ contains
          end if
          call part(self%candidates%n + spent, size(self%worker), w, low, high)
          low = max(low - spent, 1_ip)
-         call self%candidates%compare(low, high - spent, boxes%bounds, boxes%body, self%changes%of(w))
+         call self%candidates%compare(low, high - spent, boxes%bounds, boxes%piece, self%changes%of(w))
       end do
       !$omp end do
       !$omp do schedule(static, 1)

@@ -239,7 +239,7 @@ contains
                call found%push(j)
                if (overlapping(boxes%bounds(:, i), boxes%bounds(:, j))) then
                   call found%push(1_ip)
-                  call changes%record(boxes%body(i), boxes%body(j), 1_ip)
+                  call changes%record(boxes%piece(i), boxes%piece(j), 1_ip)
                else
                   call found%push(0_ip)
                end if
@@ -294,7 +294,7 @@ contains
       end if
       if (.not. meet(padded%now(:, i), padded%now(:, j))) return
       if (meet(padded%before(:, i), padded%before(:, j))) return
-      is_new = boxes%body(i) /= boxes%body(j) .and. .not. (boxes%passive(i) .and. boxes%passive(j))
+      is_new = boxes%may_meet(i, j)
    end function is_new
 
 end module polydem_quadtree_search

@@ -255,8 +255,8 @@ contains
          if (changed .and. a == 2) changed = meet(now(:, i), now(:, j), 1)
       end if
       if (.not. changed) return
-      if (boxes%body(i) == boxes%body(j) .or. (boxes%passive(i) .and. boxes%passive(j))) return
-      call changes%record(boxes%body(i), boxes%body(j), merge(1_ip, -1_ip, begins))
+      if (.not. boxes%may_meet(i, j)) return
+      call changes%record(boxes%piece(i), boxes%piece(j), merge(1_ip, -1_ip, begins))
    end subroutine record_change
 
    !> Whether two boxes overlap on an axis

@@ -1,11 +1,11 @@
-!> Division of large bodies into pieces, once and in the body frame.
+!> Division of large bodies into tiles, once and in the body frame.
 !>
 !> A grid is aligned with the longest edge of the body. Its cells are about one median diameter wide. A block of cells
 !> is halved until it is one cell, or lies deep enough in the body that its bounding box stays inside the body at any
-!> angle. Pieces are therefore one cell large along the outline, and larger with increasing depth. Together they fill
-!> the body: a small body inside a large one always meets a piece. The number of pieces is proportional to the
+!> angle. Tiles are therefore one cell large along the outline, and larger with increasing depth. Together they fill
+!> the body: a small body inside a large one always meets a tile. The number of tiles is proportional to the
 !> circumference of the body, not to its area.
-module polydem_body_pieces
+module polydem_body_tiles
    use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
    use polydem_polygon, only: clip_half_plane, cross, diameter
@@ -28,19 +28,19 @@ module polydem_body_pieces
 
 contains
 
-   !> Append the pieces of a body. A body that is small enough has no pieces.
-   pure subroutine cut_body(vertices, median_diameter, largest_ratio, room, pieces, fits)
+   !> Append the tiles of a body. A body that is small enough has no tiles.
+   pure subroutine cut_body(vertices, median_diameter, largest_ratio, room, tiles, fits)
       !> Vertices of the body in the body frame, anticlockwise, (2, n) [m]
       real(wp), intent(in) :: vertices(:, :)
       !> Median diameter of the free bodies [m]
       real(wp), intent(in) :: median_diameter
       !> A body longer than this many median diameters is cut
       real(wp), intent(in) :: largest_ratio
-      !> Greatest number of pieces to append
+      !> Greatest number of tiles to append
       integer(ip), intent(in) :: room
-      !> Pieces of all bodies, in the body frame
-      type(polygon_list_t), intent(inout) :: pieces
-      !> Whether there was room; if not, the pieces are incomplete
+      !> Tiles of all bodies, in the body frame
+      type(polygon_list_t), intent(inout) :: tiles
+      !> Whether there was room; if not, the tiles are incomplete
       logical, intent(out) :: fits
       type(grid_t) :: grid
       integer(ip) :: most
@@ -54,12 +54,12 @@ contains
          call extent(vertices, grid%direction(:, a), grid%from(a), grid%length(a))
          grid%cells(a) = number_of_cells(grid%length(a)/median_diameter, largest_ratio, room)
       end do
-      ! The outline alone has more pieces than the grid has cells along an axis.
+      ! The outline alone has more tiles than the grid has cells along an axis.
       fits = all(grid%cells == 1_ip .or. grid%cells <= room)
       if (all(grid%cells == 1_ip) .or. .not. fits) return
-      most = pieces%n + room
-      call cut_block(grid, vertices, [0_ip, 0_ip], grid%cells, vertices, most, pieces)
-      fits = pieces%n <= most
+      most = tiles%n + room
+      call cut_block(grid, vertices, [0_ip, 0_ip], grid%cells, vertices, most, tiles)
+      fits = tiles%n <= most
    end subroutine cut_body
 
    !> Number of cells along a length in median diameters; `room` + 1 if they are too many
@@ -73,8 +73,8 @@ contains
       if (diameters <= real(room, wp)) number_of_cells = max(1_ip, ceiling(diameters, ip))
    end function number_of_cells
 
-   !> Append the pieces of a body in a block of cells. Halve the block as often as necessary.
-   pure recursive subroutine cut_block(grid, outline, low, high, part, most, pieces)
+   !> Append the tiles of a body in a block of cells. Halve the block as often as necessary.
+   pure recursive subroutine cut_block(grid, outline, low, high, part, most, tiles)
       type(grid_t), intent(in) :: grid
       !> The whole body [m]
       real(wp), intent(in) :: outline(:, :)
@@ -82,17 +82,17 @@ contains
       integer(ip), intent(in) :: low(2), high(2)
       !> The body in this block [m]
       real(wp), intent(in) :: part(:, :)
-      !> Greatest number of pieces; beyond it the procedure returns
+      !> Greatest number of tiles; beyond it the procedure returns
       integer(ip), intent(in) :: most
-      type(polygon_list_t), intent(inout) :: pieces
+      type(polygon_list_t), intent(inout) :: tiles
       real(wp) :: point(2), direction(2)
       real(wp), allocatable :: half(:, :)
       integer(ip) :: middle(2)
       integer :: a
 
-      if (size(part, 2) == 0 .or. pieces%n > most) return
+      if (size(part, 2) == 0 .or. tiles%n > most) return
       if (all(high - low == 1_ip) .or. lies_deep(grid, outline, low, high)) then
-         call pieces%append_polygon(part)
+         call tiles%append_polygon(part)
          return
       end if
       a = merge(2, 1, high(2) - low(2) >= high(1) - low(1))
@@ -100,9 +100,9 @@ contains
       direction = grid%direction(:, a)
       point = line(grid, a, middle(a))*direction
       call clip_half_plane(part, point, direction, half)
-      call cut_block(grid, outline, low, merge(middle, high, [1, 2] == a), half, most, pieces)
+      call cut_block(grid, outline, low, merge(middle, high, [1, 2] == a), half, most, tiles)
       call clip_half_plane(part, point, -direction, half)
-      call cut_block(grid, outline, merge(middle, low, [1, 2] == a), high, half, most, pieces)
+      call cut_block(grid, outline, merge(middle, low, [1, 2] == a), high, half, most, tiles)
    end subroutine cut_block
 
    !> Whether the distance of a block from the outline is at least half its longer side. The bounding box of a turned
@@ -172,4 +172,4 @@ contains
       length = maxval(along) - from
    end subroutine extent
 
-end module polydem_body_pieces
+end module polydem_body_tiles
