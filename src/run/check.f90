@@ -3,11 +3,11 @@ module polydem_check
    use polydem_initial_warnings, only: warn_of_risks
    use polydem_description, only: describe, list_overlaps
    use polydem_errors, only: error_t
-   use polydem_guards, only: check_motion
+   use polydem_motion_check, only: check_motion
    use polydem_host, only: resident_memory
    use polydem_kinds, only: lp, wp
    use polydem_log, only: log_t
-   use polydem_monitor, only: check_step, new_monitor, report_pending_warnings, monitor_t
+   use polydem_monitor, only: check_step, new_monitor, monitor_t
    use polydem_run_output, only: count_frames
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
@@ -70,11 +70,9 @@ contains
 
       call new_monitor(monitor, simulation)
       call warn_of_risks(simulation, measures, log, monitor%at_start)
-      call check_step(monitor, simulation, .true., log, error)
-      if (allocated(error)) return
       ! A body that is too fast at the start moves too far in the first step.
-      call check_motion(simulation%guard, simulation%bodies, simulation%step, simulation%dt, error)
-      call report_pending_warnings(monitor, simulation, log)
+      call check_motion(simulation%motion_check, simulation%bodies, simulation%step, simulation%dt, error)
+      call check_step(monitor, simulation, .true., log, error)
    end subroutine warn_at_start
 
    !> Size of a frame [B]: bodies, and the initial contacts if contacts are written

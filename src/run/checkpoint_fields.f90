@@ -81,8 +81,6 @@ contains
          call serializer%match('/run/precision', [int(storage_size(1.0_wp), lp)], 'bit', 'working precision')
          call serializer%field('/run/sums', s%sums, '1', 'sums over steps: contacts, pairs that began, pairs that '// &
                            'ended, contacts without direction')
-         call serializer%field('/run/displacement_warnings', s%guard%warning%count, '1', &
-                               'steps in which a body moved too far')
          call serializer%field('/run/stage_calls', s%timers%calls, '1', 'steps in which each stage ran')
          call serializer%seconds_field('/run/stage_total', s%timers%total, 'time spent in each stage')
          call serializer%seconds_field('/run/stage_least', s%timers%least, 'shortest time in a step')

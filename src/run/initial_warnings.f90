@@ -5,7 +5,7 @@
 module polydem_initial_warnings
    use polydem_elementary, only: hypotenuse
    use polydem_fixed_overlaps, only: find_fixed_overlaps
-   use polydem_guards, only: shorter_step
+   use polydem_motion_check, only: shorter_step
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
    use polydem_simulation, only: simulation_t

@@ -11,7 +11,7 @@ module polydem_run_output
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_log_tables, only: write_counters, write_hash, write_ranks, write_timings
-   use polydem_monitor, only: check_step, checks_contacts, report_pending_warnings, write_warning_counts
+   use polydem_monitor, only: check_step, needs_contacts, report_pending_warnings, write_warning_counts
    use polydem_profile_file, only: write_profile
    use polydem_result_files, only: profile_name
    use polydem_run, only: run_t
@@ -67,7 +67,7 @@ contains
 
       associate (s => run%simulation)
          needs_table = s%settings%output%contacts .and. is_due(s%step + 1_lp, s%n_steps, run%frame_steps)
-         needs_table = needs_table .or. checks_contacts(s, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
+         needs_table = needs_table .or. needs_contacts(run%monitor, s%step + 1_lp, is_line_due(run, s%step + 1_lp))
       end associate
    end function needs_table
 
@@ -155,7 +155,7 @@ contains
          call write_rank_times(run, run%log)
          call write_counters(run%log, counters)
          if (s%settings%output%energy_balance) call write_energy_report(s, run%log)
-         call write_warning_counts(run%monitor, s, run%log)
+         call write_warning_counts(run%monitor, run%log)
          if (allocated(error)) call run%log%write_line('stopped: '//status)
          call write_hash(run%log, hexadecimal(hash))
          ! The profile comes last: a result with a profile has the whole log.

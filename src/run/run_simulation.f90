@@ -7,7 +7,7 @@ module polydem_run_simulation
    use polydem_errors, only: error_t, raise, stopped_early
    use polydem_finished_result, only: find_finished_result, is_finished
    use polydem_kinds, only: ip, lp
-   use polydem_monitor, only: finds_stiff, set_warning_counts, report_pending_warnings, warning_counts
+   use polydem_monitor, only: asks_all, most_guards, set_warning_counts, report_pending_warnings, warning_counts
    use polydem_oversubscription, only: oversubscription
    use polydem_prepare, only: build_and_lock, prepare
    use polydem_run, only: run_options_t, run_t, result_folder
@@ -80,7 +80,7 @@ contains
       !> Whether a checkpoint is due, and whether the run must end after it; the same on all ranks
       logical, intent(out) :: is_due, must_stop
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp) :: flags(6)
+      integer(lp) :: flags(3 + most_guards)
 
       is_due = .false.
       if (run%comm%is_root()) call run%checkpoints%decide(run%simulation%step, is_due, run%reason)
@@ -88,12 +88,12 @@ contains
       call run%log%check(error)
       if (run%comm%size == 1_ip) return
       flags = [merge(1_lp, 0_lp, is_due), merge(1_lp, 0_lp, must_stop), &
-               merge(1_lp, 0_lp, finds_stiff(run%monitor, run%simulation)), warning_counts(run%monitor, run%simulation)]
+               merge(1_lp, 0_lp, asks_all(run%monitor, run%simulation)), warning_counts(run%monitor)]
       call run%comm%all_reduce_error(error, flags)
       is_due = flags(1) == 1_lp
       must_stop = flags(2) == 1_lp
-      run%monitor%has_stiff = flags(3) == 1_lp
-      call set_warning_counts(run%monitor, run%simulation, flags(4:))
+      run%monitor%is_asked = flags(3) == 1_lp
+      call set_warning_counts(run%monitor, flags(4:))
       call run%simulation%timers%lap(stage_decomposition)
    end subroutine synchronise_ranks
 

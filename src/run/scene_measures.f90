@@ -7,7 +7,7 @@ module polydem_scene_measures
    use polydem_elementary, only: hypotenuse
    use polydem_energy_guard, only: find_stored_energy
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest, reduce_to_least, sum_exactly
-   use polydem_guards, only: greatest_displacement, place_of
+   use polydem_motion_check, only: greatest_displacement, place_of
    use polydem_kinds, only: ip, lp, wp
    use polydem_ownership, only: owns_body, owns_pair
    use polydem_simulation, only: simulation_t
@@ -89,7 +89,7 @@ contains
          call measure_bodies(comm, s%bodies, measures)
          if (measures%free > 0_lp) measures%diameter(2) = s%maker%median_diameter
          if (measures%free > 0_lp) call measure_free_bodies(comm, s%bodies, s%settings%forces%stiffness, measures)
-         call greatest_displacement(s%bodies, s%guard%moving, s%dt, measures%move, slot)
+         call greatest_displacement(s%bodies, s%motion_check%moving, s%dt, measures%move, slot)
          if (slot > 0_ip) measures%farthest = int(s%bodies%id(slot), lp)
          call keep_greatest(comm, measures%move, measures%farthest)
          do k = 1, size(s%walls)

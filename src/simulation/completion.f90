@@ -7,7 +7,7 @@ module polydem_completion
    use polydem_energy_balance, only: accumulate_bodies, accumulate_walls, count_step
    use polydem_errors, only: error_t
    use polydem_force_sums, only: find_forces, force_sums_t, set_force
-   use polydem_guards, only: check_motion, move_within_limit
+   use polydem_motion_check, only: check_motion, move_within_limit
    use polydem_kinds, only: ip, wp
    use polydem_simulation, only: simulation_t
    use polydem_thread_changes, only: part
@@ -42,11 +42,12 @@ contains
       if (n > 0_ip) done = self%bodies%free(n)
       call keep_fixed(done + 1_ip, self%bodies%n, self%force_sums, self%bodies)
       if (self%settings%output%energy_balance) call count_step(self%energy_balance)
-      do k = n + 1_ip, size(self%guard%moving, kind=ip)
-         good = good .and. move_within_limit(self%guard, self%bodies, self%guard%moving(k), self%guard%moving(k), &
-                                             self%dt)
-      end do
-      if (.not. good) call check_motion(self%guard, self%bodies, self%step, self%dt, error)
+      associate (moving => self%motion_check%moving)
+         do k = n + 1_ip, size(moving, kind=ip)
+            good = good .and. move_within_limit(self%motion_check, self%bodies, moving(k), moving(k), self%dt)
+         end do
+      end associate
+      if (.not. good) call check_motion(self%motion_check, self%bodies, self%step, self%dt, error)
    end subroutine complete_step
 
    !> Complete the step of a part of the free bodies, block by block, and keep the forces on fixed bodies between them.
@@ -117,7 +118,7 @@ contains
          if (self%settings%output%energy_balance) &
             call accumulate_bodies(self%energy_balance, 1.0_wp, gravity, bodies, sums, first, last)
       end associate
-      good = good .and. move_within_limit(self%guard, self%bodies, first, last, self%dt)
+      good = good .and. move_within_limit(self%motion_check, self%bodies, first, last, self%dt)
    end subroutine complete_run
 
 end module polydem_completion

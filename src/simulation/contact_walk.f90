@@ -13,11 +13,11 @@ module polydem_contact_walk
    use polydem_errors, only: error_t
    use polydem_fill_block, only: fill_block
    use polydem_force_sums, only: add_late_terms, add_terms, begin_sums, clear_sums, contact_terms_t, terms_of_block
-   use polydem_guards, only: check_contacts
+   use polydem_motion_check, only: check_contacts
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_ownership, only: find_owned_pairs
    use polydem_pair_ranges, only: balance_ranges, divide_pairs, most_ranges
-   use polydem_passing, only: test_block
+   use polydem_contact_flags, only: test_block
    use polydem_simulation, only: simulation_t, sum_contacts_own => sum_contacts, sum_degenerate
    use polydem_timers, only: block_clock_t
    use polydem_walk_results, only: range_results_t, walk_results_t
@@ -175,7 +175,7 @@ contains
          call count_block(self, block, walk%ranges(r))
          if (walk%has_table) call append_rows(block, walk%all_of(r), with_forces=.true.)
          call append_walls(self%bodies%fixed, block, terms, walk%walls_of(r))
-         call test_block(walk%contact_guard, self%bodies, block, self%history, suspect, some, &
+         call test_block(walk%flag_limits, self%bodies, block, self%history, suspect, some, &
                          walk%ranges(r)%passing_pair)
          if (some) call append_rows(block, walk%flagged_of(r), with_forces=.true., chosen=suspect)
       end associate

@@ -9,7 +9,7 @@ module polydem_free_flight
    use polydem_box_maker, only: box_maker_t, turn_and_bound_block
    use polydem_boxes, only: boxes_t
    use polydem_extreme_corners, only: bound_block, extreme_corners_t, forget_corners
-   use polydem_guards, only: find_coasting, motion_guard_t
+   use polydem_motion_check, only: find_coasting, motion_check_t
    use polydem_integrator, only: drift, integrator_t
    use polydem_kinds, only: ip, wp
    use polydem_pair_list, only: pair_list_t
@@ -91,11 +91,11 @@ contains
 
    !> Predict up to `block_size` bodies; those that have coasted only drift. Several threads may call it for different
    !> bodies.
-   subroutine predict(self, integrator, guard, dt, slots, bodies)
+   subroutine predict(self, integrator, check, dt, slots, bodies)
       class(free_flight_t), intent(inout) :: self
       class(integrator_t), intent(inout) :: integrator
       !> Guard of the displacement, which a body that coasts does not exceed
-      type(motion_guard_t), intent(in) :: guard
+      type(motion_check_t), intent(in) :: check
       !> Time step [s]
       real(wp), intent(in) :: dt
       !> Slots of the bodies, ascending
@@ -117,7 +117,7 @@ contains
       do while (next <= n)
          call find_run(others, n, next, first, last)
          call integrator%predict(dt, first, last, bodies)
-         call find_coasting(guard, bodies, first, last, dt, self%coasts)
+         call find_coasting(check, bodies, first, last, dt, self%coasts)
       end do
    end subroutine predict
 

@@ -8,10 +8,10 @@ module polydem_local_data
    use polydem_finder_statistics, only: finder_statistics_t
    use polydem_force_law, only: force_law_t, new_force_law
    use polydem_force_sums, only: start_sums
-   use polydem_guards, only: new_motion_guard, shorter_step, warn_share
+   use polydem_motion_check, only: new_motion_check, shorter_step, warn_share
    use polydem_kinds, only: ip, wp
    use polydem_neighbours, only: new_neighbours
-   use polydem_passing, only: new_contact_guard
+   use polydem_contact_flags, only: new_flag_limits
    use polydem_simulation, only: simulation_t, former_direction
    use polydem_stable_step, only: stiffest_product
    implicit none
@@ -48,9 +48,9 @@ contains
       if (allocated(error)) return
       call rebuild_neighbours(self, error)
       call allocate_history(self)
-      call new_contact_guard(self%walk%contact_guard, self%settings%guards, self%bodies, &
+      call new_flag_limits(self%walk%flag_limits, self%settings%guards, self%bodies, &
                              column_of(self%history, 'direction'))
-      if (self%settings%guards%step /= 'off') self%walk%contact_guard%soft = &
+      if (self%settings%guards%step /= 'off') self%walk%flag_limits%soft = &
          stiffest_product(self%law, self%integrator%stability(), self%bodies, self%dt/warn_share)
    end subroutine rebuild_local_data
 
@@ -72,9 +72,11 @@ contains
       integer :: n
 
       n = size(self%moving) - count(self%bodies%in_halo)
-      if (.not. allocated(self%guard%moving)) call new_motion_guard(self%guard, self%settings%guards, self%bodies, &
+      associate (check => self%motion_check)
+         if (.not. allocated(check%moving)) call new_motion_check(check, self%settings%guards, self%bodies, &
                                                          self%moving(:n), shorter_step(self%settings%integrate))
-      self%guard%moving = self%moving(:n)
+         check%moving = self%moving(:n)
+      end associate
    end subroutine rebuild_guard
 
    !> Start with an empty pair list. The finder statistics are preserved.

@@ -6,7 +6,7 @@ module polydem_prediction
    use polydem_body_runs, only: find_run, list_others, number_of_parts
    use polydem_box_maker, only: have_boxes_within
    use polydem_errors, only: error_t
-   use polydem_guards, only: check_poses, have_valid_poses
+   use polydem_motion_check, only: check_poses, have_valid_poses
    use polydem_kinds, only: ip, wp
    use polydem_simulation, only: simulation_t, time_of
    use polydem_thread_changes, only: part
@@ -35,10 +35,10 @@ contains
       call self%flight%begin_step(self%neighbours%pairs, self%bodies%n)
       call predict_and_bound(self, good, has_left, clock)
       call move_walls(self, time_of(self))
-      do k = size(self%bodies%free, kind=ip) + 1_ip, size(self%guard%moving, kind=ip)
-         good = good .and. have_valid_poses(self%bodies, self%guard%moving(k), self%guard%moving(k))
+      do k = size(self%bodies%free, kind=ip) + 1_ip, size(self%motion_check%moving, kind=ip)
+         good = good .and. have_valid_poses(self%bodies, self%motion_check%moving(k), self%motion_check%moving(k))
       end do
-      if (.not. good) call check_poses(self%guard, self%bodies, self%step, error)
+      if (.not. good) call check_poses(self%motion_check, self%bodies, self%step, error)
    end subroutine predict_bodies
 
    !> Predict the bodies of the border, which other ranks wait for. The message does not need their vertices and boxes.
@@ -53,7 +53,7 @@ contains
       !$omp parallel do if (number_of_parts(n) > 1) schedule(static) default(none) shared(self, n) private(low)
       do low = 1_ip, n, block_size
          associate (block => self%domain%halo%border(low:min(low + block_size - 1_ip, n)))
-            call self%flight%predict(self%integrator, self%guard, self%dt, block, self%bodies)
+            call self%flight%predict(self%integrator, self%motion_check, self%dt, block, self%bodies)
          end associate
       end do
       !$omp end parallel do
@@ -125,9 +125,9 @@ contains
 
       if (self%domain%has_halo()) then
          call list_others(size(slots, kind=ip), slots, self%domain%halo%in_border, n, others)
-         call self%flight%predict(self%integrator, self%guard, self%dt, others(:n), self%bodies)
+         call self%flight%predict(self%integrator, self%motion_check, self%dt, others(:n), self%bodies)
       else
-         call self%flight%predict(self%integrator, self%guard, self%dt, slots, self%bodies)
+         call self%flight%predict(self%integrator, self%motion_check, self%dt, slots, self%bodies)
       end if
       valid = .true.
       next = 1_ip

@@ -10,7 +10,7 @@ module polydem_redistribution
    use polydem_body_fields, only: serialize_bodies
    use polydem_energy_balance, only: serialize_contributions
    use polydem_errors, only: error_t
-   use polydem_guards, only: greatest_displacement
+   use polydem_motion_check, only: greatest_displacement
    use polydem_halo, only: new_halo
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_local_data, only: rebuild_local_data

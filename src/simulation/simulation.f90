@@ -11,7 +11,7 @@ module polydem_simulation
    use polydem_force_law, only: force_law_t
    use polydem_force_sums, only: force_sums_t
    use polydem_free_flight, only: free_flight_t
-   use polydem_guards, only: motion_guard_t
+   use polydem_motion_check, only: motion_check_t
    use polydem_integrator, only: integrator_t
    use polydem_kinds, only: ip, lp, wp
    use polydem_neighbours, only: neighbours_t
@@ -104,8 +104,8 @@ module polydem_simulation
       real(wp) :: expected_stable_step = 0.0_wp
       !> The impact for which it is estimated
       type(expected_impact_t) :: expected
-      !> Guard of the displacement per step
-      type(motion_guard_t) :: guard
+      !> Check of poses and displacements
+      type(motion_check_t) :: motion_check
       !> Summary of the relaxation before time 0
       type(relaxation_t) :: relaxation
       !> What a step leaves out for bodies in free flight

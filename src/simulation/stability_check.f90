@@ -3,8 +3,9 @@ module polydem_stability_check
    use polydem_contacts, only: contacts_t
    use polydem_errors, only: error_t, raise, run_error
    use polydem_global_reductions, only: reduce_to_greatest, reduce_to_least
-   use polydem_guards, only: check_step
-   use polydem_kinds, only: dp, ip, wp
+   use polydem_motion_check, only: warn_share
+   use polydem_bodies, only: bodies_t
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_simulation, only: simulation_t
    use polydem_stable_step, only: contact_numbers, stable_step_alone, stable_step_of_contacts
    use polydem_strings, only: to_text
@@ -28,7 +29,7 @@ contains
       integer(ip) :: critical
 
       call find_stable_step(self, stable, critical)
-      call check_step(self%bodies, self%contacts, self%step, self%dt, stable, critical, &
+      call compare_step(self%bodies, self%contacts, self%step, self%dt, stable, critical, &
                       remedy_text(self, self%contacts, critical), warning, failure)
       if (.not. allocated(failure)) return
       if (self%settings%guards%step /= 'stop') then
@@ -61,7 +62,7 @@ contains
       associate (flagged => self%walk%flagged, bodies => self%bodies)
          do c = 1_ip, flagged%n
             if (.not. flagged%length(c)*flagged%inverse_length(c)*(bodies%inverse_mass(flagged%first(c)) &
-                + bodies%inverse_mass(flagged%second(c))) > self%walk%contact_guard%soft) cycle
+                + bodies%inverse_mass(flagged%second(c))) > self%walk%flag_limits%soft) cycle
             this = self%dt/stable_step_alone(self%law, self%integrator%stability(), bodies, flagged, c)
             if (this <= share) cycle
             share = this
@@ -86,7 +87,7 @@ contains
       integer(ip) :: worst
 
       call find_stiffest(self, share, worst)
-      if (worst > 0_ip) call check_step(self%bodies, self%walk%flagged, self%step, self%dt, self%dt/share, worst, &
+      if (worst > 0_ip) call compare_step(self%bodies, self%walk%flagged, self%step, self%dt, self%dt/share, worst, &
                                         remedy_text(self, self%walk%flagged, worst), warning, failure)
       if (allocated(failure)) warning = failure%message
       call self%comm%all_reduce_text(warning, real(share, dp))
@@ -141,5 +142,39 @@ contains
       if (stable > least(1)) critical = 0_ip
       stable = least(1)
    end subroutine find_stable_step
+
+   !> Compare the time step with the stable time step of the contacts: warning above one half of it, error above it.
+   subroutine compare_step(bodies, contacts, step, dt, stable, critical, remedy, warning, error)
+      type(bodies_t), intent(in) :: bodies
+      type(contacts_t), intent(in) :: contacts
+      !> Number of the step
+      integer(lp), intent(in) :: step
+      !> Time step [s]
+      real(wp), intent(in) :: dt
+      !> Stable time step [s]
+      real(wp), intent(in) :: stable
+      !> Index of the contact that determines it, 0 if there is none
+      integer(ip), intent(in) :: critical
+      !> Sentences that follow the message: what is assumed, and what to do
+      character(len=*), intent(in) :: remedy
+      !> Allocated if dt exceeds `warn_share` of the stable time step, but not the stable time step
+      character(len=:), allocatable, intent(out) :: warning
+      !> Names the contact if dt exceeds the stable time step
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: text
+
+      if (critical == 0_ip .or. dt <= warn_share*stable) return
+      associate (i => contacts%first(critical), j => contacts%second(critical))
+         text = 'step '//to_text(step)//': dt = '//to_text(dt)//' s is '//to_text(dt/stable, 3)// &
+            ' of the stable step, set by the contact of the bodies '//to_text(bodies%id(i))//' and '// &
+            to_text(bodies%id(j))//' at ('//to_text(bodies%position(1, i) + contacts%arm_first(1, critical))//', '// &
+            to_text(bodies%position(2, i) + contacts%arm_first(2, critical))//') m'//remedy
+      end associate
+      if (dt > stable) then
+         call raise(error, run_error, text)
+      else
+         warning = text
+      end if
+   end subroutine compare_step
 
 end module polydem_stability_check

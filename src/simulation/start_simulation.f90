@@ -50,9 +50,9 @@ contains
       if (.not. allocated(error)) call rebuild_local_data(self, error, median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      limit = self%guard%limit
+      limit = self%motion_check%limit
       call reduce_to_least(self%comm, limit)
-      self%guard%limit = limit(1)
+      self%motion_check%limit = limit(1)
       call self%integrator%start(self%bodies)
       if (settings%guards%relaxed_depth > 0.0_wp) call relax_bodies(self, error)
       if (allocated(error)) return

@@ -6,7 +6,7 @@ module polydem_walk_results
    use polydem_contacts, only: contacts_t
    use polydem_force_sums, only: term_list_t
    use polydem_kinds, only: dp, ip, lp
-   use polydem_passing, only: contact_guard_t
+   use polydem_contact_flags, only: flag_limits_t
    use polydem_wall_shares, only: wall_shares_t
    use polydem_wall_terms, only: wall_terms_t
    implicit none
@@ -23,7 +23,7 @@ module polydem_walk_results
       integer(ip) :: passing_pair = 0_ip
    end type range_results_t
 
-   !> Results of the walk of a step, and the guard that it calls
+   !> Results of the walk of a step, and the limits of its flags
    type :: walk_results_t
       !> Step of the walk; -1 before the first
       integer(lp) :: step = -1_lp
@@ -43,8 +43,8 @@ module polydem_walk_results
       type(wall_terms_t) :: walls
       !> Shares of contacts with fixed bodies, if the force law needs them
       type(wall_shares_t) :: shares
-      !> Guard of the contacts
-      type(contact_guard_t) :: contact_guard
+      !> Limits beyond which contacts are flagged
+      type(flag_limits_t) :: flag_limits
       !> Contacts that are deep, degenerate or stiff
       type(contacts_t) :: flagged
       !> Lowest index in the pair list of a contact whose bodies pass through each other; 0 if there is none

@@ -1,4 +1,4 @@
-!> Runs the example force part and the example finder of the developer guide; check_recipes.py checks the output.
+!> Runs the example force part, finder and guard of the recipes; check_recipes.py checks the output.
 program try_recipes
    use trial, only: begin, block_at, steps
    use polydem_bodies, only: state_hash
@@ -7,6 +7,8 @@ program try_recipes
    use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
+   use polydem_log, only: log_t
+   use polydem_monitor, only: check_step, monitor_t, new_monitor
    use polydem_read_settings, only: read_settings_text
    use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t, compute_balance
@@ -22,6 +24,7 @@ program try_recipes
    call compare_stiffness()
    call run_gas('all_pairs')
    call run_gas('plain_loop')
+   call spin()
 
 contains
 
@@ -93,6 +96,35 @@ contains
       if (failed(error)) return
       print '(a, z16.16, 3(1x, i0))', finder//'_result ', state_hash(simulation%bodies), simulation%sums(1:3)
    end subroutine run_gas
+
+   !> Print the warnings of the example guard about a body that spins slowly, and about one that spins fast.
+   subroutine spin()
+      type(simulation_t) :: simulation
+      type(monitor_t) :: monitor
+      type(log_t) :: log
+      type(body_list_t) :: list
+      type(error_t), allocatable :: error
+      integer(ip) :: counts(2), k, n
+
+      do n = 1_ip, 2_ip
+         list = body_list_t()
+         call list%append(block_at(0.0_wp, 0.0_wp, 1.0e-4_wp, 1.0e-4_wp, 0.0_wp), angular_velocity=6.0e3_wp*real(n, wp))
+         call begin('&forces gravity = 0, 0 / &integrate duration = 1 dt = 1e-6 /', list, simulation, error)
+         if (failed(error)) return
+         call log%open('', error, quiet=.true.)
+         call new_monitor(monitor, simulation)
+         call check_step(monitor, simulation, .false., log, error)
+         do k = 1_ip, 250_ip
+            call steps(simulation, 1, error)
+            call check_step(monitor, simulation, .false., log, error)
+            if (failed(error)) return
+         end do
+         associate (last => monitor%list(size(monitor%list))%guard)
+            counts(n) = int(last%warning%count, ip)
+         end associate
+      end do
+      print '(a, 2(1x, i0))', 'spin_warnings', counts
+   end subroutine spin
 
    !> Print an error.
    logical function failed(error)

@@ -3,7 +3,7 @@ module hashing_archive
    use polydem_checkpoint_fields, only: attempts_t, serialize_run
    use polydem_hash, only: mix_word
    use polydem_kinds, only: dp, lp
-   use polydem_monitor, only: monitor_t
+   use polydem_monitor, only: monitor_t, new_monitor
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
    implicit none
@@ -30,6 +30,7 @@ contains
       type(attempts_t) :: attempts
       type(monitor_t) :: monitor
 
+      call new_monitor(monitor, simulation)
       call serialize_run(serializer, simulation, attempts, monitor)
       hash = serializer%hash
    end function hash_of_everything

@@ -11,34 +11,38 @@ module polydem_energy_guard
    use polydem_energy_balance, only: balance_t
    use polydem_errors, only: error_t
    use polydem_global_reductions, only: sum_exactly
-   use polydem_guards, only: shorter_step
+   use polydem_guard, only: guard_t
    use polydem_kinds, only: dp, ip, lp, wp
+   use polydem_motion_check, only: shorter_step
    use polydem_ownership, only: owns_pair
    use polydem_simulation, only: simulation_t, compute_balance
    use polydem_strings, only: to_text
-   use polydem_warning, only: warning_t
    implicit none
    private
-   public :: energy_guard_t, open_energy_guard, check_energy, find_stored_energy
+   public :: energy_guard_t, find_stored_energy
 
-   !> State of the guard
-   type :: energy_guard_t
+   !> Guard of the energy
+   type, extends(guard_t) :: energy_guard_t
       !> Elastic energy of the contacts at the start [J/m]
       real(wp) :: stored = 0.0_wp
-      !> Warnings of unexplained energy
-      type(warning_t) :: warning
+   contains
+      procedure :: start
+      procedure :: look
    end type energy_guard_t
 
 contains
 
-   !> Record the elastic energy of the contacts. Call it at the start of the energy balance. Collective.
-   subroutine open_energy_guard(guard, simulation)
-      type(energy_guard_t), intent(out) :: guard
-      !> Simulation at the start, with the forces of its contacts
+   !> Set what the guard says of itself, and record the elastic energy of the contacts. Collective.
+   subroutine start(self, simulation)
+      class(energy_guard_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: simulation
 
-      call find_stored_energy(simulation, guard%stored)
-   end subroutine open_energy_guard
+      self%noun = 'check'
+      self%finding = 'that found an unexplained energy gain'
+      self%choice = simulation%settings%guards%energy
+      self%is_global = .true.
+      if (self%choice /= 'off') call find_stored_energy(simulation, self%stored)
+   end subroutine start
 
    !> Find the elastic energy of the contacts of all ranks, estimated as half of force times depth. Collective.
    subroutine find_stored_energy(simulation, stored)
@@ -60,32 +64,31 @@ contains
    end subroutine find_stored_energy
 
    !> Warn or stop if the unexplained energy gain exceeds its limit. Collective; the result is the same on all ranks.
-   subroutine check_energy(guard, simulation, error)
-      type(energy_guard_t), intent(inout) :: guard
-      !> Simulation at the end of a step; `energy` and `energy_limit` of &guards define the action and the limit
+   subroutine look(self, simulation, error)
+      class(energy_guard_t), intent(inout) :: self
       type(simulation_t), intent(inout) :: simulation
-      !> Names the fastest body if the run must stop
       type(error_t), allocatable, intent(inout) :: error
       type(balance_t) :: balance
       real(wp) :: growth, scale
       real(dp) :: position(2)
       integer(lp) :: id
 
+      if (.not. self%is_check) return
       call compute_balance(simulation, balance)
-      growth = balance%energy_residual + balance%elastic_work - guard%stored &
+      growth = balance%energy_residual + balance%elastic_work - self%stored &
          + max(0.0_wp, balance%damping_work) + max(0.0_wp, balance%friction_work)
-      scale = max(simulation%energy_balance%energy_scale, guard%stored)
+      scale = max(simulation%energy_balance%energy_scale, self%stored)
       associate (settings => simulation%settings%guards)
          if (growth <= settings%energy_limit*scale) return
          call find_fastest(simulation%comm, simulation%bodies, id, position)
-         call guard%warning%respond(settings%energy, 'step '//to_text(simulation%step)//': unexplained energy '// &
+         call self%warning%respond(self%choice, 'step '//to_text(simulation%step)//': unexplained energy '// &
                                     'gain of '//to_text(growth, 3)//' J/m, '//to_text(growth/scale, 3)// &
                                     ' of the largest kinetic energy or work so far; fastest body '//to_text(id)// &
                                     ' at ('//to_text(real(position(1), wp))//', '//to_text(real(position(2), wp))// &
                                     ') m. Check for deep overlaps, or '// &
                                     shorter_step(simulation%settings%integrate), error)
       end associate
-   end subroutine check_energy
+   end subroutine look
 
    !> Find the free body with the greatest kinetic energy. A tie goes to the lowest identifier. Collective.
    subroutine find_fastest(comm, bodies, id, position)

@@ -1,4 +1,4 @@
-!> Detects bodies that pass through each other: the centre of one body is inside the other, or the direction of their
+!> Flags contacts that are deep, degenerate or stiff, and detects bodies that pass through each other: the centre of one body is inside the other, or the direction of their
 !> contact reverses.
 !>
 !> The overlap pushes a body that crosses a thin body back at first. Later the overlap has no direction, and finally it
@@ -10,7 +10,7 @@
 !> random pairs of all shapes, the depth was never less than an eighth of the thickness of the thinner body. Only
 !> contacts deeper than half of this value are tested. The contact direction of two corners that graze each other also
 !> reverses, but this is harmless.
-module polydem_passing
+module polydem_contact_flags
    use polydem_bodies, only: bodies_t
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t
@@ -20,14 +20,14 @@ module polydem_passing
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: contact_guard_t, new_contact_guard, test_block, passing_text, packed_direction, is_reversed, &
+   public :: flag_limits_t, new_flag_limits, test_block, passing_text, packed_direction, is_reversed, &
       centre_inside, least_depth
 
    !> Minimum depth of the tested contacts, as a fraction of the thickness of the thinner body
    real(wp), parameter :: least_depth = 0.0625_wp
 
-   !> Guard of the contacts
-   type :: contact_guard_t
+   !> Limits beyond which contacts are flagged
+   type :: flag_limits_t
       !> Contacts deeper than this fraction of the thickness of the thinner body are flagged; huge: only degenerate
       !> ones
       real(wp) :: least_depth = huge(1.0_wp)
@@ -37,30 +37,32 @@ module polydem_passing
       real(wp) :: soft = huge(1.0_wp)
       !> Column of the contact history with the directions of the last step; 0 if there is none
       integer :: column = 0
-   end type contact_guard_t
+   end type flag_limits_t
 
 contains
 
-   !> Set up the guard for the present bodies.
-   subroutine new_contact_guard(guard, settings, bodies, column)
-      type(contact_guard_t), intent(out) :: guard
+   !> Set up the limits for the present bodies.
+   subroutine new_flag_limits(limits, settings, bodies, column)
+      !> Limits beyond which a contact is flagged
+      type(flag_limits_t), intent(out) :: limits
       type(guards_settings_t), intent(in) :: settings
       !> Bodies, for their shapes
       type(bodies_t), intent(in) :: bodies
       !> Column of the contact history with the directions of the last step; 0 if there is none
       integer, intent(in) :: column
 
-      guard%column = column
-      if (settings%overlap /= 'off') guard%least_depth = settings%overlap_limit
-      if (settings%passing /= 'off') guard%least_depth = min(guard%least_depth, least_depth)
-      if (guard%least_depth < huge(1.0_wp)) then
-         guard%shallow = min(guard%shallow, 0.999_wp*guard%least_depth*minval(bodies%thickness))
+      limits%column = column
+      if (settings%overlap /= 'off') limits%least_depth = settings%overlap_limit
+      if (settings%passing /= 'off') limits%least_depth = min(limits%least_depth, least_depth)
+      if (limits%least_depth < huge(1.0_wp)) then
+         limits%shallow = min(limits%shallow, 0.999_wp*limits%least_depth*minval(bodies%thickness))
       end if
-   end subroutine new_contact_guard
+   end subroutine new_flag_limits
 
    !> Test the contacts of a block, and store their directions.
-   subroutine test_block(guard, bodies, block, history, suspect, any_suspect, passing_pair)
-      type(contact_guard_t), intent(in) :: guard
+   subroutine test_block(limits, bodies, block, history, suspect, any_suspect, passing_pair)
+      !> Limits beyond which a contact is flagged
+      type(flag_limits_t), intent(in) :: limits
       !> Bodies with the positions of this step
       type(bodies_t), intent(in) :: bodies
       !> Contacts in descending order of their pairs
@@ -78,16 +80,16 @@ contains
 
       deepest = -1.0_wp
       do c = 1_ip, block%n
-         deepest = max(deepest, max(block%degenerate(c), block%area(c) - guard%shallow*block%length(c), &
-                                    block%length(c)*block%inverse_length(c)*block%mobility(c) - guard%soft))
+         deepest = max(deepest, max(block%degenerate(c), block%area(c) - limits%shallow*block%length(c), &
+                                    block%length(c)*block%inverse_length(c)*block%mobility(c) - limits%soft))
       end do
       any_suspect = deepest > 0.0_wp
-      if (any_suspect) call find_suspects(guard, bodies, block, suspect)
-      if (guard%column == 0) return
+      if (any_suspect) call find_suspects(limits, bodies, block, suspect)
+      if (limits%column == 0) return
       do c = 1_ip, block%n
          now(c) = packed_direction(block%direction(c, 1), block%direction(c, 2))
       end do
-      associate (stored => history%column(guard%column)%value)
+      associate (stored => history%column(limits%column)%value)
          do c = 1_ip, block%n
             before(c) = stored(block%pair(c))
             stored(block%pair(c)) = now(c)
@@ -101,8 +103,9 @@ contains
    end subroutine test_block
 
    !> Find the contacts that are deep, degenerate or stiff.
-   pure subroutine find_suspects(guard, bodies, block, suspect)
-      type(contact_guard_t), intent(in) :: guard
+   pure subroutine find_suspects(limits, bodies, block, suspect)
+      !> Limits beyond which a contact is flagged
+      type(flag_limits_t), intent(in) :: limits
       type(bodies_t), intent(in) :: bodies
       type(contact_block_t), intent(in) :: block
       logical, intent(inout) :: suspect(block_size)
@@ -110,9 +113,9 @@ contains
 
       do c = 1_ip, block%n
          suspect(c) = block%degenerate(c) > 0.0_wp &
-            .or. block%length(c)*block%inverse_length(c)*block%mobility(c) > guard%soft
-         if (suspect(c) .or. guard%least_depth >= huge(1.0_wp)) cycle
-         suspect(c) = block%area(c) > guard%least_depth*block%length(c) &
+            .or. block%length(c)*block%inverse_length(c)*block%mobility(c) > limits%soft
+         if (suspect(c) .or. limits%least_depth >= huge(1.0_wp)) cycle
+         suspect(c) = block%area(c) > limits%least_depth*block%length(c) &
             *min(bodies%thickness(block%first(c)), bodies%thickness(block%second(c)))
       end do
    end subroutine find_suspects
@@ -219,4 +222,4 @@ contains
       is_reversed = before > 0.0_wp .and. abs(now - before) > 1.0_wp .and. abs(now - before) < 3.0_wp
    end function is_reversed
 
-end module polydem_passing
+end module polydem_contact_flags

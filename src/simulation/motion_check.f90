@@ -1,6 +1,5 @@
-!> Guards of a run: checks that warn or stop before the results become meaningless. They test for non-finite states,
-!> for displacements that are too large per step, for an unstable time step and for contacts without direction.
-module polydem_guards
+!> Checks of every step: non-finite states, displacements that are too large, and contacts without direction.
+module polydem_motion_check
    use polydem_bodies, only: bodies_t
    use polydem_contacts, only: contacts_t, is_degenerate
    use polydem_errors, only: error_t, raise, run_error
@@ -10,11 +9,11 @@ module polydem_guards
    use polydem_warning, only: warning_t
    implicit none
    private
-   public :: motion_guard_t, new_motion_guard, have_valid_poses, check_poses, move_within_limit, find_coasting, &
-      check_motion, check_step, check_contacts, place_of, greatest_displacement, shorter_step, warn_share
+   public :: motion_check_t, new_motion_check, have_valid_poses, check_poses, move_within_limit, find_coasting, &
+      check_motion, check_contacts, place_of, greatest_displacement, shorter_step, warn_share
 
-   !> Guard of the displacement of bodies per step
-   type :: motion_guard_t
+   !> Limit of the displacement of bodies per step
+   type :: motion_check_t
       !> Maximum displacement of a point of a body per step [m]; huge if the displacement is not monitored
       real(wp) :: limit = 0.0_wp
       !> Entry `displacement` of &guards
@@ -25,7 +24,7 @@ module polydem_guards
       character(len=:), allocatable :: remedy
       !> Slots of the bodies that may move
       integer(ip), allocatable :: moving(:)
-   end type motion_guard_t
+   end type motion_check_t
 
    !> Fraction of the stable time step above which a run warns
    real(wp), parameter :: warn_share = 0.5_wp
@@ -41,9 +40,10 @@ contains
       if (.not. settings%dt > 0.0_wp) clause = 'reduce fraction in &integrate'
    end function shorter_step
 
-   !> Prepare the guard for the present bodies.
-   subroutine new_motion_guard(guard, settings, bodies, moving, remedy)
-      type(motion_guard_t), intent(out) :: guard
+   !> Prepare the check for the present bodies.
+   subroutine new_motion_check(check, settings, bodies, moving, remedy)
+      !> Limit of the displacement
+      type(motion_check_t), intent(out) :: check
       type(guards_settings_t), intent(in) :: settings
       !> Bodies at the start
       type(bodies_t), intent(in) :: bodies
@@ -52,13 +52,13 @@ contains
       !> Clause that says how to shorten the time step
       character(len=*), intent(in) :: remedy
 
-      guard%choice = settings%displacement
-      guard%remedy = remedy
-      guard%moving = moving
-      guard%limit = huge(1.0_wp)
-      if (guard%choice == 'off' .or. bodies%n == 0_ip) return
-      guard%limit = settings%displacement_limit*minval(bodies%thickness)
-   end subroutine new_motion_guard
+      check%choice = settings%displacement
+      check%remedy = remedy
+      check%moving = moving
+      check%limit = huge(1.0_wp)
+      if (check%choice == 'off' .or. bodies%n == 0_ip) return
+      check%limit = settings%displacement_limit*minval(bodies%thickness)
+   end subroutine new_motion_check
 
    !> Whether all bodies of a run have valid poses
    pure logical function have_valid_poses(bodies, first, last)
@@ -76,8 +76,9 @@ contains
    end function have_valid_poses
 
    !> Stop if a body has an invalid pose, before boxes and neighbours are computed from it.
-   subroutine check_poses(guard, bodies, step, error)
-      type(motion_guard_t), intent(in) :: guard
+   subroutine check_poses(check, bodies, step, error)
+      !> Limit of the displacement
+      type(motion_check_t), intent(in) :: check
       !> Bodies in the middle of a step
       type(bodies_t), intent(in) :: bodies
       !> Number of the step
@@ -86,8 +87,8 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: k
 
-      do k = 1_ip, size(guard%moving, kind=ip)
-         associate (s => guard%moving(k))
+      do k = 1_ip, size(check%moving, kind=ip)
+         associate (s => check%moving(k))
             if (has_valid_pose(bodies, s)) cycle
             call raise(error, run_error, 'step '//to_text(step)//': body '//to_text(bodies%id(s))//' at ('// &
                        to_text(bodies%position(1, s))//', '//to_text(bodies%position(2, s))//') m with angle '// &
@@ -111,8 +112,9 @@ contains
    !> Whether the velocities of all bodies of a run are finite and none moves too far in a step. Positions and angles
    !> are not read: those of the middle of the step were finite, and an infinite correction of them is one of the
    !> velocities, too.
-   pure logical function move_within_limit(guard, bodies, first, last, dt)
-      type(motion_guard_t), intent(in) :: guard
+   pure logical function move_within_limit(check, bodies, first, last, dt)
+      !> Limit of the displacement
+      type(motion_check_t), intent(in) :: check
       !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies
       !> First and last slot
@@ -123,15 +125,16 @@ contains
 
       n_beyond = 0_ip
       do s = first, last
-         n_beyond = n_beyond + merge(0_ip, 1_ip, move_of(bodies, s, dt) <= guard%limit)
+         n_beyond = n_beyond + merge(0_ip, 1_ip, move_of(bodies, s, dt) <= check%limit)
       end do
       move_within_limit = n_beyond == 0_ip
    end function move_within_limit
 
    !> Find which bodies of a run coast unless a force acts on them: they have no acceleration, and do not move too far.
    !> Several threads may call it for different runs.
-   pure subroutine find_coasting(guard, bodies, first, last, dt, coasts)
-      type(motion_guard_t), intent(in) :: guard
+   pure subroutine find_coasting(check, bodies, first, last, dt, coasts)
+      !> Limit of the displacement
+      type(motion_check_t), intent(in) :: check
       !> Bodies in the middle of a step
       type(bodies_t), intent(in) :: bodies
       !> First and last slot
@@ -144,13 +147,14 @@ contains
 
       do s = first, last
          coasts(s) = max(abs(bodies%acceleration(1, s)), abs(bodies%acceleration(2, s)), &
-                         abs(bodies%angular_acceleration(s))) <= 0.0_wp .and. move_of(bodies, s, dt) <= guard%limit
+                         abs(bodies%angular_acceleration(s))) <= 0.0_wp .and. move_of(bodies, s, dt) <= check%limit
       end do
    end subroutine find_coasting
 
    !> Stop if the state of a body is not finite. Stop or warn if a body moves too far in a step.
-   subroutine check_motion(guard, bodies, step, dt, error)
-      type(motion_guard_t), intent(inout) :: guard
+   subroutine check_motion(check, bodies, step, dt, error)
+      !> Limit of the displacement
+      type(motion_check_t), intent(inout) :: check
       !> Bodies at the end of a step
       type(bodies_t), intent(in) :: bodies
       !> Number of the step
@@ -163,13 +167,13 @@ contains
       logical :: is_first
 
       is_first = .true.
-      do k = 1_ip, size(guard%moving, kind=ip)
-         s = guard%moving(k)
-         if (moves_within_limit(guard, bodies, s, dt)) cycle
+      do k = 1_ip, size(check%moving, kind=ip)
+         s = check%moving(k)
+         if (moves_within_limit(check, bodies, s, dt)) cycle
          if (.not. is_finite(bodies, s, dt)) then
-            call raise(error, run_error, motion_text(guard, bodies, s, step))
+            call raise(error, run_error, motion_text(check, bodies, s, step))
          else if (is_first) then
-            call guard%warning%respond(guard%choice, motion_text(guard, bodies, s, step), error, weight_of(bodies, s))
+            call check%warning%respond(check%choice, motion_text(check, bodies, s, step), error, weight_of(bodies, s))
          end if
          if (allocated(error)) then
             call place_error(error, bodies, s)
@@ -217,8 +221,9 @@ contains
    end function weight_of
 
    !> Message about a body that moves too far
-   function motion_text(guard, bodies, s, step) result(text)
-      type(motion_guard_t), intent(in) :: guard
+   function motion_text(check, bodies, s, step) result(text)
+      !> Limit of the displacement
+      type(motion_check_t), intent(in) :: check
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
       integer(lp), intent(in) :: step
@@ -228,19 +233,20 @@ contains
          to_text(bodies%position(1, s))//', '//to_text(bodies%position(2, s))//') m has the velocity ('// &
          to_text(bodies%velocity(1, s))//', '//to_text(bodies%velocity(2, s))// &
          ') m/s and the angular velocity '//to_text(bodies%angular_velocity(s))// &
-         ' 1/s; no point of it may move more than '//to_text(guard%limit)// &
+         ' 1/s; no point of it may move more than '//to_text(check%limit)// &
          ' m in a step, otherwise bodies could pass through each other. Check for deep overlaps at the start, or '// &
-         guard%remedy
+         check%remedy
    end function motion_text
 
    !> Whether the state of a body is finite and no point of it moves too far in a step; false for NaN
-   pure logical function moves_within_limit(guard, bodies, s, dt)
-      type(motion_guard_t), intent(in) :: guard
+   pure logical function moves_within_limit(check, bodies, s, dt)
+      !> Limit of the displacement
+      type(motion_check_t), intent(in) :: check
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
       real(wp), intent(in) :: dt
 
-      moves_within_limit = is_finite(bodies, s, dt) .and. move_of(bodies, s, dt) <= guard%limit
+      moves_within_limit = is_finite(bodies, s, dt) .and. move_of(bodies, s, dt) <= check%limit
    end function moves_within_limit
 
    !> Whether position, angle and velocities of a body are finite
@@ -285,40 +291,6 @@ contains
                     + bodies%radius(s)*abs(bodies%angular_velocity(s)))
    end function move_of
 
-   !> Compare the time step with the stable time step of the contacts: warning above one half of it, error above it.
-   subroutine check_step(bodies, contacts, step, dt, stable, critical, remedy, warning, error)
-      type(bodies_t), intent(in) :: bodies
-      type(contacts_t), intent(in) :: contacts
-      !> Number of the step
-      integer(lp), intent(in) :: step
-      !> Time step [s]
-      real(wp), intent(in) :: dt
-      !> Stable time step [s]
-      real(wp), intent(in) :: stable
-      !> Index of the contact that determines it, 0 if there is none
-      integer(ip), intent(in) :: critical
-      !> Sentences that follow the message: what is assumed, and what to do
-      character(len=*), intent(in) :: remedy
-      !> Allocated if dt exceeds `warn_share` of the stable time step, but not the stable time step
-      character(len=:), allocatable, intent(out) :: warning
-      !> Names the contact if dt exceeds the stable time step
-      type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: text
-
-      if (critical == 0_ip .or. dt <= warn_share*stable) return
-      associate (i => contacts%first(critical), j => contacts%second(critical))
-         text = 'step '//to_text(step)//': dt = '//to_text(dt)//' s is '//to_text(dt/stable, 3)// &
-            ' of the stable step, set by the contact of the bodies '//to_text(bodies%id(i))//' and '// &
-            to_text(bodies%id(j))//' at ('//to_text(bodies%position(1, i) + contacts%arm_first(1, critical))//', '// &
-            to_text(bodies%position(2, i) + contacts%arm_first(2, critical))//') m'//remedy
-      end associate
-      if (dt > stable) then
-         call raise(error, run_error, text)
-      else
-         warning = text
-      end if
-   end subroutine check_step
-
    !> Stop if a contact has no direction and `degenerate` is 'stop'.
    subroutine check_contacts(degenerate, bodies, contacts, step, error)
       !> Entry `degenerate` of &overlap: 'push' or 'stop'
@@ -344,4 +316,4 @@ contains
       end associate
    end subroutine check_contacts
 
-end module polydem_guards
+end module polydem_motion_check

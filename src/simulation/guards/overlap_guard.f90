@@ -1,0 +1,59 @@
+!> Guard of contacts that are deep relative to their bodies.
+module polydem_overlap_guard
+   use polydem_contact_depth, only: any_deeper, deepest_contact, depth_share, depth_text
+   use polydem_errors, only: error_t
+   use polydem_guard, only: guard_t
+   use polydem_kinds, only: dp, ip
+   use polydem_motion_check, only: shorter_step
+   use polydem_simulation, only: simulation_t
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: overlap_guard_t
+
+   !> Guard of the depth of contacts
+   type, extends(guard_t) :: overlap_guard_t
+   contains
+      procedure :: start
+      procedure :: look
+   end type overlap_guard_t
+
+contains
+
+   !> Set what the guard says of itself.
+   subroutine start(self, simulation)
+      class(overlap_guard_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+
+      self%noun = 'step'
+      self%finding = 'with a contact that was too deep'
+      self%choice = simulation%settings%guards%overlap
+   end subroutine start
+
+   !> Respond to the deepest contact. The rank with the deepest contact of all ranks reports it, at once if it stops the
+   !> run.
+   subroutine look(self, simulation, error)
+      class(overlap_guard_t), intent(inout) :: self
+      type(simulation_t), intent(inout) :: simulation
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: text
+      integer(ip) :: worst
+      real(dp) :: share
+
+      share = 0.0_dp
+      associate (s => simulation, settings => simulation%settings%guards, &
+                 thickness => simulation%bodies%thickness)
+         if (any_deeper(s%walk%flagged, thickness, settings%overlap_limit)) then
+            worst = deepest_contact(s%walk%flagged, thickness)
+            text = depth_text(s%bodies, s%walk%flagged, thickness, worst)
+            share = real(depth_share(s%walk%flagged, thickness, worst), dp)
+         end if
+         if (settings%overlap == 'stop') call s%comm%all_reduce_text(text, share)
+         if (.not. allocated(text)) return
+         call self%warning%respond(self%choice, 'step '//to_text(s%step)//': '//text// &
+                                   '. Increase stiffness in &forces, remove deep initial overlaps (relaxed_depth '// &
+                                   'in &guards), or '//shorter_step(s%settings%integrate), error, share)
+      end associate
+   end subroutine look
+
+end module polydem_overlap_guard
