@@ -7,8 +7,8 @@ module polydem_changed_entries
    public :: changed_entries
 
    !> Entries that do not affect the computed result
-   character(len=*), parameter :: harmless(*) = [character(len=23) :: 'output.folder', 'checkpoint.steps', &
-                                                 'checkpoint.interval', 'checkpoint.elapsed', &
+   character(len=*), parameter :: harmless(*) = [character(len=24) :: 'output.folder', 'checkpoint.steps', &
+                                                 'checkpoint.interval', 'checkpoint.wall_interval', &
                                                  'decomposition.margin', 'decomposition.balance', &
                                                  'decomposition.imbalance']
 

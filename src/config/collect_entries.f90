@@ -161,7 +161,10 @@ contains
          if (owners /= '') owners = owners//' and '
          owners = owners//'&'//trim(names(k))
       end do
-      if (owners /= '') then
+      if (new_name(statement) /= '') then
+         call raise(error, input_error, statement%place//': '//quoted(statement%key)//' in &'//statement%group// &
+            ' is '//new_name(statement)//' today')
+      else if (owners /= '') then
          call raise(error, input_error, statement%place//': '//quoted(statement%key)//' is a key of '//owners// &
             ', not of &'//statement%group)
       else
@@ -169,6 +172,27 @@ contains
             statement%group//suggestion(statement%key, keys_of(statement%group)))
       end if
    end subroutine raise_unknown_key
+
+   !> Clause about a key that has another name today; empty for others
+   pure function new_name(statement) result(clause)
+      type(statement_t), intent(in) :: statement
+      character(len=:), allocatable :: clause
+
+      select case (statement%group//'.'//statement%key)
+      case ('scene.fraction')
+         clause = 'solid_fraction in &scene'
+      case ('integrate.fraction')
+         clause = 'safety_factor in &integrate'
+      case ('guards.passing')
+         clause = 'tunnelling in &guards'
+      case ('guards.relaxed_depth')
+         clause = 'remove_overlap in &scene'
+      case ('checkpoint.elapsed')
+         clause = 'wall_interval in &checkpoint'
+      case default
+         clause = ''
+      end select
+   end function new_name
 
    !> Put an override in the place of a statement of the file.
    pure subroutine apply_override(override, of_bench, instances, error)

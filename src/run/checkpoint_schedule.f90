@@ -73,7 +73,7 @@ contains
 
       self%steps(1) = int(settings%steps, lp)
       if (settings%interval > 0.0_wp) self%steps(2) = max(1_lp, nint(min(settings%interval/dt, 1.0e15_wp), lp))
-      if (settings%elapsed > 0.0_wp) self%interval = real(settings%elapsed, dp)
+      if (settings%wall_interval > 0.0_wp) self%interval = real(settings%wall_interval, dp)
       if (limit > 0.0_dp) self%deadline = began + used_fraction*limit
       self%last_time = began
       self%last_check = wall_seconds()

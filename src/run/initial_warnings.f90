@@ -110,7 +110,7 @@ contains
       character(len=:), allocatable :: remedy
 
       remedy = 'Reduce dt, or omit it'
-      if (.not. simulation%settings%integrate%dt > 0.0_wp) remedy = 'Reduce fraction in &integrate'
+      if (.not. simulation%settings%integrate%dt > 0.0_wp) remedy = 'Reduce safety_factor in &integrate'
       associate (dt => simulation%dt, stable => simulation%expected_stable_step)
          if (dt <= stable) return
          call add(warnings, 'dt = '//to_text(dt)//' s is '//to_text(dt/stable, 3)//' times the stable time step '// &
@@ -134,7 +134,7 @@ contains
                measures%deepest//'. All contacts store '//to_text(measures%stored, 3)//' J/m, which can '// &
                'accelerate all free bodies to '// &
                to_text(sqrt(2.0_wp*measures%stored/max(measures%mass(3), tiny(1.0_wp))), 3)// &
-               ' m/s. Separate the bodies: set relaxed_depth in &guards')
+               ' m/s. Separate the bodies: set remove_overlap in &scene')
    end subroutine warn_of_overlaps
 
    !> Warn of bodies that can pass through others: by moving too far in one step, or by their momentum.

@@ -24,10 +24,10 @@ contains
    !> List the bodies of the channel: grains from left to right, then floor, left end, right end, lid. The centre of the
    !> channel is at the origin.
    subroutine list_channel(scene, list, error)
-      !> Settings: bodies (grains), fraction (of the channel that the polygons cover), speed, grains
+      !> Settings: bodies (grains), solid_fraction (of the channel that the polygons cover), speed, grains
       type(scene_settings_t), intent(in) :: scene
       type(body_list_t), intent(inout) :: list
-      !> Allocated if the fraction is too large for a start without overlaps
+      !> Allocated if the solid_fraction is too large for a start without overlaps
       type(error_t), allocatable, intent(inout) :: error
       type(random_t) :: random
       type(grains_t) :: grains
@@ -40,12 +40,12 @@ contains
       random = new_random(scene%seed)
       call draw_grains(scene, random, n, grains)
       height = height_share*scene%long_axis_max
-      length = total_area(grains%area)/(scene%fraction*height)
+      length = total_area(grains%area)/(scene%solid_fraction*height)
       spacing = length/real(n, wp)
       if (spacing < loose_spacing(scene)) then
-         call raise(error, input_error, 'fraction is too large for a row of grains without overlap at the start; '// &
-                    'lower fraction to '//to_text(0.99_wp*scene%fraction*spacing/loose_spacing(scene), 3)// &
-                    ', or lower long_axis_max')
+         call raise(error, input_error, 'solid_fraction is too large for a row of grains without overlap at the '// &
+                    'start; lower solid_fraction to '// &
+                    to_text(0.99_wp*scene%solid_fraction*spacing/loose_spacing(scene), 3)//', or lower long_axis_max')
          return
       end if
       do k = 1_ip, n

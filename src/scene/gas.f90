@@ -23,10 +23,10 @@ contains
 
    !> List the bodies of the gas: grains first, then floor, left wall, right wall, lid. The centre is at the origin.
    subroutine list_gas(scene, list, error)
-      !> Settings: bodies (grains), fraction (of the container that the polygons cover), width, speed, spin, grains
+      !> Settings: bodies (grains), solid_fraction (of the container), width, speed, spin, grains
       type(scene_settings_t), intent(in) :: scene
       type(body_list_t), intent(inout) :: list
-      !> Allocated if the fraction is too large for a start without overlaps
+      !> Allocated if the solid_fraction is too large for a start without overlaps
       type(error_t), allocatable, intent(inout) :: error
       type(random_t) :: random, start
       type(grains_t) :: grains
@@ -37,10 +37,11 @@ contains
       random = new_random(scene%seed)
       call draw_grains(scene, random, scene%bodies, grains)
       start = random
-      call arrange(scene, grains, scene%fraction, random, inside, centres, spacing)
+      call arrange(scene, grains, scene%solid_fraction, random, inside, centres, spacing)
       if (.not. spacing > 0.0_wp) then
-         call raise(error, input_error, 'fraction is too large for grains without overlap at the start; lower '// &
-                    'fraction'//largest_fraction(scene, grains, start)//', or change width or long_axis_max')
+         call raise(error, input_error, 'solid_fraction is too large for grains without overlap at the start; '// &
+                    'lower solid_fraction'//largest_fraction(scene, grains, start)// &
+                    ', or change width or long_axis_max')
          return
       end if
       call append_moving_grains(list, scene, random, grains, centres)
@@ -89,7 +90,7 @@ contains
 
       allocate (centres(2, size(grains%area)))
       fits = 0.0_wp
-      fails = scene%fraction
+      fails = scene%solid_fraction
       do k = 1, most_trials
          if (fits >= 0.98_wp*fails) exit
          trial = 0.5_wp*(fits + fails)

@@ -58,8 +58,8 @@ contains
             return
          end if
          if (self%dt <= 0.0_wp) then
-            steps = settings%duration/(settings%fraction*self%expected_stable_step)
-            self%dt = settings%fraction*self%expected_stable_step
+            steps = settings%duration/(settings%safety_factor*self%expected_stable_step)
+            self%dt = settings%safety_factor*self%expected_stable_step
             if (steps < most_steps) self%dt = settings%duration/real(max(1_lp, ceiling(steps, lp)), wp)
          end if
          steps = settings%duration/self%dt
@@ -67,7 +67,7 @@ contains
             call raise(error, input_error, place_of(self%settings, 'integrate', 'duration')//': a duration of '// &
                        to_text(settings%duration)//' s with dt = '//to_text(self%dt)//' s requires '// &
                        to_text(steps)//' steps, but only 1 to '//to_text(most_steps)// &
-                       ' are allowed. Change duration, dt, fraction or speed in &integrate'// &
+                       ' are allowed. Change duration, dt, safety_factor or speed in &integrate'// &
                        overrides_of(self%settings, 'integrate'))
             return
          end if

@@ -1,5 +1,5 @@
-!> Flags contacts that are deep, degenerate or stiff, and detects bodies that pass through each other: the centre of one body is inside the other, or the direction of their
-!> contact reverses.
+!> Flags contacts that are deep, degenerate or stiff, and detects bodies that pass through each other: the centre of one
+!> body is inside the other, or the direction of their contact reverses.
 !>
 !> The overlap pushes a body that crosses a thin body back at first. Later the overlap has no direction, and finally it
 !> pushes the body out on the far side. The direction therefore turns by more than a right angle from one step to the
@@ -53,7 +53,7 @@ contains
 
       limits%column = column
       if (settings%overlap /= 'off') limits%least_depth = settings%overlap_limit
-      if (settings%passing /= 'off') limits%least_depth = min(limits%least_depth, least_depth)
+      if (settings%tunnelling /= 'off') limits%least_depth = min(limits%least_depth, least_depth)
       if (limits%least_depth < huge(1.0_wp)) then
          limits%shallow = min(limits%shallow, 0.999_wp*limits%least_depth*minval(bodies%thickness))
       end if

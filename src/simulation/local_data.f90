@@ -105,7 +105,7 @@ contains
       do k = 1, size(self%law%history_kinds)
          call add_column(self%history, self%law%history_kinds(k), 0_ip)
       end do
-      if (self%settings%guards%passing /= 'off') call add_column(self%history, former_direction, 0_ip)
+      if (self%settings%guards%tunnelling /= 'off') call add_column(self%history, former_direction, 0_ip)
    end subroutine allocate_history
 
    !> List the slots that may move: free bodies, bodies with prescribed motion, halo bodies.

@@ -37,7 +37,7 @@ contains
       character(len=:), allocatable :: clause
 
       clause = 'reduce dt'
-      if (.not. settings%dt > 0.0_wp) clause = 'reduce fraction in &integrate'
+      if (.not. settings%dt > 0.0_wp) clause = 'reduce safety_factor in &integrate'
    end function shorter_step
 
    !> Prepare the check for the present bodies.

@@ -36,7 +36,7 @@ module polydem_relaxation
 
 contains
 
-   !> Push bodies apart until no contact is deeper than `relaxed_depth` of &guards. Collective; all ranks get the same
+   !> Push bodies apart until no contact is deeper than `remove_overlap` of &scene. Collective; all ranks get the same
    !> error.
    subroutine relax_bodies(self, error)
       !> The simulation before time 0; positions and angles of free bodies change, and `relaxation` is set
@@ -62,7 +62,7 @@ contains
          associate (relaxation => self%relaxation)
             relaxation%after = greatest(1)
             if (relaxation%sweeps == 0_ip) relaxation%before = relaxation%after
-            if (relaxation%after <= self%settings%guards%relaxed_depth) exit
+            if (relaxation%after <= self%settings%scene%remove_overlap) exit
             least = min(least, relaxation%after)
             call check_progress(self, least, before, is_idle)
             if (is_idle .or. relaxation%sweeps == most_sweeps) then
@@ -155,10 +155,10 @@ contains
       if (depth_share(contacts, self%bodies%thickness, worst) < self%relaxation%after) return
       idle = ''
       if (is_idle) idle = ', the last '//to_text(most_idle_sweeps)//' without progress,'
-      call raise(error, input_error, place_of(self%settings, 'guards', 'relaxed_depth')//': after '// &
+      call raise(error, input_error, place_of(self%settings, 'scene', 'remove_overlap')//': after '// &
                  to_text(self%relaxation%sweeps)//' sweeps'//idle//' '// &
                  depth_text(self%bodies, contacts, self%bodies%thickness, worst)// &
-                 '. Provide more space for the bodies, or increase relaxed_depth in &guards')
+                 '. Provide more space for the bodies, or increase remove_overlap in &scene')
    end subroutine report_depth
 
    !> One sweep: compute the impulses of all contacts, then move all free bodies. Collective.

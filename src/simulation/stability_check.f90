@@ -119,7 +119,7 @@ contains
       if (speed > self%expected%speed) then
          text = text//'Increase speed in &integrate'
       else
-         text = text//'Reduce fraction in &integrate'
+         text = text//'Reduce safety_factor in &integrate'
       end if
    end function remedy_text
 

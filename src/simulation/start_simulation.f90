@@ -54,7 +54,7 @@ contains
       call reduce_to_least(self%comm, limit)
       self%motion_check%limit = limit(1)
       call self%integrator%start(self%bodies)
-      if (settings%guards%relaxed_depth > 0.0_wp) call relax_bodies(self, error)
+      if (settings%scene%remove_overlap > 0.0_wp) call relax_bodies(self, error)
       if (allocated(error)) return
       call move_walls(self, 0.0_wp)
       call update_boxes(self%maker, self%bodies, self%moving, self%boxes)

@@ -97,6 +97,9 @@ class Names:
 BASE = Names()
 
 #: What the present tree calls what the base revision called otherwise
-PRESENT = Names(entries={"decomposition.partition": None},
+PRESENT = Names(entries={"decomposition.partition": None, "scene.fraction": "scene.solid_fraction",
+                         "integrate.fraction": "integrate.safety_factor", "guards.passing": "guards.tunnelling",
+                         "guards.relaxed_depth": "scene.remove_overlap",
+                         "checkpoint.elapsed": "checkpoint.wall_interval"},
                 # The settings of a sample, as text
                 data={"sample/case/input": None})

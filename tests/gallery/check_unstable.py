@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 
 MESSAGE = re.compile(r"polydem: (step \d+: .*bod(?:y|ies) \d+.* at \([-+.0-9E]+, [-+.0-9E]+\) m.*"
-                     r"(?:[Rr]educe (?:dt|fraction)|Increase speed).*)")
+                     r"(?:[Rr]educe (?:dt|safety_factor)|Increase speed).*)")
 RUN_ERROR = 1
 #: Overrides that leave a run to its other guards
 BLIND = ("guards.step=off", "guards.overlap=stop")
@@ -34,7 +34,7 @@ def scenes(inputs):
 
 def stop(program, path, folder, *settings):
     """Run a scene that must stop; return what it says."""
-    overrides = [f"output.folder={folder}", "integrate.dt=0", "integrate.fraction=10", *settings]
+    overrides = [f"output.folder={folder}", "integrate.dt=0", "integrate.safety_factor=10", *settings]
     command = [program, "run", str(path)] + [word for each in overrides for word in ("--set", each)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == RUN_ERROR, (path.name, done.returncode, done.stderr)
@@ -56,7 +56,7 @@ def stop(program, path, folder, *settings):
 
 def warn(program, path, folder):
     """Run a scene at ten times its stable step that no guard stops; its log must warn, and its block must hop."""
-    overrides = [f"output.folder={folder}", "integrate.dt=0", "integrate.fraction=10", *BLIND]
+    overrides = [f"output.folder={folder}", "integrate.dt=0", "integrate.safety_factor=10", *BLIND]
     command = [program, "run", str(path)] + [word for each in overrides for word in ("--set", each)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
     assert done.returncode == 0, (path.name, done.stderr)
@@ -84,7 +84,7 @@ def main():
             folder = Path(work) / path.stem
             print(path.stem, stop(program, path, folder))
             # With the look at the stable step switched off another guard must notice.
-            larger = ("integrate.fraction=20",) if path.stem == BOUNDED else ()
+            larger = ("integrate.safety_factor=20",) if path.stem == BOUNDED else ()
             print(path.stem, stop(program, path, folder / "first_order", *BLIND, *FIRST_ORDER, *larger))
             if path.stem == BOUNDED:
                 warn(program, path, folder / "warned")

@@ -17,7 +17,7 @@ import tempfile
 import time
 
 SCENE = """\
-&scene name = 'gas' bodies = 200 fraction = 0.35 speed = 2 /
+&scene name = 'gas' bodies = 200 solid_fraction = 0.35 speed = 2 /
 &forces gravity = 0, 0 /
 &integrate dt = 2e-5 duration = 1.2e-3 /
 &output trace_steps = 40 trace_start = 2e-4 /

@@ -155,7 +155,7 @@ CHANGES = [
     ("bed", "margin = 0.0", "margin = 0.01"),
     ("gas", "speed = 0.5", "speed = 0.0"),
     ("gas", "gravity = 0.0, 0.0", "gravity = 0.0, -9.81"),
-    ("soft", "fraction = 2.0", "fraction = 0.3"),
+    ("soft", "solid_fraction = 2.0", "solid_fraction = 0.3"),
     ("range", "margin = 2.0", "margin = 1e-6"),
 ]
 

@@ -371,7 +371,7 @@ def test_entries_of_a_scene_count_before_those_of_its_file():
     assert number_of("inputs/bench/drum.nml", "scene.boxes", ROOT) == 2522.0
     assert number_of("inputs/bench/drum.nml scene.boxes=7 scene.boxes=1d3", "scene.boxes", ROOT) == 1000.0
     assert number_of("inputs/bench/drum.nml", "integrate.dt", ROOT) == 2.5e-5
-    assert number_of("inputs/bench/drum.nml", "scene.fraction", ROOT) is None
+    assert number_of("inputs/bench/drum.nml", "scene.solid_fraction", ROOT) is None
 
 
 @pytest.mark.parametrize("cores, most, expected", [(1, 1, (1,)), (2, 2, (1, 2)), (6, 6, (1, 2, 4, 6)), (8, 2, (1, 2))])

@@ -12,7 +12,7 @@ from polydem_post import Trajectory
 PROGRAM = os.environ.get("POLYDEM_PROGRAM", "")
 
 SCENE = """\
-&scene name = 'gas' bodies = 40 fraction = 0.8 overlap = .true. speed = 0.5 /
+&scene name = 'gas' bodies = 40 solid_fraction = 0.8 overlap = .true. speed = 0.5 /
 &forces stiffness = 1e6 /
 &integrate dt = 1e-5 duration = 6e-3 /
 &output frame_interval = 2e-5 frames_per_segment = 30 contacts = .true. /

@@ -13,14 +13,14 @@ SCENES = {
 """,
     # Grains that fly about between two walls that shake and two that turn; most change their region several times.
     "gas": """\
-&scene name = 'gas' bodies = 120 fraction = 0.35 speed = 1.0 spin = 50 /
+&scene name = 'gas' bodies = 120 solid_fraction = 0.35 speed = 1.0 spin = 50 /
 &motion name = 'shake' kind = 'oscillation' bodies = 121, 124 amplitude = 1e-3, 2e-3 frequency = 100 /
 &motion name = 'turn' kind = 'rotation' bodies = 122, 123 rate = 2.0 ramp = 5e-3 /
 &forces
    gravity = 0, 0 stiffness = 2e5
    law = 'conservative' damping = 'hunt_crossley' damping_coefficient = 1
 /
-&integrate fraction = 0.1 duration = 0.012 /
+&integrate safety_factor = 0.1 duration = 0.012 /
 """,
     # Long oblique walls, and an integrator that remembers and moves bodies twice a step.
     "hopper": """\
@@ -32,7 +32,7 @@ SCENES = {
     "bed": """\
 &scene name = 'bed' bodies = 200 size_ratio = 10 speed = 2.0 /
 &forces gravity = 0, -80 stiffness = 2e5 damping_from_touch = .true. damping_coefficient = 0.2 midstep_slip = .false. /
-&integrate accumulation = 'compensated' fraction = 0.2 duration = 0.02 /
+&integrate accumulation = 'compensated' safety_factor = 0.2 duration = 0.02 /
 """,
     # At rest: nothing goes over a border unless the border moves.
     "stack": """\

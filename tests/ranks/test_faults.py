@@ -23,7 +23,7 @@ FAILURES = {
     "fast": ("--set", "forces.gravity=0,-5e5"),
     "far": ("--set", "guards.displacement=stop", "--set", "guards.displacement_limit=1e-6"),
     "deep": ("--set", "guards.overlap=stop", "--set", "guards.overlap_limit=1e-6"),
-    "through": ("--set", "guards.passing=stop", "--set", "forces.stiffness=5e3"),
+    "through": ("--set", "guards.tunnelling=stop", "--set", "forces.stiffness=5e3"),
 }
 #: Frames of the first and the last step only, so that the step at which the run stops is none of a frame
 FEW_FRAMES = "--set", "output.frame_interval=0", "--set", "output.frames_per_segment=0"

@@ -51,9 +51,9 @@ def test_the_result_has_the_same_bits(combination, expected, outcomes, tmp_path)
 
 #: Fast grains that fly through the areas of all ranks
 FAST = """\
-&scene name = 'gas' bodies = 60 fraction = 0.2 speed = 1.75 spin = 175 seed = 641 /
+&scene name = 'gas' bodies = 60 solid_fraction = 0.2 speed = 1.75 spin = 175 seed = 641 /
 &forces gravity = 0, 0 stiffness = 1.25e6 /
-&integrate fraction = 0.2 duration = 0.043 /
+&integrate safety_factor = 0.2 duration = 0.043 /
 &decomposition balance = 'off' /
 &guards displacement = 'off' step = 'off' /
 """

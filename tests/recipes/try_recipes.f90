@@ -75,13 +75,13 @@ contains
       call list%append(block_at(0.0_wp, 0.5_wp*side + 1.0e-6_wp, side, side, 0.0_wp), velocity=[0.0_wp, -speed])
       call list%append(block_at(0.0_wp, -side, 10.0_wp*side, 2.0_wp*side, 0.0_wp), fixed=.true.)
       call begin('&forces gravity = 0, 0 friction = ''none'' law = '''//law//''' '//damping//' / '// &
-                 '&integrate duration = 1 fraction = 0.002 speed = 1e-12 /', list, simulation, error)
+                 '&integrate duration = 1 safety_factor = 0.002 speed = 1e-12 /', list, simulation, error)
    end subroutine start
 
    !> Run a gas with a finder; print its state hash and its pair counts.
    subroutine run_gas(finder)
       character(len=*), intent(in) :: finder
-      character(len=*), parameter :: text = '&scene name = ''gas'' bodies = 60 fraction = 0.35 speed = 1 / '// &
+      character(len=*), parameter :: text = '&scene name = ''gas'' bodies = 60 solid_fraction = 0.35 speed = 1 / '// &
          '&forces stiffness = 2e5 / &integrate duration = 0.1 / '
       character(len=1) :: no_overrides(0)
       type(settings_t) :: settings

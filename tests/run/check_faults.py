@@ -35,7 +35,7 @@ def a_date_that_goes_back_changes_nothing(case, library):
         def run_limited():
             began = time.monotonic()
             code, output, message = case.run("date", "--force", "--walltime", "00:00:02", "--set", "checkpoint.steps=0",
-                                             "--set", "integrate.duration=100", "--set", "checkpoint.elapsed=0.5")
+                                             "--set", "integrate.duration=100", "--set", "checkpoint.wall_interval=0.5")
             seconds = time.monotonic() - began
             assert code == EARLY and "interrupted by --walltime" in message, (code, message)
             assert seconds > 1.0, seconds

@@ -17,7 +17,7 @@ from check_faults import environment
 from continued_run import start
 
 #: Options of a run that does not end by itself
-ENDLESS = ("--set", "integrate.duration=100", "--set", "checkpoint.steps=0", "--set", "checkpoint.elapsed=0.2",
+ENDLESS = ("--set", "integrate.duration=100", "--set", "checkpoint.steps=0", "--set", "checkpoint.wall_interval=0.2",
            "--set", "output.frame_interval=1", "--set", "output.contacts=.false.")
 
 

@@ -17,7 +17,7 @@ import time
 
 #: Few bodies, so a run takes some milliseconds; they overlap, so a run writes overlaps.csv
 SCENE = """\
-&scene name = 'gas' bodies = 6 fraction = 0.8 overlap = .true. speed = 0.5 spin = 20 /
+&scene name = 'gas' bodies = 6 solid_fraction = 0.8 overlap = .true. speed = 0.5 spin = 20 /
 &forces stiffness = 1e6 /
 &integrate dt = 1e-5 duration = 1.2e-4 /
 &output frame_interval = 2e-5 frames_per_segment = 3 /

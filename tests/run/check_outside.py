@@ -17,7 +17,7 @@ import tempfile
 import time
 
 SCENE = """\
-&scene name = 'gas' bodies = 60 fraction = 0.8 overlap = .true. speed = 0.5 spin = 20 /
+&scene name = 'gas' bodies = 60 solid_fraction = 0.8 overlap = .true. speed = 0.5 spin = 20 /
 &forces stiffness = 1e6 /
 &integrate dt = 1e-5 duration = 6e-4 /
 &output frame_interval = 3e-5 frames_per_segment = 15 log_interval = 1e-4 contacts = .true. /

@@ -9,7 +9,7 @@ SCENE = """\
 &scene
    name = 'gas'
    bodies = 60
-   fraction = 0.8
+   solid_fraction = 0.8
    overlap = .true.
    speed = 0.5
    spin = 20

@@ -27,7 +27,7 @@ OUTSIDE = ("link", "link to a group", "soft link to a link", "soft links to a li
 INSIDE = ("soft link", "soft links", "relative soft link", "hard link")
 
 SCENE = """\
-&scene name = 'gas' bodies = 20 fraction = 0.3 speed = 1 /
+&scene name = 'gas' bodies = 20 solid_fraction = 0.3 speed = 1 /
 &integrate dt = 1e-5 duration = 2e-4 /
 &output frame_interval = 2e-5 frames_per_segment = 4 /
 &checkpoint steps = 8 /

@@ -20,7 +20,7 @@ program faulty_finder
    implicit none
 
    !> A gas whose bodies are spread over all ranks
-   character(len=*), parameter :: gas = "&scene name = 'gas' bodies = 60 fraction = 0.3 speed = 1 /"// &
+   character(len=*), parameter :: gas = "&scene name = 'gas' bodies = 60 solid_fraction = 0.3 speed = 1 /"// &
       '&forces gravity = 0, 0 /&integrate dt = 1e-6 duration = 1e-3 /'
    class(communicator_t), allocatable :: comm
    type(error_t), allocatable :: error

@@ -11,7 +11,7 @@ module guarded
 
    !> Polygons with deep initial overlaps
    character(len=*), parameter :: soft = &
-      "&scene name = 'gas' bodies = 60 fraction = 0.4 overlap = .true. speed = 0 /"// &
+      "&scene name = 'gas' bodies = 60 solid_fraction = 0.4 overlap = .true. speed = 0 /"// &
       '&forces gravity = 0, 0 /&integrate dt = 1e-6 duration = 1e-3 /'
    !> A stack of squares at rest
    character(len=*), parameter :: stack = "&scene name = 'stack' bodies = 5 width = 0.01 height = 0.01 /"// &

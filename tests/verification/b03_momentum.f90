@@ -50,9 +50,9 @@ contains
       integer(ip) :: k, s
 
       call read_settings_text('gas.nml', &
-                              '&scene name = ''gas'' bodies = 40 fraction = 0.2 speed = 0.5 spin = 20 / &forces '// &
-                              'gravity = 0, 0 '//forces//' / &integrate duration = 1000 /', no_overrides, settings, &
-                                 error)
+                              '&scene name = ''gas'' bodies = 40 solid_fraction = 0.2 speed = 0.5 spin = 20 / '// &
+                              '&forces gravity = 0, 0 '//forces//' / &integrate duration = 1000 /', &
+                              no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
       if (.not. allocated(error)) then
          call compute_balance(simulation, start)

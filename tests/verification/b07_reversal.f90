@@ -39,9 +39,9 @@ contains
       type(error_t), allocatable :: error
       real(wp) :: turned
 
-      call read_settings_text('gas.nml', '&scene name = ''gas'' bodies = 9 fraction = 0.3 speed = 0.4 spin = 10 /'// &
-                              ' &forces gravity = 0, 0 damping = ''none'' friction = ''none'' law = '''//law// &
-                              ''' / &integrate dt = 1e-5 duration = 1000 /', no_overrides, settings, error)
+      call read_settings_text('gas.nml', '&scene name = ''gas'' bodies = 9 solid_fraction = 0.3 speed = 0.4 '// &
+                              'spin = 10 / &forces gravity = 0, 0 damping = ''none'' friction = ''none'' law = '''// &
+                              law//''' / &integrate dt = 1e-5 duration = 1000 /', no_overrides, settings, error)
       if (.not. allocated(error)) call new_simulation(settings, simulation, error)
       if (.not. allocated(error)) start = simulation%bodies
       if (.not. allocated(error)) call steps(simulation, n, error)

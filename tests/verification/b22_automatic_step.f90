@@ -6,9 +6,9 @@
 !> them: a face meets a face with a kink of the force at some moment within a step, which changes the speed by up to
 !> (w dt)^2/8, w the frequency of the contact. A dashpot that acts from the first touch, friction that changes between
 !> stick and slip in a step, and corners that just meet or miss each other are likely causes, too; they were not
-!> separated. With `fraction` 0.1 instead of 0.3, three times the steps, the sample has one impact of 72 beyond 1e-3,
-!> with 1.3e-3: the error follows the step, and 1e-3 for all impacts costs that much. The rows of the groups are shown;
-!> those of all impacts guard what was reached.
+!> separated. With `safety_factor` 0.1 instead of 0.3, three times the steps, the sample has one impact of 72 beyond
+!> 1e-3, with 1.3e-3: the error follows the step, and 1e-3 for all impacts costs that much. The rows of the groups are
+!> shown; those of all impacts guard what was reached.
 module b22_automatic_step
    use outlines, only: pi, regular_polygon
    use trial, only: begin, block_at

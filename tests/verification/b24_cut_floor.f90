@@ -119,8 +119,8 @@ contains
       call list%append(block_at(0.0_wp, height + gap, width, width, merge(0.25_wp*pi, 0.0_wp, on_corner)), &
                        velocity=[0.0_wp, -speed])
       call begin("&forces gravity = 0, 0 friction = 'none' law = '"//trim(law)//"' "//damping// &
-                 ' / &boxes largest_ratio = 1e4 / &output energy_balance = .false. / &integrate fraction = 0.1 '// &
-                 'duration = '//to_text(0.02_wp + 10.0_wp*gap/speed)//' /', list, simulation, error)
+                 ' / &boxes largest_ratio = 1e4 / &output energy_balance = .false. / &integrate '// &
+                 'safety_factor = 0.1 duration = '//to_text(0.02_wp + 10.0_wp*gap/speed)//' /', list, simulation, error)
       if (.not. allocated(error)) call steps(simulation, int(simulation%n_steps), error)
       call table%note_error(error)
       if (allocated(error)) return

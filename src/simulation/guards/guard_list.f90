@@ -26,7 +26,7 @@ contains
       allocate (list(0))
       call add('displacement', displacement_guard_t())
       call add('overlap', overlap_guard_t())
-      call add('passing', tunnelling_guard_t())
+      call add('tunnelling', tunnelling_guard_t())
       call add('step', step_guard_t())
       call add('energy', energy_guard_t())
 

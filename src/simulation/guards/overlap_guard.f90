@@ -51,8 +51,8 @@ contains
          if (settings%overlap == 'stop') call s%comm%all_reduce_text(text, share)
          if (.not. allocated(text)) return
          call self%warning%respond(self%choice, 'step '//to_text(s%step)//': '//text// &
-                                   '. Increase stiffness in &forces, remove deep initial overlaps (relaxed_depth '// &
-                                   'in &guards), or '//shorter_step(s%settings%integrate), error, share)
+                                   '. Increase stiffness in &forces, remove deep initial overlaps (remove_overlap '// &
+                                   'in &scene), or '//shorter_step(s%settings%integrate), error, share)
       end associate
    end subroutine look
 

@@ -27,7 +27,7 @@ contains
 
       self%noun = 'step'
       self%finding = 'in which a body was passing through another'
-      self%choice = simulation%settings%guards%passing
+      self%choice = simulation%settings%guards%tunnelling
       self%stops_alone = .true.
    end subroutine start
 

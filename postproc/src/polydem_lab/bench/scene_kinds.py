@@ -107,7 +107,7 @@ def _kind_of_gas(settings: dict) -> str:
     if slender:
         return "rods"
     if settings.get("scene.overlap", "").lower() in (".true.", "t"):
-        return "soft" if number_in(settings, "scene.fraction") >= 1.0 else OTHER
+        return "soft" if number_in(settings, "scene.solid_fraction") >= 1.0 else OTHER
     if number_in(settings, "scene.size_ratio", 1.0) > 1.0:
         return "sizes"
     weightless = not any(float_or_one(word) for word in settings.get("forces.gravity", "0").split(","))

@@ -106,7 +106,7 @@ def kinds(bench: Bench) -> Finding:
         )
         both = [pair for pair in both if pair[0].boxes <= 1.1 * paper.SIZES[1]]
         if of_kind == "gas":
-            both = list({series.parameter(pair[0], "scene.fraction"): pair for pair in both}.values())
+            both = list({series.parameter(pair[0], "scene.solid_fraction"): pair for pair in both}.values())
         most = paper.SIZES[1]
         needed(both, f"./polydem bench on a {of_kind} of at most {most} boxes, finders 'quadtree', 'sort_and_sweep'")
         ratio[of_kind] = series.pooled_ratio(both)

@@ -51,11 +51,11 @@ BARE = (
     "guards.displacement=off",
     "guards.step=off",
     "guards.overlap=off",
-    "guards.passing=off",
+    "guards.tunnelling=off",
     "output.energy_balance=.false.",
     "output.trace_steps=0",
     "output.trace_start=0",
-    "checkpoint.elapsed=0",
+    "checkpoint.wall_interval=0",
     "integrate.dt=2e-5",
 )
 
@@ -95,7 +95,7 @@ MODELS = (
     Model("guard: displacement", ("guards.displacement=stop",)),
     Model("guard: stable step", ("guards.step=stop",)),
     Model("guard: overlap", ("guards.overlap=warn",)),
-    Model("guard: passing", ("guards.passing=warn",)),
+    Model("guard: passing", ("guards.tunnelling=warn",)),
     Model("energy balance", ("output.energy_balance=.true.",)),
     Model("guard: energy", ("output.energy_balance=.true.", "guards.energy=warn"), off="energy balance"),
     Model("a frame every 50 steps", ("output.frame_interval=1e-3",)),
