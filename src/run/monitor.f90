@@ -7,6 +7,7 @@ module polydem_monitor
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: to_text
+   use polydem_warning, only: warning_t
    implicit none
    private
    public :: monitor_t, new_monitor, check_step, needs_contacts, asks_all, report_pending_warnings, &
@@ -23,6 +24,8 @@ module polydem_monitor
       integer(lp) :: at_start = 0_lp
       !> Whether the guard of a rank asks in this step for a look of all ranks, as `asks_all` says
       logical :: is_asked = .false.
+      !> Whether a guard may stop the run on one rank, in a step that is no check
+      logical, private :: stops_alone = .false.
    end type monitor_t
 
    !> Steps between checks of guards that do not look in every step
@@ -39,7 +42,11 @@ contains
 
       call list_guards(monitor%list)
       do k = 1, size(monitor%list)
-         call monitor%list(k)%guard%start(simulation)
+         associate (guard => monitor%list(k)%guard)
+            call guard%start(simulation)
+            guard%is_on = guard%choice /= 'off'
+            monitor%stops_alone = monitor%stops_alone .or. (guard%stops_alone .and. guard%choice == 'stop')
+         end associate
       end do
    end subroutine new_monitor
 
@@ -65,25 +72,23 @@ contains
       type(log_t), intent(inout) :: log
       !> Allocated if the run must stop; names body, position and step
       type(error_t), allocatable, intent(inout) :: error
-      logical :: is_check, has_stopped_alone
+      logical :: is_check
       integer :: k
 
       is_check = is_last .or. is_checked(simulation%step)
-      has_stopped_alone = .false.
       if (simulation%comm%size == 1_ip) monitor%is_asked = asks_all(monitor, simulation)
       do k = 1, size(monitor%list)
          associate (guard => monitor%list(k)%guard)
-            if (guard%choice == 'off') cycle
+            if (.not. guard%is_on) cycle
             guard%is_check = is_check
             guard%is_asked = monitor%is_asked
             call guard%look(simulation, error)
-            has_stopped_alone = has_stopped_alone .or. (guard%stops_alone .and. guard%choice == 'stop')
          end associate
       end do
-      if (is_check .or. has_stopped_alone) call simulation%comm%all_reduce_error(error)
+      if (is_check .or. monitor%stops_alone) call simulation%comm%all_reduce_error(error)
       if (is_check .or. simulation%comm%size == 1_ip) call report_pending_warnings(monitor, simulation, log)
       do k = 1, size(monitor%list)
-         if (monitor%list(k)%guard%is_global) call write_pending(monitor%list(k), log)
+         if (monitor%list(k)%guard%is_global) call write_pending(monitor%list(k)%guard%warning, log)
       end do
    end subroutine check_step
 
@@ -107,7 +112,7 @@ contains
       if (.not. (is_last .or. is_checked(step))) return
       do k = 1, size(monitor%list)
          associate (guard => monitor%list(k)%guard)
-            needs_contacts = needs_contacts .or. (guard%needs_contacts .and. guard%choice /= 'off')
+            needs_contacts = needs_contacts .or. (guard%needs_contacts .and. guard%is_on)
          end associate
       end do
    end function needs_contacts
@@ -140,20 +145,21 @@ contains
       end if
       do k = 1, size(monitor%list)
          associate (warning => monitor%list(k)%guard%warning)
-            call simulation%comm%all_reduce_text(warning%text, warning%weight)
+            if (simulation%comm%size > 1_ip) call simulation%comm%all_reduce_text(warning%text, warning%weight)
+            call write_pending(warning, log)
          end associate
-         call write_pending(monitor%list(k), log)
       end do
    end subroutine report_pending_warnings
 
    !> Write the pending warning of a guard, if there is one.
-   subroutine write_pending(listed, log)
-      type(listed_guard_t), intent(inout) :: listed
+   subroutine write_pending(warning, log)
+      type(warning_t), intent(inout) :: warning
       type(log_t), intent(inout) :: log
       character(len=:), allocatable :: text
 
-      call listed%guard%warning%take(text)
-      if (allocated(text)) call log%write_line('warning: '//text)
+      if (.not. allocated(warning%text)) return
+      call warning%take(text)
+      call log%write_line('warning: '//text)
    end subroutine write_pending
 
    !> Number of warnings of each guard on this rank. Once per step the counts become the greatest of all ranks, so that

@@ -18,6 +18,8 @@ module polydem_guard
    type, abstract :: guard_t
       !> Entry of &guards, and its value: stop, warn or off
       character(len=:), allocatable :: name, choice
+      !> Whether the value is not off
+      logical :: is_on = .true.
       !> What a warning counts, 'step' or 'check', and what was found in it: the end of 'warnings: 3 steps '
       character(len=:), allocatable :: noun, finding
       !> Whether a check looks at the table of all contacts
