@@ -30,8 +30,9 @@ contains
          call write_measures(measures, log)
          call log%write_line('boxes      '//to_text(measures%boxes)//', including '//to_text(measures%fixed_boxes)// &
                              ' of fixed bodies')
-         call log%write_line('parts      '//s%settings%neighbours%finder//', '//s%law%description//gravity_text(s)// &
-                             ', '//s%settings%integrate%scheme//motion_text(s)//balance_text(s))
+         call log%write_line('parts      '//s%settings%neighbours%finder//', '//s%law%description// &
+                             s%body_forces%description()//gravity_text(s)//', '// &
+                             s%settings%integrate%scheme//motion_text(s)//balance_text(s))
          if (gravity_text(s) /= '' .and. s%law%rest_note() /= '') &
             call log%write_line('           note: '//s%law%rest_note())
          call log%write_line('step       dt = '//to_text(s%dt)//' s, '// &

@@ -15,6 +15,8 @@ module polydem_choose_step
 
    !> Upper limit of the number of steps
    real(wp), parameter :: most_steps = 1.0e15_wp
+   !> Greatest change of a velocity in a step by a force that is no contact, as a share
+   real(wp), parameter :: greatest_change = 0.1_wp
 
 contains
 
@@ -72,6 +74,11 @@ contains
             return
          end if
          self%n_steps = nint(steps, lp)
+         if (self%dt*self%body_forces%rate() > greatest_change) call raise(error, input_error, &
+            place_of(self%settings, 'forces', 'drag')//': with dt = '//to_text(self%dt)//' s a rate of '// &
+            to_text(self%body_forces%rate())//' 1/s changes a velocity by more than a tenth in a step. Set dt in '// &
+            '&integrate to at most '//to_text(greatest_change/self%body_forces%rate(), 2)// &
+            ', or decrease drag in &forces')
       end associate
    end subroutine choose_step
 

@@ -49,15 +49,17 @@ module polydem_free_flight
 contains
 
    !> Start with nothing known of the bodies.
-   subroutine start(self, gravity, integrator, n)
+   subroutine start(self, gravity, has_fields, integrator, n)
       class(free_flight_t), intent(inout) :: self
       !> Acceleration of gravity, (2) [m/s2]
       real(wp), intent(in) :: gravity(2)
+      !> Whether forces act on bodies that are no contacts
+      logical, intent(in) :: has_fields
       class(integrator_t), intent(in) :: integrator
       !> Number of bodies
       integer(ip), intent(in) :: n
 
-      self%is_weightless = .not. any(abs(gravity) > 0.0_wp)
+      self%is_weightless = .not. (has_fields .or. any(abs(gravity) > 0.0_wp))
       self%is_dilute = .false.
       self%skips_coasting = self%is_weightless .and. integrator%coasts_exactly
       self%coasts = spread(.false., 1, n)

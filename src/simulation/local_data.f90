@@ -37,7 +37,8 @@ contains
       self%n_contacts = 0_ip
       self%walk%passing_pair = 0_ip
       call start_sums(self%bodies%n, self%force_sums)
-      call self%flight%start(self%settings%forces%gravity, self%integrator, self%bodies%n)
+      call self%flight%start(self%settings%forces%gravity, allocated(self%body_forces%list), self%integrator, &
+                             self%bodies%n)
       self%walk%incidence = incidence_t()
       call list_moving(self)
       call rebuild_guard(self)

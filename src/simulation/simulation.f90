@@ -1,6 +1,7 @@
 !> The complete state of a simulation.
 module polydem_simulation
    use polydem_bodies, only: bodies_t
+   use polydem_body_forces, only: body_forces_t
    use polydem_box_maker, only: box_maker_t
    use polydem_boxes, only: boxes_t
    use polydem_communicator, only: communicator_t
@@ -88,6 +89,8 @@ module polydem_simulation
       type(packed_history_t), allocatable :: received_history
       !> Force law
       type(force_law_t) :: law
+      !> Forces on bodies that are no contacts
+      type(body_forces_t) :: body_forces
       !> Integration scheme
       class(integrator_t), allocatable :: integrator
       !> Energy and momentum balance

@@ -1,5 +1,6 @@
 !> Start of a simulation: time step, forces and accelerations at time 0. All ranks start alike, one or many.
 module polydem_start_simulation
+   use polydem_body_forces, only: choose_body_forces
    use polydem_box_maker, only: update_boxes
    use polydem_choose_instruction_set, only: choose_instruction_set
    use polydem_choose_step, only: choose_step
@@ -43,6 +44,7 @@ contains
       allocate (self%comm, source=comm)
       self%settings = settings
       call new_integrator(settings%integrate, self%integrator)
+      call choose_body_forces(settings%forces, self%body_forces)
       call choose_step(self, error)
       if (allocated(error)) return
       call find_median(self%comm, self%bodies%diameter(self%bodies%free), median_diameter)
@@ -68,7 +70,7 @@ contains
       self%timers = timers_t()
    end subroutine start_with_bodies
 
-   !> Set the accelerations at time 0: from the forces, or from gravity alone, depending on the integration scheme.
+   !> Set the accelerations at time 0: from all forces, or from all but those of contacts, depending on the scheme.
    subroutine start_integration(self)
       type(simulation_t), intent(inout) :: self
       integer(ip) :: k
@@ -83,6 +85,11 @@ contains
                else
                   bodies%acceleration(:, s) = self%settings%forces%gravity
                   bodies%angular_acceleration(s) = 0.0_wp
+                  if (.not. allocated(self%force_sums%field)) cycle
+                  associate (field => self%force_sums%field(:, s))
+                     bodies%acceleration(:, s) = bodies%acceleration(:, s) + field(1:2)*bodies%inverse_mass(s)
+                     bodies%angular_acceleration(s) = field(3)*bodies%inverse_inertia(s)
+                  end associate
                end if
             end associate
          end do

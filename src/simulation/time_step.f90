@@ -60,7 +60,7 @@ contains
          call timers%lap(stage_neighbours)
          call walk_contacts(self, self%dt, needs_table(self, tabulate), clock, error)
          call timers%divide_lap(stage_overlap, stage_forces, clock)
-         call constrain(self, error)
+         call add_other_forces(self, error)
          call timers%lap(stage_forces)
          ! A contact may stop the run here. Then no rank completes the step.
          if (self%settings%overlap%degenerate == 'stop') call self%comm%all_reduce_error(error)
@@ -112,19 +112,22 @@ contains
       if (present(tabulate)) needs_table = tabulate .or. allocated(self%law%constraint)
    end function needs_table
 
-   !> Add the forces of a velocity constraint, if there is one.
-   subroutine constrain(self, error)
+   !> Add forces on bodies that are no contacts, and the forces of a velocity constraint, if there are any.
+   subroutine add_other_forces(self, error)
       type(simulation_t), intent(inout) :: self
       !> Names the step; on entry an error of the step, after which nothing is done
       type(error_t), allocatable, intent(inout) :: error
 
-      if (allocated(error) .or. .not. allocated(self%law%constraint)) return
+      if (allocated(error)) return
+      call self%body_forces%apply(self%bodies, self%force_sums)
+      if (.not. allocated(self%law%constraint)) return
       call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
       call self%law%constraint%apply(self%dt, self%walk%incidence, self%bodies, self%contacts, self%history, error)
       if (allocated(error)) error%message = 'step '//to_text(self%step)//': '//error%message
       call assemble_forces(self%settings%forces%gravity, self%contacts, self%bodies, self%force_sums)
+      call self%body_forces%apply(self%bodies, self%force_sums)
       call select_walls(self%bodies, self%contacts, self%walk%walls)
-   end subroutine constrain
+   end subroutine add_other_forces
 
    !> Compute the forces on the bodies at time 0 from their boxes.
    subroutine compute_forces(self, error)
@@ -136,7 +139,7 @@ contains
 
       call find_pairs(self, error)
       call walk_contacts(self, 0.0_wp, needs_table(self), clock, error)
-      call constrain(self, error)
+      call add_other_forces(self, error)
       if (allocated(error)) return
       call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
    end subroutine compute_forces
@@ -163,7 +166,7 @@ contains
          if (self%domain%has_halo()) call self%domain%halo%follow(self%comm, self%bodies)
          call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
          call walk_contacts(self, 0.0_wp, needs_table(self), clock, known_error)
-         call constrain(self, known_error)
+         call add_other_forces(self, known_error)
       end if
       call total_forces(self%settings%forces%gravity, self%force_sums, self%bodies)
    end subroutine tabulate_contacts

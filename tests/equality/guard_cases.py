@@ -88,6 +88,7 @@ VARIED = {
     "forces.restitution": "0.3",
     "forces.tilt_damping": "0.5", "forces.friction_coefficient": "0.6", "forces.tangential_stiffness": "0.5",
     "forces.tangential_damping": "0.5", "forces.friction_tolerance": "1e-6",
+    "forces.drag": "2",
     "guards.displacement_limit": "0.2", "guards.overlap_limit": "0.5", "guards.energy_limit": "0.5",
     "guards.listed_depth": "1e-4", "guards.relaxed_depth": "1e-3",
     "integrate.dt": "5e-5", "integrate.fraction": "0.1", "integrate.speed": "3", "integrate.duration": "0.025",

@@ -1,4 +1,4 @@
-"""Build and run the recipes of src/recipes.md: a new force part, a new finder and a new guard.
+"""Build and run the recipes of src/recipes.md: a force part, a finder, a force on bodies and a guard.
 
 usage: check_recipes.py ROOT BUILD NINJA
 
@@ -23,6 +23,8 @@ CHANGED = {
                                              "src/config/entries.txt"},
     "src/neighbours/finders/plain_loop.f90": {"src/neighbours/finders/finder_factory.f90",
                                               "src/neighbours/finders/CMakeLists.txt", "src/config/entries.txt"},
+    "src/contacts/fields/magnus_force.f90": {"src/contacts/fields/body_forces.f90",
+                                             "src/contacts/fields/CMakeLists.txt"},
     "src/simulation/guards/spin_guard.f90": {"src/simulation/guards/guard_list.f90", "src/simulation/CMakeLists.txt"}}
 
 
@@ -108,11 +110,13 @@ def build_program(root, copy, build, ninja, folder):
     subprocess.run([sys.executable, os.path.join(config, "make_entries.py"), os.path.join(config, "entries.txt"), made],
                    check=True)
     plan = [(os.path.join(made, "entry_table.f90"), os.path.join(build, "src", "config", "entry_table.f90"))]
-    forces, finders, guards = (os.path.join(root, "src", name) for name in (
-        "contacts/forces/force_law.f90", "neighbours/finders/finder_factory.f90", "simulation/guards/guard_list.f90"))
+    forces, finders, fields, guards = (os.path.join(root, "src", name) for name in (
+        "contacts/forces/force_law.f90", "neighbours/finders/finder_factory.f90", "contacts/fields/body_forces.f90",
+        "simulation/guards/guard_list.f90"))
     for name, like in (("contacts/forces/walton_braun.f90", forces), ("contacts/forces/force_law.f90", forces),
                        ("neighbours/finders/plain_loop.f90", finders),
                        ("neighbours/finders/finder_factory.f90", finders),
+                       ("contacts/fields/magnus_force.f90", fields), ("contacts/fields/body_forces.f90", fields),
                        ("simulation/guards/spin_guard.f90", guards), ("simulation/guards/guard_list.f90", guards)):
         plan.append((os.path.join(copy, "src", name), like))
     trial = os.path.join(root, "tests", "verification", "trial.f90")
@@ -150,6 +154,9 @@ def judge(text):
         raise RecipeError("four times the stiffness does not halve the stable step")
     if values["plain_loop_result"] != values["all_pairs_result"]:
         raise RecipeError("the finder of the recipe does not give the bits of all_pairs")
+    turned, work = (float(word) for word in values["magnus"].split())
+    if abs(turned - 0.5 * 3.0 * 0.4) > 1e-5 or abs(work) > 1e-5:
+        raise RecipeError("the force on bodies of the recipe does not turn the velocity with its rate, or does work")
     if values["spin_warnings"].split() != ["0", "3"]:
         raise RecipeError("the guard of the recipe does not warn at the checks of steps 0, 100 and 200")
 
@@ -170,7 +177,7 @@ def main(root, build, ninja):
         except RecipeError as error:
             print(f"recipes: {error}")
             return 1
-    print(f"recipes: all three work; {time.monotonic() - began:.0f} s")
+    print(f"recipes: all four work; {time.monotonic() - began:.0f} s")
     return 0
 
 

@@ -12,7 +12,7 @@ module polydem_body_contributions
    use polydem_wall_terms, only: wall_terms_t
    implicit none
    private
-   public :: n_channels, n_wall_channels, n_motions, add_powers, add_torques, add_walls, motion_of
+   public :: n_channels, n_wall_channels, n_motions, add_powers, add_fields, add_torques, add_walls, motion_of
 
    !> Number of channels of a body: powers of the elastic normal forces with cohesion, of the other normal forces with
    !> the damping of tilts, and of the tangential forces [W/m]
@@ -84,6 +84,33 @@ contains
          channels(3) = channels(3) + weight*((term(fx)*x + term(fy)*y) + term(ft)*w)
       end associate
    end subroutine add_term
+
+   !> Add the impulses of forces on some bodies that are no contacts to their wall channels, times a weight, as of a
+   !> fixed body at rest.
+   pure subroutine add_fields(bodies, field, weight, first, last, wall_channels)
+      type(bodies_t), intent(in) :: bodies
+      !> Forces along x and y [N/m] and torques [N], (3, slot)
+      real(wp), intent(in) :: field(:, :)
+      !> Factor of what is added
+      real(wp), intent(in) :: weight
+      !> First and last slot
+      integer(ip), intent(in) :: first, last
+      !> Wall channels of all bodies, (n_wall_channels, slot)
+      real(wp), intent(inout) :: wall_channels(:, :)
+      real(wp) :: torque
+      integer(ip) :: s
+
+      do s = first, last
+         associate (x => bodies%position(:, s), f => field(:, s), channels => wall_channels(:, s))
+            torque = (x(1)*f(2) - x(2)*f(1)) + f(3)
+            channels(2) = channels(2) + weight*f(1)
+            channels(3) = channels(3) + weight*f(2)
+            channels(4) = channels(4) + weight*torque
+            channels(5) = channels(5) + weight*(abs(f(1)) + abs(f(2)))
+            channels(6) = channels(6) + weight*abs(torque)
+         end associate
+      end do
+   end subroutine add_fields
 
    !> Add the torques of gravity on some bodies about the origin, times a weight.
    pure subroutine add_torques(n, weight, gravity, mass, position, torque)

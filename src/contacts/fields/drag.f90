@@ -1,0 +1,46 @@
+!> Drag of a medium at rest, in proportion to momentum: a free body slows down as exp(-c t), whatever its size.
+!>
+!> A body that falls reaches the speed g/c. Translation and rotation have the same rate.
+module polydem_drag
+   use polydem_bodies, only: bodies_t, block_size
+   use polydem_body_force, only: body_force_t
+   use polydem_kinds, only: ip, wp
+   use polydem_settings, only: forces_settings_t
+   implicit none
+   private
+   public :: drag_t
+
+   !> Drag with the force -c m v and the torque -c I omega; c is `rate`
+   type, extends(body_force_t) :: drag_t
+   contains
+      procedure :: configure
+      procedure :: add
+   end type drag_t
+
+contains
+
+   !> Copy the rate from the settings.
+   subroutine configure(self, settings)
+      class(drag_t), intent(inout) :: self
+      type(forces_settings_t), intent(in) :: settings
+
+      self%rate = settings%drag
+   end subroutine configure
+
+   !> Add the drag.
+   pure subroutine add(self, bodies, slots, force)
+      class(drag_t), intent(in) :: self
+      type(bodies_t), intent(in) :: bodies
+      integer(ip), intent(in) :: slots(:)
+      real(wp), intent(inout) :: force(3, block_size)
+      integer(ip) :: k
+
+      do k = 1_ip, size(slots, kind=ip)
+         associate (s => slots(k))
+            force(1:2, k) = force(1:2, k) - self%rate*bodies%mass(s)*bodies%velocity(:, s)
+            force(3, k) = force(3, k) - self%rate*bodies%inertia(s)*bodies%angular_velocity(s)
+         end associate
+      end do
+   end subroutine add
+
+end module polydem_drag
