@@ -30,7 +30,10 @@ PAGES = [
 
 #: Pages whose tables hold no measured numbers of one run: manuals, and lists of cases with the tests that check them
 OTHERS = {
+    "README.md",
     "inputs/README.md",
+    "inputs/checks.md",
+    "inputs/entries.md",
     "inputs/getting_started.md",
     "inputs/glossary.md",
     "inputs/log.md",
