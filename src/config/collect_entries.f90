@@ -179,15 +179,15 @@ contains
       character(len=:), allocatable :: clause
 
       select case (statement%group//'.'//statement%key)
-      case ('scene.fraction')
+      case ('scene.solid_fraction')
          clause = 'solid_fraction in &scene'
-      case ('integrate.fraction')
+      case ('integrate.safety_factor')
          clause = 'safety_factor in &integrate'
-      case ('guards.passing')
+      case ('guards.tunnelling')
          clause = 'tunnelling in &guards'
-      case ('guards.relaxed_depth')
+      case ('scene.remove_overlap')
          clause = 'remove_overlap in &scene'
-      case ('checkpoint.elapsed')
+      case ('checkpoint.wall_interval')
          clause = 'wall_interval in &checkpoint'
       case default
          clause = ''

@@ -2,7 +2,7 @@
 
 make_entries.py ENTRIES.txt FOLDER: the Fortran sources entry_table.f90 (the table as constants), settings.f90 (one type
 per group) and fill_groups.f90 (fills these types).
-make_entries.py ENTRIES.txt README.md [--check]: the table of the manual, between the lines <!-- entries --> and
+make_entries.py ENTRIES.txt PAGE.md [--check]: the table of the manual, between the lines <!-- entries --> and
 <!-- /entries -->; with --check it must be there already.
 """
 
@@ -220,21 +220,21 @@ def manual(rows):
     return text
 
 
-def update_manual(readme, rows, checks):
+def update_manual(page, rows, checks):
     """Replace the table in the manual, or check that it is there."""
-    path, opening, closing = Path(readme), "<!-- entries -->\n", "<!-- /entries -->\n"
+    path, opening, closing = Path(page), "<!-- entries -->\n", "<!-- /entries -->\n"
     before, _, rest = path.read_text(encoding="utf-8").partition(opening)
     present, mark, after = rest.partition(closing)
     if not mark:
-        sys.exit(f"{readme} has no lines {opening}and {closing}")
+        sys.exit(f"{page} has no lines {opening}and {closing}")
     if present == manual(rows):
-        print(f"{readme} has the table of entries")
+        print(f"{page} has the table of entries")
     elif checks:
-        sys.exit(f"the table of entries in {readme} is not that of the code; "
+        sys.exit(f"the table of entries in {page} is not that of the code; "
                  "cmake --build BUILD --target entries_manual makes it")
     else:
         path.write_text(before + opening + manual(rows) + closing + after, encoding="utf-8")
-        print(f"{readme} has a new table of entries")
+        print(f"{page} has a new table of entries")
 
 
 def main(table, target, *options):

@@ -87,7 +87,8 @@ def list_cases(base):
         cases = list(pool.map(lambda source: shorten(base, source), sources))
     cases += [shorten(base, source, {"scene.packing": "results/patch"}) for source in sources
               if re.fullmatch(r"drum(_\d+)?", source)]
-    manual = (folder / "README.md").read_text(encoding="utf-8")
+    page = next(path for path in (folder / "entries.md", folder / "README.md") if path.exists())
+    manual = page.read_text(encoding="utf-8")
     return [case for case in cases if case is not None] + generated_cases(manual)
 
 

@@ -1,6 +1,6 @@
 """The runs that the guard compares, in the names of the base revision.
 
-What there is to choose is read from the table of namelist entries in inputs/README.md of the base revision, so that no
+What there is to choose is read from the table of namelist entries in the manual of the base revision, so that no
 entry and no choice is left out: one that needs a value of its own and has none in VARIED is an error.
 """
 
@@ -142,7 +142,7 @@ class Entry:
 
 
 def read_entries(manual):
-    """The table of namelist entries in the text of inputs/README.md."""
+    """The table of namelist entries in the text of inputs/entries.md."""
     rows = re.findall(r"^\| &(\w+) \| `(\w+)` \|(.*)\|$", manual, re.MULTILINE)
     entries, named = [], set()
     for group, key, rest in rows:
@@ -158,7 +158,7 @@ def read_entries(manual):
         choices = tuple(allowed.split(", ")) if kind == "word" else (".true.", ".false.") if kind == "logical" else ()
         entries.append(Entry(f"{group}.{key}", kind, choices, default.strip("`'"), condition))
     if len(entries) < 50:
-        raise ValueError("inputs/README.md: the table of namelist entries was not understood")
+        raise ValueError("inputs/entries.md: the table of namelist entries was not understood")
     return entries
 
 

@@ -12,7 +12,7 @@ from guard_cases import generated_cases, read_entries
 from guard_names import BASE, PRESENT, Names
 from guard_results import differences, read_result
 
-MANUAL = guard_python.ROOT / "inputs" / "README.md"
+MANUAL = guard_python.ROOT / "inputs" / "entries.md"
 
 
 def in_words_of_base(manual):

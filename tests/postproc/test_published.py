@@ -17,7 +17,6 @@ ROOT = Path(os.environ["POLYDEM_SOURCE_DIR"])
 #: Pages with numbers that a run of the program made, and files beside tables that have no room for words
 PAGES = [
     "inputs/bench/README.md",
-    "inputs/parallel_runs.md",
     "inputs/performance.md",
     "postproc/verdicts/README.md",
     "postproc/verdicts/precision/README.md",
@@ -30,7 +29,10 @@ PAGES = [
 
 #: Pages whose tables hold no measured numbers of one run: manuals, and lists of cases with the tests that check them
 OTHERS = {
+    "README.md",
     "inputs/README.md",
+    "inputs/checks.md",
+    "inputs/entries.md",
     "inputs/getting_started.md",
     "inputs/glossary.md",
     "inputs/log.md",

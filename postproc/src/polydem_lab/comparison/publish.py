@@ -34,8 +34,6 @@ HEAD = """## Verdicts
 * *Comparison*: times of the publication belong to the program and the scenes of its authors, times on this page to
   polydem and its own drums. A verdict judges a statement, not their measurement. Run `./polydem paper` elsewhere, and
   give the folders of both machines to `./polydem tables`: its tables compare them.
-* *Elsewhere*: the report of the comparison also holds speed against error and the verification benchmarks, which have
-  pages of their own.
 """
 
 #: Beginnings of the names of tables and figures that stand on other pages
