@@ -18,7 +18,7 @@ module polydem_force_sums
    public :: force_sums_t, contact_terms_t, term_list_t, n_terms, of_elastic, of_normal, of_tangential
    public :: sum_x, sum_y, sum_torque, sum_energy, begin_sums, start_sums, clear_sums, terms_of_block, term_of
    public :: reserve_terms, append_term, add_terms, add_late_terms, assemble_forces, total_forces, find_forces
-   public :: set_force, reserve_field, add_field
+   public :: set_force
 
    !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
    integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
@@ -39,7 +39,7 @@ module polydem_force_sums
       !> them. Not allocated if there are none
       real(wp), allocatable :: field(:, :)
       !> Whether `bodies` has the total forces of these sums on all bodies, not only on fixed ones
-      logical, private :: are_in_bodies = .true.
+      logical :: are_in_bodies = .true.
    end type force_sums_t
 
    !> Terms of the contacts of a block
@@ -85,42 +85,6 @@ contains
       allocate (sums%value(n_terms, n), source=0.0_wp)
       allocate (sums%has_terms(n), source=.false.)
    end subroutine reserve_sums
-
-   !> Make room for forces on n bodies that are no contacts. New ones are zero.
-   subroutine reserve_field(n, sums)
-      !> Number of bodies
-      integer(ip), intent(in) :: n
-      type(force_sums_t), intent(inout) :: sums
-
-      sums%are_in_bodies = .false.
-      if (allocated(sums%field)) then
-         if (size(sums%field, 2) == n) return
-         deallocate (sums%field)
-      end if
-      allocate (sums%field(3, n), source=0.0_wp)
-   end subroutine reserve_field
-
-   !> Add the forces on some bodies that are no contacts to their sums, among the normal forces that are not elastic.
-   !> Several threads may call it for different bodies.
-   pure subroutine add_field(slots, force, sums)
-      !> Slots of the bodies
-      integer(ip), intent(in) :: slots(:)
-      !> Forces along x and y [N/m] and torques [N], (3, body)
-      real(wp), intent(in) :: force(:, :)
-      !> Sums after `reserve_field`
-      type(force_sums_t), intent(inout) :: sums
-      integer(ip) :: k
-
-      do k = 1_ip, size(slots, kind=ip)
-         associate (s => slots(k))
-            sums%field(:, s) = force(:, k)
-            sums%value(sum_x(of_normal), s) = sums%value(sum_x(of_normal), s) + force(1, k)
-            sums%value(sum_y(of_normal), s) = sums%value(sum_y(of_normal), s) + force(2, k)
-            sums%value(sum_torque(of_normal), s) = sums%value(sum_torque(of_normal), s) + force(3, k)
-            sums%has_terms(s) = .true.
-         end associate
-      end do
-   end subroutine add_field
 
    !> Set the sums of all bodies to zero.
    subroutine start_sums(n, sums)

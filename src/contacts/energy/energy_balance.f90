@@ -12,8 +12,8 @@
 !> change of momentum and angular momentum up to rounding, if and only if the forces of every contact are opposite and
 !> act at one point.
 !>
-!> Every free body has its own channels (see `polydem_body_contributions`) on the rank that moves it. A channel is a sum
-!> of rates over steps. The first rate has the weight 1/2; `evaluate_balance` subtracts half of the last rate. Totals
+!> Every free body has its own channels (`polydem_body_contributions`) on the rank that moves it. A channel is a sum of
+!> rates over steps. The first rate has the weight 1/2; `evaluate_balance` subtracts half of the last rate. Totals
 !> over bodies are exact sums, rounded once, then multiplied by the time step. Their bits do not depend on the number of
 !> threads and ranks.
 !>
@@ -385,11 +385,8 @@ contains
          row(at_torque) = sums%torque(s)
          row(at_torque + 1) = abs(sums%torque(s))
          row(at_energy) = energy(s)
-         row(at_unknown) = 0.0_wp
-         if (.not. sums%is_current) then
-            row(at_mass) = row(at_mass) + 0.5_wp*bodies%mass(s)
-            row(at_unknown) = 1.0_wp
-         end if
+         row(at_unknown) = merge(0.0_wp, 1.0_wp, sums%is_current)
+         if (.not. sums%is_current) row(at_mass) = row(at_mass) + 0.5_wp*bodies%mass(s)
          row(at_channels + 1:at_walls) = sums%power_sum(:, s)
          row(at_walls + 1:) = sums%wall_sum(:, s)
          do i = 1, n_totals

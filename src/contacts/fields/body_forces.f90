@@ -3,7 +3,8 @@ module polydem_body_forces
    use polydem_bodies, only: bodies_t, block_size
    use polydem_body_force, only: body_force_t
    use polydem_drag, only: drag_t
-   use polydem_force_sums, only: add_field, force_sums_t, reserve_field
+   use polydem_field_sums, only: add_field, reserve_field
+   use polydem_force_sums, only: force_sums_t
    use polydem_kinds, only: ip, wp, min_parallel_size
    use polydem_settings, only: forces_settings_t
    implicit none

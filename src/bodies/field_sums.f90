@@ -1,0 +1,47 @@
+!> Forces on bodies that are no contacts, as part of the sums of all forces.
+module polydem_field_sums
+   use polydem_force_sums, only: force_sums_t, of_normal, sum_torque, sum_x, sum_y
+   use polydem_kinds, only: ip, wp
+   implicit none
+   private
+   public :: reserve_field, add_field
+
+contains
+
+   !> Make room for forces on n bodies that are no contacts. New ones are zero.
+   subroutine reserve_field(n, sums)
+      !> Number of bodies
+      integer(ip), intent(in) :: n
+      type(force_sums_t), intent(inout) :: sums
+
+      sums%are_in_bodies = .false.
+      if (allocated(sums%field)) then
+         if (size(sums%field, 2) == n) return
+         deallocate (sums%field)
+      end if
+      allocate (sums%field(3, n), source=0.0_wp)
+   end subroutine reserve_field
+
+   !> Add the forces on some bodies that are no contacts to their sums, among the normal forces that are not elastic.
+   !> Several threads may call it for different bodies.
+   pure subroutine add_field(slots, force, sums)
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      !> Forces along x and y [N/m] and torques [N], (3, body)
+      real(wp), intent(in) :: force(:, :)
+      !> Sums after `reserve_field`
+      type(force_sums_t), intent(inout) :: sums
+      integer(ip) :: k
+
+      do k = 1_ip, size(slots, kind=ip)
+         associate (s => slots(k))
+            sums%field(:, s) = force(:, k)
+            sums%value(sum_x(of_normal), s) = sums%value(sum_x(of_normal), s) + force(1, k)
+            sums%value(sum_y(of_normal), s) = sums%value(sum_y(of_normal), s) + force(2, k)
+            sums%value(sum_torque(of_normal), s) = sums%value(sum_torque(of_normal), s) + force(3, k)
+            sums%has_terms(s) = .true.
+         end associate
+      end do
+   end subroutine add_field
+
+end module polydem_field_sums
