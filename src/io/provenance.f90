@@ -88,7 +88,7 @@ contains
       call provenance%set('input_text', input_text)
       call provenance%set('resolved_input', resolved_input)
       call provenance%set('started', utc_now())
-      ! Identifier of the run in its manifest, checkpoint from which this attempt was restarted, hash of the initial bodies
+      ! Identifier of the run, checkpoint from which this attempt of the run was restarted, hash of the initial bodies
       call provenance%set('run', '')
       call provenance%set('parent', 'none')
       call provenance%set('scene', '')
@@ -136,8 +136,8 @@ contains
       threads_are_bound = omp_get_proc_bind() /= omp_proc_bind_false
    end function threads_are_bound
 
-   !> Write what a file contains, the version of its layout, and the group /provenance. Its entry `file` is the final name
-   !> of the file, `written` the time of this call.
+   !> Write what a file contains, the version of its layout, and the group /provenance. Its entry `file` is the final
+   !> name of the file, `written` the time of this call.
    subroutine write_provenance(file, content, provenance, error)
       !> File, open for writing
       type(hdf5_file_t), intent(inout) :: file

@@ -1,5 +1,5 @@
-!> The manifest of a result: `manifest.txt`, the list of the files that belong to the result. The program neither changes
-!> nor removes any other file in the folder.
+!> The manifest of a result: `manifest.txt`, the list of the files that belong to the result. The program neither
+!> changes nor removes any other file in the folder.
 !>
 !>     polydem-manifest 1, run 3f2a9c0d1b4e5f60
 !>     log.txt                  open                 0 00000000         0               0               0
@@ -11,11 +11,11 @@
 !> segment of the trajectory also the number of frames and the steps of the first and the last one. The last line is the
 !> CRC-32 of the lines above it.
 !>
-!> An open file may be created, changed and removed by the run; this also covers the temporary names NAME.unfinished and
-!> NAME.open. A closed file is complete and final. A file is listed as open before it is created, changed or removed, and
-!> as closed after it has its final name. A killed program may therefore leave a file with its final name that is not
-!> closed, but never an unlisted file of the result. Segments, profile.h5, trace.h5, steps.h5 and overlaps.csv are
-!> closed. log.txt, running.lock and the checkpoints, which have their own checksums, stay open.
+!> An open file may be created, changed and removed by the run; this also covers the temporary names NAME.unfinished
+!> and NAME.open. A closed file is complete and final. A file is listed as open before it is created, changed or
+!> removed, and as closed after it has its final name. A killed program may therefore leave a file with its final name
+!> that is not closed, but never an unlisted file of the result. Segments, profile.h5, trace.h5, steps.h5 and
+!> overlaps.csv are closed. log.txt, running.lock and the checkpoints, which have their own checksums, stay open.
 !>
 !> Each change replaces the whole list atomically.
 module polydem_manifest
