@@ -5,6 +5,7 @@
 !> (A. Appleby, public domain).
 module polydem_hash
    use polydem_kinds, only: ip, lp
+   use polydem_pair_keys, only: pair_key
    implicit none
    private
    public :: pair_hash, add_modulo, mix_word, hexadecimal
@@ -21,7 +22,7 @@ contains
       !> Larger index of the pair, counted from 0
       integer(ip), intent(in) :: j
 
-      pair_hash = finalise(ior(shiftl(int(i, lp), 32), int(j, lp)))
+      pair_hash = finalise(pair_key(i, j))
    end function pair_hash
 
    !> Hash of a sequence extended by one word. The start value of a sequence is arbitrary.

@@ -4,6 +4,7 @@
 !> identifier. All vectors are in world coordinates. `cohesion` and `twist` are allocated only if a force part of
 !> the run needs them.
 module polydem_contacts
+   use polydem_grow, only: grow
    use polydem_kinds, only: ip, wp
    implicit none
    private
@@ -63,11 +64,6 @@ module polydem_contacts
       real(wp), allocatable :: twist(:)
    end type contacts_t
 
-   !> Lengthen a column
-   interface lengthen
-      procedure lengthen_integers, lengthen_reals, lengthen_vectors
-   end interface lengthen
-
 contains
 
    !> Whether a contact is degenerate: its `normal` vanishes, and its `length` is the square root of the area.
@@ -109,65 +105,25 @@ contains
       !> Number of contacts to keep, and new length
       integer(ip), intent(in) :: kept, m
 
-      call lengthen(contacts%pair, kept, m)
-      call lengthen(contacts%first, kept, m)
-      call lengthen(contacts%second, kept, m)
-      call lengthen(contacts%area, kept, m)
-      call lengthen(contacts%rate, kept, m)
-      call lengthen(contacts%normal, kept, m)
-      call lengthen(contacts%moment, kept, m)
-      call lengthen(contacts%arm_first, kept, m)
-      call lengthen(contacts%arm_second, kept, m)
-      call lengthen(contacts%direction, kept, m)
-      call lengthen(contacts%length, kept, m)
-      call lengthen(contacts%inverse_length, kept, m)
-      call lengthen(contacts%lever, kept, m)
-      call lengthen(contacts%elastic, kept, m)
-      if (contacts%has_cohesion) call lengthen(contacts%cohesion, kept, m)
-      call lengthen(contacts%normal_force, kept, m)
-      call lengthen(contacts%tangential_force, kept, m)
-      if (contacts%has_twist) call lengthen(contacts%twist, kept, m)
+      call grow(contacts%pair, kept, m, 0_ip)
+      call grow(contacts%first, kept, m, 0_ip)
+      call grow(contacts%second, kept, m, 0_ip)
+      call grow(contacts%area, kept, m, 0.0_wp)
+      call grow(contacts%rate, kept, m, 0.0_wp)
+      call grow(contacts%normal, kept, m, 0.0_wp)
+      call grow(contacts%moment, kept, m, 0.0_wp)
+      call grow(contacts%arm_first, kept, m, 0.0_wp)
+      call grow(contacts%arm_second, kept, m, 0.0_wp)
+      call grow(contacts%direction, kept, m, 0.0_wp)
+      call grow(contacts%length, kept, m, 0.0_wp)
+      call grow(contacts%inverse_length, kept, m, 0.0_wp)
+      call grow(contacts%lever, kept, m, 0.0_wp)
+      call grow(contacts%elastic, kept, m, 0.0_wp)
+      if (contacts%has_cohesion) call grow(contacts%cohesion, kept, m, 0.0_wp)
+      call grow(contacts%normal_force, kept, m, 0.0_wp)
+      call grow(contacts%tangential_force, kept, m, 0.0_wp)
+      if (contacts%has_twist) call grow(contacts%twist, kept, m, 0.0_wp)
    end subroutine lengthen_columns
-
-   !> Lengthen a column of integers.
-   pure subroutine lengthen_integers(column, kept, m)
-      integer(ip), allocatable, intent(inout) :: column(:)
-      !> Number of values to keep, and new length
-      integer(ip), intent(in) :: kept, m
-      integer(ip), allocatable :: longer(:)
-
-      if (kept == 0_ip .and. allocated(column)) deallocate (column)
-      allocate (longer(m))
-      if (kept > 0_ip) longer(:kept) = column(:kept)
-      longer(kept + 1_ip:) = 0_ip
-      call move_alloc(longer, column)
-   end subroutine lengthen_integers
-
-   !> Lengthen a column of real numbers.
-   pure subroutine lengthen_reals(column, kept, m)
-      real(wp), allocatable, intent(inout) :: column(:)
-      integer(ip), intent(in) :: kept, m
-      real(wp), allocatable :: longer(:)
-
-      if (kept == 0_ip .and. allocated(column)) deallocate (column)
-      allocate (longer(m))
-      if (kept > 0_ip) longer(:kept) = column(:kept)
-      longer(kept + 1_ip:) = 0.0_wp
-      call move_alloc(longer, column)
-   end subroutine lengthen_reals
-
-   !> Lengthen a column of vectors.
-   pure subroutine lengthen_vectors(column, kept, m)
-      real(wp), allocatable, intent(inout) :: column(:, :)
-      integer(ip), intent(in) :: kept, m
-      real(wp), allocatable :: longer(:, :)
-
-      if (kept == 0_ip .and. allocated(column)) deallocate (column)
-      allocate (longer(2, m))
-      if (kept > 0_ip) longer(:, :kept) = column(:, :kept)
-      longer(:, kept + 1_ip:) = 0.0_wp
-      call move_alloc(longer, column)
-   end subroutine lengthen_vectors
 
    !> Copy a contact from one table to another.
    pure subroutine copy_contact(from, c, to, d)

@@ -1,5 +1,6 @@
 !> A list of polygons, whose vertices lie one after the other in one array.
 module polydem_polygon_list
+   use polydem_grow, only: grow
    use polydem_kinds, only: ip, lp, wp
    implicit none
    private
@@ -28,25 +29,14 @@ contains
       integer(ip), intent(in) :: n
       !> Number of their vertices
       integer(lp), intent(in) :: n_vertices
-      integer(ip), allocatable :: first(:)
-      real(wp), allocatable :: vertex(:, :)
-      integer(ip) :: used
 
       if (.not. allocated(self%first)) then
          allocate (self%first(n + 1_ip), self%vertex(2, n_vertices))
          self%first(1) = 1_ip
       end if
-      if (n >= size(self%first)) then
-         allocate (first(n + 1_ip))
-         first(:self%n + 1_ip) = self%first(:self%n + 1_ip)
-         call move_alloc(first, self%first)
-      end if
-      if (n_vertices > size(self%vertex, 2, kind=lp)) then
-         used = self%first(self%n + 1_ip) - 1_ip
-         allocate (vertex(2, n_vertices))
-         vertex(:, :used) = self%vertex(:, :used)
-         call move_alloc(vertex, self%vertex)
-      end if
+      if (n >= size(self%first)) call grow(self%first, self%n + 1_ip, n + 1_ip)
+      if (n_vertices > size(self%vertex, 2, kind=lp)) &
+         call grow(self%vertex, self%first(self%n + 1_ip) - 1_ip, int(n_vertices, ip))
    end subroutine reserve
 
    !> Append a polygon.

@@ -9,7 +9,9 @@ module polydem_provenance
    use polydem_host, only: cache_sizes, cores_online, environment, frequency_governor, host_name, kernel_release, &
       load_average, memory_size, processor_clock, processor_name, utc_now
    use polydem_instruction_set, only: isa_names
+   use polydem_hdf5_location, only: dataset_location_t
    use polydem_kinds, only: dp, ip, precision_name
+   use polydem_result_files, only: complete_name, name_in
    implicit none
    private
    public :: provenance_t, collect_provenance, threads_are_bound, write_provenance, origin_of, schema_version
@@ -86,7 +88,8 @@ contains
       call provenance%set('input_text', input_text)
       call provenance%set('resolved_input', resolved_input)
       call provenance%set('started', utc_now())
-      ! Checkpoint from which this attempt of the run was restarted, and hash of the initial bodies
+      ! Identifier of the run, checkpoint from which this attempt of the run was restarted, hash of the initial bodies
+      call provenance%set('run', '')
       call provenance%set('parent', 'none')
       call provenance%set('scene', '')
       ! Why the run has so many threads
@@ -133,8 +136,8 @@ contains
       threads_are_bound = omp_get_proc_bind() /= omp_proc_bind_false
    end function threads_are_bound
 
-   !> Write what a file contains, the version of its layout, and the group /provenance. Its entry `written` is the time
-   !> of this call.
+   !> Write what a file contains, the version of its layout, and the group /provenance. Its entry `file` is the final
+   !> name of the file, `written` the time of this call.
    subroutine write_provenance(file, content, provenance, error)
       !> File, open for writing
       type(hdf5_file_t), intent(inout) :: file
@@ -142,11 +145,15 @@ contains
       character(len=*), intent(in) :: content
       type(provenance_t), intent(in) :: provenance
       type(error_t), allocatable, intent(inout) :: error
+      type(dataset_location_t) :: place
       integer :: k
 
+      if (allocated(error)) return
+      place = file%location_of('/provenance/file')
       call file%write_attribute('/', 'content', content, error)
       call file%write_attribute('/', 'schema_version', schema_version, error)
       call file%write('/provenance/program', 'polydem', error)
+      call file%write(place%name, complete_name(name_in(place%path)), error)
       do k = 1, size(provenance%facts)
          call file%write('/provenance/'//provenance%facts(k)%name, provenance%facts(k)%text, error)
       end do

@@ -24,6 +24,7 @@ module polydem_obvious_sweeps
       phase_filter, phase_structure, phase_waiting
    use polydem_kinds, only: dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
+   use polydem_partitioned_sweep, only: share
    use polydem_sweep_ends, only: add_report, bytes_of, ends_t, place_ends, range_t, refresh_ends, report_t, sort_ends
    implicit none
    private
@@ -311,14 +312,6 @@ contains
 
       is_odd = iand(k, 1_ip) == 1_ip
    end function is_odd
-
-   !> Number of elements in the first k of several equal shares of n elements
-   pure integer(ip) function share(k, shares, n)
-      integer, intent(in) :: k, shares
-      integer(ip), intent(in) :: n
-
-      share = int(int(k, lp)*int(n, lp)/int(shares, lp), ip)
-   end function share
 
    !> Set the counter of memory [B]: ends, bounds of the previous step, parts with their changes.
    subroutine survey(self)

@@ -1,14 +1,13 @@
 !> The verb `info --check`: compares every file of a result with the manifest of its folder.
 module polydem_check_result
-   use polydem_checked_files, only: check_manifest, find_problem, find_segments
+   use polydem_checked_files, only: check_manifest, find_problem, find_segments, find_stranger
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_checksum, only: verify_checksum
    use polydem_file_system, only: is_folder
    use polydem_folders, only: link_exists, list_names
    use polydem_kinds, only: ip
    use polydem_log, only: log_t
-   use polydem_manifest, only: manifest_t
-   use polydem_manifest_lines, only: entry_t
+   use polydem_manifest, only: entry_t, manifest_t
    use polydem_result_files, only: checkpoint_path, complete_name, forms_of, manifest_name, n_checkpoints, name_in, &
       overlaps_name, profile_name, segment_number, steps_name, trace_name
    use polydem_strings, only: to_text, counted
@@ -46,15 +45,15 @@ contains
          return
       end if
       if (.not. manifest%is_found) then
-         call raise(error, io_error, folder//': has no '//manifest_name//', so no file can be checked. The folder '// &
-                    'holds no result, or one of an older version of this program')
+         call raise(error, io_error, folder//': has no '//manifest_name//', so no file can be checked')
          return
       end if
       call findings%log%open('', error)
-      call report_file(findings, manifest_name, manifest%problem, manifest_text(manifest))
+      call report_file(findings, manifest_name, manifest%problem, &
+         'lists '//to_text(int(manifest%n, ip))//' files')
       if (.not. allocated(manifest%problem)) then
          do k = 1, manifest%n
-            call check_entry(folder, manifest%entry(k), findings, error)
+            call check_entry(folder, manifest%run, manifest%entry(k), findings, error)
          end do
          call check_order(folder, manifest, findings)
          call check_others(folder, manifest, findings, error)
@@ -66,18 +65,9 @@ contains
       call findings%log%close(error)
    end subroutine check_result
 
-   !> Remark on a readable manifest
-   function manifest_text(manifest) result(text)
-      type(manifest_t), intent(in) :: manifest
-      character(len=:), allocatable :: text
-
-      text = 'lists '//to_text(int(manifest%n, ip))//' files'
-      if (manifest%is_truncated) text = text//'; its last line is incomplete, which does no harm'
-   end function manifest_text
-
    !> Check one file that the manifest lists.
-   subroutine check_entry(folder, entry, findings, error)
-      character(len=*), intent(in) :: folder
+   subroutine check_entry(folder, run, entry, findings, error)
+      character(len=*), intent(in) :: folder, run
       type(entry_t), intent(in) :: entry
       type(findings_t), intent(inout) :: findings
       !> First file that cannot be read, which is not counted as wrong
@@ -103,6 +93,8 @@ contains
       do k = 1_ip, n_checkpoints
          if (name /= name_in(checkpoint_path('', k))) cycle
          call verify_checksum(folder//'/'//name, problem, failure)
+         if (.not. (allocated(problem) .or. allocated(failure))) &
+            call find_stranger(folder//'/'//name, run, problem, failure)
          remark = 'its checksum is correct'
       end do
       call report_entry()

@@ -4,7 +4,7 @@ module polydem_claim_folder
    use polydem_errors, only: error_t
    use polydem_folder_lock, only: folder_lock_t, lock_path
    use polydem_kinds, only: ip
-   use polydem_manifest, only: manifest_t
+   use polydem_manifest, only: longest_name, manifest_t
    use polydem_result_files, only: checkpoint_path, log_name, n_checkpoints, name_in, overlaps_name, profile_name, &
       steps_name, trace_name
    use polydem_set_aside, only: set_aside
@@ -12,9 +12,6 @@ module polydem_claim_folder
    implicit none
    private
    public :: claim_folder
-
-   !> Greatest length of the name of a result file
-   integer, parameter :: longest = 32
 
 contains
 
@@ -40,8 +37,8 @@ contains
       type(manifest_t), intent(inout) :: manifest
       !> Allocated if a file is in the way; names the file. The folder is then unchanged
       type(error_t), allocatable, intent(inout) :: error
-      character(len=longest), allocatable :: names(:)
-      character(len=longest) :: lock_name
+      character(len=longest_name), allocatable :: names(:)
+      character(len=longest_name) :: lock_name
       integer :: k
 
       call list_output_names(settings%output, has_deep_contacts, names)
@@ -82,17 +79,17 @@ contains
    subroutine list_output_names(output, has_deep_contacts, names)
       type(output_settings_t), intent(in) :: output
       logical, intent(in) :: has_deep_contacts
-      character(len=longest), allocatable, intent(out) :: names(:)
+      character(len=longest_name), allocatable, intent(out) :: names(:)
       integer(ip) :: k
 
       allocate (names(2))
-      names = [character(len=longest) :: log_name, profile_name]
+      names = [character(len=longest_name) :: log_name, profile_name]
       do k = 1_ip, n_checkpoints
-         names = [character(len=longest) :: names, name_in(checkpoint_path('', k))]
+         names = [character(len=longest_name) :: names, name_in(checkpoint_path('', k))]
       end do
-      if (output%trace_steps > 0_ip) names = [character(len=longest) :: names, trace_name]
-      if (output%step_profile) names = [character(len=longest) :: names, steps_name]
-      if (has_deep_contacts) names = [character(len=longest) :: names, overlaps_name]
+      if (output%trace_steps > 0_ip) names = [character(len=longest_name) :: names, trace_name]
+      if (output%step_profile) names = [character(len=longest_name) :: names, steps_name]
+      if (has_deep_contacts) names = [character(len=longest_name) :: names, overlaps_name]
    end subroutine list_output_names
 
 end module polydem_claim_folder

@@ -108,6 +108,7 @@ contains
       if (allocated(error)) return
       call claim_folder(settings, run%measures%deep > 0_lp, run%folder, force, is_restart(run), &
                         run%comm%size > 1_ip, run%lock, run%folder_note, run%manifest, error)
+      call run%provenance%set('run', run%manifest%run)
       if (.not. allocated(error)) call run%log%open(run%folder, error, appended=is_restart(run), &
          brief=run%attempt%is_brief)
       if (allocated(error)) return

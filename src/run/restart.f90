@@ -1,7 +1,7 @@
 !> Restart of an interrupted run: finds the newest valid checkpoint and restores the simulation from it.
 module polydem_restart
    use polydem_changed_entries, only: changed_entries
-   use polydem_checked_files, only: check_closed, find_segments, read_frames
+   use polydem_checked_files, only: check_closed, find_segments, find_stranger, read_frames
    use polydem_checkpoint_fields, only: attempts_t, serialize_progress, serialize_run
    use polydem_checkpoint_file, only: checkpoint_file_t
    use polydem_domain, only: new_domain
@@ -70,7 +70,7 @@ contains
       character(len=:), allocatable :: changes, former
 
       call check_closed(manifest, folder, error)
-      if (.not. allocated(error)) call choose_checkpoint(folder, earlier, error)
+      if (.not. allocated(error)) call choose_checkpoint(folder, manifest, earlier, error)
       if (allocated(error)) return
       if (earlier%checkpoint == 0_ip) then
          call restart_without_checkpoint(folder, manifest, settings, scene, earlier, error)
@@ -89,7 +89,7 @@ contains
       end if
       if (allocated(error)) return
       if (changes /= '') earlier%remark = earlier%remark//new_line('a')//'changed    '//changes
-      call count_segments(folder, manifest, scene, changes /= '', earlier, error)
+      call count_segments(folder, manifest, changes /= '', earlier, error)
    end subroutine find_restart
 
    !> Why the initial bodies differ from those of the earlier run: by entries, or by the contents of a file
@@ -133,7 +133,7 @@ contains
       changes = changed_entries(former_settings, settings%resolved)
       if (changes == '' .and. former /= scene) changes = why_other(settings, changes)
       if (changes == '') then
-         call count_segments(folder, manifest, scene, .false., earlier, error)
+         call count_segments(folder, manifest, .false., earlier, error)
       else
          call raise(error, input_error, folder//' has no checkpoint from which a run with other settings could '// &
                     'continue: '//changes//'. Choose another folder with --set output.folder=NAME, or use --force '// &
@@ -143,8 +143,9 @@ contains
 
    !> Read all checkpoints and choose the valid one with the greatest step. One that the system refuses to read may be
    !> good and newer, so it is an error.
-   subroutine choose_checkpoint(folder, earlier, error)
+   subroutine choose_checkpoint(folder, manifest, earlier, error)
       character(len=*), intent(in) :: folder
+      type(manifest_t), intent(in) :: manifest
       type(restart_state_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       type(error_t), allocatable :: problem
@@ -156,7 +157,7 @@ contains
       do k = 1_ip, n_checkpoints
          if (.not. exists(checkpoint_path(folder, k), error)) cycle
          candidate = restart_state_t(checkpoint=k)
-         call read_progress(checkpoint_path(folder, k), candidate, problem)
+         call read_progress(checkpoint_path(folder, k), manifest%run, candidate, problem)
          if (allocated(problem)) then
             if (problem%is_unread) then
                problem%message = problem%message//'. Try again; if this remains, move the file away, and the run '// &
@@ -182,12 +183,13 @@ contains
    end subroutine choose_checkpoint
 
    !> Read step, attempts and settings of a checkpoint.
-   subroutine read_progress(path, earlier, error)
-      character(len=*), intent(in) :: path
+   subroutine read_progress(path, run, earlier, error)
+      character(len=*), intent(in) :: path, run
       type(restart_state_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
       type(attempts_t) :: attempts
+      character(len=:), allocatable :: stranger
 
       call file%open(path, error)
       if (allocated(error)) return
@@ -195,11 +197,13 @@ contains
       earlier%segments_at_checkpoint = attempts%segments
       if (.not. allocated(file%error)) call file%read_origin(earlier%revision, earlier%former_settings, error)
       call file%close(error)
+      if (.not. allocated(error)) call find_stranger(path, run, stranger, error)
+      if (allocated(stranger)) call raise(error, io_error, path//' '//stranger)
    end subroutine read_progress
 
    !> Find the last frame in closed segments. With changed settings, the run removes segments after the checkpoint.
-   subroutine count_segments(folder, manifest, scene, is_changed, earlier, error)
-      character(len=*), intent(in) :: folder, scene
+   subroutine count_segments(folder, manifest, is_changed, earlier, error)
+      character(len=*), intent(in) :: folder
       type(manifest_t), intent(in) :: manifest
       logical, intent(in) :: is_changed
       type(restart_state_t), intent(inout) :: earlier
@@ -210,7 +214,7 @@ contains
 
       call find_segments(manifest, folder, places, problem)
       earlier%segments = size(places, kind=ip)
-      call find_unlisted(folder, manifest, scene, places, earlier, error)
+      call find_unlisted(folder, manifest, places, earlier, error)
       if (allocated(error)) return
       if (int(earlier%segments, lp) < earlier%segments_at_checkpoint) then
          call raise(error, io_error, segment_path(folder, earlier%segments + 1_ip)//' is missing, but it existed '// &
@@ -239,13 +243,13 @@ contains
 
    !> Find a segment that has its final name but is not closed in the manifest, because a kill came in between. A
    !> segment gets its final name only when it is complete.
-   subroutine find_unlisted(folder, manifest, scene, places, earlier, error)
-      character(len=*), intent(in) :: folder, scene
+   subroutine find_unlisted(folder, manifest, places, earlier, error)
+      character(len=*), intent(in) :: folder
       type(manifest_t), intent(in) :: manifest
       integer, intent(in) :: places(:)
       type(restart_state_t), intent(inout) :: earlier
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: path, former
+      character(len=:), allocatable :: path, problem
       integer(lp) :: last
 
       path = segment_path(folder, earlier%segments + 1_ip)
@@ -253,13 +257,13 @@ contains
       if (.not. exists(path, error)) return
       call read_frames(path, earlier%unlisted, error)
       if (allocated(error)) return
+      call find_stranger(path, manifest%run, problem, error)
       last = -1_lp
       if (size(places) > 0) last = manifest%entry(places(size(places)))%frames(3)
-      if (earlier%unlisted(2) <= last) call raise(error, io_error, path//' does not follow the previous segment, '// &
-         'which ends at step '//to_text(last)//'. Move the file away; the run writes its frames again')
-      former = origin_of(path, 'scene', error)
-      if (former /= scene) call raise(error, io_error, path//' is a segment of another run: '// &
-         other_bodies//'. Move the file away; the run writes its frames again')
+      if (earlier%unlisted(2) <= last .and. .not. allocated(problem)) &
+         problem = 'does not follow the previous segment, which ends at step '//to_text(last)
+      if (allocated(problem)) call raise(error, io_error, path//' '//problem//'. Move the file away; the run '// &
+         'writes its frames again')
       earlier%segments = earlier%segments + 1_ip
    end subroutine find_unlisted
 

@@ -18,6 +18,7 @@ module polydem_wall_shares
    use polydem_contact_history, only: contact_history_t
    use polydem_fill_block, only: fill_block
    use polydem_force_law, only: force_law_t
+   use polydem_grow, only: grow
    use polydem_kinds, only: ip, min_parallel_size, wp
    use polydem_pair_list, only: pair_list_t
    implicit none
@@ -262,19 +263,14 @@ contains
    subroutine reserve_pairs(n, shares)
       integer(ip), intent(in) :: n
       type(wall_shares_t), intent(inout) :: shares
-      integer(ip), allocatable :: longer(:)
       integer(ip) :: room, k
 
       room = 0_ip
       if (allocated(shares%pair)) room = size(shares%pair, kind=ip)
       if (room >= n) return
       room = max(2_ip*room, n)
-      allocate (longer(room))
-      if (shares%n > 0_ip) longer(:shares%n) = shares%pair(:shares%n)
-      call move_alloc(longer, shares%pair)
-      allocate (longer(room))
-      if (shares%n > 0_ip) longer(:shares%n) = shares%body(:shares%n)
-      call move_alloc(longer, shares%body)
+      call grow(shares%pair, shares%n, room)
+      call grow(shares%body, shares%n, room)
       if (allocated(shares%root)) deallocate (shares%root, shares%ratio, shares%direction, shares%mine)
       allocate (shares%root(room), shares%ratio(room), shares%direction(2, room))
       allocate (shares%mine((room - 1_ip)/block_size + 1_ip))

@@ -26,7 +26,7 @@ from polydem_post.base.emit import Table, printable
 from polydem_post.command_line import data_verbs
 from polydem_post.command_line import main as command_line
 from synthetic_bench import truths, write_sample
-from test_manifest import texts_of, write_manifest
+from test_manifest import rows_of, write_manifest
 
 FLIPPED = int(os.environ.get("POLYDEM_FUZZ", "3"))
 
@@ -66,7 +66,7 @@ def whole(tmp_path_factory, finished):
         file["counters/name"] = np.array([b"steps", b"pairs", b"ranks"])
         file["counters/value"] = [7, 5, 1]
     shutil.copytree(finished, folder / "checked")
-    write_manifest(folder / "checked", texts_of(finished))
+    write_manifest(folder / "checked", rows_of(finished))
     for finder in ("quadtree", "sort_and_sweep"):
         for repeat in range(2):
             write_sample(folder / "bench", "drum_100", finder, truths()[finder], 100, repeat=repeat)

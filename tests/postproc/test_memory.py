@@ -7,7 +7,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from polydem_post.read.manifest import HEADING, file_hashes, line_hash
+from test_manifest import closed_row, write_manifest
 
 #: Bodies, contacts and frames of a segment, and segments; POLYDEM_SEGMENTS=220 makes the 1 GB of the manual
 BODIES, CONTACTS, FRAMES = 20000, 40000, 1
@@ -56,19 +56,14 @@ def write_segment(path, number):
 def write_result(folder):
     """A result with a manifest; return its size [MB]."""
     folder.mkdir()
-    texts, total = [HEADING], 0
+    rows, total = [], 0
     for number in range(SEGMENTS):
         path = folder / f"trajectory_{number + 1:04d}.h5"
         write_segment(path, number)
-        size, first = path.stat().st_size, number * FRAMES
-        total += size
-        texts += [f"owns {path.name}",
-                  f"closed {path.name} {size} {file_hashes([path])[0]} {FRAMES} {first} {first + FRAMES - 1}"]
-    previous, lines = 0, []
-    for text in texts:
-        previous = line_hash(previous, text.encode())
-        lines.append(f"{text} {previous:016x}\n")
-    (folder / "manifest.txt").write_text("".join(lines))
+        first = number * FRAMES
+        rows.append(closed_row(path, FRAMES, first, first + FRAMES - 1))
+        total += path.stat().st_size
+    write_manifest(folder, rows)
     return total / 1e6
 
 

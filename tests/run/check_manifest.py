@@ -14,6 +14,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from pathlib import Path
 
 #: Few bodies, so a run takes some milliseconds; they overlap, so a run writes overlaps.csv
 SCENE = """\
@@ -168,6 +169,35 @@ def missing_cut_and_exchanged_files_are_found(program):
         assert code == NO_FILE, (length, output)
 
 
+def open_files_of_another_run_are_found(program):
+    """Files without a checksum in the manifest: a segment whose closing a kill prevented, and checkpoints."""
+    for folder in "first", "equal":
+        code, _, message = program.run(folder)
+        assert code == 0, message
+    last = segments("first")[-1]
+    assert os.path.getsize(f"equal/{last}") == os.path.getsize(f"first/{last}")
+    cases = {f"equal/{last}": (f"{last} was written by another run", [last]),
+             f"first/{segments('first')[0]}": (f"{last} was written as {segments('first')[0]}", [last]),
+             "equal/checkpoint_1.h5": ("was written by another run", ["checkpoint_1.h5", "checkpoint_2.h5"])}
+    for source, (words, names) in cases.items():
+        folder = copy("begun", "first")
+        os.remove(f"{folder}/profile.h5")
+        seal_list(Path(folder, "manifest.txt"),
+                  lambda lines: re.sub(f"^(profile.h5|{last})( +)closed", r"\1\2  open", lines, flags=re.MULTILINE))
+        for name in names:
+            shutil.copy(source if name == last else f"equal/{name}", f"{folder}/{name}")
+        before = contents(folder)
+        code, _, message = program.run(folder, "--continue")
+        assert code == NO_FILE and words in message, (source, code, message)
+        assert contents(folder) == before
+        code, output, _ = program.check(folder)
+        assert code == NO_FILE and f"WRONG  {names[0]}" in output, (source, output)
+    shutil.copy("first/checkpoint_1.h5", f"{folder}/checkpoint_1.h5")
+    code, output, message = program.run(folder, "--continue")
+    assert code == 0 and "checkpoint_2.h5 was written by another run" in output, (output, message)
+    assert output.splitlines()[-1] == program.hash
+
+
 def files_of_somebody_else_stay(program):
     for name in NAMES:
         for ending in ENDINGS:
@@ -238,7 +268,7 @@ def a_result_without_a_manifest_is_left_alone(program):
     before = contents(folder)
     for way in WAYS:
         code, _, message = program.run(folder, *way, *RECORDED)
-        assert code == BAD_INPUT and "Results of older versions" in message, (way, message)
+        assert code == BAD_INPUT and f"{folder}/" in message and "blocks a file" in message, (way, message)
         assert contents(folder) == before
     code, _, message = program.call("info", "--check", folder)
     assert code == NO_FILE and "has no manifest.txt" in message, message
@@ -356,7 +386,8 @@ def main():
         os.chdir(work)
         program = Program(program_path, library)
         tests = (every_file_is_listed_with_its_checksum, flipped_bits_are_found,
-                 missing_cut_and_exchanged_files_are_found, files_of_somebody_else_stay,
+                 missing_cut_and_exchanged_files_are_found, open_files_of_another_run_are_found,
+                 files_of_somebody_else_stay,
                  nothing_is_written_through_links, a_result_without_a_manifest_is_left_alone,
                  force_does_not_replace_its_own_input, other_bodies_are_not_taken_for_the_finished_run,
                  force_renames_the_folder_with_all_files, a_disturbed_force_leaves_a_whole_result)
@@ -367,4 +398,8 @@ def main():
 
 
 if __name__ == "__main__":
+    sys.dont_write_bytecode = True
+    sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "ranks"))
+    from seals import seal_list
+
     main()

@@ -18,14 +18,10 @@ verbs, until S seconds are over (15); it depends on the programs only. --full an
 check_writes.py.
 """
 
-import argparse
-import contextlib
 import os
 import random
 import re
 import shutil
-import signal
-import subprocess
 import sys
 import tempfile
 import time
@@ -33,15 +29,12 @@ import traceback
 from collections import Counter
 from pathlib import Path
 
-from check_writes import SKIPPED, WAITING, Broken, Call, Memory, hash_of, in_order
+from check_writes import WAITING, Broken, Call, execute, hash_of, in_order, main, set_up
 
-ROOT = Path(__file__).resolve().parents[2]
 #: Calls of a verb in a sample
 SAMPLE = 6
 #: When the test began [s]
 BEGAN = time.monotonic()
-#: Time within which a verb must have ended [s]
-PATIENCE = 300.0
 OUTLINES = "".join(f"POLYGON ((0 {y}, 0.01 {y}, 0.01 {y + 0.01:.2f}, 0 {y + 0.01:.2f}, 0 {y}))\n"
                    for y in (0.0, 0.009, 0.018))
 #: What both scenes have: frames with contacts in several segments, a checkpoint after each step
@@ -127,16 +120,7 @@ class Case:
         if words.split()[0] in PYTHON_VERBS:
             return in_python(words.split(), environment)
         command = ["mpirun", "-n", str(ranks), os.environ["POLYDEM_MPI_PROGRAM"]] if ranks else [self.program]
-        with subprocess.Popen([*command, *words.split()], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
-                              stderr=subprocess.PIPE, text=True, errors="replace", start_new_session=True,
-                              env={**SURROUNDINGS, "OMP_NUM_THREADS": "1", **environment}) as process:
-            try:
-                output, message = process.communicate(timeout=PATIENCE)
-            except subprocess.TimeoutExpired as late:
-                with contextlib.suppress(ProcessLookupError):
-                    os.killpg(process.pid, signal.SIGKILL)
-                raise Broken(f"nothing happens for {PATIENCE:.0f} s") from late
-        return process.returncode, output, message
+        return execute([*command, *words.split()], {**SURROUNDINGS, "OMP_NUM_THREADS": "1", **environment})
 
     def insist(self, words, code=0, **environment):
         found, output, message = self.call(words, **environment)
@@ -290,7 +274,7 @@ def try_calls(case, options, memory):
     all_calls, broken, outcomes, tried = Counter(), [], Counter(), Counter()
 
     def is_over():
-        return not options.full and tried and time.monotonic() - BEGAN > options.seconds
+        return not options.full and tried and time.monotonic() - BEGAN > (options.seconds or 15.0)
 
     for verb in verbs:
         if is_over():
@@ -315,47 +299,12 @@ def try_calls(case, options, memory):
     return broken
 
 
-def parse(words):
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("program", type=os.path.abspath)
-    parser.add_argument("library", type=os.path.abspath)
-    parser.add_argument("--ranks", type=int, default=0)
-    parser.add_argument("--full", action="store_true")
-    parser.add_argument("--verbs")
-    parser.add_argument("--part", default="1/1")
-    parser.add_argument("--how", choices=("once", "on", "short", "cut"), default="once")
-    parser.add_argument("--error", type=int, default=5)
-    parser.add_argument("--seconds", type=float, default=15.0)
-    parser.add_argument("--memory", type=os.path.abspath)
-    return parser.parse_args(words)
-
-
-def main(words):
-    options = parse(words)
-    programs = [options.program, options.library, *([os.environ["POLYDEM_MPI_PROGRAM"]] if options.ranks else [])]
-    memory = Memory(options.memory, programs)
-    with tempfile.TemporaryDirectory() as work:
-        os.chdir(os.path.realpath(work))
-        return 1 if try_calls(Case(options.program, options.library, options.ranks, options.how, options.error),
-                              options, memory) else 0
-
-
 if __name__ == "__main__":
-    if "--ranks" in sys.argv and not os.environ.get("POLYDEM_MPI_PROGRAM"):
-        print("skipped: POLYDEM_MPI_PROGRAM does not name a program with MPI")
-        sys.exit(SKIPPED)
-    PYTHON = ROOT / ".venv" / "bin" / "python"
-    if "LD_PRELOAD" not in os.environ:
-        # Verbs of Python are children of this process.
-        os.environ["LD_PRELOAD"] = os.path.abspath(sys.argv[2])
-        os.execv(PYTHON if PYTHON.exists() else sys.executable, [str(PYTHON), *sys.argv])
-    os.environ["POLYDEM_PROGRAM"] = os.path.abspath(sys.argv[1])
-    os.environ["POLYDEM_MPI_PROGRAM"] = os.path.abspath(os.environ.get("POLYDEM_MPI_PROGRAM", sys.argv[1]))
-    sys.dont_write_bytecode = True
-    sys.path[:0] = [str(ROOT / "tests" / "ranks"), str(ROOT / "postproc" / "src")]
+    # Verbs of Python are children of this process.
+    set_up(sys.argv, {"LD_PRELOAD": os.path.abspath(sys.argv[2])})
     import matplotlib.pyplot  # noqa: F401  the children need not import it
     from polydem_post.command_line.main import main as polydem_post
     from runs import ENVIRONMENT as SURROUNDINGS
 
     SURROUNDINGS = {name: text for name, text in SURROUNDINGS.items() if name != "LD_PRELOAD"}
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main(sys.argv[1:], __doc__, Case, try_calls))

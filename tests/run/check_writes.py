@@ -66,7 +66,7 @@ class Case:
     """The programs, how to start them, and the expected output of an undisturbed run."""
 
     def __init__(self, program, library, ranks, how, error):
-        self.program, self.library = os.path.abspath(program), os.path.abspath(library)
+        self.program, self.library = program, library
         self.ranks, self.how, self.error = ranks, how, error
         self.work = Path.cwd()
         duration = f"{STEPS_OF_RANKS if ranks else STEPS}e-5"
@@ -81,17 +81,7 @@ class Case:
         command = ["mpirun", "-n", str(ranks), os.environ["POLYDEM_MPI_PROGRAM"]] if ranks else [self.program]
         command += ["run", "scene.nml", "--threads", "1", "--set", f"output.folder={folder}", *options]
         began = time.monotonic()
-        with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-                              text=True, errors="replace", env={**SURROUNDINGS, **environment},
-                              start_new_session=True) as process:
-            try:
-                output, message = process.communicate(timeout=PATIENCE)
-            except subprocess.TimeoutExpired as late:
-                with contextlib.suppress(ProcessLookupError):
-                    os.killpg(process.pid, signal.SIGKILL)
-                process.communicate()
-                raise Broken(f"hangs: not ended after {PATIENCE:.0f} s") from late
-        return process.returncode, output, message, time.monotonic() - began
+        return *execute(command, {**SURROUNDINGS, **environment}), time.monotonic() - began
 
     def watched(self, folder, rank, **environment):
         """Run it with the library in front, which counts or fails calls of a rank; give what `run` does and its log."""
@@ -172,6 +162,20 @@ class Case:
         rank = r"\d" if call.name == "open" else str(call.rank)
         if call.rank > 0 and not any(re.search(f"rank {rank}", line) for line in said):
             raise Broken(f"the message does not name the rank:\n{message}")
+
+
+def execute(command, environment):
+    """Run a command to its end; return exit code, standard output, standard error."""
+    with subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+                          errors="replace", env=environment, start_new_session=True) as process:
+        try:
+            output, message = process.communicate(timeout=PATIENCE)
+        except subprocess.TimeoutExpired as late:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.communicate()
+            raise Broken(f"hangs: not ended after {PATIENCE:.0f} s") from late
+    return process.returncode, output, message
 
 
 class Call:
@@ -262,45 +266,53 @@ def try_calls(case, options, memory):
     return broken
 
 
-def parse(words):
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("program")
-    parser.add_argument("library")
+def parse(words, purpose):
+    """Options of a test, whose purpose is the first line of a text."""
+    parser = argparse.ArgumentParser(description=purpose.splitlines()[0])
+    parser.add_argument("program", type=os.path.abspath)
+    parser.add_argument("library", type=os.path.abspath)
     parser.add_argument("--ranks", type=int, default=0)
     parser.add_argument("--full", action="store_true")
+    parser.add_argument("--verbs")
     parser.add_argument("--part", default="1/1")
-    parser.add_argument("--how", choices=("once", "on", "short"), default="once")
+    parser.add_argument("--how", choices=("once", "on", "short", "cut"), default="once")
     parser.add_argument("--error", type=int, default=5)
     parser.add_argument("--seconds", type=float)
     parser.add_argument("--memory", type=os.path.abspath)
     return parser.parse_args(words)
 
 
-def main(words):
-    options = parse(words)
-    programs = [options.program, options.library]
-    if options.ranks:
-        programs.append(os.environ["POLYDEM_MPI_PROGRAM"])
-    memory = Memory(options.memory, programs)
+def main(words, purpose, make_case, try_all):
+    """Try the calls of a case in a folder of their own; give the exit code."""
+    options = parse(words, purpose)
+    memory = Memory(options.memory, [options.program, options.library,
+                                     *([os.environ["POLYDEM_MPI_PROGRAM"]] if options.ranks else [])])
     with tempfile.TemporaryDirectory() as work:
-        programs = [os.path.abspath(word) for word in programs]
         os.chdir(os.path.realpath(work))
-        return 1 if try_calls(Case(*programs[:2], options.ranks, options.how, options.error), options, memory) else 0
+        case = make_case(options.program, options.library, options.ranks, options.how, options.error)
+        return 1 if try_all(case, options, memory) else 0
+
+
+def set_up(words, python_variables=None):
+    """Skip the test if it needs MPI, start it anew by the Python of the project, and make its modules known."""
+    if "--ranks" in words and not os.environ.get("POLYDEM_MPI_PROGRAM"):
+        print("skipped: POLYDEM_MPI_PROGRAM does not name a program with MPI")
+        sys.exit(SKIPPED)
+    python = ROOT / ".venv" / "bin" / "python"
+    missing = {name: text for name, text in (python_variables or {}).items() if name not in os.environ}
+    if missing or (python.exists() and Path(sys.prefix) != python.parents[1]):
+        os.environ.update(missing)
+        os.execv(python if python.exists() else sys.executable, [str(python), *words])
+    os.environ["POLYDEM_PROGRAM"] = os.path.abspath(words[1])
+    os.environ["POLYDEM_MPI_PROGRAM"] = os.path.abspath(os.environ.get("POLYDEM_MPI_PROGRAM", words[1]))
+    sys.dont_write_bytecode = True
+    sys.path[:0] = [str(ROOT / "tests" / "ranks"), str(ROOT / "postproc" / "src")]
 
 
 if __name__ == "__main__":
-    if "--ranks" in sys.argv and not os.environ.get("POLYDEM_MPI_PROGRAM"):
-        print("skipped: POLYDEM_MPI_PROGRAM does not name a program with MPI")
-        sys.exit(SKIPPED)
-    PYTHON = ROOT / ".venv" / "bin" / "python"
-    if PYTHON.exists() and Path(sys.prefix) != PYTHON.parents[1]:
-        os.execv(PYTHON, [str(PYTHON), *sys.argv])
-    os.environ["POLYDEM_PROGRAM"] = os.path.abspath(sys.argv[1])
-    os.environ["POLYDEM_MPI_PROGRAM"] = os.path.abspath(os.environ.get("POLYDEM_MPI_PROGRAM", sys.argv[1]))
-    sys.dont_write_bytecode = True
-    sys.path[:0] = [str(ROOT / "tests" / "ranks"), str(ROOT / "postproc" / "src")]
+    set_up(sys.argv)
     from runs import ENVIRONMENT as SURROUNDINGS
     from runs import frames
     from seals import seal
 
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main(sys.argv[1:], __doc__, Case, try_calls))

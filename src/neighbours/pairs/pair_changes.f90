@@ -3,11 +3,13 @@
 !> Finders record changes in any order. `order` then sorts them and adds up those of the same pair of pieces, as
 !> `pair_list_t` requires. A few hundred changes are sorted instead of the whole list of pairs.
 module polydem_pair_changes
+   use polydem_grow, only: grow
    use polydem_kinds, only: ip, lp
+   use polydem_pair_keys, only: pair_key
    use polydem_sort, only: sort_keys
    implicit none
    private
-   public :: pair_changes_t, pair_key
+   public :: pair_changes_t
 
    !> A growing list of changes, keyed by the pair of pieces
    type :: pair_changes_t
@@ -31,16 +33,6 @@ module polydem_pair_changes
 
 contains
 
-   !> One integer that orders pairs of pieces: by the lower index, then by the higher
-   pure integer(lp) function pair_key(a, b)
-      !> Index of one piece
-      integer(ip), intent(in) :: a
-      !> Index of the other piece
-      integer(ip), intent(in) :: b
-
-      pair_key = ior(shiftl(int(min(a, b), lp), 32), int(max(a, b), lp))
-   end function pair_key
-
    !> Delete all changes; the arrays stay allocated.
    pure subroutine clear(self)
       class(pair_changes_t), intent(inout) :: self
@@ -60,7 +52,7 @@ contains
 
       call reserve(self, self%n + 1_ip)
       self%n = self%n + 1_ip
-      self%key(self%n) = pair_key(a, b)
+      self%key(self%n) = pair_key(min(a, b), max(a, b))
       self%step(self%n) = step
    end subroutine record
 
@@ -124,21 +116,14 @@ contains
    pure subroutine reserve(self, capacity)
       type(pair_changes_t), intent(inout) :: self
       integer(ip), intent(in) :: capacity
-      integer(lp), allocatable :: key(:)
-      integer(ip), allocatable :: step(:)
       integer(ip) :: m
 
       if (allocated(self%key)) then
          if (size(self%key) >= capacity) return
       end if
       m = max(256_ip, 2_ip*capacity)
-      allocate (key(m), step(m))
-      if (self%n > 0_ip) then
-         key(1:self%n) = self%key(1:self%n)
-         step(1:self%n) = self%step(1:self%n)
-      end if
-      call move_alloc(key, self%key)
-      call move_alloc(step, self%step)
+      call grow(self%key, self%n, m)
+      call grow(self%step, self%n, m)
    end subroutine reserve
 
 end module polydem_pair_changes

@@ -7,8 +7,10 @@
 !> Blocks can move in place because they keep their order. Blocks that move down are moved from the front, blocks that
 !> move up from the back. No block overwrites another one that has yet to move.
 module polydem_pair_list
+   use polydem_grow, only: grow
    use polydem_kinds, only: ip, lp, wp
-   use polydem_pair_changes, only: pair_changes_t, pair_key
+   use polydem_pair_changes, only: pair_changes_t
+   use polydem_pair_keys, only: first_of, pair_key, second_of
    implicit none
    private
    public :: pair_list_t
@@ -131,8 +133,8 @@ contains
       do k = 1_ip, self%n_began
          place = self%began(k)
          key = changes%key(self%cause(k))
-         self%first(place) = int(shiftr(key, 32), ip)
-         self%second(place) = int(iand(key, int(huge(1_ip), lp)), ip)
+         self%first(place) = first_of(key)
+         self%second(place) = second_of(key)
          call join(self, self%first(place))
          call join(self, self%second(place))
          if (self%counted) self%overlaps(place) = changes%step(self%cause(k))
@@ -209,8 +211,8 @@ contains
       integer(ip), intent(in) :: from
       integer(ip) :: high, middle, first, second
 
-      first = int(shiftr(key, 32), ip)
-      second = int(iand(key, int(huge(1_ip), lp)), ip)
+      first = first_of(key)
+      second = second_of(key)
       place_of = from
       high = self%n + 1_ip
       do while (place_of < high)
@@ -262,15 +264,10 @@ contains
       real(wp), allocatable, intent(inout) :: values(:)
       !> Value of pairs that began
       real(wp), intent(in) :: fill
-      real(wp), allocatable :: longer(:)
       integer(ip) :: b, k
 
       if (self%n_began == 0_ip .and. self%n_ended == 0_ip) return
-      if (size(values) < self%n) then
-         allocate (longer(self%n + self%n/2_ip))
-         longer(1:size(values)) = values
-         call move_alloc(longer, values)
-      end if
+      if (size(values) < self%n) call grow(values, size(values, kind=ip), self%n + self%n/2_ip)
       do b = 1_ip, self%n_blocks
          if (self%block(3, b) > 0_ip) cycle
          do k = self%block(1, b), self%block(2, b)
@@ -329,14 +326,9 @@ contains
    pure subroutine resize(values, n)
       integer(ip), allocatable, intent(inout) :: values(:)
       integer(ip), intent(in) :: n
-      integer(ip), allocatable :: longer(:)
 
-      if (allocated(values)) then
-         if (size(values) >= n) return
-      end if
-      allocate (longer(n + n/2_ip))
-      if (allocated(values)) longer(1:size(values)) = values
-      call move_alloc(longer, values)
+      if (.not. allocated(values)) allocate (values(0))
+      if (size(values) < n) call grow(values, size(values, kind=ip), n + n/2_ip)
    end subroutine resize
 
    !> Make room for a number of changes.

@@ -1,8 +1,9 @@
 !> Active candidates: those that are compared in every step of an interval (`polydem_inner_list`).
 module polydem_active_pairs
    use polydem_candidates, only: candidates_t
+   use polydem_grow, only: grow
    use polydem_index_list, only: index_list_t
-   use polydem_kinds, only: bp, ip
+   use polydem_kinds, only: ip
    implicit none
    private
    public :: active_pairs_t
@@ -35,23 +36,15 @@ contains
       class(active_pairs_t), intent(inout) :: self
       !> Number of candidates
       integer(ip), intent(in) :: n
-      integer(ip), allocatable :: box(:, :), owner(:)
-      integer(bp), allocatable :: overlap(:)
       integer(ip) :: m
 
       if (allocated(self%owner)) then
          if (size(self%owner) >= n) return
       end if
       m = n + n/2_ip + 64_ip
-      allocate (box(2, m), owner(m), overlap(m))
-      if (self%n > 0_ip) then
-         box(:, 1:self%n) = self%box(:, 1:self%n)
-         owner(1:self%n) = self%owner(1:self%n)
-         overlap(1:self%n) = self%overlap(1:self%n)
-      end if
-      call move_alloc(box, self%box)
-      call move_alloc(owner, self%owner)
-      call move_alloc(overlap, self%overlap)
+      call grow(self%box, self%n, m)
+      call grow(self%owner, self%n, m)
+      call grow(self%overlap, self%n, m)
    end subroutine reserve
 
    !> Append a candidate.
@@ -120,13 +113,9 @@ contains
       class(active_pairs_t), intent(inout) :: self
       !> Number of candidates
       integer(ip), intent(in) :: n
-      integer(ip), allocatable :: longer(:)
 
       if (.not. allocated(self%place)) allocate (self%place(0))
-      if (n <= size(self%place)) return
-      allocate (longer(n + n/4_ip + 64_ip), source=0_ip)
-      longer(1:size(self%place)) = self%place
-      call move_alloc(longer, self%place)
+      if (n > size(self%place)) call grow(self%place, size(self%place, kind=ip), n + n/4_ip + 64_ip, 0_ip)
    end subroutine reserve_places
 
    !> Copy the states to the list of all candidates.

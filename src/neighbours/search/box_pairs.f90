@@ -7,6 +7,7 @@
 !> threads.
 module polydem_box_pairs
    use polydem_boxes, only: boxes_t
+   use polydem_grow, only: grow
    use polydem_kinds, only: ip, lp
    use polydem_pair_changes, only: pair_changes_t
    use polydem_sort, only: sort_keys
@@ -52,14 +53,11 @@ contains
       class(found_pairs_t), intent(inout) :: self
       !> Number of pairs to make room for
       integer(ip), intent(in) :: more
-      integer(ip), allocatable :: longer(:, :)
 
       if (allocated(self%box)) then
          if (size(self%box, 2) >= self%n + more) return
       end if
-      allocate (longer(2, 2_ip*(self%n + more) + 64_ip))
-      if (self%n > 0_ip) longer(:, 1:self%n) = self%box(:, 1:self%n)
-      call move_alloc(longer, self%box)
+      call grow(self%box, self%n, 2_ip*(self%n + more) + 64_ip)
    end subroutine reserve_found
 
    !> Remove pairs of boxes that cannot form a pair.

@@ -7,6 +7,7 @@ module polydem_candidate_rows
    use polydem_box_pairs, only: found_pairs_t
    use polydem_boxes, only: boxes_t
    use polydem_candidates, only: candidates_t, overlapping
+   use polydem_grow, only: grow
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: bp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
@@ -178,17 +179,12 @@ contains
       integer(ip), intent(in) :: lower, higher
       !> Whether they overlap
       logical, intent(in) :: overlap
-      integer(ip), allocatable :: box(:, :)
-      integer(bp), allocatable :: longer(:)
       integer(ip) :: m
 
       if (size(self%overlap) == self%n) then
          m = self%n + self%n/4_ip + 64_ip
-         allocate (box(2, m), longer(m))
-         box(:, 1:self%n) = self%box(:, 1:self%n)
-         longer(1:self%n) = self%overlap(1:self%n)
-         call move_alloc(box, self%box)
-         call move_alloc(longer, self%overlap)
+         call grow(self%box, self%n, m)
+         call grow(self%overlap, self%n, m)
       end if
       self%n = self%n + 1_ip
       self%box(:, self%n) = [lower, higher]

@@ -7,6 +7,7 @@
 !> holes of each form a linked list. When many candidates had to go elsewhere, the list is sorted. So candidates of near
 !> boxes stay near each other in the list, and threads that compare different parts of it share few boxes.
 module polydem_candidates
+   use polydem_grow, only: grow
    use polydem_index_list, only: index_list_t
    use polydem_instruction_set, only: isa_avx2, isa_base
    use polydem_kinds, only: bp, dp, ip, lp, wp
@@ -373,28 +374,19 @@ contains
    pure subroutine reserve(self, n)
       type(candidates_t), intent(inout) :: self
       integer(ip), intent(in) :: n
-      integer(ip), allocatable :: box(:, :), next(:, :), previous(:, :), first_hole(:)
-      integer(bp), allocatable :: overlap(:)
-      integer(ip) :: m
+      integer(ip) :: holes, m
 
       if (allocated(self%box)) then
          if (size(self%overlap) >= n) return
       end if
       m = n + n/2_ip + 64_ip
-      allocate (box(2, m), next(2, m), previous(2, m), overlap(m))
-      allocate (first_hole(region(m)), source=0_ip)
-      if (self%n > 0_ip) then
-         first_hole(1:region(self%n)) = self%first_hole(1:region(self%n))
-         box(:, 1:self%n) = self%box(:, 1:self%n)
-         next(:, 1:self%n) = self%next(:, 1:self%n)
-         previous(:, 1:self%n) = self%previous(:, 1:self%n)
-         overlap(1:self%n) = self%overlap(1:self%n)
-      end if
-      call move_alloc(box, self%box)
-      call move_alloc(next, self%next)
-      call move_alloc(previous, self%previous)
-      call move_alloc(overlap, self%overlap)
-      call move_alloc(first_hole, self%first_hole)
+      holes = 0_ip
+      if (self%n > 0_ip) holes = region(self%n)
+      call grow(self%first_hole, holes, region(m), 0_ip)
+      call grow(self%box, self%n, m)
+      call grow(self%next, self%n, m)
+      call grow(self%previous, self%n, m)
+      call grow(self%overlap, self%n, m)
    end subroutine reserve
 
 end module polydem_candidates

@@ -1,5 +1,6 @@
 !> List of integers that grows.
 module polydem_index_list
+   use polydem_grow, only: grow
    use polydem_kinds, only: ip, lp
    use polydem_sort, only: sort_keys
    implicit none
@@ -26,14 +27,11 @@ contains
       class(index_list_t), intent(inout) :: self
       !> Number of entries
       integer(ip), intent(in) :: n
-      integer(ip), allocatable :: longer(:)
 
       if (allocated(self%at)) then
          if (size(self%at) >= n) return
       end if
-      allocate (longer(n + n/4_ip + 64_ip))
-      if (self%n > 0_ip) longer(1:self%n) = self%at(1:self%n)
-      call move_alloc(longer, self%at)
+      call grow(self%at, self%n, n + n/4_ip + 64_ip)
    end subroutine reserve
 
    !> Append an entry.
@@ -41,14 +39,9 @@ contains
       class(index_list_t), intent(inout) :: self
       !> Entry to append
       integer(ip), intent(in) :: entry
-      integer(ip), allocatable :: longer(:)
 
       if (.not. allocated(self%at)) allocate (self%at(64))
-      if (self%n == size(self%at)) then
-         allocate (longer(2_ip*self%n))
-         longer(1:self%n) = self%at
-         call move_alloc(longer, self%at)
-      end if
+      if (self%n == size(self%at)) call grow(self%at, self%n, 2_ip*self%n)
       self%n = self%n + 1_ip
       self%at(self%n) = entry
    end subroutine push

@@ -16,6 +16,7 @@ module polydem_outer_list
    use polydem_candidate_rows, only: candidate_rows_t
    use polydem_candidates, only: overlapping
    use polydem_grid_query, only: grid_query_t
+   use polydem_grow, only: grow
    use polydem_index_list, only: index_list_t
    use polydem_kinds, only: bp, dp, ip, lp, wp, min_parallel_size
    use polydem_pair_changes, only: pair_changes_t
@@ -247,12 +248,10 @@ contains
    pure subroutine reserve_links(self, n)
       type(outer_list_t), intent(inout) :: self
       integer(ip), intent(in) :: n
-      integer(ip), allocatable :: longer(:, :)
+      integer(ip) :: room
 
-      if (size(self%next_link, 2) >= n) return
-      allocate (longer(2, n + n/4_ip + 64_ip))
-      longer(:, 1:size(self%next_link, 2)) = self%next_link
-      call move_alloc(longer, self%next_link)
+      room = size(self%next_link, 2, kind=ip)
+      if (room < n) call grow(self%next_link, room, n + n/4_ip + 64_ip)
    end subroutine reserve_links
 
    !> Give a box a new fat box, and append its new candidates.

@@ -6,11 +6,12 @@
 module polydem_row_distribution
    use polydem_communicator, only: communicator_t
    use polydem_kinds, only: dp, ip, lp
+   use polydem_pair_keys, only: first_of
    use polydem_rank_order, only: sort_by_rank
    use polydem_sort, only: ascending_order
    implicit none
    private
-   public :: row_distribution_t, row_key, component, vector
+   public :: row_distribution_t, component, vector
 
    !> Communication plan that brings rows into blocks; `to_blocks` applies it to a column
    type :: row_distribution_t
@@ -41,16 +42,6 @@ module polydem_row_distribution
    end type row_distribution_t
 
 contains
-
-   !> Sort key of a row: body in the upper 32 bits, number of the row in the lower 32 bits
-   elemental integer(lp) function row_key(body, k)
-      !> Global index of the body of the row, from 1
-      integer(ip), intent(in) :: body
-      !> Number of the row among the rows of that body
-      integer(ip), intent(in) :: k
-
-      row_key = ior(shiftl(int(body, lp), 32), int(k, lp))
-   end function row_key
 
    !> Set up the communication plan; collective.
    subroutine lay_out(self, comm, n_bodies, n_known, key, slot)
@@ -204,7 +195,7 @@ contains
       integer(ip), intent(in) :: n_bodies, n_ranks
 
       ! The largest integer r below body P/n.
-      destination_of = int((shiftr(key, 32)*int(n_ranks, lp) - 1_lp)/int(n_bodies, lp), ip)
+      destination_of = int((int(first_of(key), lp)*int(n_ranks, lp) - 1_lp)/int(n_bodies, lp), ip)
    end function destination_of
 
 end module polydem_row_distribution

@@ -5,23 +5,24 @@
 !> All calls must come from one thread.
 module polydem_hdf5_dataset
    use, intrinsic :: iso_c_binding, only: c_ptr
-   use hdf5, only: h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dont_atexit_f, h5dopen_f, &
-      h5dset_extent_f, h5eset_auto_f, h5get_libversion_f, h5iis_valid_f, h5kind_to_type, h5lexists_f, h5open_f, &
-      h5pclose_f, h5pcreate_f, h5pset_chunk_f, h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_fill_time_f, &
-      h5pset_shuffle_f, h5sclose_f, h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, &
-      h5tclose_f, h5tget_class_f, h5tget_size_f, h5zfilter_avail_f, h5_integer_kind, h5_real_kind, &
-      h5d_fill_time_never_f, h5p_dataset_create_f, h5p_link_create_f, h5s_unlimited_f, h5t_enum_f, h5t_float_f, &
-      h5t_integer_f, h5t_native_double, h5z_filter_deflate_f, hid_t, hsize_t, size_t
+   use hdf5, only: h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_storage_size_f, h5dget_type_f, &
+      h5dont_atexit_f, h5dopen_f, h5dset_extent_f, h5eset_auto_f, h5fget_filesize_f, h5get_libversion_f, &
+      h5iis_valid_f, h5kind_to_type, h5lexists_f, h5open_f, h5pclose_f, h5pcreate_f, h5pset_chunk_f, &
+      h5pset_create_inter_group_f, h5pset_deflate_f, h5pset_fill_time_f, h5pset_shuffle_f, h5sclose_f, &
+      h5screate_simple_f, h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5tclose_f, &
+      h5tget_class_f, h5tget_size_f, h5zfilter_avail_f, h5_integer_kind, h5_real_kind, h5d_fill_time_never_f, &
+      h5p_dataset_create_f, h5p_link_create_f, h5s_unlimited_f, h5t_enum_f, h5t_float_f, h5t_integer_f, &
+      h5t_native_double, h5z_filter_deflate_f, hid_t, hsize_t, size_t
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_hdf5_hyperslab, only: read_slab, slab_t, write_slab
    use polydem_hdf5_links, only: check_storage, disable_external_links, raise_external, is_external_link
    use polydem_hdf5_location, only: check_status, dataset_location_t, reject, system_error
    use polydem_kinds, only: dp, ip, lp
-   use polydem_strings, only: to_text
+   use polydem_strings, only: join, to_text
    implicit none
    private
    public :: start_library, library_version
-   public :: write_dataset, append_rows_to, read_dataset, dataset_shape, has_link
+   public :: write_dataset, append_rows_to, read_dataset, dataset_shape, has_link, shape_text
    public :: holds_reals, holds_integers
 
    !> Accepted types: real numbers or integers
@@ -31,6 +32,10 @@ module polydem_hdf5_dataset
 
    !> Maximum size of a chunk of an extendible data set, unless one row is larger [B]
    integer(hsize_t), parameter :: chunk_bytes = 16384_hsize_t
+   !> Maximum compression ratio of deflate (zlib.net, technical details)
+   real(dp), parameter :: max_ratio = 1032.0_dp
+   !> Size up to which a data set is accepted even if no bytes are stored [B]: unwritten data sets are all zero
+   real(dp), parameter :: max_unchecked = 16777216.0_dp
    !> Least number of chunks for the expected number of rows. At most one of them is partly filled.
    integer(hsize_t), parameter :: expected_chunks = 5_hsize_t
 
@@ -253,15 +258,19 @@ contains
    end subroutine grow
 
    !> Read the shape of a data set, fastest dimension first.
-   subroutine dataset_shape(location, extent, error)
+   subroutine dataset_shape(location, extent, error, is_checked)
       type(dataset_location_t), intent(in) :: location
       !> Shape; empty for a scalar
       integer(hsize_t), allocatable, intent(out) :: extent(:)
       !> Allocated if the data set is missing or cannot be read
       type(error_t), allocatable, intent(inout) :: error
+      !> Whether a shape is refused that the stored bytes cannot fill; default: false. A damaged or hostile file of a
+      !> few bytes can claim more data than fit into memory
+      logical, intent(in), optional :: is_checked
       integer(hsize_t), allocatable :: limit(:)
       integer(hid_t) :: dataset, space
       integer :: n, status, ignored
+      logical :: checks
 
       if (.not. has_link(location, error)) then
          call raise(error, input_error, location%path//': the data set '//location%name//' is missing')
@@ -275,20 +284,68 @@ contains
       if (allocated(error)) return
       ! This check precedes the query of the shape, because HDF5 may open other files for it.
       call check_storage(dataset, location, error)
-      if (allocated(error)) then
-         call h5dclose_f(dataset, ignored)
-         return
+      if (.not. allocated(error)) then
+         call h5dget_space_f(dataset, space, status)
+         if (status >= 0) call h5sget_simple_extent_ndims_f(space, n, status)
+         if (status >= 0) then
+            allocate (extent(n), limit(n))
+            if (n > 0) call h5sget_simple_extent_dims_f(space, extent, limit, status)
+         end if
+         call check_status(status, 'read the shape of', location, error)
+         call h5sclose_f(space, ignored)
       end if
-      call h5dget_space_f(dataset, space, status)
-      if (status >= 0) call h5sget_simple_extent_ndims_f(space, n, status)
-      if (status >= 0) then
-         allocate (extent(n), limit(n))
-         if (n > 0) call h5sget_simple_extent_dims_f(space, extent, limit, status)
-      end if
-      call check_status(status, 'read the shape of', location, error)
-      call h5sclose_f(space, ignored)
+      checks = .false.
+      if (present(is_checked)) checks = is_checked
+      if (checks .and. .not. allocated(error)) call check_size(dataset, location, extent, error)
       call h5dclose_f(dataset, ignored)
    end subroutine dataset_shape
+
+   !> Check that the stored bytes of an open data set can contain as many values as it claims.
+   subroutine check_size(dataset, location, extent, error)
+      integer(hid_t), intent(in) :: dataset
+      type(dataset_location_t), intent(in) :: location
+      integer(hsize_t), intent(in) :: extent(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer(hid_t) :: kind_in_file
+      integer(hsize_t) :: stored, file_size
+      integer(size_t) :: bytes
+      integer :: status, ignored
+
+      ! HDF5 1.10 returns a failure if no bytes are stored.
+      call h5dget_storage_size_f(dataset, stored, status)
+      if (status < 0) then
+         stored = 0_hsize_t
+         if (system_error() /= 0) call check_status(status, 'read the size of', location, error)
+      end if
+      ! The claimed number of stored bytes may be wrong too.
+      call h5fget_filesize_f(location%file, file_size, status)
+      if (status >= 0) stored = min(stored, file_size)
+      call h5dget_type_f(dataset, kind_in_file, status)
+      if (status >= 0) then
+         call h5tget_size_f(kind_in_file, bytes, status)
+         call h5tclose_f(kind_in_file, ignored)
+      end if
+      call check_status(status, 'read the size of', location, error)
+      if (allocated(error)) return
+      if (real(bytes, dp)*product(real(extent, dp)) <= max(max_unchecked, max_ratio*real(stored, dp)) &
+          .and. all(extent >= 0_hsize_t)) return
+      call reject(location, 'claims the shape '//shape_text(extent)//', but the file holds '// &
+                  to_text(int(stored, lp))//' bytes of it: it is damaged or was never written', error)
+   end subroutine check_size
+
+   !> Text of a shape in the order of h5py, with the slowest dimension first
+   pure function shape_text(extent) result(text)
+      !> Shape, fastest dimension first
+      integer(hsize_t), intent(in) :: extent(:)
+      character(len=:), allocatable :: text
+      character(len=24) :: words(size(extent))
+      integer :: k
+
+      do k = 1, size(extent)
+         words(k) = to_text(int(extent(size(extent) + 1 - k), lp))
+      end do
+      text = '('//join(words, ', ')//')'
+   end function shape_text
 
    !> Read a slab of a data set into memory.
    subroutine read_dataset(location, wanted, start, extent, address, error)

@@ -8,10 +8,10 @@ module polydem_hdf5_file
    use, intrinsic :: iso_c_binding, only: c_loc
    use hdf5, only: h5_real_kind, h5kind_to_type, hsize_t
    use polydem_errors, only: error_t
-   use polydem_hdf5_dataset, only: holds_integers, holds_reals, library_version, read_dataset, start_library
+   use polydem_hdf5_dataset, only: dataset_shape, holds_integers, holds_reals, library_version, &
+      read_dataset, shape_text, start_library
    use polydem_hdf5_hyperslab, only: part_t
    use polydem_hdf5_location, only: dataset_location_t, reject
-   use polydem_hdf5_shape_check, only: checked_shape, shape_text
    use polydem_hdf5_strings, only: read_attribute_value, read_text
    use polydem_hdf5_writer, only: hdf5_writer_t, many_rows, one_row
    use polydem_kinds, only: dp, ip, lp
@@ -153,7 +153,7 @@ contains
       !> hold; nothing happens if it is allocated before
       type(error_t), allocatable, intent(inout) :: error
 
-      if (.not. allocated(error)) call checked_shape(location, extent, error)
+      if (.not. allocated(error)) call dataset_shape(location, extent, error, is_checked=.true.)
       if (allocated(error)) return
       if (size(extent) /= rank) then
          call reject(location, 'has the shape '//shape_text(extent)//' but must have '//to_text(int(rank, ip))// &

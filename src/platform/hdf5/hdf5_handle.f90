@@ -9,9 +9,8 @@ module polydem_hdf5_handle
    use polydem_file_status, only: is_shared
    use polydem_file_system, only: check_access, disk_hint, errno_message, exists, is_folder, remove_file
    use polydem_hdf5_access, only: enable_parallel_access, barrier, abort_all
-   use polydem_hdf5_dataset, only: has_link, start_library
+   use polydem_hdf5_dataset, only: dataset_shape, has_link, start_library
    use polydem_hdf5_location, only: dataset_location_t, system_error
-   use polydem_hdf5_shape_check, only: checked_shape
    use polydem_kinds, only: ip, lp
    implicit none
    private
@@ -257,7 +256,7 @@ contains
       integer(hsize_t), allocatable :: extent(:)
 
       if (allocated(error)) return
-      call checked_shape(self%location_of(name), extent, error)
+      call dataset_shape(self%location_of(name), extent, error, is_checked=.true.)
       if (allocated(error)) return
       shape = int(extent(size(extent):1:-1), lp)
    end subroutine shape_of

@@ -2,17 +2,17 @@
 !> Also detects files in the folder that do not belong to the result but have names of its files.
 module polydem_checked_files
    use polydem_errors, only: error_t, input_error, io_error, raise
-   use polydem_file_checksum, only: hash_file
+   use polydem_file_checksum, only: sum_file
    use polydem_folders, only: link_exists, list_names
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_kinds, only: ip, lp
-   use polydem_manifest, only: manifest_t
-   use polydem_manifest_lines, only: entry_t
-   use polydem_result_files, only: complete_name, conflict_text, manifest_name, segment_number, segment_path
+   use polydem_manifest, only: entry_t, manifest_t
+   use polydem_result_files, only: complete_name, conflict_text, manifest_name, name_in, segment_number, &
+      segment_path
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: check_free, check_manifest, check_closed, find_segments, find_problem, read_frames
+   public :: check_free, check_manifest, check_closed, find_segments, find_problem, find_stranger, read_frames
 
 contains
 
@@ -130,29 +130,46 @@ contains
       character(len=:), allocatable, intent(out) :: problem
       !> Allocated if the file cannot be read, which is no defect
       type(error_t), allocatable, intent(inout) :: error
-      integer(lp) :: bytes, hash, frames(3)
+      character(len=8) :: checksum
+      integer(lp) :: bytes
 
       if (.not. link_exists(folder//'/'//trim(entry%name), error)) then
          if (.not. allocated(error)) problem = 'is missing'
          return
       end if
-      call hash_file(folder//'/'//trim(entry%name), bytes, hash, error)
+      call sum_file(folder//'/'//trim(entry%name), bytes, checksum, error)
       if (allocated(error)) return
       if (bytes /= entry%bytes) then
          problem = 'is damaged: it has '//to_text(bytes)//' bytes, but '//to_text(entry%bytes)//' were written'
-      else if (hash /= entry%hash) then
-         problem = 'is damaged: its checksum differs from that in '//manifest_name
-      end if
-      if (allocated(problem) .or. segment_number(entry%name) == 0_ip) return
-      call read_frames(folder//'/'//trim(entry%name), frames, error)
-      if (allocated(error)) then
-         if (error%is_unread) return
-         problem = 'cannot be read: '//error%message
-         deallocate (error)
-      else if (any(frames /= entry%frames)) then
-         problem = 'is not the file that '//manifest_name//' lists: its frames differ'
+      else if (checksum /= entry%checksum) then
+         problem = 'is damaged or exchanged: its checksum differs from that in '//manifest_name
       end if
    end subroutine find_problem
+
+   !> Find out whether a file that is not closed was written by another run, or under another name.
+   subroutine find_stranger(path, run, problem, error)
+      !> Path of an HDF5 file of a result
+      character(len=*), intent(in) :: path
+      !> Identifier of the run, from the manifest
+      character(len=*), intent(in) :: run
+      !> What the file is, as the end of a sentence; unallocated if it belongs here
+      character(len=:), allocatable, intent(out) :: problem
+      !> Allocated if the file cannot be read
+      type(error_t), allocatable, intent(inout) :: error
+      type(hdf5_file_t) :: file
+      character(len=:), allocatable :: name, writer
+
+      call file%open(path, error)
+      call file%read('/provenance/run', writer, error)
+      call file%read('/provenance/file', name, error)
+      call file%close(error)
+      if (allocated(error)) return
+      if (writer /= run) then
+         problem = 'was written by another run'
+      else if (name /= name_in(path)) then
+         problem = 'was written as '//name
+      end if
+   end subroutine find_stranger
 
    !> Read the number of frames of a segment and the steps of its first and last frame.
    subroutine read_frames(path, frames, error)

@@ -1,42 +1,54 @@
-!> The manifest of a result: `manifest.txt`, a journal of the files that belong to the result. The program neither
+!> The manifest of a result: `manifest.txt`, the list of the files that belong to the result. The program neither
 !> changes nor removes any other file in the folder.
 !>
-!>     polydem-manifest 1 HASH
-!>     owns NAME HASH                              the result may create, change and remove the file
-!>     closed NAME BYTES FILEHASH HASH             the file is complete and final
-!>     closed NAME BYTES FILEHASH FRAMES FIRST LAST HASH    the same for a segment of the trajectory, with the number
-!>                                                 of frames and the steps of the first and the last frame
-!>     removed NAME HASH                           the file no longer exists, and its name is free
+!>     polydem-manifest 1, run 3f2a9c0d1b4e5f60
+!>     log.txt                  open                 0 00000000         0               0               0
+!>     trajectory_0001.h5       closed           19040 9a8b7c6d         3               0              20
+!>     crc32 5a6b7c8d
 !>
-!> HASH links each line to the previous one (polydem_manifest_lines). A changed or missing line is therefore detected.
-!> FILEHASH is the hash of all bytes of the file (`hash_file` of polydem_file_checksum). The last line of a file is the
-!> valid one: `owns` after `closed` means that the file is about to be changed or removed.
+!> The run is an identifier that every HDF5 file of the result repeats, together with its own name, in `/provenance`.
+!> Columns: name, state, and for a closed file its length in bytes and the CRC-32 of all bytes (polydem_crc32); for a
+!> segment of the trajectory also the number of frames and the steps of the first and the last one. The last line is the
+!> CRC-32 of the lines above it.
 !>
-!> `owns` is on disk before the file is created. It also covers the temporary names NAME.unfinished and NAME.open.
-!> `closed` is written after the file has its final name. A killed program may therefore leave a file with its final
-!> name that is not closed, but never an unlisted file of the result. Segments, profile.h5, trace.h5, steps.h5 and
-!> overlaps.csv are closed. log.txt, running.lock and the checkpoints, which have their own checksums, are not.
+!> An open file may be created, changed and removed by the run; this also covers the temporary names NAME.unfinished
+!> and NAME.open. A closed file is complete and final. A file is listed as open before it is created, changed or
+!> removed, and as closed after it has its final name. A killed program may therefore leave a file with its final name
+!> that is not closed, but never an unlisted file of the result. Segments, profile.h5, trace.h5, steps.h5 and
+!> overlaps.csv are closed. log.txt, running.lock and the checkpoints, which have their own checksums, stay open.
 !>
-!> Each line is written with one call and flushed to disk at once. A killed program may leave an incomplete last line.
-!> A reader ignores it, and the next writer cuts it off.
+!> Each change replaces the whole list atomically.
 module polydem_manifest
-   use polydem_errors, only: error_t, input_error, io_error, raise
-   use polydem_file_checksum, only: hash_file
+   use polydem_crc32, only: crc32_of
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_file_checksum, only: sum_file
    use polydem_file_system, only: remove_file, rename_file, sync_file
    use polydem_folders, only: link_exists, read_bytes
-   use polydem_kinds, only: ip, lp
+   use polydem_hash, only: hexadecimal, mix_word
+   use polydem_kinds, only: lp
    use polydem_line_writer, only: line_writer_t
-   use polydem_manifest_lines, only: chain_line, closing_text, entry_t, read_line
+   use polydem_posix_processes, only: c_getpid
    use polydem_result_files, only: forms_of, conflict_text, manifest_name, name_in, unfinished
-   use polydem_strings, only: to_text
    implicit none
    private
-   public :: manifest_t
+   public :: manifest_t, entry_t, longest_name
 
-   !> First word of every manifest, and text of the first line in the version that this program supports
-   character(len=*), parameter :: beginning = 'polydem-manifest', first_text = beginning//' 1'
-   !> Line end
-   character(len=*), parameter :: line_end = new_line('a')
+   !> Maximum length of the name of a file of a result
+   integer, parameter :: longest_name = 24
+
+   !> A file of a result
+   type :: entry_t
+      !> Name of the file, without folder
+      character(len=longest_name) :: name = ''
+      !> Whether the file is final; only then are the following components set
+      logical :: is_closed = .false.
+      !> Length of the file [B]
+      integer(lp) :: bytes = 0_lp
+      !> CRC-32 of all its bytes
+      character(len=8) :: checksum = '00000000'
+      !> For a segment: number of frames, step of the first frame, step of the last frame
+      integer(lp) :: frames(3) = 0_lp
+   end type entry_t
 
    !> The manifest of a folder
    type :: manifest_t
@@ -48,22 +60,16 @@ module polydem_manifest
       logical :: is_foreign = .false.
       !> Whether the system refused to read it: nothing is known of its contents
       logical :: is_unread = .false.
-      !> Whether its last line is incomplete
-      logical :: is_truncated = .false.
+      !> Identifier of the run
+      character(len=16) :: run = ''
       !> Number of files of the result
       integer :: n = 0
-      !> Entries of the files, (1:n) in the order of their first `owns`; the array may be larger
+      !> The files, (n) in the order in which they were added
       type(entry_t), allocatable :: entry(:)
       !> Folder of the result
       character(len=:), allocatable, private :: folder
-      !> The valid lines
-      character(len=:), allocatable, private :: text
-      !> Hash of the last valid line
-      integer(lp), private :: chain = 0_lp
       !> Whether the manifest is open for writing; otherwise no file is written or removed
       logical, private :: is_active = .false.
-      !> Whether writing a line has failed
-      logical, private :: has_failed = .false.
    contains
       procedure :: read => read_manifest
       procedure :: begin
@@ -77,6 +83,17 @@ module polydem_manifest
       procedure :: remove_entry
    end type manifest_t
 
+   !> First words of every manifest, and of one of the version that this program supports
+   character(len=*), parameter :: beginning = 'polydem-manifest', first_words = beginning//' 1, run '
+   !> First word of the last line
+   character(len=*), parameter :: last_word = 'crc32 '
+   !> A line without its end
+   character(len=*), parameter :: form = '(a, 1x, a6, 1x, i15, 1x, a8, 1x, i9, 2(1x, i15))'
+   !> Length of such a line
+   integer, parameter :: line_length = longest_name + 7 + 16 + 9 + 10 + 2*16
+   !> Line end
+   character(len=*), parameter :: line_end = new_line('a')
+
 contains
 
    !> Read the manifest of a folder, if there is one. No file is changed.
@@ -84,7 +101,7 @@ contains
       class(manifest_t), intent(inout) :: self
       !> Folder of the result
       character(len=*), intent(in) :: folder
-      character(len=:), allocatable :: path, text, problem
+      character(len=:), allocatable :: path, text
       type(error_t), allocatable :: error
 
       path = folder//'/'//manifest_name
@@ -96,8 +113,14 @@ contains
          self%is_found = .true.
          self%problem = error%message
       else if (self%is_found) then
-         call read_lines(self, text, problem)
-         if (allocated(problem)) self%problem = path//': '//problem
+         self%is_foreign = .not. is_draft(text)
+         if (self%is_foreign) then
+            self%problem = path//': this file is not a polydem manifest'
+         else if (.not. is_valid(text)) then
+            self%problem = path//': the file was truncated or changed, or written by another version of polydem'
+         else
+            call read_lines(self, text)
+         end if
       end if
    end subroutine read_manifest
 
@@ -107,92 +130,49 @@ contains
       character(len=*), intent(in) :: folder
 
       self%folder = folder
-      self%text = ''
-      allocate (self%entry(16))
+      allocate (self%entry(0))
    end subroutine clear
 
-   subroutine read_lines(self, text, problem)
+   !> Whether a text is a manifest, or the beginning of one
+   pure logical function is_draft(text)
+      character(len=*), intent(in) :: text
+      integer :: n
+
+      n = min(len(text), len(beginning))
+      is_draft = text(:n) == beginning(:n)
+   end function is_draft
+
+   !> Whether a text is a complete manifest of this version without a changed bit
+   pure logical function is_valid(text)
+      character(len=*), intent(in) :: text
+      integer :: n
+
+      n = len(text) - len(last_word) - 9
+      is_valid = index(text, first_words) == 1 .and. n > 0
+      if (is_valid) is_valid = text(n + 1:) == last_word//crc32_of(text(:n))//line_end
+   end function is_valid
+
+   !> Read the run and the files from a valid text.
+   subroutine read_lines(self, text)
       type(manifest_t), intent(inout) :: self
       character(len=*), intent(in) :: text
-      character(len=:), allocatable, intent(inout) :: problem
-      character(len=:), allocatable :: line
-      integer(ip) :: number
-      integer :: first, last
+      character(len=6) :: state
+      integer :: first, k
 
-      call chain_line(first_text, self%chain, line)
-      self%is_foreign = text(:min(len(text), len(beginning))) /= beginning(:min(len(text), len(beginning)))
-      if (self%is_foreign) then
-         problem = 'this file is not a polydem manifest'
-      else if (index(text, line//line_end) /= 1) then
-         problem = 'the first line is not '//line//': the file was changed, or written by another version of polydem'
-      end if
-      if (allocated(problem)) return
-      first = len(line) + 2
-      number = 1_ip
-      do
-         last = index(text(first:), line_end)
-         if (last == 0) exit
-         number = number + 1_ip
-         if (.not. is_accepted(self, text(first:first + last - 2))) then
-            problem = 'line '//to_text(number)//' has a wrong hash: it was changed, or an earlier line is missing'
-            return
-         end if
-         first = first + last
+      self%run = text(len(first_words) + 1:)
+      first = index(text, line_end) + 1
+      self%n = (len(text) - first)/(line_length + 1)
+      deallocate (self%entry)
+      allocate (self%entry(self%n))
+      do k = 1, self%n
+         associate (entry => self%entry(k))
+            read (text(first:first + line_length - 1), form) entry%name, state, entry%bytes, entry%checksum, &
+               entry%frames
+            entry%is_closed = adjustl(state) == 'closed'
+         end associate
+         first = first + line_length + 1
       end do
-      self%text = text(:first - 1)
-      self%is_truncated = first <= len(text)
-      if (.not. self%is_truncated) return
-      ! A killed program leaves part of a line, never a complete line followed by a character other than the line end.
-      if (is_accepted(self, text(first:len(text) - 1))) problem = 'the line end of the last line was changed'
    end subroutine read_lines
-
-   !> Apply a line to the list of entries. False if the line is invalid.
-   logical function is_accepted(self, line)
-      type(manifest_t), intent(inout) :: self
-      character(len=*), intent(in) :: line
-      character(len=:), allocatable :: verb
-      type(entry_t) :: entry
-      integer :: k
-
-      call read_line(line, self%chain, verb, entry, is_accepted)
-      if (.not. is_accepted) return
-      k = self%place_of(trim(entry%name))
-      select case (verb)
-      case ('owns')
-         if (k > 0) self%entry(k) = entry
-         if (k == 0) call add_entry(self, entry)
-      case ('closed')
-         is_accepted = k > 0
-         if (k > 0) self%entry(k) = entry
-      case ('removed')
-         is_accepted = k > 0
-         if (k > 0) call drop_entry(self, k)
-      case default
-         is_accepted = .false.
-      end select
-   end function is_accepted
-
-   subroutine add_entry(self, entry)
-      type(manifest_t), intent(inout) :: self
-      type(entry_t), intent(in) :: entry
-      type(entry_t), allocatable :: more(:)
-
-      if (self%n == size(self%entry)) then
-         allocate (more(2*self%n))
-         more(:self%n) = self%entry
-         call move_alloc(more, self%entry)
-      end if
-      self%n = self%n + 1
-      self%entry(self%n) = entry
-   end subroutine add_entry
-
-   subroutine drop_entry(self, k)
-      type(manifest_t), intent(inout) :: self
-      integer, intent(in) :: k
-
-      self%entry(k:self%n - 1) = self%entry(k + 1:self%n)
-      self%n = self%n - 1
-   end subroutine drop_entry
 
    !> Create the manifest of a new result and write it. The folder must not have a manifest.
    subroutine begin(self, folder, names, error)
@@ -202,18 +182,16 @@ contains
       !> Names of the files that the result owns from the start, blank-padded
       character(len=*), intent(in) :: names(:)
       type(error_t), allocatable, intent(inout) :: error
-      character(len=:), allocatable :: line
+      type(entry_t), allocatable :: entry(:)
+      integer(lp) :: clock
       integer :: k
 
       call clear(self, folder)
-      call chain_line(first_text, self%chain, line)
-      self%text = line//line_end
-      do k = 1, size(names)
-         call chain_line('owns '//trim(names(k)), self%chain, line)
-         self%text = self%text//line//line_end
-         call add_entry(self, entry_t(name=trim(names(k))))
-      end do
-      call write_whole(self, error)
+      call system_clock(clock)
+      self%run = hexadecimal(mix_word(clock, int(c_getpid(), lp)))
+      entry = [(entry_t(name=names(k)), k=1, size(names))]
+      self%is_active = .true.
+      call replace_list(self, entry, error)
       self%is_found = .not. allocated(error)
       self%is_active = self%is_found
    end subroutine begin
@@ -225,50 +203,58 @@ contains
       self%is_active = self%is_found .and. .not. allocated(self%problem)
    end subroutine continue_writing
 
-   !> Replace the file atomically by the valid lines.
-   subroutine write_whole(self, error)
+   !> Replace the list atomically, in the file and in memory. Nothing changes after a failure.
+   subroutine replace_list(self, entry, error)
       type(manifest_t), intent(inout) :: self
+      !> The new list
+      type(entry_t), intent(in) :: entry(:)
       type(error_t), allocatable, intent(inout) :: error
       type(line_writer_t) :: file
-      character(len=:), allocatable :: draft, path
-      integer :: n
+      character(len=:), allocatable :: draft, path, text
 
       path = self%folder//'/'//manifest_name
       if (link_exists(path//unfinished, error)) then
          call read_bytes(path//unfinished, draft, error)
-         n = min(len(beginning), len(draft))
-         if (draft(:n) /= beginning(:n)) call raise(error, input_error, conflict_text(path//unfinished))
+         if (.not. is_draft(draft)) call raise(error, input_error, conflict_text(path//unfinished))
       end if
       if (allocated(error)) return
+      text = first_words//self%run//line_end//lines_of(entry)
       call file%open(path//unfinished, error)
-      call file%put(self%text)
+      call file%put(text//last_word//crc32_of(text)//line_end)
       call file%close(error)
       if (.not. allocated(error)) call sync_file(path//unfinished, error)
       if (.not. allocated(error)) call rename_file(path//unfinished, path, error)
       if (.not. allocated(error)) call sync_file(self%folder, error)
-   end subroutine write_whole
-
-   !> Append a line to the file and flush it to disk.
-   subroutine append(self, text, error)
-      type(manifest_t), intent(inout) :: self
-      character(len=*), intent(in) :: text
-      type(error_t), allocatable, intent(inout) :: error
-      type(line_writer_t) :: file
-      character(len=:), allocatable :: line, path
-
-      path = self%folder//'/'//manifest_name
-      if (self%has_failed) call raise(error, io_error, path//': writing an earlier line has failed')
-      if (self%is_truncated .and. .not. allocated(error)) call write_whole(self, error)
       if (allocated(error)) return
-      self%is_truncated = .false.
-      self%has_failed = .true.
-      call chain_line(text, self%chain, line)
-      call file%open(path, error, appended=.true.)
-      call file%put_line(line)
-      call file%close(error)
-      if (.not. allocated(error)) call sync_file(path, error)
-      self%has_failed = allocated(error)
-   end subroutine append
+      self%entry = entry
+      self%n = size(entry)
+   end subroutine replace_list
+
+   !> The lines of files
+   pure function lines_of(entry) result(text)
+      type(entry_t), intent(in) :: entry(:)
+      character(len=(line_length + 1)*size(entry)) :: text
+      character(len=line_length) :: line
+      integer :: k
+
+      do k = 1, size(entry)
+         associate (e => entry(k))
+            write (line, form) e%name, merge('closed', 'open  ', e%is_closed), e%bytes, e%checksum, e%frames
+         end associate
+         text((line_length + 1)*(k - 1) + 1:(line_length + 1)*k) = line//line_end
+      end do
+   end function lines_of
+
+   !> Replace the entry of a file.
+   subroutine replace_entry(self, k, entry, error)
+      type(manifest_t), intent(inout) :: self
+      !> Index of the entry
+      integer, intent(in) :: k
+      type(entry_t), intent(in) :: entry
+      type(error_t), allocatable, intent(inout) :: error
+
+      call replace_list(self, [self%entry(:k - 1), entry, self%entry(k + 1:)], error)
+   end subroutine replace_entry
 
    !> Whether a file belongs to the result
    pure logical function owns(self, name)
@@ -279,7 +265,7 @@ contains
       owns = self%place_of(name) > 0
    end function owns
 
-   !> Index of a file in the list of entries; 0 if it does not belong to the result
+   !> Index of a file in the list; 0 if it does not belong to the result
    pure integer function place_of(self, name)
       class(manifest_t), intent(in) :: self
       !> Final name of the file
@@ -290,7 +276,7 @@ contains
       end do
    end function place_of
 
-   !> Index of the entry of a file if a line about it can be written; else 0
+   !> Index of the entry of a file if it can be changed; else 0
    pure integer function writable_entry(self, path, error) result(k)
       type(manifest_t), intent(in) :: self
       character(len=*), intent(in) :: path
@@ -305,7 +291,7 @@ contains
       class(manifest_t), intent(inout) :: self
       !> Final name of the file, with or without folder
       character(len=*), intent(in) :: path
-      !> Allocated if a file of this name already exists, or if the line cannot be written
+      !> Allocated if a file of this name already exists, or if the list cannot be written
       type(error_t), allocatable, intent(inout) :: error
       character(len=len(path) + len(unfinished)) :: forms(3)
       integer :: k
@@ -317,8 +303,7 @@ contains
          if (link_exists(self%folder//'/'//trim(forms(k)), error)) call raise(error, input_error, &
             conflict_text(self%folder//'/'//trim(forms(k))))
       end do
-      if (.not. allocated(error)) call append(self, 'owns '//name_in(path), error)
-      if (.not. allocated(error)) call add_entry(self, entry_t(name=name_in(path)))
+      if (.not. allocated(error)) call replace_entry(self, self%n + 1, entry_t(name=name_in(path)), error)
    end subroutine add_file
 
    !> Mark a closed file as about to be changed. A no-op if the file is not closed.
@@ -331,11 +316,10 @@ contains
 
       k = writable_entry(self, path, error)
       if (k == 0) return
-      if (self%entry(k)%is_closed) call append(self, 'owns '//name_in(path), error)
-      if (.not. allocated(error)) self%entry(k) = entry_t(name=name_in(path))
+      if (self%entry(k)%is_closed) call replace_entry(self, k, entry_t(name=name_in(path)), error)
    end subroutine reopen
 
-   !> Mark a file as final, with its length and hash. A no-op if the file does not exist.
+   !> Mark a file as final, with its length and checksum. A no-op if the file does not exist.
    subroutine close_file(self, path, error, frames)
       class(manifest_t), intent(inout) :: self
       !> Final name of the file, with or without folder
@@ -351,9 +335,8 @@ contains
       entry = entry_t(name=name_in(path), is_closed=.true.)
       if (.not. link_exists(self%folder//'/'//trim(entry%name), error)) return
       if (present(frames)) entry%frames = frames
-      call hash_file(self%folder//'/'//trim(entry%name), entry%bytes, entry%hash, error)
-      if (.not. allocated(error)) call append(self, closing_text(entry), error)
-      if (.not. allocated(error)) self%entry(k) = entry
+      call sum_file(self%folder//'/'//trim(entry%name), entry%bytes, entry%checksum, error)
+      if (.not. allocated(error)) call replace_entry(self, k, entry, error)
    end subroutine close_file
 
    !> Remove the temporary forms of a file of the result, and the file itself unless `stays`. The result keeps the name.
@@ -388,9 +371,7 @@ contains
       integer :: k
 
       k = writable_entry(self, path, error)
-      if (k == 0) return
-      call append(self, 'removed '//name_in(path), error)
-      if (.not. allocated(error)) call drop_entry(self, k)
+      if (k > 0) call replace_list(self, [self%entry(:k - 1), self%entry(k + 1:)], error)
    end subroutine remove_entry
 
 end module polydem_manifest

@@ -172,8 +172,7 @@ contains
       character(len=:), allocatable :: message
 
       message = path//' blocks a file of the result: no '//manifest_name//' lists it, so it is neither changed nor '// &
-         'removed. Move the file away, or choose another folder with --set output.folder=NAME. (Results of older '// &
-         'versions of this program have no '//manifest_name//'.)'
+         'removed. Move the file away, or choose another folder with --set output.folder=NAME'
    end function conflict_text
 
 end module polydem_result_files

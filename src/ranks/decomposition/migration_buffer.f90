@@ -6,6 +6,7 @@
 !> order, it restores the rows to other slots. Values of the whole run are ignored.
 module polydem_migration_buffer
    use polydem_communicator, only: communicator_t
+   use polydem_grow, only: grow
    use polydem_kinds, only: dp, ip, lp
    use polydem_serializer, only: serializer_t
    implicit none
@@ -94,17 +95,12 @@ contains
       class(migration_buffer_t), intent(inout) :: self
       !> The other buffer
       type(migration_buffer_t), intent(in) :: other
-      integer(lp), allocatable :: longer(:, :)
       integer(ip) :: n
       integer :: k
 
       n = self%n_rows + other%n_rows
       do k = 1, self%n_columns
-         if (size(self%columns(k)%word, 2) < n) then
-            allocate (longer(size(self%columns(k)%word, 1), n))
-            longer(:, :self%n_rows) = self%columns(k)%word(:, :self%n_rows)
-            call move_alloc(longer, self%columns(k)%word)
-         end if
+         if (size(self%columns(k)%word, 2) < n) call grow(self%columns(k)%word, self%n_rows, n)
          self%columns(k)%word(:, self%n_rows + 1_ip:n) = other%columns(k)%word(:, :other%n_rows)
       end do
       self%n_rows = n

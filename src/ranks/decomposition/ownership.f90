@@ -6,7 +6,8 @@
 module polydem_ownership
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
-   use polydem_row_distribution, only: row_distribution_t, row_key
+   use polydem_pair_keys, only: pair_key
+   use polydem_row_distribution, only: row_distribution_t
    use polydem_kinds, only: ip, lp
    implicit none
    private
@@ -79,7 +80,7 @@ contains
          associate (s => body(k))
             if (.not. owns_body(comm%is_root(), bodies%in_halo(s), bodies%fixed(s))) cycle
             n = n + 1_ip
-            key(n) = row_key(bodies%global_index(s), k)
+            key(n) = pair_key(bodies%global_index(s), k)
             slot(n) = k
          end associate
       end do
@@ -104,7 +105,7 @@ contains
       do k = 1_ip, size(first, kind=ip)
          if (.not. owns_pair(bodies, first(k), second(k))) cycle
          n = n + 1_ip
-         key(n) = row_key(bodies%global_index(first(k)), bodies%global_index(second(k)))
+         key(n) = pair_key(bodies%global_index(first(k)), bodies%global_index(second(k)))
          slot(n) = k
       end do
       call blocks%lay_out(comm, bodies%n_all, size(first, kind=ip), key(:n), slot(:n))

@@ -4,6 +4,7 @@ module polydem_packed_history
    use polydem_communicator, only: communicator_t
    use polydem_contact_history, only: contact_history_t
    use polydem_kinds, only: ip, lp, wp
+   use polydem_pair_keys, only: first_of, pair_key, second_of
    use polydem_rank_order, only: sort_by_rank
    use polydem_sort, only: ascending_order, place_in
    implicit none
@@ -63,14 +64,6 @@ contains
       end do
    end subroutine pack_pairs
 
-   !> Identifiers of both bodies of a pair in one word, the lower one in the upper half
-   elemental integer(lp) function pair_key(first, second)
-      !> Identifiers, the lower one first
-      integer(ip), intent(in) :: first, second
-
-      pair_key = ior(shiftl(int(first, lp), 32), int(second, lp))
-   end function pair_key
-
    !> Send the history of each pair to the ranks that will move one of its bodies. Collective.
    !>
    !> Both ranks that move a body of the pair have its history. Each sends it to the next owner of its own body.
@@ -129,7 +122,7 @@ contains
       integer(lp), intent(in) :: key
       integer(ip) :: slots(2)
 
-      slots = [slot_of(id, int(shiftr(key, 32), ip)), slot_of(id, int(iand(key, int(huge(1_ip), lp)), ip))]
+      slots = [slot_of(id, first_of(key)), slot_of(id, second_of(key))]
    end function slots_of_pair
 
    !> Slot of a body given by its identifier; 0 if there is none

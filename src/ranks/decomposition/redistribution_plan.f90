@@ -4,6 +4,7 @@ module polydem_redistribution_plan
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
    use polydem_domain, only: domain_t
+   use polydem_grow, only: grow
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_rank_order, only: sort_by_rank
    implicit none
@@ -139,7 +140,7 @@ contains
       integer(ip), allocatable, intent(out) :: needed(:)
       !> Number of bodies for each rank
       integer(ip), allocatable, intent(out) :: counts(:)
-      integer(ip), allocatable :: to_rank(:), longer(:), order(:)
+      integer(ip), allocatable :: to_rank(:), order(:)
       integer(ip) :: needing(comm%size), k, m, n
 
       allocate (needed(64), to_rank(64))
@@ -147,10 +148,8 @@ contains
       do k = 1_ip, size(boxes, 2, kind=ip)
          call domain%rank_bounds%needed_by(boxes(:, k), needing, m)
          if (n + m > size(needed)) then
-            longer = [needed, spread(0_ip, 1, n + m)]
-            call move_alloc(longer, needed)
-            longer = [to_rank, spread(0_ip, 1, n + m)]
-            call move_alloc(longer, to_rank)
+            call grow(needed, n, 2_ip*(n + m))
+            call grow(to_rank, n, 2_ip*(n + m))
          end if
          needed(n + 1_ip:n + m) = k
          to_rank(n + 1_ip:n + m) = needing(:m)

@@ -3,8 +3,8 @@ module polydem_wall_forces
    use polydem_bodies, only: bodies_t
    use polydem_communicator, only: communicator_t
    use polydem_force_sums, only: n_terms, set_force
-   use polydem_row_distribution, only: row_key
    use polydem_kinds, only: ip, lp, wp
+   use polydem_pair_keys, only: first_of, pair_key
    use polydem_sort, only: ascending_order
    use polydem_wall_terms, only: wall_terms_t
    implicit none
@@ -49,7 +49,7 @@ contains
 
       allocate (key(1, walls%n), terms(n_terms, walls%n))
       do c = 1_ip, walls%n
-         key(1, c) = row_key(bodies%global_index(walls%slots(1, c)), bodies%global_index(walls%slots(2, c)))
+         key(1, c) = pair_key(bodies%global_index(walls%slots(1, c)), bodies%global_index(walls%slots(2, c)))
          terms(:, c) = walls%term(:, c)
       end do
    end subroutine list_terms
@@ -69,7 +69,7 @@ contains
          if (.not. bodies%fixed(s)) cycle
          total = 0.0_wp
          do while (k > 0_ip)
-            if (shiftr(keys(order(k)), 32) /= int(bodies%global_index(s), lp)) exit
+            if (first_of(keys(order(k))) /= bodies%global_index(s)) exit
             total = total + terms(:, order(k))
             k = k - 1_ip
          end do

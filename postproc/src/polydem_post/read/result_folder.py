@@ -11,12 +11,8 @@ import h5py
 import numpy as np
 
 from ..base.result_file import OPEN_SUFFIX, ResultError, is_refused, reading
-from .manifest import MANIFEST, Closed, Manifest, ManifestError, check_bytes, check_hashes, read_manifest
-from .segments import SEGMENT_NAME, Segment, check_names, check_steps, find_segments, number_of, read_segment
-
-#: Segments are compared with their hashes as they are needed, with those that follow up to so many bytes: many at once
-#: take hardly longer than one
-CHECKED_AT_ONCE = 2**26
+from .manifest import MANIFEST, Closed, Manifest, ManifestError, check_bytes, check_sizes, read_manifest
+from .segments import SEGMENT_NAME, Segment, check_names, check_steps, find_segments, read_segment
 
 
 class NoManifest(UserWarning):
@@ -38,7 +34,7 @@ class ResultFolder:
         if not self.segments and not self.profile_path.exists():
             raise ResultError(f"{path}: holds no result (neither trajectory_0001.h5 nor profile.h5){_nearby(path)}")
         self._manifest: Manifest | None = None
-        self._unchecked: dict[str, int] = {}
+        self._unchecked: set[str] = set()
         #: Files that were looked through, as they were then
         self._known: dict[Path, tuple[int, ...]] = {}
         if check:
@@ -49,14 +45,14 @@ class ResultFolder:
         try:
             manifest = read_manifest(self.folder)
             if manifest is None:
-                warnings.warn(f"{self.folder}: has no {MANIFEST}: an older version wrote it, or the file was "
-                              "removed; nothing can be compared with what was written", NoManifest, stacklevel=4)
+                warnings.warn(f"{self.folder}: has no {MANIFEST}, which every run writes: the file was removed; "
+                              "nothing can be compared with what was written", NoManifest, stacklevel=4)
                 return
             check_names(self.segments, manifest, whole)
             names = sorted(set(manifest.closed) & {segment.name for segment in self.segments})
             if whole:
                 names = sorted(name for name in manifest.closed if SEGMENT_NAME.fullmatch(name))
-            check_bytes(self.folder, names, manifest)
+            check_sizes(self.folder, names, manifest)
             for segment in self.segments:
                 check_steps(segment, manifest.closed.get(segment.name))
         except ManifestError as error:
@@ -65,34 +61,17 @@ class ResultFolder:
             raise ResultError(f"{self.folder}: {error}. The result is not what the run wrote: take it from a copy "
                               "or run it again; Trajectory(..., check=False) reads it as it is") from error
         self._manifest = manifest
-        sizes = {segment.name: manifest.closed[segment.name].bytes
-                 for segment in self.segments if segment.name in manifest.closed}
-        self._unchecked = dict(sorted(sizes.items(), key=lambda item: number_of(item[0])))
-        if "profile.h5" in manifest.closed:
-            self._unchecked["profile.h5"] = manifest.closed["profile.h5"].bytes
+        self._unchecked = {*names, "profile.h5"} & manifest.closed.keys()
 
     def _check_bytes(self, name: str) -> None:
-        """Compare all bytes of a file with the manifest when it is first used, and those of some that follow."""
+        """Compare all bytes of a file with the manifest when it is first used."""
         if name not in self._unchecked or self._manifest is None:
             return
-        names: list[str] = []
-        total = 0
-        for each in list(self._unchecked)[list(self._unchecked).index(name) :]:
-            total += self._unchecked[each]
-            if names and total > CHECKED_AT_ONCE:
-                break
-            names.append(each)
-        for chosen in (names, [name]):  # if a later one is wrong, it is told when it is used
-            try:
-                check_bytes(self.folder, chosen, self._manifest)
-                check_hashes(self.folder, chosen, self._manifest)
-            except ManifestError as error:
-                if chosen == [name]:
-                    raise ResultError(f"{self.folder}: {error}") from error
-            else:
-                for each in chosen:
-                    del self._unchecked[each]
-                return
+        try:
+            check_bytes(self.folder, name, self._manifest)
+        except ManifestError as error:
+            raise ResultError(f"{self.folder}: {error}") from error
+        self._unchecked.remove(name)
 
     @contextmanager
     def open_segment(self, segment: Segment) -> Iterator[h5py.File]:

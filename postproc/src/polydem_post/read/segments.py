@@ -19,10 +19,11 @@ from ..base.result_file import (
     entries_of,
     insist,
     is_refused,
+    plain,
     present_path,
     reading,
 )
-from .manifest import MANIFEST, Closed, ManifestError
+from .manifest import MANIFEST, Closed, Manifest, ManifestError
 
 #: Name of a segment: trajectory_0001.h5, or trajectory_0001.h5.open while it is written
 SEGMENT_NAME = re.compile(r"trajectory_(\d{4,})\.h5(\.open)?")
@@ -141,19 +142,27 @@ def number_of(name: str) -> int:
     return int(match.group(1)) if match else -1
 
 
-def check_names(segments: list, manifest, whole: bool) -> None:
+def check_names(segments: list, manifest: Manifest, whole: bool) -> None:
     """All segments must belong to the result, and be numbered without gaps."""
     for segment in segments:
         if segment.name not in manifest.owned:
             raise ManifestError(f"{segment.path.name} does not belong to this result ({MANIFEST} does not have it)")
+        if segment.name not in manifest.closed and _origin(segment.path) != [manifest.run, segment.name]:
+            raise ManifestError(f"{segment.path.name} was written by another run, or under another name")
     numbers = sorted(number_of(name) for name in manifest.closed if SEGMENT_NAME.fullmatch(name))
     if whole and numbers != list(range(1, len(numbers) + 1)):
         raise ManifestError(f"{MANIFEST} has the segments {', '.join(map(str, numbers))}, not 1 to {len(numbers)}")
 
 
+def _origin(path: Path) -> list[str]:
+    """The run that wrote a file, and its name then."""
+    with reading(path) as file:
+        return [plain(file["provenance"][name]) for name in ("run", "file")]
+
+
 def check_steps(segment: Segment, closed) -> None:
     """A closed segment must hold the frames and steps that it held when it was closed."""
-    if closed is None or closed.frames is None:
+    if closed is None:
         return
     held = (len(segment.steps), *(int(step) for step in segment.steps[[0, -1]])) if len(segment.steps) else (0, 0, 0)
     if held != (closed.frames, *((closed.first_step, closed.last_step) if closed.frames else (0, 0))):

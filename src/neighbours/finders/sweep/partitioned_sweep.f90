@@ -35,7 +35,7 @@ module polydem_partitioned_sweep
       sort_ends
    implicit none
    private
-   public :: partitioned_sweep_t
+   public :: partitioned_sweep_t, share
 
    !> One part of the lists of both axes, with the results of the thread that sorts it
    type :: part_t
@@ -202,7 +202,9 @@ contains
 
    !> Number of elements in the first k of several equal parts of n elements
    pure integer(ip) function share(k, shares, n)
+      !> Number of parts to count, and of all parts
       integer, intent(in) :: k, shares
+      !> Number of elements
       integer(ip), intent(in) :: n
 
       share = int(int(k, lp)*int(n, lp)/int(shares, lp), ip)

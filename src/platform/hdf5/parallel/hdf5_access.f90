@@ -35,6 +35,21 @@ module polydem_hdf5_access
    !> Maximum length of a path in a message
    integer, parameter :: path_length = 255
 
+   abstract interface
+      !> MPI function that writes or reads; handles of Open MPI are addresses
+      integer(c_int) function transfer_at(file, offset, bytes, count, kind, status) bind(C)
+         import :: c_int, c_int64_t, c_ptr
+         type(c_ptr), value :: file, bytes, kind, status
+         integer(c_int64_t), value :: offset
+         integer(c_int), value :: count
+      end function transfer_at
+   end interface
+
+   procedure(transfer_at), bind(C, name='PMPI_File_write_at') :: pmpi_write_at
+   procedure(transfer_at), bind(C, name='PMPI_File_write_at_all') :: pmpi_write_at_all
+   procedure(transfer_at), bind(C, name='PMPI_File_read_at') :: pmpi_read_at
+   procedure(transfer_at), bind(C, name='PMPI_File_read_at_all') :: pmpi_read_at_all
+
    interface
       !> HDF5 function H5Pset_dxpl_mpio_collective_opt; hid_t has 64 bits since version 1.10
       integer(c_int) function set_collective_option(properties, option) &
@@ -43,41 +58,6 @@ module polydem_hdf5_access
          integer(c_int64_t), value :: properties
          integer(c_int), value :: option
       end function set_collective_option
-
-      !> MPI function that writes; handles of Open MPI are addresses
-      integer(c_int) function pmpi_write_at(file, offset, bytes, count, kind, status) &
-         bind(C, name='PMPI_File_write_at')
-         import :: c_int, c_int64_t, c_ptr
-         type(c_ptr), value :: file, bytes, kind, status
-         integer(c_int64_t), value :: offset
-         integer(c_int), value :: count
-      end function pmpi_write_at
-
-      !> Collective form of PMPI_File_write_at
-      integer(c_int) function pmpi_write_at_all(file, offset, bytes, count, kind, status) &
-         bind(C, name='PMPI_File_write_at_all')
-         import :: c_int, c_int64_t, c_ptr
-         type(c_ptr), value :: file, bytes, kind, status
-         integer(c_int64_t), value :: offset
-         integer(c_int), value :: count
-      end function pmpi_write_at_all
-
-      !> MPI function that reads
-      integer(c_int) function pmpi_read_at(file, offset, bytes, count, kind, status) bind(C, name='PMPI_File_read_at')
-         import :: c_int, c_int64_t, c_ptr
-         type(c_ptr), value :: file, bytes, kind, status
-         integer(c_int64_t), value :: offset
-         integer(c_int), value :: count
-      end function pmpi_read_at
-
-      !> Collective form of PMPI_File_read_at
-      integer(c_int) function pmpi_read_at_all(file, offset, bytes, count, kind, status) &
-         bind(C, name='PMPI_File_read_at_all')
-         import :: c_int, c_int64_t, c_ptr
-         type(c_ptr), value :: file, bytes, kind, status
-         integer(c_int64_t), value :: offset
-         integer(c_int), value :: count
-      end function pmpi_read_at_all
 
       !> Number of elements of a type that a call has written or read
       integer(c_int) function pmpi_get_count(status, kind, count) bind(C, name='PMPI_Get_count')
