@@ -2,7 +2,7 @@
 module polydem_check_parts
    use polydem_errors, only: error_t, input_error, raise
    use polydem_group_instances, only: index_of_instance, instance_t, row_of
-   use polydem_kinds, only: ip, wp
+   use polydem_kinds, only: ip, lp, wp
    use polydem_missing_entries, only: example_of
    use polydem_namelist_entries, only: entries, first_row
    use polydem_settings, only: grains_settings_t, settings_t
@@ -10,6 +10,9 @@ module polydem_check_parts
    implicit none
    private
    public :: check_parts
+
+   !> Upper limit of the number of corners of the grains of a group, of which half the range of integers can count
+   integer(lp), parameter :: corner_limit = 2_lp**30
 
 contains
 
@@ -120,6 +123,9 @@ contains
          'and ''height'' must not differ by more than a factor of 1e6', error, 'height')
       if (group%moving_grains > group%number .and. group%number > 0_ip) call blame(instance, 'moving_grains', &
          'must not exceed ''number''', error, 'number')
+      if (group%number*max(4_lp, int(group%corners(2), lp), size(group%outline, kind=lp)/2_lp) > corner_limit) &
+         call blame(instance, 'number', 'must not exceed 2^30 divided by the number of corners of a grain; give '// &
+         'less, for example number = 1000000', error, 'corners')
       if (group%overlap .and. group%size_ratio > 1.0_wp) call blame(instance, 'overlap', &
          'cannot be combined with sizes = ''octaves''', error, 'sizes')
    end subroutine check_group

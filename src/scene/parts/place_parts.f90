@@ -296,8 +296,8 @@ contains
          random = new_random(seed)
          call draw_grains(group, random, group%number, grains)
          former = group%number
-         group%number = int(min(1.0e8_wp, max(1.0_wp, anint(real(former, wp)*(wanted/total_area(grains%area))))), ip)
-         if (group%number == former) exit
+         group%number = int(min(1.0e9_wp, max(1.0_wp, anint(real(former, wp)*(wanted/total_area(grains%area))))), ip)
+         if (group%number == former .or. group%number*corners_of(group) > most_corners) exit
       end do
    end subroutine choose_number
 
@@ -315,11 +315,19 @@ contains
          ' m long, more than 1e5 times the greatest length of a grain, '//to_text(greatest_length(group), 3)// &
          ' m; give larger grains, or a region of at most '// &
          to_text(0.99_wp*longest_region*greatest_length(group), 2)//' m'
-      if (group%number*int(max(4_ip, group%corners(2)), lp) <= most_corners) return
-      problem%key = 'number'
-      problem%text = 'must not exceed 2^30 corners divided by those of a grain, '// &
-         to_text(most_corners/int(max(4_ip, group%corners(2)), lp))
+      if (group%number*corners_of(group) <= most_corners) return
+      problem%key = 'solid_fraction'
+      problem%text = 'asks for '//to_text(group%number)//' grains, but at most '// &
+         to_text(most_corners/corners_of(group))//' with so many corners are possible; lower it to '// &
+         to_text(0.9_wp*group%solid_fraction*real(most_corners/corners_of(group), wp)/real(group%number, wp), 2)
    end subroutine check_size
+
+   !> Greatest number of corners of a grain
+   pure integer(lp) function corners_of(group)
+      type(grains_settings_t), intent(in) :: group
+
+      corners_of = max(4_lp, int(group%corners(2), lp), size(group%outline, kind=lp)/2_lp)
+   end function corners_of
 
    !> Find the velocities and angular velocities of the grains of a group.
    subroutine find_velocities(group, areas, random, velocities, spins)

@@ -71,7 +71,10 @@ contains
    pure real(wp) function rounding_of(region)
       type(region_t), intent(in) :: region
 
-      rounding_of = max(1.0e-9_wp, 64.0_wp*epsilon(1.0_wp))*maxval(abs(region%corners))
+      associate (corners => region%corners)
+         rounding_of = max(1.0e-9_wp*maxval(maxval(corners, 2) - minval(corners, 2)), &
+                           64.0_wp*epsilon(1.0_wp)*maxval(abs(corners)))
+      end associate
    end function rounding_of
 
    !> Check that no wall crosses the border of a region. Walls inside become obstacles.
