@@ -50,7 +50,8 @@ contains
       if (number > 0_ip .and. given%number > 0_ip) problem%text = problem%text//'; lower it to '//to_text(number)
       if (number > 0_ip .and. given%number == 0_ip) problem%text = problem%text//'; give number = '//to_text(number)// &
          ' in its place'
-      if (group%arrangement == 'packing') return
+      ! The fraction that fits does not depend on the size of the grains.
+      if (group%arrangement == 'packing' .or. given%number == 0_ip) return
       share = 0.95_wp
       do while (share > 1.0e-2_wp)
          other = shrunk(group, rounded(share))

@@ -335,6 +335,7 @@ contains
       do n = 1, min(most, size(points, 2))
          hull(:, n) = points(:, next)
          next = rightmost(points, hull(:, n))
+         if (next == 0) return
          if (all(abs(points(:, next) - points(:, first)) <= 0.0_wp)) then
             if (n > 2) text = '; the convex hull is '//list_text(reshape(hull(:, :n), [2*n]))
             return
@@ -342,7 +343,7 @@ contains
       end do
    end function hull_text
 
-   !> The point such that all points are on the left of the line to it; the farthest of several
+   !> The point such that all points are on the left of the line to it; the farthest of several, 0 if there is no other
    pure integer function rightmost(points, from)
       real(wp), intent(in) :: points(:, :), from(2)
       real(wp) :: turn
