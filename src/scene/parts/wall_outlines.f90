@@ -66,7 +66,7 @@ contains
          problem%key = 'thickness'
          if (wall%outline == 'rectangle') problem%key = 'high'
          problem%text = 'makes a body that '//problem%text//'; give more thickness, for example '// &
-            to_text(1.0e-6_wp*maxval(abs(polygons%polygon(k))), 2)
+            to_text(1.0e-4_wp*maxval(abs(polygons%polygon(k))), 2)
          return
       end do
    end subroutine check_thickness
