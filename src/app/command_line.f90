@@ -39,6 +39,8 @@ module polydem_command_line
       character(len=:), allocatable :: samples
       !> Whether a replay compares every pair list with that of finder all_pairs
       logical :: oracle = .false.
+      !> Whether a check prints the parts of the scene as a namelist, and nothing else
+      logical :: expands = .false.
       !> Whether the files of a result are compared with their checksums
       logical :: checks = .false.
       !> How the program was called, for messages: polydem, or ./polydem by the launcher
@@ -82,6 +84,7 @@ module polydem_command_line
       option_t('--set', 'GROUP.KEY=VALUE', 'run check bench'), &
       option_t('--threads', 'T', 'run check replay'), &
       option_t('--ranks', 'R', 'run check'), &
+      option_t('--expand', '', 'check'), &
       option_t('--force', '', 'run'), &
       option_t('--continue', '', 'run'), &
       option_t('--changed', '', 'run'), &
@@ -295,6 +298,8 @@ contains
          command%samples = value
       case ('--oracle')
          command%oracle = .true.
+      case ('--expand')
+         command%expands = .true.
       case ('--check')
          command%checks = .true.
       case ('--help')

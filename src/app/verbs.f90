@@ -8,6 +8,7 @@ module polydem_verbs
    use polydem_command_line, only: command_t, usage
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t
+   use polydem_expand, only: expand_scene
    use polydem_host, only: environment
    use polydem_kinds, only: dp, ip
    use polydem_oversubscription, only: oversubscription, oversubscription_text
@@ -36,7 +37,7 @@ contains
       type(settings_t) :: settings
       type(bench_settings_t) :: bench
       type(thread_choice_t) :: threads
-      character(len=:), allocatable :: crowd
+      character(len=:), allocatable :: crowd, text
 
       if (command%help .or. command%version) then
          if (comm%is_root() .and. command%help) call print_line(usage(command%verb, command%program), error)
@@ -61,7 +62,13 @@ contains
       select case (command%verb)
       case ('check')
          call read_settings(command%file, command%overrides, settings, error)
-         if (.not. allocated(error)) call check_simulation(settings, error, crowd, threads)
+         if (allocated(error)) return
+         if (command%expands) then
+            call expand_scene(settings, text, error)
+            if (.not. allocated(error)) call print_line(text(:len(text) - 1), error)
+         else
+            call check_simulation(settings, error, crowd, threads)
+         end if
       case ('replay')
          call warn(oversubscription_text(int(max(1, command%threads), ip), int(omp_get_num_procs(), ip)))
          call replay_trace(command%file, command%finder, max(1, command%threads), command%repeat, error, &

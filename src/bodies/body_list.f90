@@ -36,6 +36,8 @@ module polydem_body_list
       integer(ip) :: n = 0_ip
       !> Number of this rank, from 0, and number of ranks that share the free bodies
       integer(ip) :: rank = 0_ip, n_ranks = 1_ip
+      !> What an identifier that is not given exceeds the position in the list by
+      integer(ip) :: id_offset = 0_ip
       !> Identifiers of all bodies, (n)
       integer(ip), allocatable, private :: id(:)
       !> Kept bodies, (polygons%n) or longer
@@ -46,6 +48,9 @@ module polydem_body_list
       procedure :: append
       procedure :: leaves_next
       procedure :: skip
+      procedure :: last_id
+      procedure :: greatest_id
+      procedure :: kept_polygons
    end type body_list_t
 
    !> Number of consecutive bodies of a share
@@ -67,7 +72,7 @@ contains
       real(wp), intent(in), optional :: velocity(2)
       !> Angular velocity [rad/s]
       real(wp), intent(in), optional :: angular_velocity
-      !> Identifier; the position in the list if absent
+      !> Identifier; the position in the list plus `id_offset` if absent
       integer(ip), intent(in), optional :: id
       !> Mass instead of that of the polygon [kg/m]
       real(wp), intent(in), optional :: mass
@@ -109,7 +114,7 @@ contains
    !> Count a body that the rank does not keep.
    subroutine skip(self, id)
       class(body_list_t), intent(inout) :: self
-      !> Identifier; the position in the list if absent
+      !> Identifier; the position in the list plus `id_offset` if absent
       integer(ip), intent(in), optional :: id
       integer(ip), allocatable :: longer(:)
 
@@ -120,9 +125,32 @@ contains
          call move_alloc(longer, self%id)
       end if
       self%n = self%n + 1_ip
-      self%id(self%n) = self%n
+      self%id(self%n) = self%n + self%id_offset
       if (present(id)) self%id(self%n) = id
    end subroutine skip
+
+   !> Identifier of the last body
+   pure integer(ip) function last_id(self)
+      class(body_list_t), intent(in) :: self
+
+      last_id = self%id(self%n)
+   end function last_id
+
+   !> Greatest identifier; 0 of an empty list
+   pure integer(ip) function greatest_id(self)
+      class(body_list_t), intent(in) :: self
+
+      greatest_id = 0_ip
+      if (self%n > 0_ip) greatest_id = maxval(self%id(:self%n))
+   end function greatest_id
+
+   !> Polygons of the bodies that the rank keeps, as they were given
+   pure function kept_polygons(self) result(polygons)
+      class(body_list_t), intent(in) :: self
+      type(polygon_list_t) :: polygons
+
+      polygons = self%polygons
+   end function kept_polygons
 
    !> Check the polygons of the kept bodies and build the arrays, in ascending order of the identifiers, at angle 0.
    subroutine new_bodies(list, bodies, error)

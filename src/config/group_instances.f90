@@ -2,13 +2,14 @@
 !> file contains is an instance; they follow each other in the order of the file, and their names differ.
 module polydem_group_instances
    use polydem_errors, only: error_t, input_error, raise
+   use polydem_kinds, only: ip, wp
    use polydem_namelist_entries, only: entries, first_row, group_length, groups, is_repeatable
    use polydem_namelist_statements, only: statement_t
    use polydem_namelist_values, only: value_t
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: instance_t, new_instances, row_of, index_of_instance, names_of, full_name
+   public :: instance_t, new_instances, new_instance, store_value, row_of, index_of_instance, names_of, full_name
 
    !> Greatest number of instances of a group. The check of their names compares all pairs
    integer, parameter :: most_instances = 9999
@@ -48,7 +49,7 @@ contains
       !> A group has too many instances
       type(error_t), allocatable, intent(inout) :: error
       character(len=group_length), allocatable :: names(:)
-      integer :: counts(size(groups())), first, g, k, n
+      integer :: counts(size(groups())), g, k, n
 
       names = groups()
       opened = 0
@@ -69,19 +70,60 @@ contains
       allocate (instances(n))
       n = 0
       do g = 1, size(names)
-         first = first_entry(names(g))
          do k = 1, counts(g)
             n = n + 1
-            instances(n)%group = names(g)
-            instances(n)%name = ''
+            call new_instance(names(g), instances(n))
             instances(n)%number = k
             instances(n)%place = file
-            associate (last => first + count(entries%group == names(g)) - 1)
-               allocate (instances(n)%given(first:last), instances(n)%values(first:last))
-            end associate
          end do
       end do
    end subroutine new_instances
+
+   !> Make an instance of a group without a name and without values.
+   pure subroutine new_instance(group, instance)
+      !> Namelist group
+      character(len=*), intent(in) :: group
+      type(instance_t), intent(out) :: instance
+      integer :: first
+
+      instance%group = group
+      instance%name = ''
+      instance%place = ''
+      first = first_entry(group)
+      associate (last => first + count(entries%group == group) - 1)
+         allocate (instance%given(first:last), instance%values(first:last))
+      end associate
+   end subroutine new_instance
+
+   !> Store the value of an entry in all its rows.
+   pure subroutine store_value(instance, key, reals, integers, flag, text)
+      type(instance_t), intent(inout) :: instance
+      !> Name of the entry in the group
+      character(len=*), intent(in) :: key
+      !> Its values, of which one kind is present
+      real(wp), intent(in), optional :: reals(:)
+      !> As `reals`
+      integer(ip), intent(in), optional :: integers(:)
+      !> As `reals`
+      logical, intent(in), optional :: flag
+      !> As `reals`
+      character(len=*), intent(in), optional :: text
+      integer :: row
+
+      do row = lbound(instance%values, 1), ubound(instance%values, 1)
+         if (entries(row)%key /= key) cycle
+         associate (value => instance%values(row))
+            if (present(reals)) value%reals = reals
+            if (present(integers)) value%integers = integers
+            if (present(flag)) value%flag = flag
+            if (.not. present(text)) cycle
+            value%text = text
+            if (allocated(value%texts)) deallocate (value%texts)
+            allocate (value%texts(1))
+            value%texts(1)%text = text
+         end associate
+      end do
+   end subroutine store_value
 
    !> First row of a group
    pure integer function first_entry(group)

@@ -21,6 +21,8 @@ TEXTS = ("word", "path", "name")
 NAME_ROW = ("name", "name", 1, "required", "", "", "")
 #: Group of a bench; all other groups belong to a run
 BENCH = "bench"
+#: Groups that a recipe makes, which --expand prints
+PARTS = ("grains", "wall")
 #: Longest piece of a text on a line
 WIDTH = 90
 
@@ -173,6 +175,15 @@ def assignment(row):
     return f"      settings%{row.key} = &\n         instance%values(row_of(instance, '{row.key}'))%{values}{first}\n"
 
 
+def storage(row):
+    """Statement that copies a component to the values of its entry."""
+    kinds = {"real": "reals", "integer": "integers", "logical": "flag"}
+    value = f"settings%{row.key}"
+    if row.type in ("real", "integer") and row.count == 1:
+        value = f"[{value}]"
+    return f"      call store_value(instance, '{row.key}', {kinds.get(row.type, 'text')}={value})\n"
+
+
 def fill_module(groups, rows):
     """Procedures that fill the types, one per group, and the one that fills all groups of a run."""
     run = [group for group in groups if group != BENCH]
@@ -195,10 +206,19 @@ def fill_module(groups, rows):
                      "      !> The group with its values\n      type(instance_t), intent(in) :: instance\n"
                      f"      !> Settings to fill\n      type({group}_settings_t), intent(inout) :: settings\n\n"
                      f"{copies}   end subroutine fill_{group}\n")
+    for group in (group for group in PARTS if group in groups):
+        copies = "".join(storage(row) for row in first_rows(rows, group))
+        parts.append(f"   !> Store a group &{group} in the values of an instance.\n"
+                     f"   pure subroutine store_{group}(settings, instance)\n"
+                     f"      !> Settings of the group\n      type({group}_settings_t), intent(in) :: settings\n"
+                     "      !> The group; its values change\n      type(instance_t), intent(inout) :: instance\n\n"
+                     f"{copies}   end subroutine store_{group}\n")
+    stores = [f"store_{group}" for group in PARTS if group in groups]
     uses = [f"settings, only: {group}_settings_t" for group in groups]
-    return module("fill_groups", "Copies the values of the table of entries to the settings.",
-                  ["group_instances, only: instance_t, row_of", "settings, only: settings_t", *uses],
-                  ["fill_groups", f"fill_{BENCH}"], "", "\n".join(parts))
+    used = f"group_instances, only: instance_t, row_of{', store_value' * bool(stores)}"
+    return module("fill_groups", "Copies the values of the table of entries to the settings, and those of parts back.",
+                  [used, "settings, only: settings_t", *uses], ["fill_groups", f"fill_{BENCH}", *stores], "",
+                  "\n".join(parts))
 
 
 def manual(rows):

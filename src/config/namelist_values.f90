@@ -7,7 +7,7 @@ module polydem_namelist_values
    use polydem_strings, only: to_text, counted, count_words, lower_case, quoted, split_words, suggestion, text_t
    implicit none
    private
-   public :: value_t, read_value, value_text, label, is_text
+   public :: value_t, read_value, value_text, label, is_text, list_text
 
    !> Decimal digits
    character(len=*), parameter :: digits = '0123456789'
@@ -297,10 +297,8 @@ contains
 
       select case (entry%type)
       case ('real')
-         allocate (words(size(value%reals)))
-         do k = 1, size(words)
-            words(k)%text = real_text(value%reals(k))
-         end do
+         text = list_text(value%reals)
+         return
       case ('integer')
          allocate (words(size(value%integers)))
          do k = 1, size(words)
@@ -317,6 +315,21 @@ contains
       end select
       text = listed(words)
    end function value_text
+
+   !> Numbers in namelist syntax, which reads back to the same bits
+   pure function list_text(numbers) result(text)
+      !> Numbers
+      real(wp), intent(in) :: numbers(:)
+      character(len=:), allocatable :: text
+      type(text_t), allocatable :: words(:)
+      integer :: k
+
+      allocate (words(size(numbers)))
+      do k = 1, size(words)
+         words(k)%text = real_text(numbers(k))
+      end do
+      text = listed(words)
+   end function list_text
 
    !> Words separated by commas; the cost is linear in their number
    pure function listed(words) result(text)

@@ -5,6 +5,7 @@
 !> not detect keys given twice, and reports most errors as 'end of file'.
 module polydem_read_settings
    use polydem_check_bench, only: check_bench
+   use polydem_check_parts, only: check_parts
    use polydem_check_settings, only: check_settings
    use polydem_errors, only: error_t
    use polydem_exclusive_entries, only: resolve_exclusive_entries
@@ -60,6 +61,7 @@ contains
          call read_values(file_name, text, overrides, .false., settings%source_locations_t, instances, error)
          if (allocated(error)) return
          call fill_groups(instances, settings)
+         call check_parts(settings, instances, error)
          call check_settings(settings, instances, error)
          call expand_short_motion(settings)
       type is (bench_settings_t)
@@ -90,6 +92,7 @@ contains
       origin%file = trim(file_name)
       origin%text = normalise_line_ends(text)
       origin%resolved = resolved_text(instances)
+      origin%given = resolved_text(instances, given_only=.true.)
       call list_places(instances, origin)
    end subroutine read_values
 
@@ -126,6 +129,7 @@ contains
       allocate (settings%motion(1))
       associate (scene => settings%scene, motion => settings%motion(1))
          motion%name = ''
+         motion%wall = ''
          motion%kind = settings%scene%motion
          motion%bodies = scene%motion_bodies
          motion%pivot = scene%motion_pivot

@@ -7,7 +7,7 @@
 module polydem_resolve_entries
    use polydem_collect_entries, only: collect_entries
    use polydem_errors, only: error_t, input_error, raise
-   use polydem_group_instances, only: instance_t, names_of
+   use polydem_group_instances, only: instance_t, names_of, row_of
    use polydem_kinds, only: ip, wp
    use polydem_missing_entries, only: example_of, missing_text
    use polydem_namelist_entries, only: bench_group, entries, entry_t, first_row, required
@@ -17,7 +17,7 @@ module polydem_resolve_entries
    use polydem_strings, only: join, count_words, quoted, split_words, suggestion
    implicit none
    private
-   public :: resolve_entries, resolved_text, check_reference
+   public :: resolve_entries, resolved_text, write_group, check_reference
 
 contains
 
@@ -96,7 +96,7 @@ contains
       is_needed = entry%needs == ''
       if (is_needed) return
       colon = index(entry%needs, ':')
-      associate (decider => instance%values(first_row(entry%group, entry%needs(:colon - 1))))
+      associate (decider => instance%values(row_of(instance, entry%needs(:colon - 1))))
          if (decider%is_active) is_needed = any(split_words(entry%needs(colon + 1:)) == decider%text)
       end associate
    end function is_needed
@@ -157,7 +157,7 @@ contains
             needs = needs//entries(row)%needs(index(entries(row)%needs, ':') + 1:)
          end do
          key = entries(home)%needs(:index(entries(home)%needs, ':') - 1)
-         associate (decider => instance%values(first_row(given%group, key)))
+         associate (decider => instance%values(row_of(instance, key)))
             if (decider%is_override .and. .not. given%is_override) return
             call raise(error, input_error, given%place//': '//label(entries(home))//' is used only with '//key// &
                ' = '//join(split_words(needs), ' or ')//', not with '//decider%text)
@@ -194,24 +194,65 @@ contains
    end subroutine check_reference
 
    !> All entries in use as namelist text that can be read again, one entry per line, without empty lists and groups
-   pure function resolved_text(instances) result(text)
+   pure function resolved_text(instances, given_only) result(text)
       !> Instances with values
       type(instance_t), intent(in) :: instances(:)
-      character(len=:), allocatable :: text, value
-      character(len=*), parameter :: line_end = new_line('a')
-      integer :: k, row
+      !> Whether entries that are not given are left out; default: no
+      logical, intent(in), optional :: given_only
+      character(len=:), allocatable :: text
+      logical, allocatable :: chosen(:)
+      integer :: k
 
       text = ''
       do k = 1, size(instances)
-         if (.not. any(instances(k)%values%is_active)) cycle
-         text = text//'&'//trim(instances(k)%group)//line_end
-         do row = lbound(instances(k)%values, 1), ubound(instances(k)%values, 1)
-            if (.not. instances(k)%values(row)%is_active) cycle
-            value = value_text(entries(row), instances(k)%values(row))
-            if (value /= '') text = text//'   '//trim(entries(row)%key)//' = '//value//line_end
-         end do
-         text = text//'/'//line_end
+         chosen = instances(k)%values%is_active
+         if (present(given_only)) chosen = chosen .and. (instances(k)%values%is_given .or. .not. given_only)
+         if (any(chosen)) text = text//chosen_text(instances(k), chosen)
       end do
    end function resolved_text
+
+   !> Write the entries of a group that are in use and differ from their defaults as namelist text.
+   pure subroutine write_group(instance, text)
+      !> Group with values; which of them are in use is set
+      type(instance_t), intent(inout) :: instance
+      !> The text
+      character(len=:), allocatable, intent(out) :: text
+      type(value_t) :: default
+      type(error_t), allocatable :: error
+      logical, allocatable :: chosen(:)
+      integer :: row
+
+      allocate (chosen(size(instance%values)))
+      do row = lbound(instance%values, 1), ubound(instance%values, 1)
+         associate (entry => entries(row), value => instance%values(row), &
+                    place => row - lbound(instance%values, 1) + 1)
+            value%is_active = is_needed(entry, instance)
+            chosen(place) = value%is_active
+            if (value%is_active .and. entry%default /= required) then
+               call read_value(entry, default_statement('', entry), default, error)
+               chosen(place) = value_text(entry, value) /= value_text(entry, default)
+            end if
+         end associate
+      end do
+      text = chosen_text(instance, chosen)
+   end subroutine write_group
+
+   !> Some entries of a group as namelist text, without empty lists
+   pure function chosen_text(instance, chosen) result(text)
+      type(instance_t), intent(in) :: instance
+      !> Whether an entry is among them, (row of the group)
+      logical, intent(in) :: chosen(:)
+      character(len=:), allocatable :: text, value
+      character(len=*), parameter :: line_end = new_line('a')
+      integer :: row
+
+      text = '&'//trim(instance%group)//line_end
+      do row = lbound(instance%values, 1), ubound(instance%values, 1)
+         if (.not. chosen(row - lbound(instance%values, 1) + 1)) cycle
+         value = value_text(entries(row), instance%values(row))
+         if (value /= '') text = text//'   '//trim(entries(row)%key)//' = '//value//line_end
+      end do
+      text = text//'/'//line_end
+   end function chosen_text
 
 end module polydem_resolve_entries

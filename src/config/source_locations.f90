@@ -23,6 +23,8 @@ module polydem_source_locations
       character(len=:), allocatable :: text
       !> Every entry in use with its value, one per line, as namelist text
       character(len=:), allocatable :: resolved
+      !> Those of these entries that the file or the command line gives, likewise
+      character(len=:), allocatable :: given
       !> Where each entry was given, (any); not allocated in settings that no text gave
       type(entry_place_t), allocatable :: places(:)
    end type source_locations_t
@@ -52,7 +54,7 @@ contains
    pure function overrides_of(settings, group) result(text)
       !> Settings of a run or a bench
       class(source_locations_t), intent(in) :: settings
-      !> Namelist group
+      !> Namelist group; with all of its names if it is repeatable and the name is not given
       character(len=*), intent(in) :: group
       character(len=:), allocatable :: text
       integer :: k
@@ -60,7 +62,7 @@ contains
       text = ''
       if (.not. allocated(settings%places)) return
       do k = 1, size(settings%places)
-         if (settings%places(k)%group /= group) cycle
+         if (index(settings%places(k)%group//'.', group//'.') /= 1) cycle
          associate (place => settings%places(k)%place)
             if (index(place, option) == 1) text = text//trim(merge(' (with', ',     ', text == ''))//' '//place
          end associate

@@ -62,16 +62,24 @@ contains
       end if
    end subroutine claim_folder
 
-   !> Paths of the input files of a run: namelist, bodies file, packing; empty where the scene reads no such file
+   !> Paths of the input files of a run: namelist, bodies file, packings; empty where the scene reads no such file
    function input_paths(settings) result(inputs)
       type(settings_t), intent(in) :: settings
       character(len=:), allocatable :: inputs(:)
+      integer :: k, longest_path
 
-      associate (file => settings%file, scene => settings%scene)
-         allocate (character(len=max(len(file), len(scene%bodies_file), len(scene%packing))) :: inputs(3))
+      associate (file => settings%file, scene => settings%scene, grains => settings%grains)
+         longest_path = max(len(file), len(scene%bodies_file), len(scene%packing))
+         do k = 1, size(grains)
+            longest_path = max(longest_path, len(grains(k)%packing))
+         end do
+         allocate (character(len=longest_path) :: inputs(3 + size(grains)))
          inputs(1) = file
          inputs(2) = scene%bodies_file
          inputs(3) = scene%packing
+         do k = 1, size(grains)
+            inputs(3 + k) = grains(k)%packing
+         end do
       end associate
    end function input_paths
 

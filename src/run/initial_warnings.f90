@@ -8,6 +8,9 @@ module polydem_initial_warnings
    use polydem_motion_check, only: shorter_step
    use polydem_kinds, only: ip, lp, wp
    use polydem_log, only: log_t
+   use polydem_parts, only: parts_t
+   use polydem_regions, only: is_beside_walls
+   use polydem_settings, only: settings_t
    use polydem_simulation, only: simulation_t
    use polydem_strings, only: counted, text_t, to_text
    use polydem_scene_measures, only: scene_measures_t
@@ -55,6 +58,7 @@ contains
       call warn_of_overlaps(simulation, measures, warnings)
       call warn_of_speeds(simulation, measures, warnings)
       call warn_of_fixed_overlaps(simulation, warnings)
+      call warn_of_regions(simulation%settings, warnings)
       if (measures%free > 0_lp) call warn_of_rounding(simulation, measures, warnings)
       ! A law that is not conservative needs damping, which removes the energy that the law adds.
       undamped = simulation%law%undamped_warning()
@@ -101,6 +105,22 @@ contains
          to_text(simulation%settings%forces%stiffness*measures%softness/firm, 2)//' it is '//to_text(firm, 2)// &
          '), and check that lengths are in metres')
    end subroutine warn_of_units
+
+   !> Warn of groups of grains that will meet no wall.
+   subroutine warn_of_regions(settings, warnings)
+      type(settings_t), intent(in) :: settings
+      type(text_t), allocatable, intent(inout) :: warnings(:)
+      type(parts_t) :: parts
+      integer :: k
+
+      if (size(settings%wall) == 0 .or. settings%scene%bodies_file /= '') return
+      parts%walls = settings%wall
+      do k = 1, size(settings%grains)
+         if (is_beside_walls(settings%grains(k), parts, settings%forces%gravity)) call add(warnings, &
+            'the grains of group '//settings%grains(k)%name//' start beside all walls and will meet none; move '// &
+            'their region between or above the walls')
+      end do
+   end subroutine warn_of_regions
 
    !> Warn of a time step that is unstable as soon as bodies touch.
    subroutine warn_of_step(simulation, warnings)

@@ -98,7 +98,7 @@ contains
       if (allocated(error)) return
       call collect_provenance(run%provenance, settings%file, settings%text, settings%resolved, settings%scene%seed)
       call run%provenance%set('scene', run%scene_hash)
-      if (settings%scene%name == 'file') call read_origin(settings%scene%bodies_file, run%provenance%origin, error)
+      if (settings%scene%bodies_file /= '') call read_origin(settings%scene%bodies_file, run%provenance%origin, error)
       if (allocated(error)) return
       run%provenance%processes = run%comm%size
       if (allocated(run%attempt%threads%reason)) call run%provenance%set('thread_choice', run%attempt%threads%reason)

@@ -105,14 +105,26 @@ contains
          else if (scene%bodies_file /= '') then
             text = other_bodies//', though no entry does: the contents of bodies_file = '// &
                quoted(trim(scene%bodies_file))//' changed'
-         else if (scene%packing /= '') then
+         else if (packing_of(settings) /= '') then
             text = other_bodies//', though no entry does: the contents of packing = '// &
-               quoted(trim(scene%packing))//' changed'
+               quoted(packing_of(settings))//' changed'
          else
             text = other_bodies//', though no entry does: another revision of this program made them'
          end if
       end associate
    end function why_other
+
+   !> Path of the first packing from which the scene is made; empty if there is none
+   pure function packing_of(settings) result(path)
+      type(settings_t), intent(in) :: settings
+      character(len=:), allocatable :: path
+      integer :: k
+
+      path = trim(settings%scene%packing)
+      do k = 1, size(settings%grains)
+         if (path == '') path = trim(settings%grains(k)%packing)
+      end do
+   end function packing_of
 
    !> Restart at step 0 without a checkpoint; keep the closed segments of a run of the same scene and settings.
    subroutine restart_without_checkpoint(folder, manifest, settings, scene, earlier, error)

@@ -3,162 +3,131 @@
 !> Grains that may overlap at the start lie on a lattice with the density that the fraction requires. The walls then lie
 !> half a long axis outside the rectangle to which the fraction refers, and no grain overlaps a wall.
 module polydem_gas
-   use polydem_body_list, only: body_list_t
-   use polydem_cut_cells, only: fit_cells
-   use polydem_errors, only: error_t, input_error, raise
-   use polydem_grains, only: append_grains, draw_grains, grains_t
+   use polydem_arrange, only: arrange_grains, region_t, total_area
+   use polydem_errors, only: error_t
+   use polydem_grains, only: draw_grains, grains_t
    use polydem_kinds, only: ip, wp
-   use polydem_lattice, only: fill_lattice, row_height
-   use polydem_pour, only: loose_spacing_ratio, loose_spacing, displace_randomly
+   use polydem_outlines, only: rectangle
+   use polydem_parts, only: parts_t
    use polydem_random, only: new_random, random_t
-   use polydem_settings, only: scene_settings_t
-   use polydem_start_velocities, only: choose_moving_grains, draw_spins, draw_velocities, remove_momentum, set_speed
+   use polydem_recipe, only: recipe_grains
+   use polydem_settings, only: grains_settings_t, scene_settings_t
    use polydem_strings, only: to_text
-   use polydem_walls, only: append_box, rectangle
    implicit none
    private
-   public :: list_gas, total_area, append_moving_grains
+   public :: make_gas, explain_gas, moving_grains, area_of_grains
 
 contains
 
-   !> List the bodies of the gas: grains first, then floor, left wall, right wall, lid. The centre is at the origin.
-   subroutine list_gas(scene, list, error)
-      !> Settings: bodies (grains), solid_fraction (of the container), width, speed, spin, grains
+   !> Make the parts of the gas: grains, floor, left wall, right wall, lid. The centre is at the origin.
+   subroutine make_gas(scene, parts)
+      !> Settings: bodies (grains), fraction (of the container that the polygons cover), width, speed, spin, grains
       type(scene_settings_t), intent(in) :: scene
-      type(body_list_t), intent(inout) :: list
-      !> Allocated if the solid_fraction is too large for a start without overlaps
-      type(error_t), allocatable, intent(inout) :: error
-      type(random_t) :: random, start
-      type(grains_t) :: grains
-      real(wp), allocatable :: centres(:, :)
-      real(wp) :: inside(2, 4), spacing
+      type(parts_t), intent(inout) :: parts
+      type(grains_settings_t) :: grains
+      real(wp) :: low(2), high(2)
 
-      allocate (centres(2, scene%bodies))
-      random = new_random(scene%seed)
-      call draw_grains(scene, random, scene%bodies, grains)
-      start = random
-      call arrange(scene, grains, scene%solid_fraction, random, inside, centres, spacing)
-      if (.not. spacing > 0.0_wp) then
-         call raise(error, input_error, 'solid_fraction is too large for grains without overlap at the start; '// &
-                    'lower solid_fraction'//largest_fraction(scene, grains, start)// &
-                    ', or change width or long_axis_max')
-         return
+      grains = moving_grains(scene)
+      grains%arrangement = 'spread'
+      grains%overlap = scene%overlap
+      call choose_box(scene, area_of_grains(grains, scene%seed)/scene%solid_fraction, grains%low, grains%high)
+      call parts%add_grains(grains)
+      low = grains%low
+      high = grains%high
+      if (scene%overlap) then
+         low = low + 0.5_wp*scene%long_axis_max*sign(1.0_wp, low)
+         high = high + 0.5_wp*scene%long_axis_max*sign(1.0_wp, high)
       end if
-      call append_moving_grains(list, scene, random, grains, centres)
-      call append_box(list, inside, scene%long_axis_max*sqrt(scene%size_ratio), closed=.true.)
-   end subroutine list_gas
+      call parts%add_box(low, high, scene%long_axis_max*sqrt(scene%size_ratio), closed=.true.)
+   end subroutine make_gas
 
-   !> Arrange the grains in the container that a fraction requires; the spacing is 0 if they do not fit.
-   subroutine arrange(scene, grains, fraction, random, inside, centres, spacing)
+   !> Grains in a box with random velocities. Their total momentum is zero unless one grain alone moves
+   pure function moving_grains(scene) result(grains)
+      !> Settings: bodies, speed, spin, moving_grains, grains
       type(scene_settings_t), intent(in) :: scene
-      type(grains_t), intent(in) :: grains
-      real(wp), intent(in) :: fraction
-      type(random_t), intent(inout) :: random
-      !> Container (2, 4), centres (2, grain), distance of the centres [m]
-      real(wp), intent(out) :: inside(2, 4), centres(:, :), spacing
-      real(wp) :: area, width
+      type(grains_settings_t) :: grains
 
-      area = total_area(grains%area)/fraction
+      grains = recipe_grains(scene)
+      grains%number = scene%bodies
+      grains%region = 'box'
+      grains%momentum = 'zero'
+      grains%spin = scene%spin
+      grains%moving_grains = scene%moving_grains
+   end function moving_grains
+
+   !> Total area of the polygons of the grains [m2]
+   real(wp) function area_of_grains(grains, seed)
+      !> Number and shape of the grains
+      type(grains_settings_t), intent(in) :: grains
+      !> Seed of the random numbers
+      integer(ip), intent(in) :: seed
+      type(random_t) :: random
+      type(grains_t) :: drawn
+
+      random = new_random(seed)
+      call draw_grains(grains, random, grains%number, drawn)
+      area_of_grains = total_area(drawn%area)
+   end function area_of_grains
+
+   !> Choose the box of a given area around the origin.
+   pure subroutine choose_box(scene, area, low, high)
+      type(scene_settings_t), intent(in) :: scene
+      real(wp), intent(in) :: area
+      real(wp), intent(out) :: low(2), high(2)
+      real(wp) :: width
+
       width = scene%width
       if (.not. width > 0.0_wp) width = sqrt(area)
-      inside = rectangle(-0.5_wp*width, 0.5_wp*width, -0.5_wp*area/width, 0.5_wp*area/width)
-      if (scene%size_ratio > 1.0_wp) then
-         call fit_cells(inside, loose_spacing_ratio*grains%length, random, centres, spacing)
-      else if (scene%overlap) then
-         call spread_out(inside, 0.0_wp, centres, spacing)
-         call displace_randomly(random, spacing, centres)
-         inside = inside + 0.5_wp*scene%long_axis_max*sign(1.0_wp, inside)
-      else
-         call spread_out(inside, loose_spacing(scene), centres, spacing)
-         call displace_randomly(random, spacing - scene%long_axis_max, centres)
-      end if
-   end subroutine arrange
+      low = [-0.5_wp*width, -0.5_wp*area/width]
+      high = [0.5_wp*width, 0.5_wp*area/width]
+   end subroutine choose_box
 
-   !> The end of a message: ' to ' and a fraction with which the grains fit, near the largest one
-   function largest_fraction(scene, grains, start) result(text)
+   !> What is said of grains that do not fit, with a fraction near the largest one with which they do
+   subroutine explain_gas(scene, grains, text)
+      !> Settings of the gas
       type(scene_settings_t), intent(in) :: scene
-      type(grains_t), intent(in) :: grains
-      !> State of the random numbers before the grains are arranged
-      type(random_t), intent(in) :: start
-      character(len=:), allocatable :: text
+      !> The grains of the gas
+      type(grains_settings_t), intent(in) :: grains
+      !> The message
+      character(len=:), allocatable, intent(out) :: text
+      type(error_t), allocatable :: error
+      type(grains_t) :: drawn
       type(random_t) :: random
+      type(region_t) :: region
       real(wp), allocatable :: centres(:, :)
-      real(wp) :: inside(2, 4), spacing, fits, fails, trial
+      character(len=:), allocatable :: fraction
+      real(wp) :: area, fits, fails, low(2), high(2), trial
       ! Number of trials; below a millionth of the given fraction the bodies of the walls are the problem
       integer, parameter :: most_trials = 26
+      integer(ip) :: n_found
       integer :: k
 
-      allocate (centres(2, size(grains%area)))
+      area = area_of_grains(grains, scene%seed)
+      allocate (centres(2, grains%number))
+      region%is_box = .true.
       fits = 0.0_wp
       fails = scene%solid_fraction
       do k = 1, most_trials
          if (fits >= 0.98_wp*fails) exit
          trial = 0.5_wp*(fits + fails)
          ! The number that the message names is the one that was tried.
-         text = to_text(trial, 2)
-         read (text, *) trial
+         fraction = to_text(trial, 2)
+         read (fraction, *) trial
          if (trial <= fits .or. trial >= fails) exit
-         random = start
-         call arrange(scene, grains, trial, random, inside, centres, spacing)
-         if (spacing > 0.0_wp) then
+         call choose_box(scene, area/trial, low, high)
+         region%corners = rectangle(low(1), high(1), low(2), high(2))
+         random = new_random(scene%seed)
+         call arrange_grains(grains, region, scene%seed, random, drawn, centres, n_found, error)
+         if (n_found == grains%number) then
             fits = trial
          else
             fails = trial
          end if
       end do
-      text = ''
-      if (fits > 0.0_wp) text = ' to '//to_text(fits, 2)
-   end function largest_fraction
-
-   !> Append grains with random velocities and angular velocities. The total momentum is zero unless one grain alone
-   !> moves.
-   subroutine append_moving_grains(list, scene, random, grains, centres)
-      type(body_list_t), intent(inout) :: list
-      !> Settings: speed, spin, moving_grains
-      type(scene_settings_t), intent(in) :: scene
-      type(random_t), intent(inout) :: random
-      type(grains_t), intent(in) :: grains
-      !> Centres of the grains, (2, grain) [m]
-      real(wp), intent(in) :: centres(:, :)
-      real(wp), allocatable :: velocities(:, :), spins(:)
-      logical, allocatable :: moves(:)
-
-      allocate (velocities(2, size(centres, 2)), spins(size(centres, 2)))
-      call draw_velocities(random, 1.0_wp, velocities)
-      moves = choose_moving_grains(size(centres, 2, kind=ip), scene%moving_grains)
-      if (count(moves) > 1) call remove_momentum(grains%area, moves, velocities)
-      call set_speed(scene%speed, moves, velocities)
-      call draw_spins(random, scene%spin, spins)
-      call append_grains(list, scene, grains, centres, velocities, spins)
-   end subroutine append_moving_grains
-
-   !> Total area of the grains [m2]
-   pure real(wp) function total_area(areas)
-      !> Area of each grain, (grain) [m2]
-      real(wp), intent(in) :: areas(:)
-      integer :: k
-
-      total_area = 0.0_wp
-      do k = 1, size(areas)
-         total_area = total_area + areas(k)
-      end do
-   end function total_area
-
-   !> Find the lattice with the largest spacing on which all points fit; the spacing is 0 if it would be below `least`.
-   subroutine spread_out(inside, least, centres, spacing)
-      real(wp), intent(in) :: inside(2, 4), least
-      real(wp), intent(out) :: centres(:, :), spacing
-      real(wp) :: area
-      integer(ip) :: n_found
-
-      area = (inside(1, 3) - inside(1, 1))*(inside(2, 3) - inside(2, 1))
-      spacing = 1.1_wp*sqrt(area/(row_height*real(size(centres, 2), wp)))
-      do while (spacing >= least)
-         call fill_lattice(inside, spacing, centres, n_found)
-         if (n_found == size(centres, 2)) return
-         spacing = 0.998_wp*spacing
-      end do
-      spacing = 0.0_wp
-   end subroutine spread_out
+      fraction = ''
+      if (fits > 0.0_wp) fraction = ' to '//to_text(fits, 2)
+      text = 'solid_fraction is too large for grains without overlap at the start; lower solid_fraction'//fraction// &
+             ', or change width or long_axis_max'
+   end subroutine explain_gas
 
 end module polydem_gas

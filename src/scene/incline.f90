@@ -2,17 +2,16 @@
 !>
 !> The centre of the contact is at the origin at the start. The slope falls to the right and has a stop at each end.
 module polydem_incline
-   use polydem_body_list, only: body_list_t
    use polydem_elementary, only: cosine, sine
-   use polydem_grains, only: pi
    use polydem_errors, only: error_t
-   use polydem_kinds, only: wp
-   use polydem_settings, only: settings_t
+   use polydem_kinds, only: ip, wp
+   use polydem_outlines, only: pi, rectangle
+   use polydem_parts, only: new_grains, parts_t
+   use polydem_settings, only: grains_settings_t, settings_t
    use polydem_static_depth, only: resting_block_t, static_depth
-   use polydem_walls, only: rectangle
    implicit none
    private
-   public :: list_incline
+   public :: make_incline
 
    !> Distance from the start to the upper end of the slope, in widths of the block
    real(wp), parameter :: uphill = 10.0_wp
@@ -21,13 +20,14 @@ module polydem_incline
 
 contains
 
-   !> List the bodies of the incline: block, slope, upper stop, lower stop.
-   subroutine list_incline(settings, list, error)
+   !> Make the parts of the incline: block, slope, upper stop, lower stop.
+   subroutine make_incline(settings, parts, error)
       !> Settings: slope, width and height of the block, speed (downhill); gravity, stiffness and law
       type(settings_t), intent(in) :: settings
-      type(body_list_t), intent(inout) :: list
+      type(parts_t), intent(inout) :: parts
       !> Allocated if the block is too heavy for the stiffness
       type(error_t), allocatable, intent(inout) :: error
+      type(grains_settings_t) :: block
       real(wp) :: along(2), depth, load, top, bottom
 
       along = [cosine(settings%scene%slope*pi/180.0_wp), -sine(settings%scene%slope*pi/180.0_wp)]
@@ -37,15 +37,21 @@ contains
          call static_depth(settings%forces, resting_block_t(load, width, height, (uphill + downhill)*width, height, &
                                                             0.5_wp*(downhill - uphill)*width), depth, error)
          if (allocated(error)) return
-         call list%append(tilted(rectangle(-0.5_wp*width, 0.5_wp*width, -depth, height - depth), along), &
-                          density=density, velocity=settings%scene%speed*along)
+         block = new_grains('block')
+         block%region = 'at'
+         block%arrangement = 'single'
+         block%number = 1_ip
+         block%shape = 'outline'
+         block%outline = reshape(tilted(rectangle(-0.5_wp*width, 0.5_wp*width, -depth, height - depth), along), [8])
+         block%velocity = settings%scene%speed*along
+         call parts%add_grains(block)
          top = -uphill*width
          bottom = downhill*width
-         call list%append(tilted(rectangle(top, bottom, -height, 0.0_wp), along), fixed=.true.)
-         call list%append(tilted(rectangle(top - width, top, -height, height), along), fixed=.true.)
-         call list%append(tilted(rectangle(bottom, bottom + width, -height, height), along), fixed=.true.)
+         call parts%add_polygon('slope', tilted(rectangle(top, bottom, -height, 0.0_wp), along))
+         call parts%add_polygon('upper_stop', tilted(rectangle(top - width, top, -height, height), along))
+         call parts%add_polygon('lower_stop', tilted(rectangle(bottom, bottom + width, -height, height), along))
       end associate
-   end subroutine list_incline
+   end subroutine make_incline
 
    !> Corners rotated about the origin; the rotation turns the x axis to the unit vector `along`
    pure function tilted(corners, along)

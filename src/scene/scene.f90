@@ -1,35 +1,41 @@
 !> Initial state: the bodies of a scene and the prescribed motions of its walls.
 !>
-!> A generator lists polygons. This module makes the bodies from them and assigns the motions. A new scene needs a
-!> generator, a case in `list_generated`, and its name in the table of namelist entries, which also holds the checks of
-!> single entries.
+!> A scene consists of parts, walls and groups of grains: those of the namelist, or those that a recipe makes. This
+!> module makes the bodies from them and assigns the motions.
 module polydem_scene
-   use polydem_bed, only: list_bed
+   use polydem_bed, only: make_bed
    use polydem_bodies, only: bodies_t
    use polydem_bodies_reader, only: read_bodies_file
    use polydem_body_list, only: body_list_t, new_bodies
-   use polydem_channel, only: list_channel
-   use polydem_drum, only: list_drum
+   use polydem_channel, only: make_channel
+   use polydem_drum, only: make_drum
    use polydem_errors, only: error_t, input_error, raise
    use polydem_file_system, only: exists
-   use polydem_gas, only: list_gas
-   use polydem_grains, only: pi
-   use polydem_heap, only: list_heap
-   use polydem_hopper, only: list_hopper
-   use polydem_incline, only: list_incline
+   use polydem_gas, only: explain_gas, make_gas
+   use polydem_heap, only: make_heap
+   use polydem_hopper, only: make_hopper
+   use polydem_incline, only: make_incline
    use polydem_kinds, only: ip, lp, wp
+   use polydem_outlines, only: pi
+   use polydem_parts, only: parts_t
+   use polydem_place_parts, only: list_parts, wall_bodies_t
+   use polydem_polygon_list, only: polygon_list_t
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_prescribed_motion, only: motion_t
    use polydem_settings, only: motion_settings_t, settings_t
-   use polydem_stack, only: list_stack
+   use polydem_stack, only: make_stack
    use polydem_strings, only: to_text
    use polydem_wall, only: new_wall, wall_t
+   use polydem_wall_outlines, only: is_anticlockwise
    implicit none
    private
-   public :: build_scene
+   public :: build_scene, find_parts
 
    !> Entries that determine shapes and masses of generated bodies, for a message
    character(len=*), parameter :: sizes = 'short_axis, long_axis_max, solid_fraction, radius, width, height and density'
+
+   !> Greatest identifier of a bodies file beside parts
+   integer(ip), parameter :: most_id = 2_ip**30
 
 contains
 
@@ -47,69 +53,160 @@ contains
       !> bodies. Default: one rank
       integer(ip), intent(in), optional :: rank, n_ranks
       type(body_list_t) :: list
-      character(len=:), allocatable :: origin
+      type(parts_t) :: parts
+      type(wall_bodies_t), allocatable :: walls_of_parts(:)
 
       if (present(rank)) list%rank = rank
       if (present(n_ranks)) list%n_ranks = n_ranks
-
-      origin = place_of(settings, 'scene', 'name')//': &scene'
-      if (settings%scene%name == 'file') then
-         associate (path => settings%scene%bodies_file)
-            origin = place_of(settings, 'scene', 'bodies_file')//": 'bodies_file' in &scene"
-            if (.not. exists(path)) call raise(error, input_error, path//': there is no such file')
-            if (.not. allocated(error)) call read_bodies_file(path, settings%scene%density, list, error)
-            if (.not. allocated(error)) then
-               call new_bodies(list, bodies, error)
-               if (allocated(error)) error%message = path//': '//error%message
-            end if
-         end associate
-      else
-         call list_generated(settings, list, error)
-         if (.not. allocated(error)) then
-            call new_bodies(list, bodies, error)
-            if (allocated(error)) error%message = error%message//' (the bodies follow from '//sizes//' in &scene)'
-         end if
-         if (allocated(error)) error%message = error%message//overrides_of(settings, 'scene')
+      allocate (walls_of_parts(0))
+      if (settings%scene%bodies_file /= '') call list_file(settings, list, error)
+      if (.not. allocated(error)) call find_parts(settings, parts, error)
+      if (.not. allocated(error)) call list_parts_beside_file(settings, parts, list, walls_of_parts, error)
+      if (.not. allocated(error)) then
+         call new_bodies(list, bodies, error)
+         if (allocated(error)) error%message = origin_of_bodies(settings)//error%message
+         if (allocated(error) .and. parts%recipe /= '') error%message = error%message// &
+            ' (the bodies follow from '//sizes//' in &scene)'//overrides_of(settings, 'scene')
+         if (allocated(error) .and. parts%recipe == '') error%message = error%message// &
+            overrides_of(settings, 'grains')//overrides_of(settings, 'wall')
       end if
-      if (allocated(error)) then
-         error%message = origin//': '//error%message
-         return
-      end if
-      call assign_motions(settings, bodies, walls, error)
+      if (.not. allocated(error)) call assign_motions(settings, bodies, walls_of_parts, walls, error)
    end subroutine build_scene
 
-   !> Call the generator of the scene, which lists the bodies.
-   subroutine list_generated(settings, list, error)
+   !> Beginning of a message about one of all bodies
+   pure function origin_of_bodies(settings) result(origin)
+      type(settings_t), intent(in) :: settings
+      character(len=:), allocatable :: origin
+
+      associate (scene => settings%scene)
+         origin = place_of(settings, 'scene', 'name')//': &scene: '
+         if (size(settings%grains) > 0) origin = place_of(settings, 'grains.'//settings%grains(1)%name, 'name')// &
+            ': the bodies of &grains and &wall: '
+         if (scene%bodies_file /= '') origin = origin_of_file(settings)//scene%bodies_file//': '
+      end associate
+   end function origin_of_bodies
+
+   !> Beginning of a message about the bodies file
+   pure function origin_of_file(settings) result(origin)
+      type(settings_t), intent(in) :: settings
+      character(len=:), allocatable :: origin
+
+      origin = place_of(settings, 'scene', 'bodies_file')//": 'bodies_file' in &scene: "
+   end function origin_of_file
+
+   !> List the bodies of a file.
+   subroutine list_file(settings, list, error)
       type(settings_t), intent(in) :: settings
       type(body_list_t), intent(inout) :: list
       type(error_t), allocatable, intent(inout) :: error
 
+      associate (path => settings%scene%bodies_file)
+         if (.not. exists(path)) call raise(error, input_error, path//': there is no such file')
+         if (.not. allocated(error)) call read_bodies_file(path, settings%scene%density, list, error)
+      end associate
+      if (allocated(error)) error%message = origin_of_file(settings)//error%message
+   end subroutine list_file
+
+   !> Find the parts of a scene: those of the namelist, or those that its recipe makes.
+   subroutine find_parts(settings, parts, error)
+      !> Settings: groups &scene, &grains, &wall and &forces
+      type(settings_t), intent(in) :: settings
+      !> Its parts
+      type(parts_t), intent(out) :: parts
+      !> Allocated if the recipe cannot be followed
+      type(error_t), allocatable, intent(inout) :: error
+
+      parts%recipe = ''
+      if (any(settings%scene%name == [character(len=5) :: 'parts', 'file'])) then
+         parts%grains = settings%grains
+         parts%walls = settings%wall
+         return
+      end if
+      call parts%start(settings%scene%name)
       select case (settings%scene%name)
       case ('drum')
-         call list_drum(settings, list, error)
+         call make_drum(settings%scene, parts, error)
       case ('hopper')
-         call list_hopper(settings%scene, list, error)
+         call make_hopper(settings%scene, parts, error)
       case ('gas')
-         call list_gas(settings%scene, list, error)
+         call make_gas(settings%scene, parts)
       case ('channel')
-         call list_channel(settings%scene, list, error)
+         call make_channel(settings%scene, parts, error)
       case ('bed')
-         call list_bed(settings, list, error)
+         call make_bed(settings%scene, parts, error)
       case ('heap')
-         call list_heap(settings%scene, list, error)
+         call make_heap(settings%scene, parts, error)
       case ('incline')
-         call list_incline(settings, list, error)
+         call make_incline(settings, parts, error)
       case ('stack')
-         call list_stack(settings, list, error)
+         call make_stack(settings%scene, parts)
       case default
          call raise(error, input_error, 'unknown scene '//settings%scene%name)
       end select
-   end subroutine list_generated
+      if (allocated(error)) call blame_recipe(settings, error)
+   end subroutine find_parts
+
+   !> Complete a message about a recipe.
+   pure subroutine blame_recipe(settings, error)
+      type(settings_t), intent(in) :: settings
+      type(error_t), intent(inout) :: error
+
+      error%message = place_of(settings, 'scene', 'name')//': &scene: '//error%message//overrides_of(settings, 'scene')
+   end subroutine blame_recipe
+
+   !> List the bodies of the parts, whose identifiers follow the greatest one of the bodies file.
+   subroutine list_parts_beside_file(settings, parts, list, walls, error)
+      type(settings_t), intent(in) :: settings
+      type(parts_t), intent(in) :: parts
+      type(body_list_t), intent(inout) :: list
+      !> Walls of the parts with their bodies
+      type(wall_bodies_t), allocatable, intent(out) :: walls(:)
+      type(error_t), allocatable, intent(inout) :: error
+      type(body_list_t) :: whole
+      type(polygon_list_t) :: given, others
+      character(len=:), allocatable :: text
+      integer(ip) :: k
+
+      if (list%n > 0_ip .and. size(parts%grains) + size(parts%walls) > 0) then
+         if (list%greatest_id() > most_id) then
+            call raise(error, input_error, origin_of_file(settings)//'identifiers must be at most '// &
+                       to_text(most_id)//' if there are groups &grains or &wall')
+            return
+         end if
+         list%id_offset = list%greatest_id() - list%n
+      end if
+      if (list%n > 0_ip .and. size(parts%grains) > 0) then
+         call list_file(settings, whole, error)
+         if (allocated(error)) return
+         given = whole%kept_polygons()
+         do k = 1_ip, given%n
+            if (is_anticlockwise(given%polygon(k))) call others%append_polygon(given%polygon(k))
+            if (.not. is_anticlockwise(given%polygon(k))) call others%append_polygon(reversed(given%polygon(k)))
+         end do
+      end if
+      call list_parts(parts, settings, others, list, walls, error)
+      if (.not. allocated(error) .or. parts%recipe == '') return
+      if (parts%recipe == 'gas') then
+         call explain_gas(settings%scene, parts%grains(1), text)
+         error%message = text
+      end if
+      call blame_recipe(settings, error)
+   end subroutine list_parts_beside_file
+
+   !> Corners in the opposite order, (2, corner)
+   pure function reversed(corners)
+      real(wp), intent(in) :: corners(:, :)
+      real(wp) :: reversed(2, size(corners, 2))
+
+      reversed = corners(:, size(corners, 2):1:-1)
+   end function reversed
 
    !> Find the bodies of each prescribed motion, and make walls of those with the same motions.
-   subroutine assign_motions(settings, bodies, walls, error)
+   subroutine assign_motions(settings, bodies, named, walls, error)
       type(settings_t), intent(in) :: settings
       type(bodies_t), intent(in) :: bodies
+      !> Walls of the parts, which motions may name
+      type(wall_bodies_t), intent(in) :: named(:)
       type(wall_t), allocatable, intent(out) :: walls(:)
       type(error_t), allocatable, intent(inout) :: error
       ! Slots of the fixed bodies; the wall of each one, 0 if it is at rest; the first body of each wall
@@ -122,11 +219,13 @@ contains
       slots = pack([(s, s=1_ip, bodies%n)], bodies%fixed)
       allocate (moves(size(settings%motion), size(slots)), motions(size(settings%motion)))
       do k = 1_ip, size(motions, kind=ip)
-         call find_moved(settings%motion(k), bodies, slots, moves(k, :), error)
-         if (allocated(error)) then
-            error%message = origin_of(settings, settings%motion(k)%name)//error%message
-            return
-         end if
+         associate (motion => settings%motion(k))
+            call find_moved(ids_of(motion, named), bodies, slots, moves(k, :), error)
+            if (allocated(error)) then
+               error%message = origin_of(settings, motion)//error%message
+               return
+            end if
+         end associate
          motions(k) = prescribed(settings%motion(k))
       end do
       allocate (wall_of(size(slots)), first(size(slots)))
@@ -162,22 +261,38 @@ contains
       prescribed%ramp = motion%ramp
    end function prescribed
 
-   !> Beginning of a message about the bodies of a motion: the group &motion with this name, or &scene without a name
-   pure function origin_of(settings, name) result(origin)
+   !> Identifiers of the bodies that a motion moves; none if it moves all fixed bodies
+   pure function ids_of(motion, named) result(ids)
+      type(motion_settings_t), intent(in) :: motion
+      type(wall_bodies_t), intent(in) :: named(:)
+      integer(ip), allocatable :: ids(:)
+      integer :: w
+
+      ids = motion%bodies
+      do w = 1, size(named)
+         if (motion%wall == named(w)%name) ids = named(w)%id
+      end do
+   end function ids_of
+
+   !> Beginning of a message about the bodies of a motion: they are entries of a wall, of &motion, or of &scene if the
+   !> motion has no name
+   pure function origin_of(settings, motion) result(origin)
       type(settings_t), intent(in) :: settings
-      character(len=*), intent(in) :: name
+      type(motion_settings_t), intent(in) :: motion
       character(len=:), allocatable :: origin
 
-      if (name == '') then
+      if (motion%wall /= '') then
+         origin = place_of(settings, 'wall.'//motion%wall, 'bodies')//": 'bodies' in &wall "//motion%wall//': '
+      else if (motion%name == '') then
          origin = place_of(settings, 'scene', 'motion_bodies')//": 'motion_bodies' in &scene: "
       else
-         origin = place_of(settings, 'motion.'//name, 'bodies')//": 'bodies' in &motion: "
+         origin = place_of(settings, 'motion.'//motion%name, 'bodies')//": 'bodies' in &motion: "
       end if
    end function origin_of
 
    !> Find which fixed bodies a motion moves: those with the given identifiers, or all if no identifiers are given.
-   subroutine find_moved(motion, bodies, slots, is_moved, error)
-      type(motion_settings_t), intent(in) :: motion
+   subroutine find_moved(ids, bodies, slots, is_moved, error)
+      integer(ip), intent(in) :: ids(:)
       type(bodies_t), intent(in) :: bodies
       !> Slots of the fixed bodies
       integer(ip), intent(in) :: slots(:)
@@ -186,13 +301,13 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       integer(ip) :: k, slot
 
-      is_moved = size(motion%bodies) == 0
+      is_moved = size(ids) == 0
       if (size(slots) == 0) then
          call raise(error, input_error, 'motion needs a fixed body, but the scene has none')
          return
       end if
-      do k = 1_ip, size(motion%bodies, kind=ip)
-         associate (id => motion%bodies(k))
+      do k = 1_ip, size(ids, kind=ip)
+         associate (id => ids(k))
             slot = findloc(bodies%id, id, dim=1)
             if (slot == 0_ip) then
                call raise(error, input_error, 'body '//to_text(id)//' does not exist')

@@ -16,6 +16,9 @@ walk | steps | integer | 2 | required | m | > 0 | way: none | Steps
 group dog *: who comes along
 dog | name | name | 1 | required | - | - | - | Name of the dog
 dog | friends | name | 2 | required | - | dog | - | Other dogs
+group wall *: what is in the way
+wall | name | name | 1 | required | - | - | - | Name of the wall
+wall | height | real | 1 | 1 | m | - | - | Height
 group bench
 bench | names | path | 0 | - | - | - | - | Names
 """
@@ -39,7 +42,8 @@ class TestMakeEntries(unittest.TestCase):
 
     def test_a_repeatable_group_makes_an_array(self):
         table = read_table(GOOD)
-        self.assertIn("repeatable_groups(*) = [character(len=group_length) :: &\n      'dog']", table_module(*table))
+        self.assertIn("repeatable_groups(*) = [character(len=group_length) :: &\n      'dog', &\n      'wall']",
+                      table_module(*table))
         self.assertIn("type(dog_settings_t), allocatable :: dog(:)", settings_module(*table))
         self.assertIn("type(walk_settings_t) :: walk\n", settings_module(*table))
         self.assertIn("allocate (settings%dog(count(instances%group == 'dog')))", fill_module(*table))
@@ -47,12 +51,19 @@ class TestMakeEntries(unittest.TestCase):
         self.assertIn("| &dog | `name` | name | | required | letters, digits, _ | | Name", manual(table[1]))
         self.assertIn("| &dog | `friends` | 2 names | | required | name of a &dog | | Other", manual(table[1]))
 
+    def test_a_part_can_be_stored_back(self):
+        made = fill_module(*read_table(GOOD))
+        self.assertIn("subroutine store_wall(settings, instance)", made)
+        self.assertIn("call store_value(instance, 'name', text=settings%name)", made)
+        self.assertIn("call store_value(instance, 'height', reals=[settings%height])", made)
+        self.assertNotIn("subroutine store_dog", made)
+
     def test_bad_rows_are_named(self):
         for old, new, message in (("| 1 | slow", "| slow", "line 4: 8 fields, not 9"),
                                   ("| 1 | slow", "| one | slow", "line 4: one is not a number of values"),
                                   ("{ways} none", "{way} none", "line 4: there is no list way above it"),
                                   ("way | word", "way | wort", "line 4: there is no entry of type wort"),
-                                  ("group bench", "group other", "line 11: the row is not in its group"),
+                                  ("group bench", "group other", "line 14: the row is not in its group"),
                                   ("name | name | 1 | required", "name | name | 1 | -", "line 8: the first row of a"),
                                   ("dog | -", "walk | -", "friends of dog is the name of a group walk, which is not"),
                                   ("integer | 2 | required", "real | 2 | 0", "line 6: steps has another type")):

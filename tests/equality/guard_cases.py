@@ -25,6 +25,10 @@ SCENES = {
                 "scene.speed": "0.1", "integrate.duration": "0.03"},
     "stack": {**SOFT, "scene.name": "stack", "scene.bodies": "6", "scene.width": "0.01", "scene.height": "0.01",
               "integrate.duration": "0.03"},
+    "parts": {**SOFT, "wall.one.outline": "ring", "wall.one.radius": "0.1", "wall.one.segments": "40",
+              "wall.one.thickness": "0.01", "grains.one.region": "box", "grains.one.low": "-0.06, -0.06",
+              "grains.one.high": "0.06, 0.06", "grains.one.number": "10", "grains.one.speed": "1.0",
+              "integrate.duration": "0.02"},
     "file": {**SOFT, "scene.name": "file", "scene.bodies_file": "results/workprecision/bodies/stack.h5",
              "integrate.duration": "0.01"},
 }
@@ -68,6 +72,8 @@ GUARDS = {
 }
 #: Name of the group in cases of a group that may be there several times
 NAME = "one"
+#: Beginnings of the entries of parts, which need a scene of parts
+PARTS = (f"grains.{NAME}.", f"wall.{NAME}.")
 #: A value other than the default for each entry that is neither a word nor logical; by entry, or entry@scene
 VARIED = {
     "scene.seed": "7", "scene.boxes": "150", "scene.bodies": "50", "scene.packing": None, "scene.corners_min": "3",
@@ -83,6 +89,19 @@ VARIED = {
     "motion.one.bodies": "82, 84", "motion.one.pivot": "0.01, 0.02", "motion.one.rate": "1",
     "motion.one.velocity": "0.1, 0.2", "motion.one.amplitude": "1e-3, 0", "motion.one.frequency": "50",
     "motion.one.start": "0.005", "motion.one.ramp": "0.01",
+    "wall.one.from": "-0.2, -0.2", "wall.one.to": "0.2, -0.2", "wall.one.low": "-0.2, -0.2",
+    "wall.one.high": "0.2, -0.11", "wall.one.angle": "3", "wall.one.centre": "0.01, 0", "wall.one.radius": "0.12",
+    "wall.one.segments": "30", "wall.one.vertices": "-0.2, -0.3, 0.2, -0.3, 0, -0.15", "wall.one.thickness": "0.02",
+    "wall.one.bodies": None, "motion.one.wall": "one",
+    "grains.one.low": "-0.05, -0.05", "grains.one.high": "0.05, 0.05", "grains.one.centre": "0.01, 0",
+    "grains.one.radius": "0.08", "grains.one.vertices": "-0.05, -0.05, 0.05, -0.05, 0, 0.05", "grains.one.wall": "one",
+    "grains.one.at": "0.01, 0", "grains.one.number": "30", "grains.one.number@at": None,
+    "grains.one.solid_fraction": "0.2", "grains.one.packing": None, "grains.one.corners": "5, 9",
+    "grains.one.short_axis": "7e-3", "grains.one.long_axis": "9e-3, 12e-3", "grains.one.diameter": "8e-3, 9e-3",
+    "grains.one.width": "6e-3", "grains.one.height": "4e-3",
+    "grains.one.outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3", "grains.one.angle": "30, 40",
+    "grains.one.size_ratio": "2", "grains.one.velocity": "0.1, 0.2", "grains.one.speed": "1.5",
+    "grains.one.moving_grains": "5", "grains.one.spin": "20", "grains.one.density": "1000", "grains.one.seed": "7",
     "boxes.largest_ratio": "2", "boxes.margin": "1e-4", "neighbours.skin": "1e-3",
     "forces.gravity": "10, -40", "forces.stiffness": "1e6", "forces.damping_coefficient": "0.2",
     "forces.restitution": "0.3",
@@ -102,7 +121,12 @@ VARIED = {
 BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_limit": {"guards.energy": "warn"}}
 #: Why entries have None above: where else they are tried
 ELSEWHERE = {"scene.packing": "packed/...", "scene.bodies_file": "inputs/precision/...", "output.folder": "every case",
+             "wall.one.bodies": "as motion.one.bodies", "grains.one.packing": "as scene.packing",
+             "grains.one.number": "blocks of scene.name = stack",
              "checkpoint.elapsed": "nowhere: what it does depends on the time that steps take"}
+
+#: Words of parts that need a file, or several other entries; the recipes drum and stack try the same code
+UNTRIED = {("wall.one.outline", "bodies"), ("grains.one.arrangement", "packing"), ("grains.one.arrangement", "column")}
 
 #: Numbers of ranks of the program with MPI
 RANKS = (1, 2, 3)
@@ -200,6 +224,7 @@ def entry_cases(entries):
             continue
         condition, words = entry.condition or ("", ())
         scene = words[next(turn) % len(words)] if condition == "scene.name" else "drum"
+        scene = "parts" if entry.name.startswith((*PARTS, f"motion.{NAME}.wall")) else scene
         base = dict(SCENES[scene])
         if condition and condition != "scene.name" and OUTPUT.get(condition) not in words:
             base[condition] = words[0]
@@ -208,15 +233,28 @@ def entry_cases(entries):
             base = {key: value for key, value in base.items() if not key.startswith("scene.motion")}
         if entry.name.startswith("motion."):
             base.setdefault(f"motion.{NAME}.kind", "rotation")
-        for value in values_of(entry, scene):
+        for value in values_of(entry, "at" if base.get(f"grains.{NAME}.region") == "at" else scene):
             settings = {**base, **BESIDE.get(entry.name, {}), entry.name: value}
+            if scene == "parts":
+                settings = fitting_parts(settings, entries)
             if entry.name == "scene.name":
                 settings = dict(SCENES[value])
             settings.update(companions(settings, entry.name, entries))
             if entry.name == "scene.boxes":
                 settings.pop("scene.bodies")
             name = f"entries/{entry.name}={value.replace(', ', ',')}" + f"@{scene}" * (scene != "drum")
+            name += "".join(f"-{word}" for word in words[:1] if scene == "parts")
             yield generated(name, settings, ranks=3 if entry.name.startswith("decomposition.") else None)
+
+
+def fitting_parts(settings, entries):
+    """Entries of a scene of parts without those that others replace."""
+    settings = {key: value for key, value in settings.items() if fits(key, settings, entries)}
+    if settings.get(f"grains.{NAME}.region") == "at":
+        settings[f"grains.{NAME}.number"] = "1"
+    if f"grains.{NAME}.solid_fraction" in settings:
+        settings.pop(f"grains.{NAME}.number")
+    return settings
 
 
 def fits(key, settings, entries):
@@ -235,14 +273,15 @@ def companions(settings, name, entries):
     """Entries that are required with these settings and not given."""
     return {entry.name: VARIED[entry.name] for entry in entries
             if entry.default == "required" and entry.name not in settings and entry.name != name
-            and entry.name.startswith(("scene.motion_", "motion.")) and entry.condition
+            and entry.name.startswith(("scene.motion_", "motion.", *PARTS)) and entry.condition
             and settings.get(entry.condition[0], "none") in entry.condition[1]}
 
 
 def values_of(entry, scene):
     """Values to try of an entry."""
     if entry.choices:
-        return [value for value in entry.choices if value != OUTPUT.get(entry.name, entry.default)]
+        return [value for value in entry.choices if value != OUTPUT.get(entry.name, entry.default)
+                and (entry.name, value) not in UNTRIED]
     key = f"{entry.name}@{scene}" if f"{entry.name}@{scene}" in VARIED else entry.name
     if key not in VARIED:
         raise ValueError(f"{entry.name} is a namelist entry without a value in VARIED of guard_cases.py: add one")

@@ -220,6 +220,27 @@ def test_flags_say_which_walls_move(run, tmp_path):
     assert_array_equal(Trajectory(every)[-1].driven, Trajectory(every)[-1].fixed)
 
 
+#: Three grains, and walls of three, two and one bodies; a motion follows
+PARTS = """
+&grains name = 'sample' region = 'box' low = 0.2, 0.2 high = 0.3, 0.3 number = 3 /
+&wall name = 'hill' outline = 'polyline' vertices = 0, 0, 0.1, 0, 0.2, 0.1, 0.5, 0.1 thickness = 0.01 /
+&wall name = 'cup' outline = 'polyline' closed = .true. vertices = 1, 0, 2, 0, 1, 1 thickness = 0.01 /
+&wall name = 'plate' outline = 'rectangle' low = 0, -1 high = 1, -0.9 /
+&integrate duration = 1e-3 /
+&output folder = 'result' /
+&motion name = 'a' kind = 'translation' velocity = 0, 0.01 wall = '{}' /
+"""
+
+
+@pytest.mark.parametrize("wall, identifiers", [("hill", [4, 5, 6]), ("cup", [7, 8, 9]), ("plate", [10])])
+def test_flags_say_which_wall_of_parts_moves(wall, identifiers, tmp_path):
+    (tmp_path / "parts.nml").write_text(PARTS.format(wall))
+    subprocess.run([PROGRAM, "run", "parts.nml"], cwd=tmp_path, check=True, capture_output=True)
+    frame = Trajectory(tmp_path / "result")[-1]
+    assert list(frame.id[frame.driven]) == identifiers
+    assert (frame.speed[frame.driven] > 0).all() and not (frame.speed[frame.static] > 0).any()
+
+
 def test_series_stacks_a_column(run):
     positions = run.series("position")
     assert positions.shape == (len(run), len(run[0]), 2)

@@ -344,16 +344,32 @@ class Trajectory:
     def driven_of(self, frame: Frame) -> npt.NDArray[np.bool_]:
         """Which bodies the stored namelist moves, (n): all fixed ones, or those that a motion lists."""
         scene = self.settings.scene
-        chosen = [motion.get("bodies") for motion in self.settings.get("motion", {}).values()]
+        walls = _wall_bodies(self.settings, frame)
+        chosen = [walls[motion["wall"]] if motion.get("wall") else motion.get("bodies")
+                  for motion in self.settings.get("motion", {}).values()]
         if scene.get("motion", "none") != "none":
             chosen.append(scene.get("motion_bodies"))
-        if None in chosen:
+        if any(ids is None for ids in chosen):
             return frame.fixed
         return frame.fixed & np.isin(frame.id, np.concatenate([np.atleast_1d(ids) for ids in [[], *chosen]]))
 
     def origin_for(self, frame: Frame) -> tuple[float, float]:
         """The point that the coordinates of a frame lack [m]: `origin`, and (0, 0) in a trajectory in the world."""
         return self.origin if self._shift is None else (0.0, 0.0)
+
+
+def _wall_bodies(settings: Settings, frame: Frame) -> dict[str, Any]:
+    """Identifiers of the bodies of each group &wall: the last bodies of the run, wall after wall, or those it lists."""
+    counts = {}
+    for name, wall in settings.get("wall", {}).items():
+        corners = np.size(wall.get("vertices", [])) // 2
+        counts[name] = {"bodies": 0, "ring": wall.get("segments"),
+                        "polyline": corners - (not wall.get("closed"))}.get(wall["outline"], 1)
+    ends = len(frame.id) - sum(counts.values()) + np.cumsum([0, *counts.values()])
+    found = {name: np.sort(frame.id)[first:last] for name, first, last in zip(counts, ends, ends[1:])}
+    listed = {name: np.atleast_1d(wall["bodies"]) for name, wall in settings.get("wall", {}).items()
+              if wall["outline"] == "bodies"}
+    return {**found, **listed}
 
 
 def _bodies_in(file: h5py.File) -> dict[str, Any]:

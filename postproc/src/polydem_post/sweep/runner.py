@@ -106,8 +106,9 @@ def lock_holder(result: Path) -> str:
 
 def reads_bodies(result: Path) -> bool:
     """Whether a result was made of bodies from a file, or from another result."""
-    scene = Settings(input_of(result)).get("scene")
-    return bool(scene and (scene.get("bodies_file") or scene.get("packing")))
+    settings = Settings(input_of(result))
+    groups = [settings.get("scene", {}), *settings.get("grains", {}).values()]
+    return any(group.get("bodies_file") or group.get("packing") for group in groups)
 
 
 def last_words(run: Run) -> str:

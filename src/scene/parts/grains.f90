@@ -1,23 +1,22 @@
-!> Random grains: irregular convex polygons inscribed in ellipses.
+!> Shapes and sizes of the grains of a group.
 !>
-!> All ellipses have the same short axis. The long axis, the number of corners, the positions of the corners and the
-!> orientation are random. A polygon inscribed in an ellipse is convex for any positions of its corners. If grains
-!> differ in size, both axes are multiplied by the size factor of the grain.
+!> The usual grains are irregular convex polygons inscribed in ellipses. All ellipses have the same short axis. The long
+!> axis, the number of corners, the positions of the corners and the orientation are random. A polygon inscribed in an
+!> ellipse is convex for any positions of its corners. Other groups have regular polygons, rectangles or a given
+!> outline. If grains differ in size, all lengths are multiplied by the size factor of the grain.
 module polydem_grains
    use polydem_body_list, only: body_list_t
-   use polydem_elementary, only: sine_and_cosine
+   use polydem_elementary, only: hypotenuse, sine_and_cosine
    use polydem_kinds, only: ip, lp, wp
+   use polydem_outlines, only: as_corners, pi, rectangle
    use polydem_polygon, only: mass_properties
    use polydem_polygon_list, only: polygon_list_t
    use polydem_random, only: random_t
-   use polydem_settings, only: scene_settings_t
+   use polydem_settings, only: grains_settings_t
    use polydem_sort_reals, only: sort_reals
    implicit none
    private
-   public :: grain_t, grains_t, draw_grains, draw_sizes, append_grains, settled_area, pi
-
-   !> The number pi
-   real(wp), parameter :: pi = 3.141592653589793238462643383279503_wp
+   public :: grain_t, grains_t, draw_grains, draw_sizes, append_grains, settled_area, greatest_length
 
    !> Total area of the ellipses around the grains of a settled bed over the area of the bed
    real(wp), parameter :: settled_fraction = 0.895_wp
@@ -67,9 +66,9 @@ contains
    end subroutine append
 
    !> Draw grains of random shape and orientation, in descending order of size.
-   subroutine draw_grains(scene, random, n, grains)
-      !> Numbers of corners, axes of the ellipses and size ratio
-      type(scene_settings_t), intent(in) :: scene
+   subroutine draw_grains(group, random, n, grains)
+      !> Shape, sizes and angles
+      type(grains_settings_t), intent(in) :: group
       type(random_t), intent(inout) :: random
       !> Number of grains
       integer(ip), intent(in) :: n
@@ -79,14 +78,47 @@ contains
       real(wp) :: length, area, centroid(2), second_moment
       integer(ip) :: k
 
-      call grains%start(n, scene%corners_max)
-      sizes = draw_sizes(scene%size_ratio, n)
+      call grains%start(n, max(4_ip, group%corners(2), size(group%outline, kind=ip)/2_ip))
+      sizes = draw_sizes(group%size_ratio, n)
       do k = 1_ip, n
-         call draw_corners(scene, sizes(k), random, corners, length)
+         select case (group%shape)
+         case ('regular')
+            call draw_regular(group, sizes(k), random, corners, length)
+         case ('rectangle')
+            corners = sizes(k)*rectangle(-0.5_wp*group%width, 0.5_wp*group%width, -0.5_wp*group%height, &
+                                         0.5_wp*group%height)
+            length = sizes(k)*greatest_length(group)
+            call turn_at_random(group, random, corners)
+         case ('outline')
+            corners = sizes(k)*as_corners(group%outline)
+            length = sizes(k)*greatest_length(group)
+            call turn_at_random(group, random, corners)
+         case default
+            call draw_corners(group, sizes(k), random, corners, length)
+         end select
          call mass_properties(corners, area, centroid, second_moment)
          call grains%append(corners, length, area)
       end do
    end subroutine draw_grains
+
+   !> Greatest length of a grain whose size factor is 1: twice the greatest distance of a corner from the origin [m]
+   pure real(wp) function greatest_length(group)
+      !> Shape of the grains
+      type(grains_settings_t), intent(in) :: group
+
+      select case (group%shape)
+      case ('regular')
+         greatest_length = group%diameter(2)
+      case ('rectangle')
+         greatest_length = hypotenuse(group%width, group%height)
+      case ('outline')
+         associate (corners => as_corners(group%outline))
+            greatest_length = 2.0_wp*maxval(hypotenuse(corners(1, :), corners(2, :)))
+         end associate
+      case default
+         greatest_length = group%long_axis(2)
+      end select
+   end function greatest_length
 
    !> Size factors between 1 and the size ratio, in descending order, without randomness.
    !>
@@ -116,10 +148,12 @@ contains
    !> The order 'descending' is the worst start of a sweep that exchanges neighbours in lists of box ends: all pairs of
    !> boxes are in the wrong order on x, and half of them on y. No other order has a larger total. Each box has two
    !> ends, so n grains that hardly overlap need about 2 n**2 exchanges on x and n**2 on y.
-   subroutine append_grains(list, scene, grains, centres, velocities, spins)
+   subroutine append_grains(list, group, density, grains, centres, velocities, spins)
       type(body_list_t), intent(inout) :: list
-      !> Order and density
-      type(scene_settings_t), intent(in) :: scene
+      !> Order
+      type(grains_settings_t), intent(in) :: group
+      !> Density [kg/m3]
+      real(wp), intent(in) :: density
       type(grains_t), intent(in) :: grains
       !> Position of the origin of the corners of each grain, (2, grain) [m]
       real(wp), intent(in) :: centres(:, :)
@@ -133,7 +167,7 @@ contains
 
       allocate (order(size(centres, 2)))
       order = [(k, k=1_ip, size(order, kind=ip))]
-      if (scene%order == 'descending') call sort_reals(-centres(1, :), order)
+      if (group%order == 'descending') call sort_reals(-centres(1, :), order)
       do j = 1_ip, size(order, kind=ip)
          k = order(j)
          if (list%leaves_next()) then
@@ -143,30 +177,73 @@ contains
          corners = grains%polygon(k)
          corners(1, :) = corners(1, :) + centres(1, k)
          corners(2, :) = corners(2, :) + centres(2, k)
-         call list%append(corners, density=scene%density, velocity=velocities(:, k), angular_velocity=spins(k))
+         call list%append(corners, density=density, velocity=velocities(:, k), angular_velocity=spins(k))
       end do
    end subroutine append_grains
 
    !> Area of a settled bed of grains, voids included [m2]
-   pure real(wp) function settled_area(scene, n)
+   pure real(wp) function settled_area(group, n)
       !> Axes of the ellipses, size ratio
-      type(scene_settings_t), intent(in) :: scene
+      type(grains_settings_t), intent(in) :: group
       !> Number of grains
       integer(ip), intent(in) :: n
       real(wp) :: mean_ellipse
 
-      mean_ellipse = 0.25_wp*pi*scene%short_axis*0.5_wp*(scene%long_axis_min + scene%long_axis_max)
+      mean_ellipse = 0.25_wp*pi*group%short_axis*0.5_wp*(group%long_axis(1) + group%long_axis(2))
       settled_area = real(n, wp)*mean_ellipse/settled_fraction
-      if (scene%size_ratio > 1.0_wp) settled_area = settled_area*sum(draw_sizes(scene%size_ratio, n)**2)/real(n, wp)
+      if (group%size_ratio > 1.0_wp) settled_area = settled_area*sum(draw_sizes(group%size_ratio, n)**2)/real(n, wp)
    end function settled_area
 
-   !> Draw the corners of one grain.
+   !> Draw the corners of a regular polygon.
+   subroutine draw_regular(group, factor, random, corners, length)
+      type(grains_settings_t), intent(in) :: group
+      real(wp), intent(in) :: factor
+      type(random_t), intent(inout) :: random
+      real(wp), allocatable, intent(out) :: corners(:, :)
+      real(wp), intent(out) :: length
+      real(wp) :: c, s, turn
+      integer(ip) :: k, n
+
+      n = random%whole(group%corners(1), group%corners(2))
+      length = factor*random%between(group%diameter(1), group%diameter(2))
+      turn = angle_of(group, random)
+      allocate (corners(2, n))
+      do k = 1_ip, n
+         call sine_and_cosine(turn + 2.0_wp*pi*real(k - 1_ip, wp)/real(n, wp), s, c)
+         corners(:, k) = 0.5_wp*length*[c, s]
+      end do
+   end subroutine draw_regular
+
+   !> An angle between both bounds of a group [rad]
+   real(wp) function angle_of(group, random)
+      type(grains_settings_t), intent(in) :: group
+      type(random_t), intent(inout) :: random
+
+      angle_of = random%between(2.0_wp*pi*(group%angle(1)/360.0_wp), 2.0_wp*pi*(group%angle(2)/360.0_wp))
+   end function angle_of
+
+   !> Turn an outline about the origin, unless its angle is 0.
+   subroutine turn_at_random(group, random, corners)
+      type(grains_settings_t), intent(in) :: group
+      type(random_t), intent(inout) :: random
+      real(wp), intent(inout) :: corners(:, :)
+      real(wp) :: c, s
+      integer :: k
+
+      if (.not. any(abs(group%angle) > 0.0_wp)) return
+      call sine_and_cosine(angle_of(group, random), s, c)
+      do k = 1, size(corners, 2)
+         corners(:, k) = [c*corners(1, k) - s*corners(2, k), s*corners(1, k) + c*corners(2, k)]
+      end do
+   end subroutine turn_at_random
+
+   !> Draw the corners of one grain inscribed in an ellipse.
    !>
    !> The ellipse is the affine image of a circle. The gaps between neighbouring corners are angles on that circle; the
    !> ratio of any two gaps is between one half and two. No edge is very short, and no gap reaches half a turn, so the
    !> centre lies inside the polygon.
-   subroutine draw_corners(scene, factor, random, corners, length)
-      type(scene_settings_t), intent(in) :: scene
+   subroutine draw_corners(group, factor, random, corners, length)
+      type(grains_settings_t), intent(in) :: group
       real(wp), intent(in) :: factor
       type(random_t), intent(inout) :: random
       real(wp), allocatable, intent(out) :: corners(:, :)
@@ -175,11 +252,11 @@ contains
       real(wp) :: long_half, short_half, turn, place, total, x, y, c, s
       integer(ip) :: k, n
 
-      n = random%whole(scene%corners_min, scene%corners_max)
-      length = factor*random%between(scene%long_axis_min, scene%long_axis_max)
+      n = random%whole(group%corners(1), group%corners(2))
+      length = factor*random%between(group%long_axis(1), group%long_axis(2))
       long_half = 0.5_wp*length
-      short_half = 0.5_wp*factor*scene%short_axis
-      turn = random%between(0.0_wp, 2.0_wp*pi)
+      short_half = 0.5_wp*factor*group%short_axis
+      turn = angle_of(group, random)
       place = random%between(0.0_wp, 2.0_wp*pi)
       allocate (gaps(n), corners(2, n))
       total = 0.0_wp

@@ -4,12 +4,12 @@
 !> lowest to the highest. Time and memory are proportional to the number of grains.
 module polydem_packing
    use polydem_elementary, only: hypotenuse
-   use polydem_errors, only: error_t, input_error, raise
-   use polydem_grains, only: grain_t, grains_t, pi
+   use polydem_errors, only: error_t
+   use polydem_grains, only: grain_t, grains_t
    use polydem_kinds, only: ip, wp
+   use polydem_outlines, only: pi
    use polydem_patch, only: patch_t, read_patch
-   use polydem_settings, only: motion_settings_t, scene_settings_t
-   use polydem_strings, only: to_text
+   use polydem_settings, only: motion_settings_t
    implicit none
    private
    public :: pack_grains, fill_with_patch, rotate_with_walls
@@ -28,31 +28,30 @@ module polydem_packing
 
 contains
 
-   !> Read the packing of a scene and fill a container with its grains.
-   subroutine pack_grains(scene, corners, grains, centres, error)
-      !> Settings: packing (path)
-      type(scene_settings_t), intent(in) :: scene
+   !> Read a packing and fill a container with its grains.
+   subroutine pack_grains(packing, corners, grains, centres, n_found, error)
+      !> Path of the packing
+      character(len=*), intent(in) :: packing
       !> Corners of the container, convex, anticlockwise, (2, corner) [m]
       real(wp), intent(in) :: corners(:, :)
       type(grains_t), intent(out) :: grains
       !> Centres of the grains, (2, grain) [m]; their number is given
       real(wp), intent(out) :: centres(:, :)
-      !> Allocated if the packing cannot be read, or if the grains do not fit
+      !> Number of grains that fit; there are no grains unless all fit
+      integer(ip), intent(out) :: n_found
+      !> Allocated if the packing cannot be read
       type(error_t), allocatable, intent(inout) :: error
       type(patch_t) :: patch
       integer(ip), allocatable :: source(:)
-      integer(ip) :: k, most, n, n_found
+      integer(ip) :: k, most, n
 
+      n_found = 0_ip
       n = size(centres, 2, kind=ip)
-      call read_patch(scene%packing, patch, error)
+      call read_patch(packing, patch, error)
       if (allocated(error)) return
       allocate (source(n))
       call fill_with_patch(corners, patch, centres, source, n_found)
-      if (n_found < n) then
-         call raise(error, input_error, 'the container has room for '//to_text(n_found)//' packed grains, not for ' &
-                    //to_text(n)//'; enlarge the container or reduce the number of grains')
-         return
-      end if
+      if (n_found < n) return
       most = 0_ip
       do k = 1_ip, size(patch%grains, kind=ip)
          most = max(most, size(patch%grains(k)%corners, 2, kind=ip))
@@ -103,9 +102,11 @@ contains
 
    !> If walls rotate from time 0 on, add the same rotation to the grains. Walls and grains then move as one rigid body,
    !> and their contacts do not change.
-   pure subroutine rotate_with_walls(motions, centres, velocities, spins)
+   pure subroutine rotate_with_walls(motions, wall, centres, velocities, spins)
       !> Prescribed motions of the walls
       type(motion_settings_t), intent(in) :: motions(:)
+      !> Wall around the grains, whose motions alone count beside those of all fixed bodies; empty: all motions count
+      character(len=*), intent(in) :: wall
       !> Centres of the grains, (2, grain) [m]
       real(wp), intent(in) :: centres(:, :)
       !> Velocities, (2, grain) [m/s]; the velocities of the rotation are added
@@ -118,6 +119,7 @@ contains
       do k = 1, size(motions)
          associate (motion => motions(k))
             if (motion%kind /= 'rotation' .or. max(motion%start, motion%ramp) > 0.0_wp) cycle
+            if (motion%wall /= '' .and. wall /= '' .and. motion%wall /= wall) cycle
             rate = 2.0_wp*pi*motion%rate
             velocities(1, :) = velocities(1, :) - rate*(centres(2, :) - motion%pivot(2))
             velocities(2, :) = velocities(2, :) + rate*(centres(1, :) - motion%pivot(1))

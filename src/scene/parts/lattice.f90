@@ -2,6 +2,7 @@
 module polydem_lattice
    use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
+   use polydem_obstacles, only: obstacles_t
    implicit none
    private
    public :: fill_lattice, lattice_height, row_height
@@ -14,7 +15,7 @@ contains
    !> Find lattice points row by row, each row from left to right, until `centres` is full.
    !>
    !> Any two points are at least `spacing` apart. The distance of each point from the outline is at least half of it.
-   pure subroutine fill_lattice(outline, spacing, centres, n_found)
+   pure subroutine fill_lattice(outline, spacing, centres, n_found, obstacles)
       !> Corners of the convex outline, anticlockwise, (2, corner) [m]
       real(wp), intent(in) :: outline(:, :)
       !> Distance of neighbours [m]
@@ -23,6 +24,8 @@ contains
       real(wp), intent(out) :: centres(:, :)
       !> Number of points found; less than size(centres, 2) if the outline has no room for more
       integer(ip), intent(out) :: n_found
+      !> Bodies in the way, half a spacing from which there are no points; default: none
+      type(obstacles_t), intent(in), optional :: obstacles
       real(wp) :: middle, left, right, shift, x, y
       integer(ip) :: row, column
 
@@ -39,9 +42,12 @@ contains
             x = shift + spacing*real(column, wp)
             if (x > right) exit
             if (n_found == size(centres, 2)) return
+            column = column + 1_ip
+            if (present(obstacles)) then
+               if (.not. obstacles%leaves([x, y], 0.5_wp*spacing)) cycle
+            end if
             n_found = n_found + 1_ip
             centres(:, n_found) = [x, y]
-            column = column + 1_ip
          end do
          row = row + 1_ip
       end do
