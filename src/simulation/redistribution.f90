@@ -263,7 +263,7 @@ contains
       call copy_packed(own%bodies, sent, halo)
       call all_to_all_bodies(self%comm, counts, halo, counts_received)
       call join_packed(own%bodies, halo)
-      call unpack_bodies(own%bodies, (self%bodies%n_all), self%bodies, slots)
+      call unpack_bodies(own%bodies, self%bodies, slots)
       n = own%columns%n_rows
       call own%columns%restore_to(slots(:n))
       call self%integrator%start(self%bodies)
