@@ -5,19 +5,18 @@
 !> neighbour finders. After a restart the first search starts without pairs. The pairs that it finds again get their
 !> contact history. A hash of the bodies at the start guards against the checkpoint of another run.
 module polydem_checkpoint_fields
-   use polydem_bodies, only: turn_bodies
    use polydem_checkpoint_bodies, only: read_bodies, save_bodies
    use polydem_contact_history, only: contact_history_t
    use polydem_energy_balance, only: serialize_contributions, serialize_balance
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_sums, only: total_forces
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_local_data, only: rebuild_local_data
    use polydem_monitor, only: serialize_monitor, monitor_t
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
+   use polydem_packed_state, only: find_walls
+   use polydem_replace_bodies, only: settle_bodies
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
-   use polydem_wall, only: find_slots
    implicit none
    private
    public :: attempts_t, serialize_run, serialize_progress
@@ -49,7 +48,6 @@ contains
       type(attempts_t), intent(inout) :: attempts
       type(monitor_t), intent(inout) :: monitor
       integer(ip), allocatable :: former(:)
-      integer(ip) :: k
 
       call serialize_global(serializer, simulation, attempts, monitor)
       associate (s => simulation)
@@ -74,11 +72,8 @@ contains
          call read_pairs(serializer, s)
          call s%comm%all_reduce_error(serializer%error)
          if (allocated(serializer%error)) return
-         do k = 1_ip, size(s%walls, kind=ip)
-            call find_slots(s%walls(k), former, s%bodies%id)
-         end do
-         call turn_bodies(s%bodies, [(k, k=1_ip, s%bodies%n)])
-         call rebuild_local_data(s, serializer%error, s%domain%median_diameter)
+         call find_walls(s, former)
+         call settle_bodies(s, serializer%error)
       end associate
    end subroutine serialize_run
 

@@ -10,8 +10,8 @@ module polydem_guards
    use polydem_warning, only: warning_t
    implicit none
    private
-   public :: motion_guard_t, new_motion_guard, have_valid_poses, check_poses, move_within_limit, find_coasting, &
-      check_motion, check_step, check_contacts, place_of, greatest_displacement, shorter_step, warn_share
+   public :: motion_guard_t, new_motion_guard, displacement_limit, have_valid_poses, check_poses, move_within_limit, &
+      find_coasting, check_motion, check_step, check_contacts, place_of, greatest_displacement, shorter_step, warn_share
 
    !> Guard of the displacement of bodies per step
    type :: motion_guard_t
@@ -55,10 +55,19 @@ contains
       guard%choice = settings%displacement
       guard%remedy = remedy
       guard%moving = moving
-      guard%limit = huge(1.0_wp)
-      if (guard%choice == 'off' .or. bodies%n == 0_ip) return
-      guard%limit = settings%displacement_limit*minval(bodies%thickness)
+      guard%limit = displacement_limit(settings, bodies)
    end subroutine new_motion_guard
+
+   !> Maximum displacement of a point of a body per step; huge if it is not monitored [m]
+   pure real(wp) function displacement_limit(settings, bodies) result(limit)
+      type(guards_settings_t), intent(in) :: settings
+      !> Bodies that may touch
+      type(bodies_t), intent(in) :: bodies
+
+      limit = huge(1.0_wp)
+      if (settings%displacement == 'off' .or. bodies%n == 0_ip) return
+      limit = settings%displacement_limit*minval(bodies%thickness)
+   end function displacement_limit
 
    !> Whether all bodies of a run have valid poses
    pure logical function have_valid_poses(bodies, first, last)

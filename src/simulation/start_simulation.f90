@@ -8,10 +8,10 @@ module polydem_start_simulation
    use polydem_energy_balance, only: start_energy_balance
    use polydem_errors, only: error_t
    use polydem_force_law, only: check_law
-   use polydem_global_reductions, only: find_median, reduce_to_least
+   use polydem_global_reductions, only: find_median
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, wp
-   use polydem_local_data, only: rebuild_local_data
+   use polydem_local_data, only: limit_displacement, rebuild_local_data
    use polydem_prediction, only: move_walls
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
@@ -35,7 +35,7 @@ contains
       type(simulation_t), intent(inout) :: self
       !> Allocated if bodies or settings are invalid
       type(error_t), allocatable, intent(inout) :: error
-      real(wp) :: median_diameter, limit(1)
+      real(wp) :: median_diameter
 
       call choose_instruction_set(self%bodies%isa, error)
       call check_law(settings, 1_ip, error)
@@ -50,9 +50,7 @@ contains
       if (.not. allocated(error)) call rebuild_local_data(self, error, median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      limit = self%guard%limit
-      call reduce_to_least(self%comm, limit)
-      self%guard%limit = limit(1)
+      call limit_displacement(self)
       call self%integrator%start(self%bodies)
       if (settings%guards%relaxed_depth > 0.0_wp) call relax_bodies(self, error)
       if (allocated(error)) return
@@ -71,23 +69,10 @@ contains
    !> Set the accelerations at time 0: from the forces, or from gravity alone, depending on the integration scheme.
    subroutine start_integration(self)
       type(simulation_t), intent(inout) :: self
-      integer(ip) :: k
       integer :: c
 
-      associate (bodies => self%bodies)
-         do k = 1_ip, size(bodies%free, kind=ip)
-            associate (s => bodies%free(k))
-               if (self%integrator%starts_from_forces) then
-                  bodies%acceleration(:, s) = bodies%force(:, s)*bodies%inverse_mass(s)
-                  bodies%angular_acceleration(s) = bodies%torque(s)*bodies%inverse_inertia(s)
-               else
-                  bodies%acceleration(:, s) = self%settings%forces%gravity
-                  bodies%angular_acceleration(s) = 0.0_wp
-               end if
-            end associate
-         end do
-         call self%integrator%start(bodies)
-      end associate
+      call self%integrator%start_accelerations(self%settings%forces%gravity, self%bodies)
+      call self%integrator%start(self%bodies)
       ! A scheme that ignores the forces at time 0 has no contact history before its first step.
       if (self%integrator%starts_from_forces .or. .not. allocated(self%history%column)) return
       do c = 1, size(self%history%column)
