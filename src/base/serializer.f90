@@ -5,8 +5,9 @@
 !> decides whether values are saved or restored.
 !>
 !> Names have the form /group/column. The group determines the rows of a column. A column of /run is one value or list
-!> for the whole run. A column of /bodies or /pairs has one row per body or pair, in ascending order of identifiers (not
-!> of slots). A parallel serializer therefore derives from the name how to gather and distribute rows.
+!> for the whole run. A column of /bodies, /pieces, /vertices or /pairs has one row per body, polygon, vertex or pair,
+!> in ascending order of the identifiers of bodies (not of slots). A parallel serializer therefore derives from the name
+!> how to gather and distribute rows.
 !>
 !> Every bit is preserved in any working precision. Restored data are untrusted: integers must not exceed 2^62 in
 !> magnitude. The first failure stays in `error`, and all later calls do nothing.
@@ -33,7 +34,6 @@ module polydem_serializer
       !> Save a column, or check that it equals the saved one: match(name, values, unit, meaning)
       generic :: match => match_longs, match_real
       procedure :: seconds_field
-      procedure :: has_failed
       procedure :: count_rows
       procedure :: choose_rows
       !> Save or restore real numbers
@@ -76,13 +76,6 @@ module polydem_serializer
 
 contains
 
-   !> Whether an earlier call failed. Serializers of several ranks make sure that the answer is the same on all ranks.
-   logical function has_failed(self)
-      class(serializer_t), intent(inout) :: self
-
-      has_failed = allocated(self%error)
-   end function has_failed
-
    !> Number of saved rows of a column, for a column whose length is unknown before it is restored; 0 when saving
    subroutine count_rows(self, name, n)
       class(serializer_t), intent(inout) :: self
@@ -101,10 +94,10 @@ contains
       class(serializer_t), intent(inout) :: self
       !> Name of the group, such as /pairs/
       character(len=*), intent(in) :: group
-      !> Number of rows before the rows to restore, and number of rows to restore
-      integer(lp), intent(in) :: rows(2)
+      !> Numbers of the rows among all saved ones, from 1, ascending
+      integer(lp), intent(in) :: rows(:)
 
-      associate (unused_self => self, unused => group, unused_rows => rows)
+      associate (unused_self => self, unused => group, unused_rows => size(rows))
       end associate
    end subroutine choose_rows
 
@@ -161,7 +154,7 @@ contains
       real(dp), allocatable :: doubles(:)
       integer(lp), allocatable :: words(:)
 
-      if (self%has_failed()) return
+      if (allocated(self%error)) return
       if (storage_size(values) > storage_size(1.0_dp)) then
          words = transfer(values, [0_lp])
          call self%transfer_longs(name, width*storage_size(values)/storage_size(1_lp), words, unit, &
@@ -180,7 +173,7 @@ contains
       integer(lp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
 
-      if (self%has_failed()) return
+      if (allocated(self%error)) return
       call self%transfer_longs(name, 1, values, unit, meaning)
       if (.not. self%is_reading .or. allocated(self%error)) return
       if (any(values > max_magnitude .or. values < -max_magnitude)) call raise(self%error, input_error, name//' ('// &
@@ -226,7 +219,7 @@ contains
       !> Meaning, which is stored with the column
       character(len=*), intent(in) :: meaning
 
-      if (self%has_failed()) return
+      if (allocated(self%error)) return
       call self%transfer_reals(name, 1, values, 's', meaning)
    end subroutine seconds_field
 
@@ -241,7 +234,7 @@ contains
       character(len=*), intent(in) :: unit, meaning
       integer(lp), allocatable :: saved_values(:)
 
-      if (self%has_failed()) return
+      if (allocated(self%error)) return
       allocate (saved_values, source=values)
       call self%transfer_longs(name, 1, saved_values, unit, meaning)
       if (allocated(self%error)) return

@@ -16,8 +16,8 @@ module polydem_bodies
    use polydem_polygon, only: diameter, greatest_radius, thickness
    implicit none
    private
-   public :: bodies_t, allocate_bodies, turn_bodies, turn_block, find_directions, block_size, measure_sizes, &
-      state_hash, state_words
+   public :: bodies_t, allocate_bodies, allocate_with_corners, measure_bodies, turn_bodies, turn_block, &
+      find_directions, block_size, measure_sizes, state_hash, state_words
 
    !> Greatest number of bodies of a block for `turn_block`
    integer(ip), parameter :: block_size = 64_ip
@@ -38,6 +38,8 @@ module polydem_bodies
       integer(ip), allocatable :: global_index(:)
       !> Number of all bodies of the run
       integer(ip) :: n_all = 0_ip
+      !> Greatest identifier that a body of the run has or had
+      integer(ip) :: last_id = 0_ip
       !> Instruction set of the kernels that compute with these bodies
       integer :: isa = isa_base
       !> Mass [kg/m]; an infinite mass is stored as 0
@@ -96,6 +98,20 @@ contains
       allocate (bodies%pieces%vertex(2, n_vertices))
    end subroutine allocate_bodies
 
+   !> Allocate the columns of bodies whose numbers of vertices are known, and set them to zero.
+   subroutine allocate_with_corners(bodies, corners)
+      type(bodies_t), intent(out) :: bodies
+      !> Number of vertices of each body
+      integer(ip), intent(in) :: corners(:)
+      integer(ip) :: s
+
+      call allocate_bodies(bodies, size(corners, kind=ip), sum(corners))
+      allocate (bodies%pieces%turned(2, sum(corners)), source=0.0_wp)
+      do s = 1_ip, bodies%n
+         bodies%pieces%vertex_start(s + 1_ip) = bodies%pieces%vertex_start(s) + corners(s)
+      end do
+   end subroutine allocate_with_corners
+
    !> Update `turned` of the given bodies to their angles.
    subroutine turn_bodies(bodies, slots)
       !> Bodies; only `turned` changes
@@ -112,6 +128,18 @@ contains
       end do
       !$omp end parallel do
    end subroutine turn_bodies
+
+   !> Compute what follows from the masses and shapes of all bodies: sizes and inverse masses.
+   subroutine measure_bodies(bodies)
+      !> Bodies; only `radius`, `diameter`, `thickness`, `inverse_mass` and `inverse_inertia` change
+      type(bodies_t), intent(inout) :: bodies
+
+      call measure_sizes(bodies)
+      bodies%inverse_mass = 0.0_wp
+      bodies%inverse_inertia = 0.0_wp
+      where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass
+      where (bodies%inertia > 0.0_wp) bodies%inverse_inertia = 1.0_wp/bodies%inertia
+   end subroutine measure_bodies
 
    !> Compute the sizes of all bodies from their shapes.
    subroutine measure_sizes(bodies)

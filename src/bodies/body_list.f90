@@ -1,6 +1,6 @@
 !> A list to which generators and readers append bodies one by one, and its conversion to the arrays of `bodies_t`.
 module polydem_body_list
-   use polydem_bodies, only: allocate_bodies, bodies_t, measure_sizes, turn_bodies
+   use polydem_bodies, only: allocate_bodies, bodies_t, measure_bodies, turn_bodies
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: ip, lp, wp
    use polydem_polygon, only: clean_polygon, mass_properties
@@ -9,7 +9,7 @@ module polydem_body_list
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: body_list_t, new_bodies
+   public :: body_list_t, new_bodies, check_mass
 
    !> Least mass [kg/m] and moment of inertia [kg m]; the greatest is the inverse of this. In double precision products
    !> of two such values are normal numbers; in single precision only the values themselves are.
@@ -171,6 +171,7 @@ contains
       end do
       call allocate_bodies(bodies, list%polygons%n, 16_ip*list%polygons%n)
       bodies%n_all = list%n
+      if (list%n > 0_ip) bodies%last_id = list%id(order(list%n))
       s = 0_ip
       do k = 1_ip, list%n
          if (kept(order(k)) == 0_ip) cycle
@@ -256,11 +257,15 @@ contains
    !> Reject a mass so small or large that its inverse or products leave the range of normal numbers. 0 is infinite and
    !> valid for fixed bodies.
    subroutine check_mass(name, mass, id, is_fixed, error)
+      !> What it is, for the message
       character(len=*), intent(in) :: name
+      !> The mass [kg/m], or a moment of inertia [kg m]
       real(wp), intent(in) :: mass
-      !> Identifier of the body, and whether it is fixed
+      !> Identifier of the body
       integer(ip), intent(in) :: id
+      !> Whether it is fixed
       logical, intent(in) :: is_fixed
+      !> Names the body
       type(error_t), allocatable, intent(inout) :: error
 
       if (mass >= least_mass .and. mass <= 1.0_wp/least_mass) return
@@ -290,9 +295,7 @@ contains
       allocate (shape(2, n_vertices), bodies%pieces%turned(2, n_vertices))
       shape(:, :) = bodies%pieces%vertex(:, :n_vertices)
       call move_alloc(shape, bodies%pieces%vertex)
-      call measure_sizes(bodies)
-      where (bodies%mass > 0.0_wp) bodies%inverse_mass = 1.0_wp/bodies%mass
-      where (bodies%inertia > 0.0_wp) bodies%inverse_inertia = 1.0_wp/bodies%inertia
+      call measure_bodies(bodies)
       bodies%free = pack([(s, s=1_ip, bodies%n)],.not. bodies%fixed)
       call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
    end subroutine finish

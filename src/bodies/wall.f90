@@ -4,9 +4,10 @@ module polydem_wall
    use polydem_elementary, only: hypotenuse
    use polydem_kinds, only: ip, wp
    use polydem_prescribed_motion, only: carry_bodies, motion_t, pose_bodies
+   use polydem_sort, only: place_in
    implicit none
    private
-   public :: wall_t, new_wall, move_wall, greatest_wall_speed
+   public :: wall_t, new_wall, move_wall, find_slots, greatest_wall_speed
 
    !> A wall with prescribed motions
    type :: wall_t
@@ -38,6 +39,27 @@ contains
       wall%angle = bodies%angle(slots)
       wall%motions = motions
    end subroutine new_wall
+
+   !> Find the bodies of a wall again after bodies have changed their slots. Bodies that are gone leave the wall.
+   pure subroutine find_slots(wall, former, id)
+      type(wall_t), intent(inout) :: wall
+      !> Identifier of the body of each former slot, and of each slot now, ascending
+      integer(ip), intent(in) :: former(:), id(:)
+      integer(ip) :: slots(size(wall%slots)), kept(size(wall%slots)), k, n, s
+
+      n = 0_ip
+      do k = 1_ip, size(wall%slots, kind=ip)
+         s = place_in(id, former(wall%slots(k)))
+         if (s > size(id)) cycle
+         if (id(s) /= former(wall%slots(k))) cycle
+         n = n + 1_ip
+         slots(n) = s
+         kept(n) = k
+      end do
+      wall%slots = slots(:n)
+      wall%position = wall%position(:, kept(:n))
+      wall%angle = wall%angle(kept(:n))
+   end subroutine find_slots
 
    !> Set positions, angles, velocities and accelerations of the bodies of a wall at a time.
    subroutine move_wall(wall, time, bodies)

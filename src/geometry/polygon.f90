@@ -9,7 +9,7 @@ module polydem_polygon
    use polydem_strings, only: counted, to_text
    implicit none
    private
-   public :: clean_polygon, mass_properties, diameter, greatest_radius, thickness, clip_half_plane, cross
+   public :: clean_polygon, mass_properties, signed_area, diameter, greatest_radius, thickness, clip_half_plane, cross
 
    !> A vertex is dropped if it is closer to its neighbour, or to the line of its neighbours, than this fraction of
    !> the size: far above the rounding errors of a text file, far below any effect on a result.
@@ -368,6 +368,7 @@ contains
 
    !> Area, positive if anticlockwise [m2]
    pure real(wp) function signed_area(vertices)
+      !> Vertices in order, (2, n) [m]
       real(wp), intent(in) :: vertices(:, :)
       integer(ip) :: k
 

@@ -29,6 +29,7 @@ module polydem_integrator
       procedure(correct), deferred :: correct
       !> Greatest stable products of angular frequency and time step
       procedure(stability), deferred :: stability
+      procedure :: start_accelerations
       procedure :: serialize
       procedure :: serialize_step
    end type integrator_t
@@ -133,6 +134,28 @@ contains
          values(k) = merge(0.0_wp, values(k), abs(values(k)) < negligible)
       end do
    end subroutine clear_negligible
+
+   !> Set the accelerations with which free bodies start: from their forces, or from gravity alone.
+   pure subroutine start_accelerations(self, gravity, bodies)
+      class(integrator_t), intent(in) :: self
+      !> Acceleration of gravity, (2) [m/s2]
+      real(wp), intent(in) :: gravity(2)
+      !> Bodies with their forces; accelerations of free bodies change
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: k
+
+      do k = 1_ip, size(bodies%free, kind=ip)
+         associate (s => bodies%free(k))
+            if (self%starts_from_forces) then
+               bodies%acceleration(:, s) = bodies%force(:, s)*bodies%inverse_mass(s)
+               bodies%angular_acceleration(s) = bodies%torque(s)*bodies%inverse_inertia(s)
+            else
+               bodies%acceleration(:, s) = gravity
+               bodies%angular_acceleration(s) = 0.0_wp
+            end if
+         end associate
+      end do
+   end subroutine start_accelerations
 
    !> Serialize the state of the scheme between steps. Schemes with such a state override this.
    subroutine serialize(self, serializer)

@@ -1,17 +1,18 @@
 !> Checkpoint files: the state that a bitwise identical restart needs, in an atomic file (polydem_atomic_file).
 !>
 !>     /run         step, time step, energy balance, clocks and counters of the whole run
-!>     /bodies      id and variable state: one row per body, in ascending order of identifiers
+!>     /bodies      id, mass and state: one row per body, in ascending order of identifiers
+!>     /pieces      number of corners: one row per polygon, in the order of the bodies
+!>     /vertices    position in the body frame: one row per vertex, in the order of the pieces
 !>     /pairs       first, second (identifiers) and contact history of each pair of the last search
 !>     /provenance  origin of the file
 !>
-!> Constant data (shapes, masses) follow from the namelist; hashes detect a difference. The caller defines the
-!> contents of the groups with `field` and `match`. The file ends with a checksum and is opened only if the checksum
-!> is correct.
+!> The caller defines the contents of the groups with `field` and `match`. The file ends with a checksum and is opened
+!> only if the checksum is correct.
 !>
-!> All ranks write and read a checkpoint collectively. The root rank writes /run, all ranks read it. In the other
-!> groups each rank writes the rows that `set_rows` assigns to it. When reading, each rank reads one block of the rows
-!> and sends them to the ranks that own them, or it reads the rows that `choose_rows` names.
+!> All ranks write a checkpoint collectively. The root rank writes /run; in the other groups each rank writes the rows
+!> that `set_rows` assigns to it. All ranks open and close it together to read it. In between each rank reads by itself
+!> what it needs: /run, and the rows that `choose_rows` names.
 module polydem_checkpoint_file
    use polydem_atomic_file, only: begin_file, complete_file, open_on_all_ranks
    use polydem_communicator, only: choose_communicator, communicator_t
@@ -29,7 +30,15 @@ module polydem_checkpoint_file
    public :: checkpoint_file_t
 
    !> Groups with distributed rows
-   character(len=*), parameter :: groups(2) = [character(len=8) :: '/bodies/', '/pairs/']
+   character(len=*), parameter :: groups(4) = [character(len=10) :: '/bodies/', '/pieces/', '/vertices/', '/pairs/']
+   !> Greatest number of rows that are read at once
+   integer(lp), parameter :: most_rows = 65536_lp
+
+   !> Rows of a group that a rank reads
+   type :: chosen_rows_t
+      !> Their numbers from 1, ascending; unallocated: all rows
+      integer(lp), allocatable :: row(:)
+   end type chosen_rows_t
 
    !> A checkpoint that is being written or read
    type, extends(serializer_t) :: checkpoint_file_t
@@ -44,8 +53,8 @@ module polydem_checkpoint_file
       type(row_distribution_t) :: rows(size(groups))
       !> Whether the rows of each group are distributed; otherwise each column is complete on one rank
       logical :: is_spread(size(groups)) = .false.
-      !> Rows of each group to read: number of rows before them, and their number; negative: all rows
-      integer(lp) :: part(2, size(groups)) = -1_lp
+      !> Rows of each group to read
+      type(chosen_rows_t) :: chosen(size(groups))
    contains
       procedure :: create
       procedure :: set_rows
@@ -53,7 +62,6 @@ module polydem_checkpoint_file
       procedure :: open => open_checkpoint
       procedure :: close => close_checkpoint
       procedure :: read_origin
-      procedure :: has_failed
       procedure :: count_rows
       procedure :: choose_rows
       procedure :: transfer_reals
@@ -87,11 +95,10 @@ contains
       call open_on_all_ranks(self%comm, self%file, path//unfinished, bytes, self%error)
    end subroutine create
 
-   !> Set the distribution of the rows of a group over ranks. Call it before the columns of the group are written or
-   !> read.
+   !> Set the distribution of the rows of a group over ranks. Call it before the columns of the group are written.
    subroutine set_rows(self, group, rows)
       class(checkpoint_file_t), intent(inout) :: self
-      !> /bodies/ or /pairs/
+      !> Name of the group, such as /pairs/
       character(len=*), intent(in) :: group
       !> Global order of the rows
       type(row_distribution_t), intent(in) :: rows
@@ -137,14 +144,6 @@ contains
       call self%comm%all_reduce_error(error)
    end subroutine open_checkpoint
 
-   !> Whether an earlier call failed on any rank; collective while reading.
-   logical function has_failed(self)
-      class(checkpoint_file_t), intent(inout) :: self
-
-      if (self%is_reading) call self%comm%all_reduce_error(self%error)
-      has_failed = allocated(self%error)
-   end function has_failed
-
    !> Number of rows of a column in the file
    subroutine count_rows(self, name, n)
       class(checkpoint_file_t), intent(inout) :: self
@@ -153,18 +152,18 @@ contains
       integer(lp), allocatable :: extent(:)
 
       n = 0_lp
-      if (self%has_failed()) return
+      if (allocated(self%error)) return
       call self%file%shape_of(name, extent, self%error)
       if (.not. allocated(self%error)) n = product(extent(:min(1, size(extent))))
    end subroutine count_rows
 
-   !> Choose the rows of a group that are read next, without a distribution over ranks.
+   !> Choose the rows of a group that are read next.
    subroutine choose_rows(self, group, rows)
       class(checkpoint_file_t), intent(inout) :: self
       character(len=*), intent(in) :: group
-      integer(lp), intent(in) :: rows(2)
+      integer(lp), intent(in) :: rows(:)
 
-      self%part(:, place_of(group)) = rows
+      self%chosen(place_of(group))%row = rows
    end subroutine choose_rows
 
    !> Refuse a checkpoint of another version of the file layout. Close it in this case.
@@ -216,22 +215,34 @@ contains
       real(dp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
       real(dp), allocatable :: table(:, :), list(:)
-      integer(lp), allocatable :: words(:)
-      integer(lp) :: rows(2)
+      integer(lp), allocatable :: row(:)
+      integer :: k, first, last
 
       if (.not. self%is_reading) then
-         call write_reals(self, name, reshape(values, [width, size(values)/width]), unit, meaning)
+         call write_reals(self, name, width, size(values)/width, values, unit, meaning)
          return
       end if
-      call find_rows(self, name, 1_lp, rows)
-      if (self%has_failed()) return
-      if (width == 1) call self%file%read(name, list, self%error, rows)
-      if (width > 1) call self%file%read(name, table, self%error, rows)
-      if (self%has_failed()) return
-      if (width > 1) list = reshape(table, [size(table)])
-      words = transfer(list, 0_lp, size(list))
-      call receive_rows(self, name, width, transfer(values, 0_lp, size(values)), words)
-      if (.not. allocated(self%error)) values = transfer(words, values, size(words))
+      call list_rows(self, name, 1, size(values)/width, row)
+      last = 0
+      do while (last < size(row) .and. .not. allocated(self%error))
+         first = last + 1
+         last = last_of_part(row, first)
+         associate (rows => [row(first) - 1_lp, row(last) - row(first) + 1_lp])
+            if (width == 1) then
+               call self%file%read(name, list, self%error, rows)
+            else
+               call self%file%read(name, table, self%error, rows)
+               if (.not. allocated(self%error)) call expect_size(self, name, size(table, 1), width)
+               if (.not. allocated(self%error)) list = reshape(table, [size(table)])
+            end if
+         end associate
+         if (allocated(self%error)) return
+         do k = first, last
+            associate (before => width*int(row(k) - row(first)))
+               values(width*(k - 1) + 1:width*k) = list(before + 1:before + width)
+            end associate
+         end do
+      end do
    end subroutine transfer_reals
 
    !> Write or read integers. Rows of several integers are stored one after the other in a list.
@@ -241,102 +252,109 @@ contains
       integer, intent(in) :: width
       integer(lp), intent(inout), contiguous :: values(:)
       character(len=*), intent(in) :: unit, meaning
-      integer(lp), allocatable :: list(:)
-      integer(lp) :: rows(2)
+      integer(lp), allocatable :: row(:), list(:)
+      integer :: k, first, last
 
       if (.not. self%is_reading) then
-         call write_longs(self, name, width, values, unit, meaning)
+         call write_longs(self, name, width, size(values)/width, values, unit, meaning)
          return
       end if
-      call find_rows(self, name, int(width, lp), rows)
-      if (self%has_failed()) return
-      call self%file%read(name, list, self%error, rows)
-      if (self%has_failed()) return
-      call receive_rows(self, name, width, values, list)
-      if (.not. allocated(self%error)) values = list
+      call list_rows(self, name, width, size(values)/width, row)
+      last = 0
+      do while (last < size(row) .and. .not. allocated(self%error))
+         first = last + 1
+         last = last_of_part(row, first)
+         call self%file%read(name, list, self%error, width*[row(first) - 1_lp, row(last) - row(first) + 1_lp])
+         if (allocated(self%error)) return
+         do k = first, last
+            associate (before => width*int(row(k) - row(first)))
+               values(width*(k - 1) + 1:width*k) = list(before + 1:before + width)
+            end associate
+         end do
+      end do
    end subroutine transfer_longs
 
-   !> Send the rows that this rank has read to the ranks that need them, and check their number. Collective for rows
-   !> that are distributed.
-   subroutine receive_rows(self, name, width, mine, words)
+   !> List the rows of a column to read: the chosen ones, or all.
+   subroutine list_rows(self, name, entries, wanted, row)
       class(checkpoint_file_t), intent(inout) :: self
       character(len=*), intent(in) :: name
-      integer, intent(in) :: width
-      !> Present rows of this rank
-      integer(lp), intent(in) :: mine(:)
-      !> Rows that were read; on return those of this rank
-      integer(lp), allocatable, intent(inout) :: words(:)
-      integer(lp), allocatable :: received(:, :)
-
-      if (group_of(self, name) > 0) then
-         received = reshape(mine, [width, size(mine)/width])
-         call self%rows(place_of(name))%from_blocks(self%comm, reshape(words, [width, size(words)/width]), received)
-         words = reshape(received, [size(received)])
-      end if
-      if (.not. allocated(self%error)) call expect_size(self, name, size(words), size(mine))
-   end subroutine receive_rows
-
-   !> Find the rows of a column that this rank reads.
-   subroutine find_rows(self, name, entries, rows)
-      class(checkpoint_file_t), intent(inout) :: self
-      character(len=*), intent(in) :: name
-      !> Number of entries of the data set along its slowest dimension that make a row of the group
-      integer(lp), intent(in) :: entries
-      !> Number of rows before them, and their number
-      integer(lp), intent(out) :: rows(2)
+      !> Number of entries of the data set along its slowest dimension that make a row
+      integer, intent(in) :: entries
+      !> Number of rows that the caller needs
+      integer, intent(in) :: wanted
+      !> Numbers of the rows, ascending
+      integer(lp), allocatable, intent(out) :: row(:)
+      integer(lp) :: n, j
       integer :: k
 
-      rows = 0_lp
-      call self%count_rows(name, rows(2))
-      if (allocated(self%error)) return
       k = place_of(name)
-      if (k == 0) return
-      if (self%part(1, k) >= 0_lp) then
-         rows = entries*self%part(:, k)
-      else if (self%is_spread(k)) then
-         call expect_size(self, name, int(rows(2)), int(entries*self%rows(k)%total))
-         rows = entries*[self%rows(k)%first, int(self%rows(k)%n, lp)]
+      if (k > 0) then
+         if (allocated(self%chosen(k)%row)) row = self%chosen(k)%row
       end if
-   end subroutine find_rows
+      if (.not. allocated(row)) then
+         call self%count_rows(name, n)
+         if (.not. allocated(self%error)) call expect_size(self, name, int(n), entries*wanted)
+         row = [(j, j=1_lp, int(wanted, lp))]
+      end if
+      if (.not. allocated(self%error)) call expect_size(self, name, size(row), wanted)
+   end subroutine list_rows
+
+   !> Last of the rows that are read at once with a row: those behind it that lie close to it. The rows between them are
+   !> dropped.
+   pure integer function last_of_part(row, first) result(last)
+      !> Numbers of the rows, ascending
+      integer(lp), intent(in) :: row(:)
+      !> Index of the first row to read
+      integer, intent(in) :: first
+
+      last = first
+      do while (last < size(row))
+         if (row(last + 1) - row(first) >= most_rows) exit
+         last = last + 1
+      end do
+   end function last_of_part
 
    !> Write rows of real numbers.
-   subroutine write_reals(self, name, values, unit, meaning)
+   subroutine write_reals(self, name, width, n, values, unit, meaning)
       class(checkpoint_file_t), intent(inout) :: self
       character(len=*), intent(in) :: name, unit, meaning
-      real(dp), intent(in) :: values(:, :)
+      !> Numbers per row, and number of rows
+      integer, intent(in) :: width, n
+      real(dp), intent(in) :: values(width, n)
       real(dp), allocatable :: block(:, :)
       type(part_t) :: part
       integer :: k
 
       k = group_of(self, name)
-      if (k == 0 .and. size(values, 1) == 1) then
+      if (k == 0 .and. width == 1) then
          call self%file%write(name, component(values, 1), self%error, unit, meaning)
       else if (k == 0) then
          call self%file%write(name, values, self%error, unit, meaning)
       else
          call self%rows(k)%to_blocks(self%comm, values, block)
          part = part_t(self%rows(k)%first, self%rows(k)%total)
-         if (size(values, 1) == 1) call self%file%write(name, component(block, 1), self%error, unit, meaning, part)
-         if (size(values, 1) > 1) call self%file%write(name, block, self%error, unit, meaning, part)
+         if (width == 1) call self%file%write(name, component(block, 1), self%error, unit, meaning, part)
+         if (width > 1) call self%file%write(name, block, self%error, unit, meaning, part)
       end if
    end subroutine write_reals
 
    !> Write rows of integers as a list.
-   subroutine write_longs(self, name, width, values, unit, meaning)
+   subroutine write_longs(self, name, width, n, values, unit, meaning)
       class(checkpoint_file_t), intent(inout) :: self
       character(len=*), intent(in) :: name, unit, meaning
-      integer, intent(in) :: width
-      integer(lp), intent(in), contiguous :: values(:)
+      !> Integers per row, and number of rows
+      integer, intent(in) :: width, n
+      integer(lp), intent(in) :: values(width, n)
       integer(lp), allocatable :: block(:, :)
       integer :: k
 
       k = group_of(self, name)
       if (k == 0) then
-         call self%file%write(name, values, self%error, unit, meaning)
+         call self%file%write(name, reshape(values, [width*n]), self%error, unit, meaning)
          return
       end if
       associate (rows => self%rows(k))
-         call rows%to_blocks(self%comm, reshape(values, [width, size(values)/width]), block)
+         call rows%to_blocks(self%comm, values, block)
          call self%file%write(name, reshape(block, [size(block)]), self%error, unit, meaning, &
                               part_t(width*rows%first, width*rows%total))
       end associate
@@ -348,7 +366,7 @@ contains
       character(len=*), intent(in) :: name
 
       group_of = place_of(name)
-      if (group_of > 0) group_of = merge(group_of, 0, self%is_spread(group_of) .and. self%part(1, group_of) < 0_lp)
+      if (group_of > 0) group_of = merge(group_of, 0, self%is_spread(group_of))
    end function group_of
 
    !> Index of the group of a column in `groups`; 0: none of them

@@ -22,7 +22,7 @@ module polydem_trajectory_segment
    use polydem_hdf5_file, only: hdf5_file_t, many_rows, one_row, part_t
    use polydem_kinds, only: bp, dp, ip, lp
    use polydem_named_values, only: named_values_t
-   use polydem_ownership, only: order_bodies, order_pairs, order_parts
+   use polydem_ownership, only: order_bodies, order_pairs, order_vertices
    implicit none
    private
    public :: write_bodies, add_frame, add_walls, add_contacts, add_balance
@@ -96,12 +96,12 @@ contains
       type(part_t), intent(in) :: part
       type(error_t), allocatable, intent(inout) :: error
       type(row_distribution_t) :: blocks
-      integer(ip), allocatable :: body(:), start(:)
+      integer(ip), allocatable :: start(:)
       real(dp), allocatable :: vertices(:, :)
       character(len=*), parameter :: about_start = &
          'body k owns the rows vertex_start[k] to vertex_start[k + 1] - 1 of vertex', &
          about_vertex = 'vertices relative to the centre of mass at angle 0, anticlockwise'
-      integer(ip) :: k, n, s
+      integer(ip) :: k, n
 
       n = bodies%pieces%vertex_start(bodies%n + 1_ip) - 1_ip
       if (comm%size == 1_ip) then
@@ -115,11 +115,8 @@ contains
          end do
          return
       end if
-      allocate (body(n), start(size(n_vertices) + 1))
-      do s = 1_ip, bodies%n
-         body(bodies%pieces%vertex_start(s):bodies%pieces%vertex_start(s + 1_ip) - 1_ip) = s
-      end do
-      call order_parts(comm, bodies, body, blocks)
+      allocate (start(size(n_vertices) + 1))
+      call order_vertices(comm, bodies, blocks)
       call blocks%to_blocks(comm, real(bodies%pieces%vertex(:, :n), dp), vertices)
       start(1) = int(blocks%first, ip)
       do k = 1_ip, size(n_vertices, kind=ip)

@@ -1,19 +1,20 @@
-!> The list of fields of a checkpoint: all state that outlives a time step and does not follow from the namelist.
+!> The list of fields of a checkpoint: the bodies, and all other state that outlives a time step and does not follow
+!> from the namelist.
 !>
-!> A checkpoint does not hold shapes and masses (the scene is built again; a hash detects a difference), motions
-!> (functions of time), contacts (computed by the next step) or the state of neighbour finders. After a restart the
-!> first search starts without pairs. The pairs that it finds again get their contact history.
+!> A checkpoint does not hold motions (functions of time), contacts (computed by the next step) or the state of
+!> neighbour finders. After a restart the first search starts without pairs. The pairs that it finds again get their
+!> contact history. A hash of the bodies at the start guards against the checkpoint of another run.
 module polydem_checkpoint_fields
-   use polydem_bodies, only: turn_bodies
-   use polydem_body_fields, only: serialize_bodies
+   use polydem_checkpoint_bodies, only: read_bodies, save_bodies
    use polydem_contact_history, only: contact_history_t
    use polydem_energy_balance, only: serialize_contributions, serialize_balance
    use polydem_errors, only: error_t, input_error, raise
    use polydem_force_sums, only: total_forces
    use polydem_kinds, only: dp, ip, lp, wp
-   use polydem_local_data, only: rebuild_local_data
    use polydem_monitor, only: serialize_monitor, monitor_t
    use polydem_packed_history, only: pack_pairs, packed_history_t, slots_of_pair
+   use polydem_packed_state, only: find_walls
+   use polydem_replace_bodies, only: settle_bodies
    use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
    implicit none
@@ -46,22 +47,33 @@ contains
       type(simulation_t), intent(inout) :: simulation
       type(attempts_t), intent(inout) :: attempts
       type(monitor_t), intent(inout) :: monitor
+      integer(ip), allocatable :: former(:)
 
       call serialize_global(serializer, simulation, attempts, monitor)
       associate (s => simulation)
-         if (.not. serializer%is_reading) call total_forces(s%settings%forces%gravity, s%force_sums, s%bodies)
-         call serialize_bodies(serializer, s%bodies)
+         if (serializer%is_reading) then
+            former = s%bodies%id
+            call read_bodies(serializer, s%comm, s%bodies)
+            if (.not. allocated(serializer%error)) call s%integrator%start(s%bodies)
+         else
+            call total_forces(s%settings%forces%gravity, s%force_sums, s%bodies)
+            call save_bodies(serializer, s%bodies)
+         end if
          call s%integrator%serialize(serializer)
          if (s%settings%output%energy_balance) call serialize_contributions(s%energy_balance, s%bodies%n, serializer)
          associate (work => s%neighbours%finder%work)
             call serializer%field('/run/finder_counts', work%value, '1', 'statistics of the finder so far')
             call serializer%seconds_field('/run/finder_seconds', work%seconds, 'time of each phase of the finder')
          end associate
-         if (.not. serializer%is_reading) call save_pairs(serializer, s)
-         if (serializer%is_reading) call read_pairs(serializer, s)
-         if (.not. serializer%is_reading .or. allocated(serializer%error)) return
-         call turn_bodies(s%bodies, s%moving)
-         call rebuild_local_data(s, serializer%error, s%domain%median_diameter)
+         if (.not. serializer%is_reading) then
+            call save_pairs(serializer, s)
+            return
+         end if
+         call read_pairs(serializer, s)
+         call s%comm%all_reduce_error(serializer%error)
+         if (allocated(serializer%error)) return
+         call find_walls(s, former)
+         call settle_bodies(s, serializer%error)
       end associate
    end subroutine serialize_run
 
@@ -133,9 +145,9 @@ contains
       call resize(part, s%history, 0_ip)
       s%received_history = part
       do first = 0_lp, max(0_lp, n - 1_lp), most_rows
-         if (serializer%has_failed()) return
+         if (allocated(serializer%error)) return
          call resize(part, s%history, int(min(most_rows, n - first), ip))
-         call serializer%choose_rows('/pairs/', [first, size(part%key, kind=lp)])
+         call serializer%choose_rows('/pairs/', [(first + k, k=1_ip, size(part%key, kind=ip))])
          call serialize_pairs(serializer, s%history, part)
          if (allocated(serializer%error)) cycle
          call check_pairs(s, part, serializer%error)

@@ -11,7 +11,7 @@ module polydem_checkpoint_schedule
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_log, only: log_t
    use polydem_monitor, only: monitor_t
-   use polydem_ownership, only: order_bodies, order_pairs
+   use polydem_ownership, only: order_bodies, order_pairs, order_vertices
    use polydem_provenance, only: provenance_t
    use polydem_result_files, only: checkpoint_path, n_checkpoints
    use polydem_settings, only: checkpoint_settings_t
@@ -124,11 +124,13 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
       type(time_limit_t) :: limit
+      integer(lp) :: room
       real(dp) :: began
 
       began = wall_seconds()
-      if (comm%size > 1_ip) call limit%set(checkpoint_path(folder, self%next), comm%rank, room_for(simulation))
-      call file%create(checkpoint_path(folder, self%next), provenance, comm, room_for(simulation))
+      call find_room(comm, simulation, room)
+      if (comm%size > 1_ip) call limit%set(checkpoint_path(folder, self%next), comm%rank, room)
+      call file%create(checkpoint_path(folder, self%next), provenance, comm, room)
       if (.not. allocated(file%error)) call lay_out_rows(comm, simulation, file)
       call complete_wall_forces(comm, simulation%walk%walls, simulation%bodies)
       call collect_counts(simulation)
@@ -145,13 +147,19 @@ contains
       self%longest = max(self%longest, self%last_time - began)
    end subroutine write_checkpoint
 
-   !> Upper bound of the size of a checkpoint [B]. A body takes 200 bytes and each of its three or four pairs 40 bytes;
-   !> the bound also covers the arrays of Gear's scheme.
-   pure integer(lp) function room_for(simulation)
+   !> Find an upper bound of the size of a checkpoint [B]. A body takes 230 bytes, a vertex 16 bytes, and each of the
+   !> three or four pairs of a body 40 bytes; the bound also covers the arrays of Gear's scheme. Collective.
+   subroutine find_room(comm, simulation, room)
+      class(communicator_t), intent(inout) :: comm
       type(simulation_t), intent(in) :: simulation
+      !> The bound, equal on all ranks
+      integer(lp), intent(out) :: room
+      integer(lp) :: n_vertices(1)
 
-      room_for = 1000000_lp + 1000_lp*int(simulation%bodies%n_all, lp)
-   end function room_for
+      n_vertices = size(simulation%bodies%pieces%vertex, 2, kind=lp)
+      call comm%all_reduce_sum(n_vertices)
+      room = 1000000_lp + 1000_lp*int(simulation%bodies%n_all, lp) + 16_lp*n_vertices(1)
+   end subroutine find_room
 
    !> Set the rows of each group of a checkpoint that this rank writes; collective.
    subroutine lay_out_rows(comm, simulation, file)
@@ -163,6 +171,9 @@ contains
       associate (bodies => simulation%bodies, pairs => simulation%neighbours%pairs)
          call order_bodies(comm, bodies, rows)
          call file%set_rows('/bodies/', rows)
+         call file%set_rows('/pieces/', rows)
+         call order_vertices(comm, bodies, rows)
+         call file%set_rows('/vertices/', rows)
          call order_pairs(comm, bodies, pairs%first(:pairs%n), pairs%second(:pairs%n), rows)
          call file%set_rows('/pairs/', rows)
       end associate

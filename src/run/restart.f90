@@ -7,12 +7,10 @@ module polydem_restart
    use polydem_domain, only: new_domain
    use polydem_errors, only: error_t, input_error, io_error, raise
    use polydem_file_system, only: exists
-   use polydem_row_distribution, only: row_distribution_t
    use polydem_kinds, only: dp, ip, lp
    use polydem_log, only: log_t
    use polydem_manifest, only: manifest_t
    use polydem_monitor, only: monitor_t
-   use polydem_ownership, only: order_bodies
    use polydem_provenance, only: origin_of
    use polydem_result_files, only: checkpoint_path, n_checkpoints, name_in, profile_name, segment_path, trace_name
    use polydem_serializer, only: serializer_t
@@ -340,12 +338,9 @@ contains
       !> Allocated if the checkpoint does not fit this run
       type(error_t), allocatable, intent(inout) :: error
       type(checkpoint_file_t) :: file
-      type(row_distribution_t) :: rows
 
       call file%open(checkpoint_path(folder, earlier%checkpoint), error, simulation%comm)
       if (allocated(error)) return
-      call order_bodies(simulation%comm, simulation%bodies, rows)
-      call file%set_rows('/bodies/', rows)
       call serialize_run(file, simulation, attempts, monitor)
       call file%close(error)
       if (allocated(error)) then

@@ -8,7 +8,8 @@ module polydem_local_data
    use polydem_finder_statistics, only: finder_statistics_t
    use polydem_force_law, only: force_law_t, new_force_law
    use polydem_force_sums, only: start_sums
-   use polydem_motion_check, only: new_motion_check, shorter_step, warn_share
+   use polydem_motion_check, only: displacement_limit, new_motion_check, shorter_step, warn_share
+   use polydem_global_reductions, only: reduce_to_least
    use polydem_kinds, only: ip, wp
    use polydem_neighbours, only: new_neighbours
    use polydem_contact_flags, only: new_flag_limits
@@ -16,7 +17,7 @@ module polydem_local_data
    use polydem_stable_step, only: stiffest_product
    implicit none
    private
-   public :: rebuild_local_data
+   public :: rebuild_local_data, limit_displacement
 
 contains
 
@@ -54,6 +55,17 @@ contains
       if (self%settings%guards%step /= 'off') self%walk%flag_limits%soft = &
          stiffest_product(self%law, self%integrator%stability(), self%bodies, self%dt/warn_share)
    end subroutine rebuild_local_data
+
+   !> Limit the displacement of a step to that of the thinnest body of all ranks. Collective.
+   subroutine limit_displacement(self)
+      !> The simulation with its guard
+      type(simulation_t), intent(inout) :: self
+      real(wp) :: limit(1)
+
+      limit = displacement_limit(self%settings%guards, self%bodies)
+      call reduce_to_least(self%comm, limit)
+      self%motion_check%limit = limit(1)
+   end subroutine limit_displacement
 
    !> Empty a table of contacts, and give it the columns that the law needs.
    subroutine fit_table(law, contacts)

@@ -9,8 +9,8 @@ module polydem_motion_check
    use polydem_warning, only: warning_t
    implicit none
    private
-   public :: motion_check_t, new_motion_check, have_valid_poses, check_poses, move_within_limit, find_coasting, &
-      check_motion, check_contacts, place_of, greatest_displacement, shorter_step, warn_share
+   public :: motion_check_t, new_motion_check, displacement_limit, have_valid_poses, check_poses, move_within_limit, &
+      find_coasting, check_motion, check_contacts, place_of, greatest_displacement, shorter_step, warn_share
 
    !> Limit of the displacement of bodies per step
    type :: motion_check_t
@@ -55,10 +55,19 @@ contains
       check%choice = settings%displacement
       check%remedy = remedy
       check%moving = moving
-      check%limit = huge(1.0_wp)
-      if (check%choice == 'off' .or. bodies%n == 0_ip) return
-      check%limit = settings%displacement_limit*minval(bodies%thickness)
+      check%limit = displacement_limit(settings, bodies)
    end subroutine new_motion_check
+
+   !> Maximum displacement of a point of a body per step; huge if it is not monitored [m]
+   pure real(wp) function displacement_limit(settings, bodies) result(limit)
+      type(guards_settings_t), intent(in) :: settings
+      !> Bodies that may touch
+      type(bodies_t), intent(in) :: bodies
+
+      limit = huge(1.0_wp)
+      if (settings%displacement == 'off' .or. bodies%n == 0_ip) return
+      limit = settings%displacement_limit*minval(bodies%thickness)
+   end function displacement_limit
 
    !> Whether all bodies of a run have valid poses
    pure logical function have_valid_poses(bodies, first, last)

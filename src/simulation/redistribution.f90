@@ -7,39 +7,30 @@
 module polydem_redistribution
    use polydem_bodies, only: turn_bodies
    use polydem_box_maker, only: have_boxes_within
-   use polydem_body_fields, only: serialize_bodies
-   use polydem_energy_balance, only: serialize_contributions
    use polydem_errors, only: error_t
    use polydem_motion_check, only: greatest_displacement
    use polydem_halo, only: new_halo
    use polydem_kinds, only: dp, ip, lp, wp
    use polydem_local_data, only: rebuild_local_data
-   use polydem_migration_buffer, only: migration_buffer_t
-   use polydem_packed_bodies, only: packed_bodies_t, all_to_all_bodies, copy_packed, join_packed, pack_bodies, &
-      unpack_bodies
+   use polydem_packed_bodies, only: packed_bodies_t, all_to_all_bodies, copy_packed, join_packed
    use polydem_packed_history, only: pack_pairs, receive_pairs, send_pairs, slots_of_pair
+   use polydem_packed_state, only: join_state, pack_state, packed_state_t, send_state, unpack_state
    use polydem_rank_order, only: sort_by_rank
    use polydem_redistribution_plan, only: divide, needs_repartition, list_needed, owners_of, padded_boxes, &
       work_of_bodies
-   use polydem_serializer, only: serializer_t
    use polydem_simulation, only: simulation_t
-   use polydem_sort, only: place_in
    use polydem_timers, only: stage_boxes, stage_forces, stage_integrate, stage_neighbours, stage_overlap
    implicit none
    private
    public :: redistribute, have_boxes_left, restore_history
 
-   !> Packed bodies with their state
-   type :: packed_state_t
-      !> Constant fields and shapes
-      type(packed_bodies_t) :: bodies
-      !> Variable fields
-      type(migration_buffer_t) :: columns
+   !> Packed bodies with their boxes
+   type, extends(packed_state_t) :: packed_boxes_t
       !> Indices of the free bodies
       integer(ip), allocatable :: free(:)
       !> Their padded boxes: xmin, ymin, xmax, ymax, (4, free body) [m]
       real(wp), allocatable :: boxes(:, :)
-   end type packed_state_t
+   end type packed_boxes_t
 
    !> Stages whose time is proportional to the work for the bodies of a rank
    integer, parameter :: work_stages(*) = [stage_boxes, stage_neighbours, stage_overlap, stage_forces, stage_integrate]
@@ -80,7 +71,8 @@ contains
       else
          call self%domain%adapt_margin(self%step)
       end if
-      call balance_work(self)
+      ! When the bodies have just been replaced, there are no pairs that tell the work of a rank.
+      if (self%domain%last_step < 0_lp .or. allocated(self%domain%reference)) call balance_work(self)
       call migrate(self, error)
    end subroutine redistribute
 
@@ -111,7 +103,8 @@ contains
          call divide(self%domain, self%comm, self%step, self%bodies, weight, seconds)
    end subroutine balance_work
 
-   !> Restore the contact history of pairs after a redistribution. A no-op otherwise.
+   !> Restore the contact history of pairs after a redistribution, a restart or a replacement of bodies. A no-op
+   !> otherwise.
    subroutine restore_history(self)
       !> The simulation, directly after the pair search
       type(simulation_t), intent(inout) :: self
@@ -138,22 +131,14 @@ contains
    subroutine migrate(self, error)
       type(simulation_t), intent(inout) :: self
       type(error_t), allocatable, intent(inout) :: error
-      type(packed_state_t) :: own
+      type(packed_boxes_t) :: own
       integer(ip), allocatable :: owner(:)
-      integer(ip) :: j, k
+      integer(ip) :: k
 
-      do k = 1_ip, size(self%walls, kind=ip)
-         self%walls(k)%slots = self%bodies%global_index(self%walls(k)%slots)
-      end do
       owner = owners_of(self%domain, self%bodies)
       call send_history(self, owner)
       call send_bodies(self, owner, own)
       call receive_halo(self, own)
-      do k = 1_ip, size(self%walls, kind=ip)
-         associate (slots => self%walls(k)%slots)
-            slots = [(place_in(self%bodies%global_index, slots(j)), j=1_ip, size(slots, kind=ip))]
-         end associate
-      end do
       call self%domain%halo%follow(self%comm, self%bodies)
       call turn_bodies(self%bodies, [(k, k=1_ip, self%bodies%n)])
       call rebuild_local_data(self, error, self%domain%median_diameter)
@@ -170,7 +155,7 @@ contains
    end subroutine migrate
 
    !> Send the contact history of all pairs to the next owners of their bodies. The history that a restart has read
-   !> belongs to pairs that are not found yet.
+   !> belongs to pairs that are not found yet, and so does that of a replacement of bodies.
    subroutine send_history(self, owner)
       type(simulation_t), intent(inout) :: self
       integer(ip), intent(in) :: owner(:)
@@ -200,8 +185,8 @@ contains
       !> Rank that owns each body from now on, negative for fixed bodies, (slot)
       integer(ip), intent(in) :: owner(:)
       !> The bodies that this rank owns from now on, and its fixed bodies
-      type(packed_state_t), intent(out) :: own
-      type(packed_state_t) :: other
+      type(packed_boxes_t), intent(out) :: own
+      type(packed_boxes_t) :: other
       real(wp), allocatable :: boxes(:, :)
       integer(ip), allocatable :: slots(:), counts(:), counts_received(:), order(:)
       integer(ip) :: s, k
@@ -210,48 +195,43 @@ contains
          call turn_bodies(bodies, bodies%free)
          slots = pack(bodies%free, owner(bodies%free) /= comm%rank)
          call sort_by_rank(owner(slots), comm%size, counts, order)
-         call pack_state(self, slots(order), 0_ip, other)
-         call all_to_all_bodies(comm, counts, other%bodies, counts_received)
-         call other%columns%move(comm, counts, counts_received)
+         call pack_boxes(self, slots(order), 0_ip, other)
+         call send_state(comm, counts, other%packed_state_t, counts_received)
          call comm%all_to_all(other%boxes, counts, boxes, counts_received)
          call move_alloc(boxes, other%boxes)
          other%free = [(k, k=1_ip, sum(counts_received))]
          self%domain%arrivals = self%domain%arrivals + int(sum(counts_received), lp)
 
          slots = pack([(s, s=1_ip, bodies%n)], bodies%fixed .or. (owner == comm%rank .and. .not. bodies%in_halo))
-         call pack_state(self, slots, sum(counts_received) + 2_ip*count(bodies%in_halo, kind=ip), own)
+         call pack_boxes(self, slots, sum(counts_received) + 2_ip*count(bodies%in_halo, kind=ip), own)
       end associate
       own%free = [own%free, own%columns%n_rows + other%free]
       own%boxes = reshape([own%boxes, other%boxes], [4, size(own%free)])
-      call join_packed(own%bodies, other%bodies)
-      call own%columns%append(other%columns)
+      call join_state(own%packed_state_t, other%packed_state_t)
    end subroutine send_bodies
 
-   !> Pack bodies of this rank with their state.
-   subroutine pack_state(self, slots, room, packed)
+   !> Pack bodies of this rank with their state and boxes.
+   subroutine pack_boxes(self, slots, room, packed)
       type(simulation_t), intent(inout) :: self
       !> Slots of the bodies
       integer(ip), intent(in) :: slots(:)
       !> Number of bodies to join later, for which memory is reserved
       integer(ip), intent(in) :: room
       !> The packed bodies, in the order of the slots
-      type(packed_state_t), intent(out) :: packed
+      type(packed_boxes_t), intent(out) :: packed
       integer(ip) :: k
 
-      call pack_bodies(self%bodies, slots, packed%bodies, room)
-      packed%columns%slots = slots
-      packed%columns%room = room
-      call serialize_columns(packed%columns, self)
+      call pack_state(self, slots, room, packed%packed_state_t)
       packed%free = pack([(k, k=1_ip, size(slots, kind=ip))],.not. self%bodies%fixed(slots))
       packed%boxes = padded_boxes(self%bodies, slots(packed%free), self%domain%margin + self%settings%boxes%margin)
-   end subroutine pack_state
+   end subroutine pack_boxes
 
    !> Publish the bounds of the bodies of this rank, receive the nearby bodies of other ranks as the halo, and unpack
    !> all of them.
    subroutine receive_halo(self, own)
       type(simulation_t), intent(inout) :: self
       !> The bodies that this rank owns, and its fixed bodies; afterwards with the halo
-      type(packed_state_t), intent(inout) :: own
+      type(packed_boxes_t), intent(inout) :: own
       type(packed_bodies_t) :: halo
       integer(ip), allocatable :: sent(:), counts(:), counts_received(:), slots(:)
       integer(lp) :: n_halo(1)
@@ -263,11 +243,8 @@ contains
       call copy_packed(own%bodies, sent, halo)
       call all_to_all_bodies(self%comm, counts, halo, counts_received)
       call join_packed(own%bodies, halo)
-      call unpack_bodies(own%bodies, (self%bodies%n_all), self%bodies, slots)
+      call unpack_state(self, own%packed_state_t, slots)
       n = own%columns%n_rows
-      call own%columns%restore_to(slots(:n))
-      call self%integrator%start(self%bodies)
-      call serialize_columns(own%columns, self)
       self%bodies%in_halo(slots(n + 1_ip:)) = .true.
       self%bodies%free = pack([(s, s=1_ip, self%bodies%n)],.not. (self%bodies%fixed .or. self%bodies%in_halo))
       call new_halo(self%domain%halo, self%bodies%free, counts, slots(sent), counts_received, slots(n + 1_ip:), &
@@ -276,19 +253,5 @@ contains
       call self%comm%all_reduce_sum(n_halo)
       self%domain%halo_share = real(n_halo(1), wp)/real(self%bodies%n_all, wp)
    end subroutine receive_halo
-
-   !> Serialize the variable state of the bodies, including data of the current step.
-   subroutine serialize_columns(serializer, self)
-      class(serializer_t), intent(inout) :: serializer
-      type(simulation_t), intent(inout) :: self
-
-      call serialize_bodies(serializer, self%bodies)
-      call self%integrator%serialize_step(serializer)
-      if (self%settings%output%energy_balance) &
-         call serialize_contributions(self%energy_balance, self%bodies%n, serializer)
-      if (.not. allocated(self%relaxation%from)) return
-      if (serializer%is_reading) self%relaxation%from = self%bodies%position
-      call serializer%field('/bodies/from', self%relaxation%from, 'm', 'centres of mass before the relaxation')
-   end subroutine serialize_columns
 
 end module polydem_redistribution

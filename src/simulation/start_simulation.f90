@@ -1,5 +1,6 @@
 !> Start of a simulation: time step, forces and accelerations at time 0. All ranks start alike, one or many.
 module polydem_start_simulation
+   use polydem_bodies, only: bodies_t
    use polydem_body_forces, only: choose_body_forces
    use polydem_box_maker, only: update_boxes
    use polydem_choose_instruction_set, only: choose_instruction_set
@@ -9,10 +10,11 @@ module polydem_start_simulation
    use polydem_energy_balance, only: start_energy_balance
    use polydem_errors, only: error_t
    use polydem_force_law, only: check_law
-   use polydem_global_reductions, only: find_median, reduce_to_least
+   use polydem_force_sums, only: force_sums_t
+   use polydem_global_reductions, only: find_median
    use polydem_integrator_factory, only: new_integrator
    use polydem_kinds, only: ip, wp
-   use polydem_local_data, only: rebuild_local_data
+   use polydem_local_data, only: limit_displacement, rebuild_local_data
    use polydem_prediction, only: move_walls
    use polydem_redistribution, only: redistribute
    use polydem_relaxation, only: relax_bodies
@@ -36,7 +38,7 @@ contains
       type(simulation_t), intent(inout) :: self
       !> Allocated if bodies or settings are invalid
       type(error_t), allocatable, intent(inout) :: error
-      real(wp) :: median_diameter, limit(1)
+      real(wp) :: median_diameter
 
       call choose_instruction_set(self%bodies%isa, error)
       call check_law(settings, 1_ip, error)
@@ -52,9 +54,7 @@ contains
       if (.not. allocated(error)) call rebuild_local_data(self, error, median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
-      limit = self%motion_check%limit
-      call reduce_to_least(self%comm, limit)
-      self%motion_check%limit = limit(1)
+      call limit_displacement(self)
       call self%integrator%start(self%bodies)
       if (settings%scene%remove_overlap > 0.0_wp) call relax_bodies(self, error)
       if (allocated(error)) return
@@ -73,33 +73,31 @@ contains
    !> Set the accelerations at time 0: from all forces, or from all but those of contacts, depending on the scheme.
    subroutine start_integration(self)
       type(simulation_t), intent(inout) :: self
-      integer(ip) :: k
       integer :: c
 
-      associate (bodies => self%bodies)
-         do k = 1_ip, size(bodies%free, kind=ip)
-            associate (s => bodies%free(k))
-               if (self%integrator%starts_from_forces) then
-                  bodies%acceleration(:, s) = bodies%force(:, s)*bodies%inverse_mass(s)
-                  bodies%angular_acceleration(s) = bodies%torque(s)*bodies%inverse_inertia(s)
-               else
-                  bodies%acceleration(:, s) = self%settings%forces%gravity
-                  bodies%angular_acceleration(s) = 0.0_wp
-                  if (.not. allocated(self%force_sums%field)) cycle
-                  associate (field => self%force_sums%field(:, s))
-                     bodies%acceleration(:, s) = bodies%acceleration(:, s) + field(1:2)*bodies%inverse_mass(s)
-                     bodies%angular_acceleration(s) = field(3)*bodies%inverse_inertia(s)
-                  end associate
-               end if
-            end associate
-         end do
-         call self%integrator%start(bodies)
-      end associate
+      call self%integrator%start_accelerations(self%settings%forces%gravity, self%bodies)
+      if (.not. self%integrator%starts_from_forces) call add_fields(self%force_sums, self%bodies)
+      call self%integrator%start(self%bodies)
       ! A scheme that ignores the forces at time 0 has no contact history before its first step.
       if (self%integrator%starts_from_forces .or. .not. allocated(self%history%column)) return
       do c = 1, size(self%history%column)
          if (self%history%column(c)%kind%zero_is_new) self%history%column(c)%value = 0.0_wp
       end do
    end subroutine start_integration
+
+   !> Add the accelerations by forces that are no contacts to those by gravity.
+   pure subroutine add_fields(sums, bodies)
+      type(force_sums_t), intent(in) :: sums
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: k
+
+      if (.not. allocated(sums%field)) return
+      do k = 1_ip, size(bodies%free, kind=ip)
+         associate (s => bodies%free(k))
+            bodies%acceleration(:, s) = bodies%acceleration(:, s) + sums%field(1:2, s)*bodies%inverse_mass(s)
+            bodies%angular_acceleration(s) = sums%field(3, s)*bodies%inverse_inertia(s)
+         end associate
+      end do
+   end subroutine add_fields
 
 end module polydem_start_simulation

@@ -61,7 +61,7 @@ def rows_of(path):
 
 def _lengths(file):
     """Names of lengths in the shapes."""
-    named = {"bodies/id": "n", "bodies/vertex": "v", "walls/id": "w", "body": "b",
+    named = {"bodies/id": "n", "bodies/vertex": "v", "vertices/position": "v", "walls/id": "w", "body": "b",
              "profile/stage": "stages", "counters/name": "counters", "steps/stage_name": "stages",
              "steps/phase_name": "phases", "steps/count_name": "counts"}
     found = {file[key].shape[0]: name for key, name in named.items() if key in file and file[key].shape[0] > 1}

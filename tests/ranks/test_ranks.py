@@ -2,13 +2,14 @@
 
 import re
 import signal
+import subprocess
 import time
 from itertools import product
 from pathlib import Path
 
 import pytest
 from conftest import Outcome
-from runs import complaints, contents, count, differences, frames, newest, run, start, state_hash
+from runs import ENVIRONMENT, PARALLEL, complaints, contents, count, differences, frames, newest, run, start, state_hash
 from scenes import SCENES, write_scene
 
 RANKS = (1, 2, 3, 4, 7)
@@ -97,6 +98,19 @@ def test_what_ranks_tell_each_other_is_counted(scene, midstep, row_bytes, tmp_pa
     assert most["bytes"] == row_bytes*2*most["bodies"]*steps
     # The one that has fewest bodies of its own has most halo bodies.
     assert 2*bodies*steps <= ranks*most["halo bodies"] and most["halo bodies"] < bodies*steps
+
+
+def test_bodies_leave_and_enter_alike_on_any_number_of_ranks():
+    build = Path(PARALLEL).parents[2]
+    subprocess.run(["cmake", "--build", build, "--target", "replaced_bodies"], check=True, stdout=subprocess.PIPE)
+    told = {}
+    for ranks in (1, 2, 3):
+        done = subprocess.run(["mpirun", "-n", str(ranks), build / "tests/simulation/replaced_bodies"],
+                              env=ENVIRONMENT, timeout=300, stdin=subprocess.DEVNULL, capture_output=True, text=True,
+                              check=False)
+        told[ranks] = (done.returncode, done.stderr, done.stdout)
+    assert told[1][:2] == (0, "") and re.fullmatch("[0-9a-f]{16}\n", told[1][2]), told
+    assert set(told.values()) == {told[1]}, told
 
 
 def interrupt(folder, namelist, ranks, options):

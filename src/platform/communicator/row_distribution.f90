@@ -21,14 +21,10 @@ module polydem_row_distribution
       integer(lp) :: first = 0_lp
       !> Number of rows in all blocks
       integer(lp) :: total = 0_lp
-      !> Number of rows in the local columns, including rows that other ranks own
-      integer(ip) :: n_known = 0_ip
       !> Local indices of the rows that this rank owns, in the order of their destination ranks
       integer(ip), allocatable, private :: slot(:)
       !> Number of rows to send to each rank, (0:size - 1)
       integer(ip), allocatable, private :: counts(:)
-      !> Number of rows received from each rank, (0:size - 1)
-      integer(ip), allocatable, private :: counts_received(:)
       !> Index of the received row for each row of the block, (n)
       integer(ip), allocatable, private :: source(:)
       !> Whether there is only one rank, and its rows are already in order: there is nothing to send
@@ -37,29 +33,25 @@ module polydem_row_distribution
       procedure :: lay_out
       !> Bring a column into blocks: to_blocks(comm, values, block)
       generic :: to_blocks => longs_to_blocks, doubles_to_blocks
-      procedure :: from_blocks
       procedure, private :: longs_to_blocks, doubles_to_blocks
    end type row_distribution_t
 
 contains
 
    !> Set up the communication plan; collective.
-   subroutine lay_out(self, comm, n_bodies, n_known, key, slot)
+   subroutine lay_out(self, comm, n_bodies, key, slot)
       class(row_distribution_t), intent(inout) :: self
       class(communicator_t), intent(inout) :: comm
       !> Number of bodies of the run
       integer(ip), intent(in) :: n_bodies
-      !> Number of rows in the local columns
-      integer(ip), intent(in) :: n_known
       !> Keys of the rows that this rank owns, in any order; each row has one owner
       integer(lp), intent(in) :: key(:)
-      !> Local indices of these rows, in [1, n_known]
+      !> Indices of these rows in the local columns
       integer(ip), intent(in) :: slot(:)
       integer(lp), allocatable :: sent(:, :), received(:, :), sizes(:)
-      integer(ip), allocatable :: destinations(:), counts(:)
+      integer(ip), allocatable :: destinations(:), counts(:), counts_received(:)
       integer(ip) :: k
 
-      self%n_known = n_known
       self%is_in_order = comm%size == 1_ip .and. all(key(2:) > key(:size(key) - 1))
       if (self%is_in_order) then
          self%slot = slot
@@ -75,7 +67,7 @@ contains
          sent(1, k) = key(self%slot(k))
       end do
       self%slot = slot(self%slot)
-      call comm%all_to_all(sent, self%counts, received, self%counts_received)
+      call comm%all_to_all(sent, self%counts, received, counts_received)
       self%n = size(received, 2, kind=ip)
       self%source = ascending_order(received(1, :))
       call comm%gather([int(self%n, lp)], sizes, counts)
@@ -87,7 +79,7 @@ contains
    subroutine longs_to_blocks(self, comm, values, block)
       class(row_distribution_t), intent(in) :: self
       class(communicator_t), intent(inout) :: comm
-      !> The local column, (width, n_known)
+      !> The local column, (width, row)
       integer(lp), intent(in) :: values(:, :)
       !> The block of this rank, (width, n)
       integer(lp), allocatable, intent(out) :: block(:, :)
@@ -110,39 +102,11 @@ contains
       end do
    end subroutine longs_to_blocks
 
-   !> Bring the blocks of a column back to the ranks that own the rows: the inverse of `to_blocks`. Collective.
-   subroutine from_blocks(self, comm, block, values)
-      class(row_distribution_t), intent(in) :: self
-      class(communicator_t), intent(inout) :: comm
-      !> The block of this rank, (width, n)
-      integer(lp), intent(in) :: block(:, :)
-      !> The local column, (width, n_known); rows that other ranks own are unchanged
-      integer(lp), intent(inout) :: values(:, :)
-      integer(lp), allocatable :: sent(:, :), received(:, :)
-      integer(ip), allocatable :: counts(:)
-      integer(ip) :: k
-
-      if (self%is_in_order) then
-         do k = 1_ip, self%n
-            values(:, self%slot(k)) = block(:, k)
-         end do
-         return
-      end if
-      allocate (sent(size(block, 1), self%n))
-      do k = 1_ip, self%n
-         sent(:, self%source(k)) = block(:, k)
-      end do
-      call comm%all_to_all(sent, self%counts_received, received, counts)
-      do k = 1_ip, size(self%slot, kind=ip)
-         values(:, self%slot(k)) = received(:, k)
-      end do
-   end subroutine from_blocks
-
    !> Bring a column of real numbers into blocks without changing a bit; collective.
    subroutine doubles_to_blocks(self, comm, values, block)
       class(row_distribution_t), intent(in) :: self
       class(communicator_t), intent(inout) :: comm
-      !> The local column, (width, n_known)
+      !> The local column, (width, row)
       real(dp), intent(in) :: values(:, :)
       !> The block of this rank, (width, n)
       real(dp), allocatable, intent(out) :: block(:, :)

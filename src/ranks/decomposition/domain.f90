@@ -57,6 +57,7 @@ module polydem_domain
       procedure :: must_redistribute
       procedure :: choose_margin
       procedure :: set_reference
+      procedure :: forget_halo
       procedure :: adapt_margin
       procedure :: send_border
       procedure :: count_halo
@@ -107,7 +108,7 @@ contains
    end function has_halo
 
    !> Whether a redistribution is necessary: a box of a body of this rank is outside both the zone and its padded box
-   !> recorded at the last one, the last one was long ago, or there was none yet.
+   !> recorded at the last one, the last one was long ago, or there was none yet with these bodies.
    pure logical function must_redistribute(self, step, has_left)
       class(domain_t), intent(in) :: self
       !> The present step
@@ -147,17 +148,25 @@ contains
       self%last_step = step
    end subroutine set_reference
 
-   !> Choose the margin, unless the settings give one. With a wide margin redistributions are rare, but the halo is
-   !> large. The interval between redistributions is proportional to the margin. The halo is about a median diameter
-   !> and two margins wide. The sum of both costs is least where redistributions cost as much as that part of the halo
-   !> which is due to the margin.
+   !> Forget the halo and the padded boxes, since the bodies are others: the next step redistributes them.
+   subroutine forget_halo(self)
+      class(domain_t), intent(inout) :: self
+
+      self%halo = halo_t()
+      if (allocated(self%reference)) deallocate (self%reference)
+   end subroutine forget_halo
+
+   !> Choose the margin, unless the settings give one, or the bodies are others. With a wide margin redistributions are
+   !> rare, but the halo is large. The interval between redistributions is proportional to the margin. The halo is about
+   !> a median diameter and two margins wide. The sum of both costs is least where redistributions cost as much as that
+   !> part of the halo which is due to the margin.
    subroutine adapt_margin(self, step)
       class(domain_t), intent(inout) :: self
       !> Step of the redistribution that begins. It and `halo_share` are equal on all ranks, and so is the margin
       integer(lp), intent(in) :: step
       real(wp) :: cost_of_redistributions, cost_of_margin, factor
 
-      if (self%settings%margin > 0.0_wp .or. self%last_step < 0_lp) return
+      if (self%settings%margin > 0.0_wp .or. self%last_step < 0_lp .or. .not. allocated(self%reference)) return
       cost_of_redistributions = redistribution_cost/real(max(1_lp, step - self%last_step), wp)
       cost_of_margin = halo_body_cost*self%halo_share*2.0_wp*self%margin/(self%median_diameter + 2.0_wp*self%margin)
       factor = greatest_change

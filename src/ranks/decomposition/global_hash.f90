@@ -5,7 +5,7 @@ module polydem_global_hash
    use polydem_row_distribution, only: row_distribution_t
    use polydem_hash, only: mix_word
    use polydem_kinds, only: dp, ip, lp
-   use polydem_ownership, only: order_bodies, order_parts
+   use polydem_ownership, only: order_bodies, order_vertices
    implicit none
    private
    public :: hash_all_bodies, hash_scene
@@ -42,7 +42,7 @@ contains
       integer(lp), intent(out) :: hash
       type(row_distribution_t) :: blocks
       integer(lp), allocatable :: words(:, :), block(:, :), counts_of_ranks(:)
-      integer(ip), allocatable :: body(:), counts(:)
+      integer(ip), allocatable :: counts(:)
       integer(ip) :: k
 
       call hash_all_bodies(comm, bodies, hash)
@@ -62,14 +62,11 @@ contains
       end do
       call mix_blocks(comm, block, hash)
       deallocate (words)
-      allocate (words(2, size(bodies%pieces%vertex, 2)), body(size(bodies%pieces%vertex, 2)))
-      do k = 1_ip, bodies%n
-         body(bodies%pieces%vertex_start(k):bodies%pieces%vertex_start(k + 1_ip) - 1_ip) = k
-      end do
-      do k = 1_ip, size(body, kind=ip)
+      allocate (words(2, size(bodies%pieces%vertex, 2)))
+      do k = 1_ip, size(words, 2, kind=ip)
          words(:, k) = transfer(real(bodies%pieces%vertex(:, k), dp), 0_lp, 2)
       end do
-      call order_parts(comm, bodies, body, blocks)
+      call order_vertices(comm, bodies, blocks)
       call blocks%to_blocks(comm, words, block)
       call mix_blocks(comm, block, hash)
    end subroutine hash_scene

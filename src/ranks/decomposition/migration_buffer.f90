@@ -1,9 +1,9 @@
-!> Migration buffer: transfers fields of bodies between ranks.
+!> Migration buffer: transfers fields of bodies between ranks, or to other slots.
 !>
 !> The buffer is a serializer and is used in three steps. First it stores the rows of some slots of all columns over
-!> /bodies. Then `move` sends them to their new ranks, all-to-all, `copy_rows` takes some of them, and `append` joins
-!> those of several buffers, if necessary. Finally, after `restore_to` and called with the same columns in the same
-!> order, it restores the rows to other slots. Values of the whole run are ignored.
+!> bodies, or over vertices. Then `move` sends them to their new ranks, all-to-all, `copy_rows` takes some of them, and
+!> `append` joins those of several buffers, if necessary. Finally, after `restore_to` and called with the same columns
+!> in the same order, it restores the rows to other slots. Values of the whole run are ignored.
 module polydem_migration_buffer
    use polydem_communicator, only: communicator_t
    use polydem_grow, only: grow
@@ -42,8 +42,8 @@ module polydem_migration_buffer
       procedure :: transfer_longs
    end type migration_buffer_t
 
-   !> Prefix of the names of columns over bodies
-   character(len=*), parameter :: of_bodies = '/bodies/'
+   !> Prefix of the names of values of the whole run
+   character(len=*), parameter :: of_run = '/run/'
 
 contains
 
@@ -128,7 +128,7 @@ contains
 
       associate (unused => unit//meaning)
       end associate
-      if (index(name, of_bodies) /= 1) return
+      if (index(name, of_run) == 1) return
       call next_column(self, width)
       associate (word => self%columns(self%last)%word)
          do k = 1_ip, size(self%slots, kind=ip)
@@ -157,7 +157,7 @@ contains
 
       associate (unused => unit//meaning)
       end associate
-      if (index(name, of_bodies) /= 1) return
+      if (index(name, of_run) == 1) return
       call next_column(self, width)
       associate (word => self%columns(self%last)%word)
          do k = 1_ip, size(self%slots, kind=ip)

@@ -1,4 +1,4 @@
-!> Ownership and global order of bodies, of parts of bodies (such as boxes and vertices), and of pairs of bodies.
+!> Ownership and global order of bodies, of their vertices, and of pairs of bodies.
 !>
 !> A rank owns the free bodies that it moves. The root rank also owns the fixed bodies, which all ranks have. Two ranks
 !> can have the same pair of bodies. Its owner is the owner of the *leading* body: the first body, or the second one if
@@ -11,7 +11,7 @@ module polydem_ownership
    use polydem_kinds, only: ip, lp
    implicit none
    private
-   public :: owns_body, owns_pair, find_owned_pairs, order_bodies, order_parts, order_pairs
+   public :: owns_body, owns_pair, find_owned_pairs, order_bodies, order_vertices, order_pairs
 
 contains
 
@@ -62,7 +62,7 @@ contains
       call order_parts(comm, bodies, [(s, s=1_ip, bodies%n)], blocks)
    end subroutine order_bodies
 
-   !> Find the global order of columns over parts of bodies, such as boxes and vertices. Collective.
+   !> Find the global order of columns over parts of bodies. Collective.
    subroutine order_parts(comm, bodies, body, blocks)
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
@@ -84,8 +84,24 @@ contains
             slot(n) = k
          end associate
       end do
-      call blocks%lay_out(comm, bodies%n_all, size(body, kind=ip), key(:n), slot(:n))
+      call blocks%lay_out(comm, bodies%n_all, key(:n), slot(:n))
    end subroutine order_parts
+
+   !> Find the global order of columns over the vertices of bodies. Collective.
+   subroutine order_vertices(comm, bodies, blocks)
+      class(communicator_t), intent(inout) :: comm
+      type(bodies_t), intent(in) :: bodies
+      !> Destination of each row
+      type(row_distribution_t), intent(inout) :: blocks
+      integer(ip), allocatable :: body(:)
+      integer(ip) :: s
+
+      allocate (body(bodies%pieces%vertex_start(bodies%n + 1_ip) - 1_ip))
+      do s = 1_ip, bodies%n
+         body(bodies%pieces%vertex_start(s):bodies%pieces%vertex_start(s + 1_ip) - 1_ip) = s
+      end do
+      call order_parts(comm, bodies, body, blocks)
+   end subroutine order_vertices
 
    !> Find the global order of columns over pairs of bodies, such as contacts. Pairs of two fixed bodies are not
    !> allowed. Collective.
@@ -108,7 +124,7 @@ contains
          key(n) = pair_key(bodies%global_index(first(k)), bodies%global_index(second(k)))
          slot(n) = k
       end do
-      call blocks%lay_out(comm, bodies%n_all, size(first, kind=ip), key(:n), slot(:n))
+      call blocks%lay_out(comm, bodies%n_all, key(:n), slot(:n))
    end subroutine order_pairs
 
 end module polydem_ownership

@@ -1,10 +1,10 @@
 !> Packed bodies: transfer of the constant fields and the shapes of bodies between ranks.
 module polydem_packed_bodies
-   use polydem_bodies, only: allocate_bodies, bodies_t
-   use polydem_body_fields, only: serialize_constants
+   use polydem_bodies, only: allocate_with_corners, bodies_t
+   use polydem_body_fields, only: serialize_constants, serialize_corners, serialize_sizes, serialize_vertices
    use polydem_communicator, only: communicator_t
    use polydem_instruction_set, only: isa_base
-   use polydem_kinds, only: ip, lp, wp
+   use polydem_kinds, only: ip, lp
    use polydem_migration_buffer, only: migration_buffer_t
    use polydem_serializer, only: serializer_t
    use polydem_sort, only: ascending_order
@@ -21,6 +21,8 @@ module polydem_packed_bodies
       type(migration_buffer_t) :: constants
       !> Vertices in the body frame, those of each body in order
       type(migration_buffer_t) :: vertices
+      !> Number of all bodies of the run, and greatest identifier that it has used
+      integer(ip) :: n_all = 0_ip, last_id = 0_ip
       !> Instruction set of the kernels that compute with the bodies
       integer :: isa = isa_base
    end type packed_bodies_t
@@ -46,14 +48,17 @@ contains
          packed%vertices%room = int(min(int(room, lp)*int(size(bodies%pieces%vertex, 2)/max(1_ip, bodies%n) + 1, lp), &
                                         size(bodies%pieces%vertex, 2, kind=lp)), ip)
       end if
+      packed%n_all = bodies%n_all
+      packed%last_id = bodies%last_id
       packed%isa = bodies%isa
       corners = bodies%pieces%vertex_start(2:) - bodies%pieces%vertex_start(:bodies%n)
       packed%list%slots = slots
       call serialize_list(packed%list, bodies%global_index, corners)
       packed%constants%slots = slots
       call serialize_constants(packed%constants, bodies)
+      call serialize_sizes(packed%constants, bodies)
       packed%vertices%slots = vertices_of(bodies%pieces%vertex_start(slots), corners(slots))
-      call serialize_shapes(packed%vertices, bodies)
+      call serialize_vertices(packed%vertices, bodies)
    end subroutine pack_bodies
 
    !> Serialize the list of packed bodies.
@@ -63,16 +68,8 @@ contains
       integer(ip), intent(inout), contiguous :: global_index(:), corners(:)
 
       call serializer%field('/bodies/global_index', global_index, '1', 'indices among all bodies of the run')
-      call serializer%field('/bodies/corners', corners, '1', 'numbers of vertices')
+      call serialize_corners(serializer, corners)
    end subroutine serialize_list
-
-   !> Serialize the shapes of bodies. The rows are vertices.
-   subroutine serialize_shapes(serializer, bodies)
-      class(serializer_t), intent(inout) :: serializer
-      type(bodies_t), intent(inout) :: bodies
-
-      call serializer%field('/bodies/shape', bodies%pieces%vertex, 'm', 'vertices in the body frame')
-   end subroutine serialize_shapes
 
    !> Indices of the vertices of some bodies
    pure function vertices_of(first, corners) result(vertices)
@@ -164,11 +161,9 @@ contains
 
    !> Unpack bodies in ascending order of the global index. Their variable fields are zero. Free bodies belong to this
    !> rank; none is in the halo.
-   subroutine unpack_bodies(packed, n_all, bodies, slots)
+   subroutine unpack_bodies(packed, bodies, slots)
       !> Packed bodies in any order; the order is kept
       type(packed_bodies_t), intent(inout) :: packed
-      !> Number of all bodies of the run
-      integer(ip), intent(in) :: n_all
       !> The same bodies in ascending order of the global index
       type(bodies_t), intent(out) :: bodies
       !> Slot of each packed body
@@ -178,21 +173,19 @@ contains
 
       call read_list(packed, global_index, corners)
       n = size(corners, kind=ip)
-      call allocate_bodies(bodies, n, sum(corners))
-      bodies%n_all = n_all
-      bodies%isa = packed%isa
-      allocate (bodies%pieces%turned(2, size(bodies%pieces%vertex, 2)), source=0.0_wp)
       order = ascending_order(int(global_index, lp))
+      call allocate_with_corners(bodies, corners(order))
+      bodies%n_all = packed%n_all
+      bodies%last_id = packed%last_id
+      bodies%isa = packed%isa
       allocate (slots(n))
       slots(order) = [(s, s=1_ip, n)]
-      do s = 1_ip, n
-         bodies%pieces%vertex_start(s + 1_ip) = bodies%pieces%vertex_start(s) + corners(order(s))
-      end do
       call packed%constants%restore_to(slots)
       call serialize_constants(packed%constants, bodies)
+      call serialize_sizes(packed%constants, bodies)
       bodies%global_index = global_index(order)
       call packed%vertices%restore_to(vertices_of(bodies%pieces%vertex_start(slots), corners))
-      call serialize_shapes(packed%vertices, bodies)
+      call serialize_vertices(packed%vertices, bodies)
       bodies%free = pack([(s, s=1_ip, n)],.not. bodies%fixed)
    end subroutine unpack_bodies
 

@@ -1,5 +1,5 @@
 !> Contact history of pairs without their bodies: its transfer to the ranks that have these pairs after a
-!> redistribution, and its way from a checkpoint to the pairs of the first search.
+!> redistribution, and its way from a checkpoint, or from the former bodies, to the pairs of the first search.
 module polydem_packed_history
    use polydem_communicator, only: communicator_t
    use polydem_contact_history, only: contact_history_t

@@ -1,0 +1,148 @@
+!> Changes the set of bodies between two steps: some leave, others enter.
+!>
+!> This is a restart in memory. The bodies that stay are packed with their state, and unpacked together with the new
+!> ones; the pairs keep their contact history until the next step finds them again. What depends on the bodies is built
+!> anew, as in a restart from a checkpoint (`settle_bodies`). On several ranks the next step redistributes the bodies.
+!>
+!> Slots and global indices change; identifiers do not, and none is used twice. The energy balance does not know what
+!> the bodies bring and take.
+module polydem_replace_bodies
+   use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_body_fields, only: serialize_bodies
+   use polydem_errors, only: error_t, raise, run_error
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_local_data, only: limit_displacement, rebuild_local_data
+   use polydem_migration_buffer, only: migration_buffer_t
+   use polydem_ownership, only: owns_body
+   use polydem_packed_bodies, only: join_packed, pack_bodies, packed_bodies_t
+   use polydem_packed_history, only: pack_pairs
+   use polydem_packed_state, only: pack_state, packed_state_t, unpack_state
+   use polydem_simulation, only: simulation_t
+   use polydem_sort, only: ascending_order, place_in
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: replace_bodies, settle_bodies
+
+contains
+
+   !> Remove bodies, and add others, before a step. Collective; all ranks get the same error.
+   subroutine replace_bodies(self, kept, added, error)
+      !> The simulation between two steps; a checkpoint must not follow before the next step
+      type(simulation_t), intent(inout) :: self
+      !> Whether each body stays, (slot); the same on all ranks for a fixed body, and not read for bodies in the halo
+      logical, intent(in) :: kept(:)
+      !> New bodies as `new_bodies` makes them: the free ones of this rank, and all fixed ones. They get the next
+      !> identifiers and, if free, the acceleration of their weight. On return they are unchanged otherwise
+      type(bodies_t), intent(inout) :: added
+      !> Allocated if there are no identifiers left
+      type(error_t), allocatable, intent(inout) :: error
+      type(packed_state_t) :: packed
+      type(packed_bodies_t) :: new
+      type(migration_buffer_t) :: columns
+      integer(ip), allocatable :: removed(:), slots(:)
+      integer(ip) :: s
+
+      if (self%bodies%last_id > huge(1_ip) - 1_ip - added%n_all) call raise(error, run_error, 'step '// &
+         to_text(self%step)//': there are no identifiers for more bodies')
+      call self%comm%all_reduce_error(error)
+      if (allocated(error)) return
+      call list_removed(self, kept, removed)
+      call hold_history(self)
+      call renumber(removed, self%bodies, added)
+      slots = pack([(s, s=1_ip, self%bodies%n)], kept .and. .not. self%bodies%in_halo)
+      call pack_state(self, slots, added%n, packed)
+      if (added%n_all > 0_ip) then
+         call start_added(self, added)
+         slots = [(s, s=1_ip, added%n)]
+         call pack_bodies(added, slots, new)
+         call join_packed(packed%bodies, new)
+         columns%slots = slots
+         call serialize_bodies(columns, added)
+      end if
+      call unpack_state(self, packed, slots)
+      if (added%n_all > 0_ip) then
+         call columns%restore_to(slots(packed%columns%n_rows + 1_ip:))
+         call serialize_bodies(columns, self%bodies)
+      end if
+      call settle_bodies(self, error)
+   end subroutine replace_bodies
+
+   !> Build anew what depends on the bodies, after their set has changed or a checkpoint was read: boxes, guards, an
+   !> empty list of pairs. The ranks forget their halos. Collective; all ranks get the same error.
+   subroutine settle_bodies(self, error)
+      !> The simulation between two steps, with its bodies, walls and integrator
+      type(simulation_t), intent(inout) :: self
+      !> Allocated if bodies or settings are invalid
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: s
+
+      call turn_bodies(self%bodies, [(s, s=1_ip, self%bodies%n)])
+      call rebuild_local_data(self, error, self%domain%median_diameter)
+      call limit_displacement(self)
+      call self%domain%forget_halo()
+      call self%comm%all_reduce_error(error)
+   end subroutine settle_bodies
+
+   !> List the identifiers of the bodies of all ranks that leave, ascending. Collective.
+   subroutine list_removed(self, kept, removed)
+      type(simulation_t), intent(inout) :: self
+      logical, intent(in) :: kept(:)
+      integer(ip), allocatable, intent(out) :: removed(:)
+      integer(lp), allocatable :: mine(:), all_of_them(:)
+      integer(ip), allocatable :: counts(:)
+
+      associate (bodies => self%bodies)
+         mine = int(pack(bodies%id, owns_body(self%comm%is_root(), bodies%in_halo, bodies%fixed) .and. .not. kept), lp)
+      end associate
+      call self%comm%gather(mine, all_of_them, counts)
+      removed = int(all_of_them(ascending_order(all_of_them)), ip)
+   end subroutine list_removed
+
+   !> Hold the contact history of the pairs until they are found again, unless it is held already. Those of bodies that
+   !> leave will not be found, and end.
+   subroutine hold_history(self)
+      type(simulation_t), intent(inout) :: self
+
+      if (allocated(self%received_history)) return
+      allocate (self%received_history)
+      associate (pairs => self%neighbours%pairs)
+         call pack_pairs(pairs%n, pairs%first, pairs%second, self%bodies%id, self%history, self%received_history)
+      end associate
+   end subroutine hold_history
+
+   !> Set the global indices of the bodies that stay and those of new bodies, which come last and get the next
+   !> identifiers.
+   subroutine renumber(removed, bodies, added)
+      !> Identifiers of the bodies that leave, ascending
+      integer(ip), intent(in) :: removed(:)
+      type(bodies_t), intent(inout) :: bodies, added
+      integer(ip) :: s
+
+      do s = 1_ip, bodies%n
+         bodies%global_index(s) = bodies%global_index(s) - (place_in(removed, bodies%id(s)) - 1_ip)
+      end do
+      bodies%n_all = bodies%n_all - size(removed, kind=ip)
+      if (added%n_all == 0_ip) return
+      added%id = bodies%last_id + added%global_index
+      added%global_index = bodies%n_all + added%global_index
+      bodies%n_all = bodies%n_all + added%n_all
+      bodies%last_id = bodies%last_id + added%n_all
+   end subroutine renumber
+
+   !> Give new bodies the state of bodies at the end of a step that touch no other.
+   subroutine start_added(self, added)
+      type(simulation_t), intent(in) :: self
+      type(bodies_t), intent(inout) :: added
+      integer(ip) :: k
+
+      do k = 1_ip, size(added%free, kind=ip)
+         associate (s => added%free(k))
+            added%force(:, s) = added%mass(s)*self%settings%forces%gravity
+            added%torque(s) = 0.0_wp
+         end associate
+      end do
+      call self%integrator%start_accelerations(self%settings%forces%gravity, added)
+   end subroutine start_added
+
+end module polydem_replace_bodies
