@@ -125,7 +125,7 @@ contains
          end if
       end do
       fraction = ''
-      if (fits > 0.0_wp) solid_fraction = ' to '//to_text(fits, 2)
+      if (fits > 0.0_wp) fraction = ' to '//to_text(fits, 2)
       text = 'solid_fraction is too large for grains without overlap at the start; lower solid_fraction'//fraction// &
              ', or change width or long_axis_max'
    end subroutine explain_gas
