@@ -179,15 +179,15 @@ contains
       character(len=:), allocatable :: clause
 
       select case (statement%group//'.'//statement%key)
-      case ('scene.solid_fraction')
+      case ('scene.fraction')
          clause = 'solid_fraction in &scene'
-      case ('integrate.safety_factor')
+      case ('integrate.fraction')
          clause = 'safety_factor in &integrate'
-      case ('guards.tunnelling')
+      case ('guards.passing')
          clause = 'tunnelling in &guards'
-      case ('scene.remove_overlap')
+      case ('guards.relaxed_depth')
          clause = 'remove_overlap in &scene'
-      case ('checkpoint.wall_interval')
+      case ('checkpoint.elapsed')
          clause = 'wall_interval in &checkpoint'
       case default
          clause = ''

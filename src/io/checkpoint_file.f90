@@ -291,8 +291,9 @@ contains
       if (k > 0) then
          if (allocated(self%chosen(k)%row)) row = self%chosen(k)%row
       end if
+      ! Also a column of which no row is read must be there, and in this file.
+      if (.not. allocated(row) .or. wanted == 0) call self%count_rows(name, n)
       if (.not. allocated(row)) then
-         call self%count_rows(name, n)
          if (.not. allocated(self%error)) call expect_size(self, name, int(n), entries*wanted)
          row = [(j, j=1_lp, int(wanted, lp))]
       end if

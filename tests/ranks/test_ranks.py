@@ -14,9 +14,9 @@ from scenes import SCENES, write_scene
 
 RANKS = (1, 2, 3, 4, 7)
 THREADS = (1, 2)
-#: All finders, from the table in the manual of inputs
+#: All finders, from the table of entries
 FINDERS = re.search(r"^\| &neighbours \| `finder` .*?\| (\w+(?:, \w+)+) \|",
-                    (Path(__file__).parents[2] / "inputs" / "README.md").read_text(encoding="utf-8"),
+                    (Path(__file__).parents[2] / "inputs" / "entries.md").read_text(encoding="utf-8"),
                     re.MULTILINE).group(1).split(", ")
 #: How often bodies are handed out anew at least; grains in a stack hardly move
 LEAST_SETTLEMENTS = {"drum": 100, "gas": 100, "hopper": 100, "bed": 100, "parts": 100, "stack": 1}

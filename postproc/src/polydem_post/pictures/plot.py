@@ -75,7 +75,7 @@ def add_scale(figure: Figure, axes, grains, look: SettledLook, extend: str | Non
     arrows = {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}
     x0, x1, y0, y1 = look.limits
     rows, columns = axes[0].get_gridspec().get_geometry()
-    bar = figure.colorbar(grains[0].artist, ax=list(axes), label=look.quantity.title, pad=0.02, solid_fraction=0.05,
+    bar = figure.colorbar(grains[0].artist, ax=list(axes), label=look.quantity.title, pad=0.02, fraction=0.05,
                           aspect=30.0 * float(np.clip(rows * (y1 - y0) / (columns * (x1 - x0)), 1.0, 1.6)),
                           extend=extend or arrows[below, above])
     if look.quantity.count:
