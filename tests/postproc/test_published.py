@@ -36,6 +36,7 @@ OTHERS = {
     "inputs/getting_started.md",
     "inputs/glossary.md",
     "inputs/log.md",
+    "inputs/parts.md",
     "src/README.md",
     "src/recipes.md",
     "src/algorithms.md",
