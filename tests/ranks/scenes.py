@@ -34,7 +34,7 @@ SCENES = {
 &forces gravity = 0, -80 stiffness = 2e5 damping_from_touch = .true. damping_coefficient = 0.2 midstep_slip = .false. /
 &integrate accumulation = 'compensated' safety_factor = 0.2 duration = 0.02 /
 """,
-    # A turning ring and a funnel made of parts; three groups of grains, each placed around walls and earlier groups; drag.
+    # A turning ring and a funnel of parts; three groups of grains, each placed around walls and earlier ones; drag.
     "parts": """\
 &wall name = 'drum' outline = 'ring' radius = 0.1 segments = 30 thickness = 0.01 /
 &wall name = 'funnel' outline = 'polyline' vertices = -0.06, 0.02, -0.01, -0.03 thickness = 0.004 /
