@@ -46,6 +46,8 @@ module polydem_bodies
       real(wp), allocatable :: mass(:)
       !> Moment of inertia about the centre of mass [kg m]; an infinite one is stored as 0
       real(wp), allocatable :: inertia(:)
+      !> Number of the material: position among the groups &material, 0 for none; not allocated if there are none
+      integer(ip), allocatable :: material(:)
       !> 1/mass, 0 for infinite mass [m/kg]
       real(wp), allocatable :: inverse_mass(:)
       !> 1/inertia, 0 for infinite inertia [1/(kg m)]

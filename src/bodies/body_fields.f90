@@ -41,6 +41,8 @@ contains
       call serializer%field('/bodies/mass', bodies%mass, 'kg/m', 'masses; 0: infinite')
       call serializer%field('/bodies/inertia', bodies%inertia, 'kg m', &
                             'moments of inertia about the centres of mass; 0: infinite')
+      if (allocated(bodies%material)) call serializer%field('/bodies/material', bodies%material, '1', &
+         'numbers of the materials: position among the groups &material, 0: none of them')
       bodies%fixed = fixed == 1_ip
    end subroutine serialize_constants
 

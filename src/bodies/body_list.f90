@@ -27,6 +27,8 @@ module polydem_body_list
       real(wp) :: velocity(2) = 0.0_wp, angular_velocity = 0.0_wp
       !> Mass [kg/m] and moment of inertia [kg m], 0 if not given
       real(wp) :: mass = 0.0_wp, inertia = 0.0_wp
+      !> Number of the material
+      integer(ip) :: material = 0_ip
    end type given_body_t
 
    !> A growing list of bodies before their mass properties are computed. One of several ranks keeps all fixed bodies
@@ -38,6 +40,8 @@ module polydem_body_list
       integer(ip) :: rank = 0_ip, n_ranks = 1_ip
       !> What an identifier that is not given exceeds the position in the list by
       integer(ip) :: id_offset = 0_ip
+      !> Whether the run has materials
+      logical :: has_materials = .false.
       !> Identifiers of all bodies, (n)
       integer(ip), allocatable, private :: id(:)
       !> Kept bodies, (polygons%n) or longer
@@ -60,7 +64,7 @@ contains
 
    !> Append a body. The default `mass` of a free body is density times area. Its default `inertia` is that of its mass
    !> spread evenly over the polygon. The default mass and moment of inertia of a fixed body are infinite.
-   subroutine append(self, vertices, fixed, density, velocity, angular_velocity, id, mass, inertia)
+   subroutine append(self, vertices, fixed, density, velocity, angular_velocity, id, mass, inertia, material)
       class(body_list_t), intent(inout) :: self
       !> Vertices in world coordinates, clockwise or anticlockwise, (2, vertex) [m]
       real(wp), intent(in) :: vertices(:, :)
@@ -78,6 +82,8 @@ contains
       real(wp), intent(in), optional :: mass
       !> Moment of inertia instead of that of the polygon [kg m]
       real(wp), intent(in), optional :: inertia
+      !> Number of its material, 0 if absent
+      integer(ip), intent(in), optional :: material
       type(given_body_t) :: body
       type(given_body_t), allocatable :: longer(:)
       logical :: is_left
@@ -92,6 +98,7 @@ contains
       if (present(angular_velocity)) body%angular_velocity = angular_velocity
       if (present(mass)) body%mass = mass
       if (present(inertia)) body%inertia = inertia
+      if (present(material)) body%material = material
       associate (n => self%polygons%n)
          if (.not. allocated(self%body)) allocate (self%body(64))
          if (n == size(self%body)) then
@@ -172,6 +179,7 @@ contains
       call allocate_bodies(bodies, list%polygons%n, 16_ip*list%polygons%n)
       bodies%n_all = list%n
       if (list%n > 0_ip) bodies%last_id = list%id(order(list%n))
+      if (list%has_materials) allocate (bodies%material(bodies%n))
       s = 0_ip
       do k = 1_ip, list%n
          if (kept(order(k)) == 0_ip) cycle
@@ -238,6 +246,7 @@ contains
          bodies%position(:, s) = centroid
          bodies%velocity(:, s) = given%velocity
          bodies%angular_velocity(s) = given%angular_velocity
+         if (list%has_materials) bodies%material(s) = given%material
          bodies%mass(s) = given%mass
          bodies%inertia(s) = given%inertia
          if (.not. bodies%fixed(s) .and. bodies%mass(s) <= 0.0_wp) bodies%mass(s) = given%density*area

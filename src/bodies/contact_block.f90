@@ -26,6 +26,8 @@ module polydem_contact_block
       integer(ip) :: pair(block_size) = 0_ip
       !> Slots of the first and of the second body
       integer(ip) :: first(block_size) = 0_ip, second(block_size) = 0_ip
+      !> Numbers of the materials of both bodies; set only if bodies have materials, (contact, body)
+      integer(ip) :: material(block_size, 2)
       !> Rate of change of the area [m2/s]
       real(wp) :: rate(block_size)
       !> Unit vector from the second body to the first, (contact, x or y)
@@ -38,7 +40,8 @@ module polydem_contact_block
       real(wp) :: angular_velocity(block_size, 2)
       !> Sum of the reciprocal masses [m/kg]
       real(wp) :: mobility(block_size)
-      !> Reciprocal of the characteristic length of the force model [1/m]
+      !> Reciprocal of the characteristic length of the force model, times the ratio of the stiffness of this pair of
+      !> materials to that of the law if materials differ [1/m]
       real(wp) :: inverse_length(block_size)
       !> Torque of the normal force about the centroid of the overlap, on the first body, per unit of force [m]
       real(wp) :: lever(block_size)
@@ -71,10 +74,10 @@ contains
       is_exchanged = bodies%radius(high) < bodies%radius(low)
    end function is_exchanged
 
-   !> Copy velocities and masses of the bodies to the contacts of a block.
+   !> Copy velocities, masses and materials of the bodies to the contacts of a block.
    pure subroutine copy_motion(bodies, block)
       type(bodies_t), intent(in) :: bodies
-      !> Contacts; `velocity_first` to `mobility` are set
+      !> Contacts; `velocity_first` to `mobility`, and `material`, are set
       type(contact_block_t), intent(inout) :: block
       integer(ip) :: c, i, j
 
@@ -88,6 +91,11 @@ contains
          block%angular_velocity(c, 1) = bodies%angular_velocity(i)
          block%angular_velocity(c, 2) = bodies%angular_velocity(j)
          block%mobility(c) = bodies%inverse_mass(i) + bodies%inverse_mass(j)
+      end do
+      if (.not. allocated(bodies%material)) return
+      do c = 1_ip, block%n
+         block%material(c, 1) = bodies%material(block%first(c))
+         block%material(c, 2) = bodies%material(block%second(c))
       end do
    end subroutine copy_motion
 

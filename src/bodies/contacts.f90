@@ -48,7 +48,8 @@ module polydem_contacts
       real(wp), allocatable :: direction(:, :)
       !> Length of the contact |normal|, or the square root of the area if degenerate [m]
       real(wp), allocatable :: length(:)
-      !> Reciprocal of the characteristic length of the force model [1/m]
+      !> Reciprocal of the characteristic length of the force model, times the ratio of the stiffness of this pair of
+      !> materials to that of the law if materials differ [1/m]
       real(wp), allocatable :: inverse_length(:)
       !> Torque of the normal force about the centroid of the overlap, on the first body, per unit of force [m]
       real(wp), allocatable :: lever(:)

@@ -86,6 +86,11 @@ def with_lists(text, lists, number):
     return text
 
 
+def is_optional(row):
+    """Whether an entry is a single number without a default."""
+    return row.type in ("real", "integer") and row.count == 1 and row.default == ""
+
+
 def literal(text):
     """A Fortran text, broken into lines."""
     pieces = [text[k:k + WIDTH] for k in range(0, len(text), WIDTH)] or [""]
@@ -140,8 +145,8 @@ def component(row):
         kind = "character(len=:), allocatable :: " if row.count == 1 else "type(text_t), allocatable :: "
         return f"{comment}\n      {kind}{row.key}{'' if row.count == 1 else '(:)'}"
     kind, zero = TYPES[row.type]
-    if row.count == 0:
-        return f"{comment}\n      {kind}, allocatable :: {row.key}(:)"
+    if row.count == 0 or is_optional(row):
+        return f"{comment}\n      {kind}, allocatable :: {row.key}{'(:)' if row.count == 0 else ''}"
     return f"{comment}\n      {kind} :: {row.key}{f'({row.count})' if row.count > 1 else ''} = {zero}"
 
 
@@ -172,7 +177,9 @@ def assignment(row):
     values = {"real": "reals", "integer": "integers", "logical": "flag"}.get(row.type)
     values = values or ("text" if row.count == 1 else "texts")
     first = "(1)" if row.count == 1 and values in ("reals", "integers") else ""
-    return f"      settings%{row.key} = &\n         instance%values(row_of(instance, '{row.key}'))%{values}{first}\n"
+    place = f"instance%values(row_of(instance, '{row.key}'))%{values}"
+    given = f"      if (size({place}) > 0) &\n" if is_optional(row) else ""
+    return f"{given}      settings%{row.key} = &\n         {place}{first}\n"
 
 
 def storage(row):

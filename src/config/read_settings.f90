@@ -5,6 +5,7 @@
 !> not detect keys given twice, and reports most errors as 'end of file'.
 module polydem_read_settings
    use polydem_check_bench, only: check_bench
+   use polydem_check_materials, only: check_materials
    use polydem_check_parts, only: check_parts
    use polydem_check_settings, only: check_settings
    use polydem_errors, only: error_t
@@ -62,6 +63,7 @@ contains
          if (allocated(error)) return
          call fill_groups(instances, settings)
          call check_parts(settings, instances, error)
+         call check_materials(settings, instances, error)
          call check_settings(settings, instances, error)
          call expand_short_motion(settings)
       type is (bench_settings_t)

@@ -77,12 +77,14 @@ contains
          if (value%is_active) value%is_active = is_needed(entry, instance)
          if (value%is_active .and. allocated(instance%given(home)%values)) then
             call read_value(entry, instance%given(home), value, error)
+         else if (is_optional(entry)) then
+            call set_unused(instance%place, 0, entry, value)
          else if (entry%default /= required) then
             call read_value(entry, default_statement(instance%place, entry), value, error)
          else if (value%is_active) then
             call raise(error, input_error, instance%place//': '//missing_text(entry, instance))
          else
-            call set_unused(instance%place, entry, value)
+            call set_unused(instance%place, entry%count, entry, value)
          end if
       end associate
    end subroutine resolve_row
@@ -124,18 +126,27 @@ contains
       end if
    end function default_statement
 
-   !> Set zeros and an empty text for an entry without default that is not in use.
-   pure subroutine set_unused(place, entry, value)
+   !> Whether an entry is a single number without a default
+   pure logical function is_optional(entry)
+      type(entry_t), intent(in) :: entry
+
+      is_optional = (entry%type == 'real' .or. entry%type == 'integer') .and. entry%count == 1 .and. entry%default == ''
+   end function is_optional
+
+   !> Set zeros and an empty text for an entry without default that is not in use, or no number if it is optional.
+   pure subroutine set_unused(place, n, entry, value)
       !> Place of the group, for messages
       character(len=*), intent(in) :: place
+      !> Number of zeros
+      integer, intent(in) :: n
       type(entry_t), intent(in) :: entry
       type(value_t), intent(inout) :: value
       integer :: k
 
       value%place = place
       value%text = ''
-      value%reals = [(0.0_wp, k=1, merge(entry%count, 0, entry%type == 'real'))]
-      value%integers = [(0_ip, k=1, merge(entry%count, 0, entry%type == 'integer'))]
+      value%reals = [(0.0_wp, k=1, merge(n, 0, entry%type == 'real'))]
+      value%integers = [(0_ip, k=1, merge(n, 0, entry%type == 'integer'))]
       allocate (value%texts(0))
    end subroutine set_unused
 
@@ -228,7 +239,7 @@ contains
                     place => row - lbound(instance%values, 1) + 1)
             value%is_active = is_needed(entry, instance)
             chosen(place) = value%is_active
-            if (value%is_active .and. entry%default /= required) then
+            if (value%is_active .and. entry%default /= required .and. .not. is_optional(entry)) then
                call read_value(entry, default_statement('', entry), default, error)
                chosen(place) = value_text(entry, value) /= value_text(entry, default)
             end if

@@ -4,16 +4,16 @@ module polydem_bodies_index
    use polydem_errors, only: error_t
    use polydem_hdf5_file, only: hdf5_file_t
    use polydem_hdf5_members, only: count_names, is_dataset, read_name
-   use polydem_kinds, only: dp, ip, lp
+   use polydem_kinds, only: dp, ip, lp, wp
    use polydem_sort, only: ascending_order
-   use polydem_strings, only: to_text, quoted, suggestion
+   use polydem_strings, only: to_text, quoted, split_words, suggestion, text_t
    implicit none
    private
-   public :: bodies_index_t, read_index, entry_text
+   public :: bodies_index_t, known_materials_t, read_index, read_materials, entry_text
 
    !> Data sets that a bodies file may have
-   character(len=*), parameter :: known_names(9) = [character(len=16) :: 'vertex', 'vertex_start', 'fixed', &
-      'velocity', 'angular_velocity', 'density', 'mass', 'inertia', 'id']
+   character(len=*), parameter :: known_names(11) = [character(len=16) :: 'vertex', 'vertex_start', 'fixed', &
+      'velocity', 'angular_velocity', 'density', 'mass', 'inertia', 'id', 'material', 'material_names']
    !> Those that may be absent and have a number per body, or two
    character(len=*), parameter :: optional_columns(5) = known_names(4:8)
 
@@ -30,7 +30,19 @@ module polydem_bodies_index
       integer(ip), allocatable :: fixed(:)
       !> Identifiers, (body)
       integer(ip), allocatable :: id(:)
+      !> Numbers of the materials of the run, (body)
+      integer(ip), allocatable :: material(:)
    end type bodies_index_t
+
+   !> Materials of the run for which bodies are read
+   type :: known_materials_t
+      !> Their names
+      type(text_t), allocatable :: names(:)
+      !> Their densities [kg/m3]
+      real(wp), allocatable :: density(:)
+      !> Number of the material of free and of fixed bodies without a material of their own
+      integer(ip) :: of_free = 0_ip, of_fixed = 0_ip
+   end type known_materials_t
 
 contains
 
@@ -123,6 +135,7 @@ contains
       end if
       call check_rows(file, 'fixed', int(min(extent(1) - 1_lp, int(huge(1_ip), lp)), ip), error)
       call check_rows(file, 'id', int(min(extent(1) - 1_lp, int(huge(1_ip), lp)), ip), error)
+      call check_rows(file, 'material', int(min(extent(1) - 1_lp, int(huge(1_ip), lp)), ip), error)
    end subroutine check_number
 
    !> Check the distribution of the vertices over bodies: every body has at least one.
@@ -221,6 +234,60 @@ contains
          end associate
       end do
    end subroutine read_identifiers
+
+   !> Read the materials. A number of the file is a position in its list of names, and 0 is none; a number of the run is
+   !> a position among its materials.
+   subroutine read_materials(file, materials, table, error)
+      type(hdf5_file_t), intent(in) :: file
+      type(known_materials_t), intent(in) :: materials
+      !> Bodies with their flags; the materials are set
+      type(bodies_index_t), intent(inout) :: table
+      !> Names the body, or a material that the run does not have
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip), allocatable :: numbers(:), run_number(:)
+      integer(ip) :: k
+
+      table%material = merge(materials%of_fixed, materials%of_free, table%fixed == 1_ip)
+      if (.not. file%has('material', error)) return
+      call file%read('material', numbers, error)
+      if (allocated(error)) return
+      call check_length(file, 'material', size(numbers, kind=lp), table%n, error)
+      call match_names(file, materials, run_number, error)
+      do k = 1_ip, table%n
+         if (allocated(error)) return
+         if (numbers(k) < 0_ip .or. numbers(k) > size(run_number)) then
+            call file%reject(entry_text('material', k)//' is '//to_text(numbers(k))//', but must be between 0 and '// &
+                             to_text(size(run_number))//', the number of names in material_names', error)
+         else if (numbers(k) > 0_ip) then
+            table%material(k) = run_number(numbers(k))
+         end if
+      end do
+   end subroutine read_materials
+
+   !> Find the numbers in the run of the materials that a file names.
+   subroutine match_names(file, materials, run_number, error)
+      type(hdf5_file_t), intent(in) :: file
+      type(known_materials_t), intent(in) :: materials
+      !> Number in the run of each name of the file
+      integer(ip), allocatable, intent(out) :: run_number(:)
+      type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: text, names(:)
+      integer :: k, m
+
+      allocate (run_number(0))
+      if (.not. file%has('material_names', error)) return
+      call file%read('material_names', text, error)
+      if (allocated(error)) return
+      names = split_words(text)
+      do k = 1, size(names)
+         do m = size(materials%names), 1, -1
+            if (materials%names(m)%text == names(k)) exit
+         end do
+         run_number = [run_number, int(m, ip)]
+         if (m == 0) call file%reject('material_names has '//quoted(trim(names(k)))//', but the namelist has no '// &
+                                      '&material of this name', error)
+      end do
+   end subroutine match_names
 
    !> Check that a data set has one row per body.
    pure subroutine check_length(file, name, length, n, error)

@@ -11,13 +11,15 @@
 !>     mass, inertia     (n)      optional [kg/m, kg m]; 0 or absent: computed from the polygon for a
 !>                                free body, infinite for a fixed body
 !>     id                (n)      optional, default: 1 to n
+!>     material          (n)      optional, position in material_names, from 1; 0: none
+!>     material_names    ()       names of groups &material, separated by blanks; needed if material has not only 0
 !>
 !> Any other data set at the top level is an error, because it may be a misspelt name. Groups are ignored. The
 !> attributes origin_x and origin_y of the file, if there are any, are where the origin of its coordinates lies in
 !> those of the program that made the polygons [m]; a run does not use them, but copies them to its result.
 module polydem_bodies_reader
    use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
-   use polydem_bodies_index, only: bodies_index_t, entry_text, read_index
+   use polydem_bodies_index, only: bodies_index_t, entry_text, known_materials_t, read_index, read_materials
    use polydem_body_list, only: body_list_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_hdf5_file, only: hdf5_file_t
@@ -25,7 +27,7 @@ module polydem_bodies_reader
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: read_bodies_file, read_origin
+   public :: known_materials_t, read_bodies_file, read_origin
 
    !> Number of bodies that are read together
    integer(ip), parameter :: block_size = 16384_ip
@@ -52,7 +54,7 @@ contains
 
    !> Append the bodies of a file to a list. They are read block by block: beyond what the list keeps, this takes memory
    !> for a block and some 40 bytes per body of the file.
-   subroutine read_bodies_file(path, density, list, error)
+   subroutine read_bodies_file(path, density, list, error, materials)
       !> Path of the file
       character(len=*), intent(in) :: path
       !> Density of the bodies if the file has no data set `density` [kg/m3]
@@ -60,6 +62,8 @@ contains
       type(body_list_t), intent(inout) :: list
       !> Names the file, the data set and the body
       type(error_t), allocatable, intent(inout) :: error
+      !> Materials of the run; if absent, those of the file are not read
+      type(known_materials_t), intent(in), optional :: materials
       type(hdf5_file_t) :: file
       type(bodies_index_t) :: table
       integer :: bytes
@@ -75,7 +79,8 @@ contains
       call file%open(path, error)
       if (allocated(error)) return
       call read_index(file, table, error)
-      if (.not. allocated(error)) call list_blocks(file, real(density, dp), table, list, error)
+      if (.not. allocated(error) .and. present(materials)) call read_materials(file, materials, table, error)
+      if (.not. allocated(error)) call list_blocks(file, real(density, dp), table, list, error, materials)
       call file%close(error)
    end subroutine read_bodies_file
 
@@ -100,12 +105,13 @@ contains
    end subroutine read_origin
 
    !> Append the bodies of the file to a list, block by block.
-   subroutine list_blocks(file, density, table, list, error)
+   subroutine list_blocks(file, density, table, list, error, materials)
       type(hdf5_file_t), intent(in) :: file
       real(dp), intent(in) :: density
       type(bodies_index_t), intent(in) :: table
       type(body_list_t), intent(inout) :: list
       type(error_t), allocatable, intent(inout) :: error
+      type(known_materials_t), intent(in), optional :: materials
       type(block_t) :: block
       integer(lp) :: rows(2)
       integer(ip) :: k, v, w
@@ -124,21 +130,40 @@ contains
          call read_column(file, 'mass', table, rows, 0.0_dp, 0.0_dp, block%mass, error)
          call read_column(file, 'inertia', table, rows, 0.0_dp, 0.0_dp, block%inertia, error)
          if (allocated(error)) return
+         if (present(materials)) then
+            if (.not. file%has('density', error)) call take_densities(materials, table, block)
+         end if
+         if (allocated(error)) return
          call list_block(table, block, list)
       end do
    end subroutine list_blocks
+
+   !> Give the bodies of a block the densities of their materials.
+   pure subroutine take_densities(materials, table, block)
+      type(known_materials_t), intent(in) :: materials
+      type(bodies_index_t), intent(in) :: table
+      type(block_t), intent(inout) :: block
+      integer(ip) :: k, m
+
+      do k = 1_ip, size(block%density, kind=ip)
+         m = table%material(block%first + k - 1_ip)
+         if (m > 0_ip) block%density(k) = real(materials%density(m), dp)
+      end do
+   end subroutine take_densities
 
    !> Append the bodies of a block to a list.
    subroutine list_block(table, block, list)
       type(bodies_index_t), intent(in) :: table
       type(block_t), intent(in) :: block
       type(body_list_t), intent(inout) :: list
-      integer(ip) :: k, s, first, last
+      integer(ip) :: k, material, s, first, last
 
+      material = 0_ip
       do k = 1_ip, block%last - block%first + 1_ip
          s = block%first + k - 1_ip
          first = table%vertex_start(s) - table%vertex_start(block%first) + 1_ip
          last = table%vertex_start(s + 1_ip) - table%vertex_start(block%first)
+         if (allocated(table%material)) material = table%material(s)
          call list%append(real(block%vertex(:, first:last), wp), &
                           fixed=table%fixed(s) == 1_ip, &
                           density=real(block%density(k), wp), &
@@ -146,7 +171,8 @@ contains
                           angular_velocity=real(block%angular_velocity(k), wp), &
                           id=table%id(s), &
                           mass=real(block%mass(k), wp), &
-                          inertia=real(block%inertia(k), wp))
+                          inertia=real(block%inertia(k), wp), &
+                          material=material)
       end do
    end subroutine list_block
 

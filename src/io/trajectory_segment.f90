@@ -32,7 +32,7 @@ module polydem_trajectory_segment
 
 contains
 
-   !> Write the constant properties of the bodies: identifier, fixed flag, mass, inertia and shape.
+   !> Write the constant properties of the bodies: identifier, fixed flag, mass, inertia, shape and material.
    subroutine write_bodies(file, comm, bodies, error)
       type(hdf5_file_t), intent(inout) :: file
       class(communicator_t), intent(inout) :: comm
@@ -58,6 +58,11 @@ contains
       call file%write('/bodies/fixed', int(block(2, :), bp), error, '1', &
                       '1: fixed or with prescribed motion, 0: free', part)
       call write_vertices(file, comm, bodies, int(block(3, :), ip), part, error)
+      if (allocated(bodies%material)) then
+         call blocks%to_blocks(comm, reshape(int(bodies%material, lp), [1, size(bodies%material)]), block)
+         call file%write('/bodies/material', int(block(1, :), ip), error, '1', &
+                         'material: position among the groups &material of the namelist, 0: none of them', part)
+      end if
       if (.not. any(bodies%fixed(:bodies%n))) return
       call file%write('/walls/id', pack(bodies%id(:bodies%n), bodies%fixed(:bodies%n)), error, '1', &
                       'identifier of each fixed body, ascending')

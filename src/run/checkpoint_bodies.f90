@@ -66,13 +66,16 @@ contains
       type(taken_t) :: taken
       integer(ip) :: k, last_id(1)
       integer :: isa
+      logical :: has_materials
 
       call choose_bodies(serializer, comm, taken)
       if (allocated(serializer%error)) return
       last_id = 0_ip
       call serialize_last(serializer, last_id)
       isa = bodies%isa
+      has_materials = allocated(bodies%material)
       call allocate_with_corners(bodies, taken%corners)
+      if (has_materials) allocate (bodies%material(bodies%n))
       bodies%n_all = taken%n_all
       bodies%last_id = max(last_id(1), taken%last_id)
       bodies%isa = isa

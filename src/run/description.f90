@@ -14,6 +14,8 @@ module polydem_description
 
    !> Share of the undamped stable step below which the log gives damping as the reason for a short step
    real(wp), parameter :: strongly_damped = 0.3_wp
+   !> Greatest number of pairs of materials in the log
+   integer(ip), parameter :: most_pairs = 15_ip
 
 contains
 
@@ -33,6 +35,7 @@ contains
          call log%write_line('parts      '//s%settings%neighbours%finder//', '//s%law%description// &
                              s%body_forces%description()//gravity_text(s)//', '// &
                              s%settings%integrate%scheme//motion_text(s)//balance_text(s))
+         if (allocated(measures%of_material)) call write_materials(simulation, measures%of_material, log)
          if (gravity_text(s) /= '' .and. s%law%rest_note() /= '') &
             call log%write_line('           note: '//s%law%rest_note())
          call log%write_line('step       dt = '//to_text(s%dt)//' s, '// &
@@ -130,6 +133,61 @@ contains
          end if
       end associate
    end subroutine list_overlaps
+
+   !> Write the number of bodies of each material, and the parameters of the contacts of each pair.
+   subroutine write_materials(simulation, of_material, log)
+      type(simulation_t), intent(in) :: simulation
+      !> Number of bodies of each material
+      integer(lp), intent(in) :: of_material(0:)
+      type(log_t), intent(inout) :: log
+      character(len=:), allocatable :: text
+      integer(ip) :: i, j, n
+
+      n = 0_ip
+      text = 'materials '
+      do i = 0_ip, ubound(of_material, 1, kind=ip)
+         if (of_material(i) > 0_lp) text = text//' '//material_name(simulation, i)//' ('// &
+            to_text(of_material(i))//trim(merge(' body  ', ' bodies', of_material(i) == 1_lp))//'),'
+      end do
+      call log%write_line(text(:len(text) - 1))
+      do i = 0_ip, ubound(of_material, 1, kind=ip)
+         do j = i, ubound(of_material, 1, kind=ip)
+            if (of_material(i) == 0_lp .or. of_material(j) == 0_lp) cycle
+            n = n + 1_ip
+            if (n <= most_pairs) call log%write_line('           '//material_name(simulation, i)//' on '// &
+               material_name(simulation, j)//': '//pair_text(simulation, [i, j]))
+         end do
+      end do
+      if (n > most_pairs) call log%write_line('           and '//to_text(n - most_pairs)//' more pairs')
+   end subroutine write_materials
+
+   !> Name of a material in the log
+   function material_name(simulation, number) result(name)
+      type(simulation_t), intent(in) :: simulation
+      integer(ip), intent(in) :: number
+      character(len=:), allocatable :: name
+
+      name = '(none)'
+      if (number > 0_ip) name = simulation%settings%material(number)%name
+   end function material_name
+
+   !> Parameters of the contacts of two materials that the force law uses
+   function pair_text(simulation, materials) result(text)
+      type(simulation_t), intent(in) :: simulation
+      integer(ip), intent(in) :: materials(2)
+      character(len=:), allocatable :: text
+
+      associate (pairs => simulation%law%pairs, parts => simulation%law%description)
+         text = 'stiffness '//to_text(pairs%stiffness%of(materials), 3)//' N/m2'
+         if (index(parts, 'restitution') > 0) then
+            text = text//', restitution '//to_text(pairs%restitution%of(materials), 3)
+         else if (index(parts, 'damping') > 0) then
+            text = text//', damping '//to_text(pairs%damping_coefficient%of(materials), 3)
+         end if
+         if (index(parts, 'friction') > 0) text = text//', friction '// &
+            to_text(pairs%friction_coefficient%of(materials), 3)
+      end associate
+   end function pair_text
 
    !> Remark if the requested duration is not a whole number of steps; else empty
    function rounding_text(duration, wanted) result(text)

@@ -101,8 +101,8 @@ contains
          ' times that of the Earth; check the units')
       if (measures%softness > softest) call add(warnings, &
          'the pressure under the full height of the free bodies is '//to_text(measures%softness, 3)// &
-         ' of the stiffness: the lowest bodies overlap deeply. Increase stiffness in &forces (with '// &
-         to_text(simulation%settings%forces%stiffness*measures%softness/firm, 2)//' it is '//to_text(firm, 2)// &
+         ' of the least stiffness: the lowest bodies overlap deeply. Increase stiffness in &forces or &material '// &
+         '(with '//to_text(measures%stiffness*measures%softness/firm, 2)//' it is '//to_text(firm, 2)// &
          '), and check that lengths are in metres')
    end subroutine warn_of_units
 

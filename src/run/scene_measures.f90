@@ -50,7 +50,11 @@ module polydem_scene_measures
       real(wp) :: move = 0.0_wp
       !> Identifier of that body
       integer(lp) :: farthest = 0_lp
-      !> Pressure under the full height of the free bodies, over the stiffness [1]
+      !> Number of bodies of each material, (0:n); not allocated if there are no materials
+      integer(lp), allocatable :: of_material(:)
+      !> Least stiffness of all pairs of materials [N/m2]
+      real(wp) :: stiffness = 0.0_wp
+      !> Pressure under the full height of the free bodies, over that stiffness [1]
       real(wp) :: softness = 0.0_wp
       !> Distance between neighbouring numbers at the farthest vertex of a free body from the origin [m]
       real(wp) :: last_bit = 0.0_wp
@@ -88,7 +92,8 @@ contains
       associate (s => simulation, comm => simulation%comm)
          call measure_bodies(comm, s%bodies, measures)
          if (measures%free > 0_lp) measures%diameter(2) = s%maker%median_diameter
-         if (measures%free > 0_lp) call measure_free_bodies(comm, s%bodies, s%settings%forces%stiffness, measures)
+         measures%stiffness = s%law%pairs%stiffness%least()
+         if (measures%free > 0_lp) call measure_free_bodies(comm, s%bodies, measures)
          call greatest_displacement(s%bodies, s%motion_check%moving, s%dt, measures%move, slot)
          if (slot > 0_ip) measures%farthest = int(s%bodies%id(slot), lp)
          call keep_greatest(comm, measures%move, measures%farthest)
@@ -101,8 +106,8 @@ contains
             down = abs(s%settings%forces%gravity)/gravity
             measures%potential = gravity*measures%mass(3)*along(measures%extent)
             measures%fall_speed = sqrt(2.0_wp*gravity*along(measures%extent))
-            measures%softness = measures%density(2)*gravity*along(measures%free_extent)/s%settings%forces%stiffness
-            measures%static_depth = [measures%mass(1)*gravity/s%settings%forces%stiffness, &
+            measures%softness = measures%density(2)*gravity*along(measures%free_extent)/measures%stiffness
+            measures%static_depth = [measures%mass(1)*gravity/measures%stiffness, &
                                      measures%softness*measures%diameter(2)]
          end if
          measures%last_bit = spacing(maxval(abs(measures%free_extent)))
@@ -147,12 +152,29 @@ contains
          end do
       end associate
       call simulation%comm%all_reduce_sum(counts)
+      if (allocated(simulation%bodies%material)) call count_materials(simulation, measures)
       measures%free = counts(1)
       measures%corners = counts(2)
       measures%boxes = counts(3) + measures%fixed_boxes
       measures%contacts = counts(4)
       measures%deep = counts(5)
    end subroutine count_parts
+
+   !> Count the bodies of each material.
+   subroutine count_materials(simulation, measures)
+      type(simulation_t), intent(inout) :: simulation
+      type(scene_measures_t), intent(inout) :: measures
+      integer(ip) :: k
+
+      allocate (measures%of_material(0:simulation%law%pairs%n_materials), source=0_lp)
+      associate (bodies => simulation%bodies, n => measures%of_material)
+         do k = 1_ip, bodies%n
+            if (owns_body(simulation%comm%is_root(), bodies%in_halo(k), bodies%fixed(k))) &
+               n(bodies%material(k)) = n(bodies%material(k)) + 1_lp
+         end do
+      end associate
+      call simulation%comm%all_reduce_sum(measures%of_material)
+   end subroutine count_materials
 
    !> Find the deepest contact in terms of its thinner body, and that with the greatest depth in metres.
    subroutine measure_contacts(simulation, measures)
@@ -232,10 +254,10 @@ contains
    !>
    !> A body of mass m and speed v causes an overlap of at most v sqrt(m/E) in a contact of stiffness E, if the contact
    !> is as long as the length in the force law and the other body is at rest.
-   subroutine measure_free_bodies(comm, bodies, stiffness, measures)
+   subroutine measure_free_bodies(comm, bodies, measures)
       class(communicator_t), intent(inout) :: comm
       type(bodies_t), intent(in) :: bodies
-      real(wp), intent(in) :: stiffness
+      !> Measures with the stiffness
       type(scene_measures_t), intent(inout) :: measures
       real(wp) :: density, speed, impact, least(3), greatest(4)
       real(wp), allocatable :: kinetic(:)
@@ -257,7 +279,7 @@ contains
          measures%density = [min(measures%density(1), density), max(measures%density(2), density)]
          measures%speed = max(measures%speed, speed)
          kinetic(k) = 0.5_wp*bodies%mass(s)*speed**2 + 0.5_wp*bodies%inertia(s)*bodies%angular_velocity(s)**2
-         impact = speed*sqrt(bodies%mass(s)/stiffness)
+         impact = speed*sqrt(bodies%mass(s)/measures%stiffness)
          if (impact <= measures%impact) cycle
          measures%impact = impact
          measures%fastest = int(bodies%id(s), lp)

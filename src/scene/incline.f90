@@ -6,6 +6,7 @@ module polydem_incline
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip, wp
    use polydem_outlines, only: pi, rectangle
+   use polydem_pair_parameters, only: density_of, material_number
    use polydem_parts, only: new_grains, parts_t
    use polydem_settings, only: grains_settings_t, settings_t
    use polydem_static_depth, only: resting_block_t, static_depth
@@ -28,14 +29,20 @@ contains
       !> Allocated if the block is too heavy for the stiffness
       type(error_t), allocatable, intent(inout) :: error
       type(grains_settings_t) :: block
-      real(wp) :: along(2), depth, load, top, bottom
+      real(wp) :: along(2), density, depth, load, top, bottom
+      integer(ip) :: material, floor_material
 
       along = [cosine(settings%scene%slope*pi/180.0_wp), -sine(settings%scene%slope*pi/180.0_wp)]
       associate (width => settings%scene%width, height => settings%scene%height, &
-                 density => settings%scene%density, gravity => settings%forces%gravity)
+                 gravity => settings%forces%gravity)
+         material = material_number(settings, settings%scene%material)
+         density = density_of(settings, material)
+         floor_material = material
+         if (settings%scene%wall_material /= '') &
+            floor_material = material_number(settings, settings%scene%wall_material)
          load = density*width*height*max(0.0_wp, gravity(1)*along(2) - gravity(2)*along(1))
-         call static_depth(settings%forces, resting_block_t(load, width, height, (uphill + downhill)*width, height, &
-                                                            0.5_wp*(downhill - uphill)*width), depth, error)
+         call static_depth(settings, resting_block_t(load, width, height, (uphill + downhill)*width, height, &
+            0.5_wp*(downhill - uphill)*width, [material, floor_material]), depth, error)
          if (allocated(error)) return
          block = new_grains('block')
          block%region = 'at'

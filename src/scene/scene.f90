@@ -5,7 +5,7 @@
 module polydem_scene
    use polydem_bed, only: make_bed
    use polydem_bodies, only: bodies_t
-   use polydem_bodies_reader, only: read_bodies_file
+   use polydem_bodies_reader, only: known_materials_t, read_bodies_file
    use polydem_body_list, only: body_list_t, new_bodies
    use polydem_channel, only: make_channel
    use polydem_drum, only: make_drum
@@ -17,6 +17,7 @@ module polydem_scene
    use polydem_incline, only: make_incline
    use polydem_kinds, only: ip, lp, wp
    use polydem_outlines, only: pi
+   use polydem_pair_parameters, only: density_of, material_number
    use polydem_parts, only: parts_t
    use polydem_place_parts, only: list_parts, wall_bodies_t
    use polydem_polygon_list, only: polygon_list_t
@@ -58,6 +59,7 @@ contains
 
       if (present(rank)) list%rank = rank
       if (present(n_ranks)) list%n_ranks = n_ranks
+      list%has_materials = size(settings%material) > 0
       allocate (walls_of_parts(0))
       if (settings%scene%bodies_file /= '') call list_file(settings, list, error)
       if (.not. allocated(error)) call find_parts(settings, parts, error)
@@ -102,10 +104,28 @@ contains
 
       associate (path => settings%scene%bodies_file)
          if (.not. exists(path)) call raise(error, input_error, path//': there is no such file')
-         if (.not. allocated(error)) call read_bodies_file(path, settings%scene%density, list, error)
+         if (.not. allocated(error)) call read_bodies_file(path, settings%scene%density, list, error, &
+                                                            materials_of(settings))
       end associate
       if (allocated(error)) error%message = origin_of_file(settings)//error%message
    end subroutine list_file
+
+   !> The materials of the run, for the bodies of a file
+   pure type(known_materials_t) function materials_of(settings) result(materials)
+      type(settings_t), intent(in) :: settings
+      integer(ip) :: k
+
+      associate (n => size(settings%material, kind=ip), scene => settings%scene)
+         allocate (materials%names(n), materials%density(n))
+         do k = 1_ip, n
+            materials%names(k)%text = settings%material(k)%name
+            materials%density(k) = density_of(settings, k)
+         end do
+         materials%of_free = material_number(settings, scene%material)
+         materials%of_fixed = materials%of_free
+         if (scene%wall_material /= '') materials%of_fixed = material_number(settings, scene%wall_material)
+      end associate
+   end function materials_of
 
    !> Find the parts of a scene: those of the namelist, or those that its recipe makes.
    subroutine find_parts(settings, parts, error)

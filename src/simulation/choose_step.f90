@@ -4,6 +4,7 @@ module polydem_choose_step
    use polydem_force_law, only: choose_parts, force_law_t
    use polydem_global_reductions, only: keep_greatest, reduce_to_greatest
    use polydem_kinds, only: ip, lp, wp
+   use polydem_pair_parameters, only: pair_parameters
    use polydem_source_locations, only: overrides_of, place_of
    use polydem_simulation, only: simulation_t
    use polydem_expected_speed, only: find_expected_speed
@@ -32,7 +33,7 @@ contains
       real(wp) :: steps, stable, depth, length, damped, has_free(1), found(3)
       integer(lp) :: limiting
 
-      call choose_parts(self%settings%forces, law)
+      call choose_parts(self%settings%forces, law, pair_parameters(self%settings))
       call find_expected_speed(self)
       call stable_step_of_shapes(law, self%integrator%stability(), self%bodies, self%expected%speed, stable, critical, &
                                  depth, length, damped)

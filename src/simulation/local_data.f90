@@ -12,6 +12,7 @@ module polydem_local_data
    use polydem_global_reductions, only: reduce_to_least
    use polydem_kinds, only: ip, wp
    use polydem_neighbours, only: new_neighbours
+   use polydem_pair_parameters, only: pair_parameters
    use polydem_contact_flags, only: new_flag_limits
    use polydem_simulation, only: simulation_t, former_direction
    use polydem_stable_step, only: stiffest_product
@@ -30,7 +31,7 @@ contains
       !> Median diameter of all free bodies of the run [m]; default: median of the free bodies of this rank
       real(wp), intent(in), optional :: median_diameter
 
-      call new_force_law(self%settings%forces, self%bodies, self%law)
+      call new_force_law(self%settings%forces, self%bodies, self%law, pair_parameters(self%settings))
       call fit_table(self%law, self%contacts)
       self%walk%walls%n = 0_ip
       self%walk%walls%energy_is_quadratic = self%law%energy_is_quadratic

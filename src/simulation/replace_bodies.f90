@@ -53,6 +53,8 @@ contains
       slots = pack([(s, s=1_ip, self%bodies%n)], kept .and. .not. self%bodies%in_halo)
       call pack_state(self, slots, added%n, packed)
       if (added%n_all > 0_ip) then
+         if (allocated(self%bodies%material) .and. .not. allocated(added%material)) &
+            allocate (added%material(added%n), source=0_ip)
          call start_added(self, added)
          slots = [(s, s=1_ip, added%n)]
          call pack_bodies(added, slots, new)

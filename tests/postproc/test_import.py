@@ -119,6 +119,27 @@ def test_an_origin_is_a_point(tmp_path, origin, message):
         write_bodies([SQUARE], tmp_path / "bodies.h5", origin=origin)
 
 
+def test_materials_go_by_name_from_a_file_to_a_run_and_back(tmp_path):
+    features = [geojson(SQUARE, material="wood"), geojson(FLOOR, fixed=True)]
+    (tmp_path / "two.json").write_text(json.dumps({"features": features}))
+    import_bodies(tmp_path / "two.json", tmp_path / "out.h5")
+    assert_array_equal(contents(tmp_path / "out.h5")["material"], [1, 0])
+    (tmp_path / "scene.nml").write_text(
+        f"&scene name = 'file' bodies_file = '{tmp_path}/out.h5' wall_material = 'iron' /\n&material name = 'iron' /\n"
+        "&material name = 'wood' density = 600 stiffness = 1e6 /\n&integrate duration = 1e-4 /\n")
+    subprocess.run([PROGRAM, "run", "scene.nml"], cwd=tmp_path, capture_output=True, check=True)
+    frame = Trajectory(tmp_path / "results" / "scene")[-1]
+    assert_array_equal(frame.material, [2, 1])
+    assert frame.material_names == ("iron", "wood")
+    assert_allclose(frame.density[0], 600.0)
+    frame.write_bodies(tmp_path / "again.h5")
+    with h5py.File(tmp_path / "again.h5") as file:
+        names = file["material_names"].asstr()[()].split()
+        assert [names[number - 1] for number in file["material"]] == ["wood", "iron"]
+    with pytest.raises(ResultError, match="the material is 7, but must be a name"):
+        write_bodies([SQUARE], tmp_path / "bad.h5", material=7)
+
+
 def test_geojson_gives_properties(tmp_path):
     features = [geojson(SQUARE, velocity=[0.5, -1], density=1000, name="a", id=7),
                 geojson(FLOOR, fixed=True, density=2000, id=3)]

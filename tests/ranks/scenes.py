@@ -48,6 +48,21 @@ SCENES = {
 &forces gravity = 0, -40 stiffness = 1e6 drag = 2 /
 &integrate duration = 0.01 /
 """,
+    # Grains of two materials, of which one is softer and lighter, between walls of a third one, and a pair of its own.
+    "materials": """\
+&scene wall_material = 'steel' /
+&material name = 'glass' stiffness = 4e5 restitution = 0.9 friction_coefficient = 0.1 /
+&material name = 'rubber' density = 900 stiffness = 1e5 restitution = 0.3 friction_coefficient = 0.9 /
+&material name = 'steel' stiffness = 1e6 tangential_stiffness = 0.8 /
+&contact_pair name = 'dust' materials = 'steel', 'rubber' friction_coefficient = 0.05 restitution = 0.7 /
+&wall name = 'drum' outline = 'ring' radius = 0.1 segments = 30 thickness = 0.01 /
+&wall name = 'shelf' outline = 'line' from = -0.04, -0.02 to = 0.04, -0.02 thickness = 0.004 material = 'glass' /
+&grains name = 'heavy' region = 'inside' wall = 'drum' number = 80 speed = 1 material = 'glass' /
+&grains name = 'light' region = 'inside' wall = 'drum' number = 80 speed = 1 material = 'rubber' /
+&motion name = 'turn' kind = 'rotation' rate = 2.0 wall = 'drum' /
+&forces gravity = 0, -40 /
+&integrate duration = 0.02 /
+""",
     # At rest: nothing goes over a border unless the border moves.
     "stack": """\
 &scene name = 'stack' bodies = 9 width = 0.01 height = 0.01 /

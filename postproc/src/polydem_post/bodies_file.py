@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import replace
@@ -74,6 +75,7 @@ def write_bodies(outlines: Iterable[Outline | Any], output: str | os.PathLike[st
         mass              [kg/m]   default, and meaning of 0: from polygon and density; infinite for fixed bodies
         inertia           [kg m]   about the centre of mass; default, and meaning of 0: from mass and polygon, likewise
         id                [1]      identifiers, all different; default: 1 to n
+        material          [1]      names of groups &material of the namelist; default: that of &scene
 
     The mass, inertia and density of a fixed body may be infinite, as in the columns of a `Frame`.
     """
@@ -97,6 +99,7 @@ def write_frame(frame: Any, output: str | os.PathLike[str], origin: tuple[float,
     given = [Outline(outline, f"body {number}") for number, outline in zip(frame.id, frame.vertices)]
     given = _with_columns(given, {
         "fixed": frame.fixed, "mass": frame.mass, "inertia": frame.inertia, "id": frame.id,
+        **({"material": np.array(["", *frame.material_names])[frame.material]} if frame.material_names else {}),
         "velocity": np.where(frame.fixed[:, None], 0.0, frame.velocity),
         "angular_velocity": np.where(frame.fixed, 0.0, frame.angular_velocity)})
     return _save(Path(output), given, 1.0, np.zeros(2), False, np.array(origin) if any(origin) else None, overwrite)
@@ -204,6 +207,8 @@ def _column(name: str, rows: list[dict[str, Any]], places: list[str]) -> Any:
         for place, row in zip(places, rows):
             if name not in row:
                 raise ResultError(f"{place}: has no {name}, which other polygons have")
+    if name == "material":
+        return _material_column(rows, places)
     width = WIDE.get(name, 1)
     values = []
     for place, row in zip(places, rows):
@@ -227,6 +232,17 @@ def _column(name: str, rows: list[dict[str, Any]], places: list[str]) -> Any:
     return column if width > 1 else column[:, 0]
 
 
+def _material_column(rows: list[dict[str, Any]], places: list[str]) -> list[str]:
+    """Name of the material of each body; empty if it has none of its own."""
+    names = []
+    for place, row in zip(places, rows):
+        name = row.get("material", "")
+        if not isinstance(name, str) or not re.fullmatch(r"\w*", name, re.ASCII):
+            raise ResultError(f"{place}: the material is {name!r}, but must be a name of letters, digits and _")
+        names.append(name)
+    return names
+
+
 def _write(path: Path, polygons: list[FloatArray], columns: dict[str, Any], origin: FloatArray | None) -> None:
     vertex, start = join(polygons)
     try:
@@ -235,6 +251,11 @@ def _write(path: Path, polygons: list[FloatArray], columns: dict[str, Any], orig
         raise cannot_write(path, error) from error
     with new_file(path) as part, NewHdf5(part) as file:
         file["vertex"], file["vertex_start"] = vertex, start
+        materials = columns.pop("material", None)
+        if materials is not None:
+            names = sorted(set(materials) - {""})
+            file["material"] = [names.index(name) + 1 if name else 0 for name in materials]
+            file["material_names"] = " ".join(names)
         for name, values in columns.items():
             file[name] = values
         if origin is not None:

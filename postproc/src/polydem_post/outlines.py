@@ -15,7 +15,7 @@ from .base.polygons import FloatArray
 from .base.result_file import ResultError, cannot_read
 
 #: Properties of a body that GeoJSON may give, besides its outline
-PROPERTIES = ("fixed", "velocity", "angular_velocity", "density", "mass", "inertia", "id")
+PROPERTIES = ("fixed", "velocity", "angular_velocity", "density", "mass", "inertia", "id", "material")
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _RING = re.compile(r"\(([^()]*)\)")

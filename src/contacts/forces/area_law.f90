@@ -11,6 +11,8 @@ module polydem_area_law
    use polydem_elementary, only: hypotenuse
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
    use polydem_kinds, only: ip, wp
+   use polydem_pair_parameters, only: pair_parameters_t
+   use polydem_pair_value, only: pair_value_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -19,7 +21,7 @@ module polydem_area_law
    !> The area law
    type, extends(force_part_t) :: area_law_t
       !> Young's modulus in two dimensions E [N/m2]
-      real(wp) :: stiffness = 0.0_wp
+      type(pair_value_t) :: stiffness
    contains
       procedure :: configure
       procedure :: add
@@ -34,12 +36,15 @@ module polydem_area_law
 contains
 
    !> Copy the parameters from the settings. The force does work on closed paths, which only damping hides.
-   subroutine configure(self, settings)
+   subroutine configure(self, settings, pairs)
       class(area_law_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
+      associate (unused => settings)
+      end associate
       self%stage = stage_elastic
-      self%stiffness = settings%stiffness
+      self%stiffness = pairs%stiffness
       self%undamped_warning = 'the area law is not conservative: without damping it adds kinetic energy at '// &
          'any time step (a third in 0.2 s in a gas); set law = ''conservative'' in &forces, or use damping'
    end subroutine configure
@@ -71,10 +76,15 @@ contains
             length(c) = max(length(c), max(least_length*sqrt(block%area(c)), block%degenerate(c)*block%length(c)))
          end do
       end if
+      if (allocated(self%stiffness%factor)) then
+         do c = 1_ip, block%n
+            length(c) = length(c)/self%stiffness%factor(block%material(c, 1), block%material(c, 2))
+         end do
+      end if
       do c = 1_ip, block%n
          block%inverse_length(c) = 1.0_wp/length(c)
          block%lever(c) = 0.0_wp
-         force = self%stiffness*block%area(c)*block%inverse_length(c)
+         force = self%stiffness%one*block%area(c)*block%inverse_length(c)
          block%elastic(c) = block%elastic(c) + force
          block%normal_force(c) = block%normal_force(c) + force
       end do
@@ -87,8 +97,8 @@ contains
       !> The contact; its normal stiffness changes, and its ratio if it is an expected contact
       type(linearised_contact_t), intent(inout) :: element
 
-      if (element%is_expected) element%ratio = element%edge_ratio
-      element%normal_stiffness = element%normal_stiffness + self%stiffness*element%ratio
+      if (element%is_expected) element%ratio = element%edge_ratio*self%stiffness%factor_of(element%materials)
+      element%normal_stiffness = element%normal_stiffness + self%stiffness%one*element%ratio
    end subroutine stiffen
 
    !> Depth at which a flat contact carries a block at rest [m]: inverse of Matuttis & Chen 2014, Eq. 7.6.
@@ -99,14 +109,15 @@ contains
    real(wp) function static_depth(self, block) result(depth)
       class(area_law_t), intent(in) :: self
       type(resting_block_t), intent(in) :: block
-      real(wp) :: r1, r2
+      real(wp) :: stiffness, r1, r2
       integer :: k
 
+      stiffness = self%stiffness%of(block%materials)
       depth = 0.0_wp
       do k = 1, 12
          r1 = 0.5_wp*(block%height - depth)
          r2 = hypotenuse(0.5_wp*(block%support_height - depth), block%offset)
-         depth = block%load/(self%stiffness*block%width)*4.0_wp*r1*r2/(r1 + r2)
+         depth = block%load/(stiffness*block%width)*4.0_wp*r1*r2/(r1 + r2)
          if (.not. depth < block%height) return
       end do
    end function static_depth

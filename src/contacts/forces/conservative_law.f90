@@ -27,6 +27,8 @@ module polydem_conservative_law
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, resting_block_t, stage_elastic
    use polydem_kinds, only: ip, wp
+   use polydem_pair_parameters, only: pair_parameters_t
+   use polydem_pair_value, only: pair_value_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -35,7 +37,7 @@ module polydem_conservative_law
    !> The conservative law
    type, extends(force_part_t) :: conservative_law_t
       !> Young's modulus in two dimensions E [N/m2]
-      real(wp) :: stiffness = 0.0_wp
+      type(pair_value_t) :: stiffness
       !> Reciprocal side 1/s of the square of each body's area, (slot) [1/m]
       real(wp), allocatable :: inverse_size(:)
    contains
@@ -52,14 +54,17 @@ module polydem_conservative_law
 contains
 
    !> Copy the parameters from the settings.
-   subroutine configure(self, settings)
+   subroutine configure(self, settings, pairs)
       class(conservative_law_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
+      associate (unused => settings)
+      end associate
       self%stage = stage_elastic
       self%needs_effective_area = .true.
       self%energy_is_quadratic = .true.
-      self%stiffness = settings%stiffness
+      self%stiffness = pairs%stiffness
    end subroutine configure
 
    !> Measure the areas of the bodies.
@@ -118,10 +123,18 @@ contains
          end associate
          nearer = 0.5_wp + sign(0.5_wp, nearer) - 0.5_wp*merge(1.0_wp, 0.0_wp, abs(nearer) <= 0.0_wp)
          block%lever(c) = -(nearer*moment_first + (1.0_wp - nearer)*moment_second)/block%length(c)
-         force = self%stiffness*block%area(c)*block%inverse_length(c)
+         force = self%stiffness%one*block%area(c)*block%inverse_length(c)
          block%elastic(c) = block%elastic(c) + force
          block%normal_force(c) = block%normal_force(c) + force
       end do
+      if (.not. allocated(self%stiffness%factor)) return
+      do c = 1_ip, block%n
+         force = self%stiffness%one*block%area(c)*block%inverse_length(c)
+         force = (self%stiffness%factor(block%material(c, 1), block%material(c, 2)) - 1.0_wp)*force
+         block%elastic(c) = block%elastic(c) + force
+         block%normal_force(c) = block%normal_force(c) + force
+      end do
+      call self%stiffness%scale(block%n, block%material, block%inverse_length)
    end subroutine add
 
    !> Add upper bounds of the stiffness. K_n is E L^2/(l b), the characteristic length being l b/L.
@@ -140,11 +153,11 @@ contains
       type(linearised_contact_t), intent(inout) :: element
 
       if (element%is_expected) then
-         element%ratio = element%square_ratio
-         element%normal_stiffness = element%normal_stiffness + steepening*(self%stiffness*element%ratio)
+         element%ratio = element%square_ratio*self%stiffness%factor_of(element%materials)
+         element%normal_stiffness = element%normal_stiffness + steepening*(self%stiffness%one*element%ratio)
       else
-         element%normal_stiffness = element%normal_stiffness + steepening*(self%stiffness*element%ratio)
-         element%tilt_stiffness = element%tilt_stiffness + steepening*face_tilt_stiffness(self%stiffness, element)
+         element%normal_stiffness = element%normal_stiffness + steepening*(self%stiffness%one*element%ratio)
+         element%tilt_stiffness = element%tilt_stiffness + steepening*face_tilt_stiffness(self%stiffness%one, element)
       end if
    end subroutine stiffen
 
@@ -157,7 +170,8 @@ contains
 
       s1 = sqrt(block%width*block%height)
       s2 = sqrt(block%support_width*block%support_height)
-      depth = block%load/(self%stiffness*block%width)*(2.0_wp*s1*s2*min(s1, s2)/((s1 + s2)*block%width))
+      depth = block%load/(self%stiffness%of(block%materials)*block%width) &
+         *(2.0_wp*s1*s2*min(s1, s2)/((s1 + s2)*block%width))
    end function static_depth
 
 end module polydem_conservative_law

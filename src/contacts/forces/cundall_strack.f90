@@ -18,6 +18,8 @@ module polydem_cundall_strack
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
+   use polydem_pair_parameters, only: pair_parameters_t
+   use polydem_pair_value, only: pair_value_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -26,9 +28,9 @@ module polydem_cundall_strack
    !> Friction by a tangential spring
    type, extends(force_part_t) :: cundall_strack_t
       !> Friction coefficient mu
-      real(wp) :: coefficient = 0.0_wp
-      !> Stiffness of the spring k_t [N/m2]
-      real(wp) :: stiffness = 0.0_wp
+      type(pair_value_t) :: coefficient
+      !> Stiffness of the spring k_t [N/m2], and the square roots of its factors
+      type(pair_value_t) :: stiffness, root_factor
       !> Dashpot as a share d of sqrt(k_t m_t)
       real(wp) :: damping = 0.0_wp
       !> Whether the spring uses the slip velocity in the middle of the step instead of that at its end
@@ -42,13 +44,16 @@ module polydem_cundall_strack
 contains
 
    !> Copy the parameters from the settings. The contact history is the spring force.
-   subroutine configure(self, settings)
+   subroutine configure(self, settings, pairs)
       class(cundall_strack_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
       self%stage = stage_last
-      self%coefficient = settings%friction_coefficient
-      self%stiffness = settings%tangential_stiffness*settings%stiffness
+      self%coefficient = pairs%friction_coefficient
+      self%stiffness = pairs%tangential_stiffness
+      self%root_factor = self%stiffness
+      if (allocated(self%stiffness%factor)) self%root_factor%factor = sqrt(self%stiffness%factor)
       self%damping = settings%tangential_damping
       self%midstep = settings%midstep_slip
       self%needs_accelerations = self%midstep
@@ -58,12 +63,32 @@ contains
    !> Add the tangential force and store the spring force.
    subroutine add(self, bodies, dt, block, history)
       class(cundall_strack_t), intent(in) :: self
-      !> Bodies, for their masses and velocities
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: dt
       !> Contacts; `tangential_force` changes
       type(contact_block_t), intent(inout) :: block
       !> Contact history; the spring force is read and set
+      type(contact_history_t), intent(inout) :: history
+      real(wp) :: load(block_size)
+
+      if (allocated(self%coefficient%factor)) then
+         load(:block%n) = block%normal_force(:block%n)
+         call self%coefficient%scale(block%n, block%material, load)
+         call add_limited(self, bodies, dt, load, block, history)
+      else
+         call add_limited(self, bodies, dt, block%normal_force, block, history)
+      end if
+   end subroutine add
+
+   !> Add the tangential force for given loads.
+   subroutine add_limited(self, bodies, dt, load, block, history)
+      class(cundall_strack_t), intent(in) :: self
+      !> Bodies, for their masses and velocities
+      type(bodies_t), intent(in) :: bodies
+      real(wp), intent(in) :: dt
+      !> Normal force of each contact, times the factor of its friction coefficient [N/m]
+      real(wp), intent(in) :: load(block_size)
+      type(contact_block_t), intent(inout) :: block
       type(contact_history_t), intent(inout) :: history
       real(wp) :: slip(block_size), mean(block_size), spring(block_size), root(block_size), limit
       integer(ip) :: c
@@ -72,29 +97,36 @@ contains
       associate (stored => history%column(self%first_column)%value)
          if (self%midstep) then
             call find_midstep_slip(bodies%n, bodies%acceleration, bodies%angular_acceleration, dt, block, slip, mean)
-            call stretch(self, dt, block, mean, stored, spring)
+            call self%stiffness%scale(block%n, block%material, mean)
+            call stretch(self, dt, block, load, mean, stored, spring)
+         else if (allocated(self%stiffness%factor)) then
+            mean(:block%n) = slip(:block%n)
+            call self%stiffness%scale(block%n, block%material, mean)
+            call stretch(self, dt, block, load, mean, stored, spring)
          else
-            call stretch(self, dt, block, slip, stored, spring)
+            call stretch(self, dt, block, load, slip, stored, spring)
          end if
       end associate
       if (self%damping > 0.0_wp) then
          call find_dashpots(self, bodies%n, bodies%inverse_inertia, block, root)
+         call self%root_factor%scale(block%n, block%material, root)
          do c = 1_ip, block%n
-            limit = self%coefficient*max(0.0_wp, block%normal_force(c))
+            limit = self%coefficient%one*max(0.0_wp, load(c))
             spring(c) = max(-limit, min(limit, spring(c) - root(c)*slip(c)))
          end do
       end if
       do c = 1_ip, block%n
          block%tangential_force(c) = block%tangential_force(c) + spring(c)
       end do
-   end subroutine add
+   end subroutine add_limited
 
    !> Change the spring forces by the slip of a step, up to Coulomb's limit, and store them.
-   pure subroutine stretch(self, dt, block, slip, stored, spring)
+   pure subroutine stretch(self, dt, block, load, slip, stored, spring)
       class(cundall_strack_t), intent(in) :: self
       real(wp), intent(in) :: dt
       type(contact_block_t), intent(in) :: block
-      real(wp), intent(in) :: slip(block_size)
+      !> Normal forces times factors of the friction coefficient [N/m], and slip velocities times those of the stiffness
+      real(wp), intent(in) :: load(block_size), slip(block_size)
       !> Spring forces of all pairs
       real(wp), intent(inout) :: stored(:)
       !> Spring forces of the block [N/m]
@@ -106,8 +138,8 @@ contains
          spring(c) = stored(block%pair(c))
       end do
       do c = 1_ip, block%n
-         limit = self%coefficient*max(0.0_wp, block%normal_force(c))
-         spring(c) = max(-limit, min(limit, spring(c) - self%stiffness*slip(c)*dt))
+         limit = self%coefficient%one*max(0.0_wp, load(c))
+         spring(c) = max(-limit, min(limit, spring(c) - self%stiffness%one*slip(c)*dt))
       end do
       do c = 1_ip, block%n
          stored(block%pair(c)) = spring(c)
@@ -120,9 +152,9 @@ contains
       !> The contact; tangential stiffness and dashpot change
       type(linearised_contact_t), intent(inout) :: element
 
-      element%tangential_stiffness = element%tangential_stiffness + self%stiffness
+      element%tangential_stiffness = element%tangential_stiffness + self%stiffness%of(element%materials)
       element%tangential_dashpot = element%tangential_dashpot &
-         + self%damping*sqrt(element%tangential_mass*self%stiffness)
+         + self%damping*sqrt(element%tangential_mass*self%stiffness%of(element%materials))
    end subroutine stiffen
 
    !> Find the velocity of the first body relative to the second at the force point, along (-direction_y, direction_x)
@@ -191,7 +223,7 @@ contains
          square_first = block%arm_first(c, 1)**2 + block%arm_first(c, 2)**2
          square_second = block%arm_second(c, 1)**2 + block%arm_second(c, 2)**2
          mobility = block%mobility(c) + (square_first*inverse(c, 1) + square_second*inverse(c, 2))
-         dashpot(c) = self%damping*sqrt(self%stiffness/mobility)
+         dashpot(c) = self%damping*sqrt(self%stiffness%one/mobility)
       end do
    end subroutine find_dashpots
 

@@ -12,6 +12,7 @@ module polydem_damping_onset
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_force_part, only: force_part_t, stage_on_damping
    use polydem_kinds, only: ip, wp
+   use polydem_pair_parameters, only: pair_parameters_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -27,11 +28,12 @@ module polydem_damping_onset
 contains
 
    !> There are no parameters. The contact history is the overlap area of the last step.
-   subroutine configure(self, settings)
+   subroutine configure(self, settings, pairs)
       class(damping_onset_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
-      associate (unused => settings)
+      associate (unused => settings, unused_pairs => pairs)
       end associate
       self%stage = stage_on_damping
       self%history_kinds = [history_kind_t('area', 'm2', 'overlap area at the last step', zero_is_new=.true.)]

@@ -36,6 +36,8 @@ module polydem_exact_friction
    use polydem_errors, only: error_t, input_error, raise, run_error
    use polydem_friction_network, only: build_network, free_velocities, friction_network_t, within
    use polydem_kinds, only: ip, lp, wp
+   use polydem_pair_parameters, only: pair_parameters_t
+   use polydem_pair_value, only: pair_value_t
    use polydem_source_locations, only: place_of
    use polydem_settings, only: forces_settings_t, settings_t
    use polydem_strings, only: to_text
@@ -47,7 +49,7 @@ module polydem_exact_friction
    !> Coulomb friction without a spring
    type, extends(velocity_constraint_t) :: exact_friction_t
       !> Friction coefficient mu
-      real(wp) :: coefficient = 0.0_wp
+      type(pair_value_t) :: coefficient
       !> Accepted remaining slip, as a share of the greatest slip velocity that friction removes in a step
       real(wp) :: tolerance = 0.0_wp
       !> Network of the contacts of the last step
@@ -71,11 +73,12 @@ module polydem_exact_friction
 contains
 
    !> Copy the parameters from the settings. The contact history is the force, from which the next search starts.
-   subroutine configure(self, settings)
+   subroutine configure(self, settings, pairs)
       class(exact_friction_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
-      self%coefficient = settings%friction_coefficient
+      self%coefficient = pairs%friction_coefficient
       self%tolerance = settings%friction_tolerance
       self%history_kinds = [history_kind_t('tangential', 'N/m', 'tangential force of the last step')]
    end subroutine configure
@@ -111,11 +114,19 @@ contains
       type(contact_history_t), intent(inout) :: history
       !> Allocated if the search does not converge; gives the remaining slip
       type(error_t), allocatable, intent(inout) :: error
+      real(wp), allocatable :: coefficients(:)
       logical :: solved
       integer(ip) :: c
 
+      allocate (coefficients(contacts%n))
+      coefficients = self%coefficient%one
+      if (allocated(self%coefficient%factor)) then
+         do c = 1_ip, contacts%n
+            coefficients(c) = self%coefficient%of(bodies%material([contacts%first(c), contacts%second(c)]))
+         end do
+      end if
       associate (network => self%network, programme => self%programme)
-         call build_network(dt, self%coefficient, bodies, contacts, network)
+         call build_network(dt, coefficients, bodies, contacts, network)
          call reserve_box_qp(programme, bodies%n, contacts%n)
          call free_velocities(dt, bodies, programme%free)
          programme%tolerance = self%tolerance

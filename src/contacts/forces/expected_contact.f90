@@ -36,11 +36,13 @@ module polydem_expected_contact
 contains
 
    !> Describe the expected contact of a body: the greatest length, and the greatest ratios of all edges.
-   subroutine expect_contact(law, bodies, s, speed, element, outline)
+   subroutine expect_contact(law, bodies, s, materials, speed, element, outline)
       type(force_law_t), intent(in) :: law
       type(bodies_t), intent(in) :: bodies
       !> Slot of the body
       integer(ip), intent(in) :: s
+      !> Its material, and that of the other body. If they differ, the other body is heavy
+      integer(ip), intent(in) :: materials(2)
       !> Speed of approach [m/s]
       real(wp), intent(in) :: speed
       !> The contact, without springs and dashpots
@@ -54,6 +56,11 @@ contains
       low = bodies%pieces%vertex_start(s)
       high = bodies%pieces%vertex_start(s + 1_ip) - 1_ip
       call start_contact(bodies, s, speed, element, outline, area)
+      element%materials = materials
+      if (materials(1) /= materials(2)) then
+         element%normal_mass = bodies%mass(s)
+         element%normal_mobility = bodies%inverse_mass(s)
+      end if
       do v = low, high, 1_ip + (high - low)/most_cuts
          w = merge(high, v - 1_ip, v == low)
          call find_depth(law, bodies%pieces%vertex(:, low:high), w - low + 1_ip, v - low + 1_ip, area, element, cut)

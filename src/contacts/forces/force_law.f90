@@ -18,6 +18,7 @@ module polydem_force_law
    use polydem_hunt_crossley, only: hunt_crossley_t
    use polydem_kinds, only: ip, wp
    use polydem_matuttis_chen_damping, only: matuttis_chen_damping_t
+   use polydem_pair_parameters, only: pair_parameters, pair_parameters_t, uniform_parameters
    use polydem_rate_damping, only: rate_damping_t
    use polydem_restitution_damping, only: restitution_damping_t
    use polydem_settings, only: forces_settings_t, settings_t
@@ -36,6 +37,8 @@ module polydem_force_law
    !> A force law: its parts in the order in which they act, and their requirements
    type :: force_law_t
       type(part_holder_t), allocatable, private :: parts(:)
+      !> Parameters that may differ between pairs of materials; not allocated before the first part
+      type(pair_parameters_t), allocatable :: pairs
       !> Constraint that acts after all parts; not allocated if there is none
       class(velocity_constraint_t), allocatable :: constraint
       !> First columns of the contact history, in this order; not allocated before `choose_parts`
@@ -72,22 +75,28 @@ module polydem_force_law
 contains
 
    !> Create the law that the settings ask for. It contains no other parts.
-   subroutine new_force_law(settings, bodies, law)
+   subroutine new_force_law(settings, bodies, law, pairs)
       type(forces_settings_t), intent(in) :: settings
       !> Bodies, for their shapes
       type(bodies_t), intent(in) :: bodies
       type(force_law_t), intent(out) :: law
+      !> Parameters of pairs of materials; default: those of the settings for all pairs
+      type(pair_parameters_t), intent(in), optional :: pairs
 
-      call choose_parts(settings, law)
+      call choose_parts(settings, law, pairs)
       call law%measure(bodies)
    end subroutine new_force_law
 
    !> Choose the parts that the settings ask for, from the list of all parts. The law must `measure` the bodies before
    !> it computes forces.
-   subroutine choose_parts(settings, law)
+   subroutine choose_parts(settings, law, pairs)
       type(forces_settings_t), intent(in) :: settings
       type(force_law_t), intent(out) :: law
+      !> Parameters of pairs of materials; default: those of the settings for all pairs
+      type(pair_parameters_t), intent(in), optional :: pairs
 
+      if (present(pairs)) law%pairs = pairs
+      if (.not. present(pairs)) law%pairs = uniform_parameters(settings)
       associate (s => settings)
          if (s%law == 'area') call law%add(area_law_t(name='area law'), s)
          if (s%law == 'conservative') call law%add(conservative_law_t(name='conservative law'), s)
@@ -103,7 +112,7 @@ contains
          if (s%damping == 'rate' .and. s%damping_from_touch) &
             call law%add(damping_onset_t(name='from first touch'), s)
          if (s%damping /= 'none' .and. s%tilt_damping > 0.0_wp) call law%add(tilt_damping_t(name='damping of tilts'), s)
-         if (s%friction_coefficient > 0.0_wp) then
+         if (law%pairs%friction_coefficient%greatest() > 0.0_wp) then
             if (s%friction == 'cundall_strack') call law%add(cundall_strack_t(name='Cundall-Strack friction'), s)
             if (s%friction == 'exact') call law%add(exact_friction_t(name='exact friction'), s)
          end if
@@ -122,9 +131,10 @@ contains
       class(force_part_t), allocatable :: part
       integer :: k, n, place
 
+      if (.not. allocated(law%pairs)) law%pairs = uniform_parameters(settings)
       if (.not. allocated(law%parts)) allocate (law%parts(0))
       allocate (part, source=new)
-      call part%configure(settings)
+      call part%configure(settings, law%pairs)
       n = size(law%parts)
       place = 1
       do k = 1, n
@@ -145,9 +155,10 @@ contains
       class(velocity_constraint_t), intent(in) :: new
       type(forces_settings_t), intent(in) :: settings
 
+      if (.not. allocated(law%pairs)) law%pairs = uniform_parameters(settings)
       if (allocated(law%constraint)) deallocate (law%constraint)
       allocate (law%constraint, source=new)
-      call law%constraint%configure(settings)
+      call law%constraint%configure(settings, law%pairs)
    end subroutine add_constraint
 
    !> Collect the requirements, the contact history and the names of the parts.
@@ -206,7 +217,7 @@ contains
       type(force_law_t) :: law
       integer :: k
 
-      call choose_parts(settings%forces, law)
+      call choose_parts(settings%forces, law, pair_parameters(settings))
       do k = 1, size(law%parts)
          call law%parts(k)%part%check(settings, n_processes, error)
       end do

@@ -16,7 +16,7 @@ module polydem_force_part
    use polydem_bodies, only: bodies_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contact_block, only: contact_block_t
-   use polydem_kinds, only: wp
+   use polydem_kinds, only: ip, wp
    use polydem_law_part, only: law_part_t
    implicit none
    private
@@ -37,6 +37,8 @@ module polydem_force_part
       real(wp) :: support_width, support_height
       !> Distance of the two centres along the contact [m]
       real(wp) :: offset = 0.0_wp
+      !> Numbers of the materials of block and support
+      integer(ip) :: materials(2) = 0_ip
    end type resting_block_t
 
    !> One part of the force between two bodies in contact. The factory or `configure` sets all components

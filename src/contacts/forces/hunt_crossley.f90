@@ -9,6 +9,8 @@ module polydem_hunt_crossley
    use polydem_linearised_contact, only: linearised_contact_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
+   use polydem_pair_parameters, only: pair_parameters_t
+   use polydem_pair_value, only: weighted
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -26,11 +28,14 @@ module polydem_hunt_crossley
 contains
 
    !> Copy the parameters from the settings. At rest the dashpot is in proportion to the load, so this damping is weak.
-   subroutine configure(self, settings)
+   !> Damping over elastic force is in proportion to gamma/sqrt(E).
+   subroutine configure(self, settings, pairs)
       class(hunt_crossley_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
-      call self%take_coefficients(settings)
+      call self%take_coefficients(settings, pairs)
+      self%coefficient = weighted(pairs%damping_coefficient, pairs%stiffness, 3)
       self%is_weak = .true.
    end subroutine configure
 
@@ -44,7 +49,7 @@ contains
 
       do c = 1_ip, block%n
          ! Bars that nearly cross turn without approach. L is at least the side of a square of the same area.
-         share = self%coefficient*sqrt(1.0_wp/(block%mobility(c)*self%stiffness))*block%inverse_length(c) &
+         share = self%coefficient%one*sqrt(1.0_wp/(block%mobility(c)*self%stiffness))*block%inverse_length(c) &
             *(block%rate(c)/max(block%length(c), sqrt(block%area(c))))
          force(c) = block%elastic(c)*share
       end do
@@ -58,7 +63,7 @@ contains
       integer(ip) :: c
 
       do c = 1_ip, block%n
-         dashpot(c) = block%elastic(c)*(self%coefficient*sqrt(1.0_wp/(block%mobility(c)*self%stiffness))) &
+         dashpot(c) = block%elastic(c)*(self%coefficient%one*sqrt(1.0_wp/(block%mobility(c)*self%stiffness))) &
             *(block%inverse_length(c)*block%length(c)/max(block%length(c), sqrt(block%area(c))))
       end do
    end subroutine find_dashpots
@@ -71,8 +76,8 @@ contains
       type(linearised_contact_t), intent(inout) :: element
       real(wp) :: share
 
-      share = self%coefficient*sqrt(1.0_wp/(element%normal_mobility*self%stiffness))*element%ratio &
-         /max(element%length, sqrt(element%area))
+      share = self%coefficient%of(element%materials)*sqrt(1.0_wp/(element%normal_mobility*self%stiffness)) &
+         *element%ratio/max(element%length, sqrt(element%area))
       if (element%is_expected) then
          element%normal_dashpot = element%normal_dashpot + share*element%normal_stiffness*element%depth
          element%normal_stiffness = element%normal_stiffness*(1.0_wp + share*element%speed)

@@ -10,6 +10,7 @@ module polydem_law_part
    use polydem_contact_history, only: history_kind_t
    use polydem_errors, only: error_t
    use polydem_kinds, only: ip
+   use polydem_pair_parameters, only: pair_parameters_t
    use polydem_settings, only: forces_settings_t, settings_t
    implicit none
    private
@@ -38,11 +39,14 @@ module polydem_law_part
 contains
 
    !> Copy the parameters from the settings. Default: there are none.
-   subroutine configure(self, settings)
+   subroutine configure(self, settings, pairs)
       class(law_part_t), intent(inout) :: self
+      !> Group &forces
       type(forces_settings_t), intent(in) :: settings
+      !> Those of its entries that may differ between pairs of materials
+      type(pair_parameters_t), intent(in) :: pairs
 
-      associate (unused_self => self, unused_settings => settings)
+      associate (unused_self => self, unused_settings => settings, unused_pairs => pairs)
       end associate
    end subroutine configure
 

@@ -1,6 +1,6 @@
 !> Springs and dashpots of a contact, from which the stable time step is computed. The parts of a force law add theirs.
 module polydem_linearised_contact
-   use polydem_kinds, only: wp
+   use polydem_kinds, only: ip, wp
    implicit none
    private
    public :: linearised_contact_t, face_tilt_stiffness
@@ -10,6 +10,8 @@ module polydem_linearised_contact
    type :: linearised_contact_t
       !> Whether the contact is expected
       logical :: is_expected = .false.
+      !> Numbers of the materials of both bodies
+      integer(ip) :: materials(2) = 0_ip
       !> Ratio L/l of the length of the contact to the characteristic length; the elastic part sets that of an expected
       !> contact
       real(wp) :: ratio = 0.0_wp

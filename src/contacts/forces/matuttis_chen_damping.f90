@@ -9,6 +9,7 @@ module polydem_matuttis_chen_damping
    use polydem_contact_history, only: contact_history_t, history_kind_t
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
+   use polydem_pair_parameters, only: pair_parameters_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -27,11 +28,12 @@ module polydem_matuttis_chen_damping
 contains
 
    !> Copy the parameters from the settings. The contact history is the overlap area of the last step.
-   subroutine configure(self, settings)
+   subroutine configure(self, settings, pairs)
       class(matuttis_chen_damping_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
-      call self%take_coefficients(settings)
+      call self%take_coefficients(settings, pairs)
       self%history_kinds = [history_kind_t('area', 'm2', 'overlap area at the last step', zero_is_new=.true.)]
    end subroutine configure
 
@@ -52,16 +54,23 @@ contains
          do c = 1_ip, block%n
             difference = 0.0_wp
             if (dt > 0.0_wp) then
-               difference = self%coefficient*sqrt(self%stiffness/block%mobility(c))*block%inverse_length(c) &
+               difference = self%coefficient%one*sqrt(self%stiffness/block%mobility(c))*block%inverse_length(c) &
                   *((block%area(c) - area(block%pair(c)))/dt)
-               difference = min(difference, approach_limit*block%elastic(c))
             end if
             force(c) = difference
             area(block%pair(c)) = block%area(c)
          end do
       end associate
+      call self%coefficient%scale(block%n, block%material, force)
+      if (dt > 0.0_wp) then
+         do c = 1_ip, block%n
+            force(c) = min(force(c), approach_limit*block%elastic(c))
+         end do
+      end if
       call self%add_limited(force, block)
-      if (self%fills_dashpots) call self%find_dashpots(block, block%dashpot)
+      if (.not. self%fills_dashpots) return
+      call self%find_dashpots(block, block%dashpot)
+      call self%coefficient%scale(block%n, block%material, block%dashpot)
    end subroutine add
 
 end module polydem_matuttis_chen_damping

@@ -9,6 +9,8 @@ module polydem_normal_damping
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, stage_damping
    use polydem_kinds, only: ip, wp
+   use polydem_pair_parameters, only: pair_parameters_t
+   use polydem_pair_value, only: pair_value_t, weighted
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -16,10 +18,11 @@ module polydem_normal_damping
 
    !> A normal damping
    type, abstract, extends(force_part_t) :: normal_damping_t
-      !> Young's modulus in two dimensions E [N/m2]
+      !> Young's modulus in two dimensions E [N/m2]; `inverse_length` and `ratio` of contacts have its factor
       real(wp) :: stiffness = 0.0_wp
-      !> Dimensionless damping coefficient gamma
-      real(wp) :: coefficient = 0.0_wp
+      !> Dimensionless damping coefficient gamma, or a damping ratio, with the factors that forces and dashpots need
+      !> beside that of the stiffness
+      type(pair_value_t) :: coefficient
       !> Whether it fills the column `dashpot` of a block
       logical :: fills_dashpots = .false.
    contains
@@ -53,11 +56,14 @@ contains
       associate (unused_bodies => bodies, unused_dt => dt, unused_history => history)
       end associate
       call self%find_forces(block, force)
+      call self%coefficient%scale(block%n, block%material, force)
       call self%add_limited(force, block)
-      if (self%fills_dashpots) call self%find_dashpots(block, block%dashpot)
+      if (.not. self%fills_dashpots) return
+      call self%find_dashpots(block, block%dashpot)
+      call self%coefficient%scale(block%n, block%material, block%dashpot)
    end subroutine add
 
-   !> Compute the damping forces of a block of contacts, without a limit. Default: none.
+   !> Compute the damping forces of a block of contacts, without a limit and factors of pairs. Default: none.
    subroutine find_forces(self, block, force)
       class(normal_damping_t), intent(in) :: self
       !> Contacts with their elastic forces
@@ -70,7 +76,7 @@ contains
       force(:block%n) = 0.0_wp
    end subroutine find_forces
 
-   !> Find the dashpots of a block of contacts, gamma sqrt(m E) L/l: force per normal velocity.
+   !> Find the dashpots of a block of contacts, gamma sqrt(m E) L/l: force per normal velocity, without factors.
    subroutine find_dashpots(self, block, dashpot)
       class(normal_damping_t), intent(in) :: self
       !> Contacts with their elastic forces
@@ -80,7 +86,8 @@ contains
       integer(ip) :: c
 
       do c = 1_ip, block%n
-         dashpot(c) = self%coefficient*sqrt(self%stiffness/block%mobility(c))*block%inverse_length(c)*block%length(c)
+         dashpot(c) = self%coefficient%one*sqrt(self%stiffness/block%mobility(c)) &
+            *block%inverse_length(c)*block%length(c)
       end do
    end subroutine find_dashpots
 
@@ -104,19 +111,20 @@ contains
       type(linearised_contact_t), intent(inout) :: element
 
       element%normal_dashpot = element%normal_dashpot &
-         + self%coefficient*sqrt(element%normal_mass*self%stiffness)*element%ratio
+         + self%coefficient%of(element%materials)*sqrt(element%normal_mass*self%stiffness)*element%ratio
    end subroutine stiffen
 
-   !> Copy stiffness and coefficient from the settings.
-   subroutine take_coefficients(self, settings)
+   !> Copy stiffness and coefficient from the settings. Forces are in proportion to gamma sqrt(E).
+   subroutine take_coefficients(self, settings, pairs)
       class(normal_damping_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
       self%stage = stage_damping
-      self%stiffness = settings%stiffness
-      self%coefficient = settings%damping_coefficient
-      self%dissipates = self%coefficient > 0.0_wp
-      self%is_weak = self%coefficient < weak_coefficient
+      self%stiffness = pairs%stiffness%one
+      self%coefficient = weighted(pairs%damping_coefficient, pairs%stiffness, 1)
+      self%dissipates = pairs%damping_coefficient%greatest() > 0.0_wp
+      self%is_weak = pairs%damping_coefficient%least() < weak_coefficient
       self%fills_dashpots = settings%tilt_damping > 0.0_wp
    end subroutine take_coefficients
 

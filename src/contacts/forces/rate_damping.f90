@@ -26,7 +26,7 @@ contains
       integer(ip) :: c
 
       do c = 1_ip, block%n
-         force(c) = self%coefficient*sqrt(self%stiffness/block%mobility(c))*block%rate(c) &
+         force(c) = self%coefficient%one*sqrt(self%stiffness/block%mobility(c))*block%rate(c) &
             *block%inverse_length(c)
       end do
    end subroutine find_forces

@@ -18,15 +18,14 @@ module polydem_restitution_damping
    use polydem_elementary, only: arc_cosine, exponential, logarithm
    use polydem_kinds, only: ip, wp
    use polydem_normal_damping, only: normal_damping_t
+   use polydem_pair_parameters, only: pair_parameters_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
    public :: restitution_damping_t, restitution_of, damping_ratio_of
 
-   !> Damping with one damping ratio for all contacts; `coefficient` is not used
+   !> Damping with a given restitution; the coefficient is the damping ratio zeta
    type, extends(normal_damping_t) :: restitution_damping_t
-      !> Damping ratio zeta
-      real(wp) :: ratio = 0.0_wp
    contains
       procedure :: configure
       procedure :: find_forces
@@ -40,15 +39,21 @@ module polydem_restitution_damping
 contains
 
    !> Copy the parameters from the settings.
-   subroutine configure(self, settings)
+   subroutine configure(self, settings, pairs)
       class(restitution_damping_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
-      call self%take_coefficients(settings)
+      call self%take_coefficients(settings, pairs)
       self%needs_shares = .true.
-      self%ratio = damping_ratio_of(settings%restitution)
-      self%dissipates = self%ratio > 0.0_wp
-      self%is_weak = settings%restitution > weak_restitution
+      self%coefficient = pairs%restitution
+      if (allocated(pairs%restitution%factor)) then
+         self%coefficient%factor = damping_ratio_of(pairs%restitution%factor)
+      else
+         self%coefficient%one = damping_ratio_of(pairs%restitution%one)
+      end if
+      self%dissipates = self%coefficient%greatest() > 0.0_wp
+      self%is_weak = pairs%restitution%greatest() > weak_restitution
    end subroutine configure
 
    !> Compute the damping forces of one block of contacts.
@@ -62,7 +67,7 @@ contains
       do c = 1_ip, block%n
          ! Bars that nearly cross turn without approach. L is at least the side of a square of the same area.
          reach = max(block%length(c), sqrt(block%area(c)))
-         force(c) = 2.0_wp*self%ratio*sqrt(self%stiffness/block%mobility(c)) &
+         force(c) = 2.0_wp*self%coefficient%one*sqrt(self%stiffness/block%mobility(c)) &
             *sqrt(block%inverse_length(c)/reach)*block%rate(c)*block%share_root(c)
       end do
    end subroutine find_forces
@@ -77,7 +82,7 @@ contains
 
       do c = 1_ip, block%n
          reach = max(block%length(c), sqrt(block%area(c)))
-         dashpot(c) = 2.0_wp*self%ratio*sqrt(self%stiffness/block%mobility(c)) &
+         dashpot(c) = 2.0_wp*self%coefficient%one*sqrt(self%stiffness/block%mobility(c)) &
             *sqrt(block%inverse_length(c)/reach)*(block%length(c)*block%share_root(c))
       end do
    end subroutine find_dashpots
@@ -89,7 +94,8 @@ contains
       type(linearised_contact_t), intent(inout) :: element
 
       element%normal_dashpot = element%normal_dashpot &
-         + 2.0_wp*self%ratio*sqrt(element%normal_mass*self%stiffness)*sqrt(element%ratio)
+         + 2.0_wp*self%coefficient%of(element%materials)*sqrt(element%normal_mass*self%stiffness) &
+         *sqrt(element%ratio)
    end subroutine stiffen
 
    !> Restitution of a damped spring that is released when its force vanishes

@@ -122,15 +122,49 @@ contains
       real(wp), intent(out) :: step
       !> Depth and length of the contact [m], and its stable step over that without dashpots
       real(wp), intent(out) :: found(3)
-      type(linearised_contact_t) :: element
-      real(wp) :: g(4), outline, share
+      real(wp) :: step_with, found_with(3)
+      integer(ip) :: materials(2), partner
 
-      call expect_contact(law, bodies, s, speed, element, outline)
-      g(1) = assumed_contacts*bodies%inverse_mass(s)
-      g(2) = assumed_contacts*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
+      materials = 0_ip
+      if (allocated(bodies%material)) materials = bodies%material(s)
+      call find_step_of_pair(law, table, bodies, s, materials, speed, step, found)
+      if (.not. allocated(law%pairs%stiffness%factor)) return
+      do partner = 0_ip, law%pairs%n_materials
+         if (partner == materials(1)) cycle
+         call find_step_of_pair(law, table, bodies, s, [materials(1), partner], speed, step_with, found_with)
+         if (.not. step_with < step) cycle
+         step = step_with
+         found = found_with
+      end do
+   end subroutine find_expected_step
+
+   !> Find the stable step of the expected contacts of a body with equal bodies or, if their material differs, with
+   !> heavy ones. (The step of two light bodies of different materials is that of the lighter one on a heavy body.)
+   subroutine find_step_of_pair(law, table, bodies, s, materials, speed, step, found)
+      type(force_law_t), intent(in) :: law
+      type(stability_table_t), intent(in) :: table
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      !> Its material, and that of the others
+      integer(ip), intent(in) :: materials(2)
+      !> Speed of approach [m/s]
+      real(wp), intent(in) :: speed
+      !> Stable step [s]
+      real(wp), intent(out) :: step
+      !> Depth and length of the contact [m], and its stable step over that without dashpots
+      real(wp), intent(out) :: found(3)
+      type(linearised_contact_t) :: element
+      real(wp) :: g(4), outline, share, number
+
+      number = assumed_contacts
+      if (materials(1) /= materials(2)) number = 0.5_wp*assumed_contacts
+      call expect_contact(law, bodies, s, materials, speed, element, outline)
+      g(1) = number*bodies%inverse_mass(s)
+      g(2) = number*(bodies%inverse_mass(s) + element%radius_square*bodies%inverse_inertia(s))
       g(3) = 0.0_wp
-      g(4) = assumed_contacts*bodies%inverse_inertia(s)
-      element%tangential_mass = 1.0_wp/(g(2)/assumed_contacts)
+      g(4) = number*bodies%inverse_inertia(s)
+      element%tangential_mass = 1.0_wp/(g(2)/number)
       call law%stiffen(element)
       ! The contacts of a body share its outline, and so do their dashpots. The springs do not, for accuracy: then an
       ! impact of two bodies takes at least ten steps.
@@ -142,7 +176,7 @@ contains
       element%tangential_dashpot = 0.0_wp
       element%tilt_dashpot = 0.0_wp
       found = [element%depth, element%length, step/step_of_element(table, element, g)]
-   end subroutine find_expected_step
+   end subroutine find_step_of_pair
 
    !> Stable step of a contact whose bodies have no other contacts [s]
    real(wp) function stable_step_alone(law, table, bodies, contacts, c)
@@ -174,6 +208,7 @@ contains
       alone = 0.0_wp
       call add_body(contacts%first(c), contacts%arm_first(:, c), numbers(1))
       call add_body(contacts%second(c), contacts%arm_second(:, c), numbers(2))
+      if (allocated(bodies%material)) element%materials = bodies%material([contacts%first(c), contacts%second(c)])
       element%area = contacts%area(c)
       element%length = contacts%length(c)
       element%inverse_length = contacts%inverse_length(c)
@@ -247,7 +282,7 @@ contains
          factor = 16.0_wp
          do k = 1, 2000
             if (factor < 1.01_wp) exit
-            if (is_stable(mobility, factor*product_at/mobility)) then
+            if (is_stable(law, table, step, turning, mobility, factor*product_at/mobility)) then
                product_at = factor*product_at
             else
                factor = sqrt(factor)
@@ -255,25 +290,33 @@ contains
          end do
       end function product_at
 
-      !> Whether the step is stable for a contact of unit arms and of twice their length
-      logical function is_stable(mobility, ratio)
-         real(wp), intent(in) :: mobility, ratio
-         type(linearised_contact_t) :: element
-         real(wp) :: g(4)
-
-         element%ratio = ratio
-         element%length = 2.0_wp
-         element%inverse_length = 0.5_wp*ratio
-         element%normal_mobility = mobility
-         element%normal_mass = 1.0_wp/mobility
-         element%rotational_mobility = turning*mobility
-         g = [mobility*(1.0_wp + turning), mobility*(1.0_wp + turning), mobility*turning, mobility*turning]
-         element%tangential_mass = 1.0_wp/mobility
-         call law%stiffen(element)
-         is_stable = step_of_element(table, element, g) >= step
-      end function is_stable
-
    end function stiffest_product
+
+   !> Whether a step is stable for a contact of unit arms and of twice their length, of any pair of materials
+   logical function is_stable(law, table, step, turning, mobility, ratio)
+      type(force_law_t), intent(in) :: law
+      type(stability_table_t), intent(in) :: table
+      !> Time step [s]
+      real(wp), intent(in) :: step
+      !> Share of the rotation in the mobility, mobility [m/kg], and ratio L/l
+      real(wp), intent(in) :: turning, mobility, ratio
+      type(linearised_contact_t) :: element
+      real(wp) :: g(4)
+      integer(ip) :: i, j
+
+      g = [mobility*(1.0_wp + turning), mobility*(1.0_wp + turning), mobility*turning, mobility*turning]
+      is_stable = .true.
+      do j = 0_ip, law%pairs%n_materials
+         do i = 0_ip, j
+            element = linearised_contact_t(materials=[i, j], ratio=ratio, length=2.0_wp, &
+                                           inverse_length=0.5_wp*ratio, normal_mobility=mobility, &
+                                           normal_mass=1.0_wp/mobility, rotational_mobility=turning*mobility, &
+                                           tangential_mass=1.0_wp/mobility)
+            call law%stiffen(element)
+            is_stable = is_stable .and. step_of_element(table, element, g) >= step
+         end do
+      end do
+   end function is_stable
 
    !> Number of contacts of each body, (slot)
    pure function contact_numbers(n_bodies, incidence) result(numbers)

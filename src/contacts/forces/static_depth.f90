@@ -4,7 +4,8 @@ module polydem_static_depth
    use polydem_force_law, only: choose_parts, force_law_t
    use polydem_force_part, only: resting_block_t
    use polydem_kinds, only: wp
-   use polydem_settings, only: forces_settings_t
+   use polydem_pair_parameters, only: pair_parameters
+   use polydem_settings, only: settings_t
    use polydem_strings, only: to_text
    implicit none
    private
@@ -13,9 +14,9 @@ module polydem_static_depth
 contains
 
    !> Find the depth d at which the elastic force of a flat contact, E w d/l, balances a load.
-   subroutine static_depth(forces, block, depth, error)
-      !> Group &forces
-      type(forces_settings_t), intent(in) :: forces
+   subroutine static_depth(settings, block, depth, error)
+      !> Groups &forces, &material and &contact_pair
+      type(settings_t), intent(in) :: settings
       !> The block, of width w
       type(resting_block_t), intent(in) :: block
       !> Depth d [m]
@@ -24,7 +25,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(force_law_t) :: law
 
-      call choose_parts(forces, law)
+      call choose_parts(settings%forces, law, pair_parameters(settings))
       depth = law%static_depth(block)
       if (depth >= 0.0_wp .and. depth < block%height) return
       call raise(error, input_error, 'a block of height '//to_text(block%height)//' m sinks deeper than its height '// &

@@ -15,6 +15,7 @@ module polydem_tilt_damping
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, stage_last
    use polydem_kinds, only: ip, wp
+   use polydem_pair_parameters, only: pair_parameters_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -33,10 +34,13 @@ module polydem_tilt_damping
 contains
 
    !> Copy the parameters from the settings.
-   subroutine configure(self, settings)
+   subroutine configure(self, settings, pairs)
       class(tilt_damping_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
+      associate (unused_pairs => pairs)
+      end associate
       self%stage = stage_last
       self%needs_twist = .true.
       self%damps_tilts = .true.

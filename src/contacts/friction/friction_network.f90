@@ -62,11 +62,11 @@ module polydem_friction_network
 contains
 
    !> Build the network of a step.
-   subroutine build_network(dt, coefficient, bodies, contacts, network)
+   subroutine build_network(dt, coefficients, bodies, contacts, network)
       !> Time step [s]
       real(wp), intent(in) :: dt
-      !> Friction coefficient mu
-      real(wp), intent(in) :: coefficient
+      !> Friction coefficient mu of each contact
+      real(wp), intent(in) :: coefficients(:)
       type(bodies_t), intent(in) :: bodies
       !> Contacts with their normal forces
       type(contacts_t), intent(in) :: contacts
@@ -76,7 +76,7 @@ contains
       call reserve(bodies%n, contacts%n, network)
       network%n = contacts%n
       !$omp parallel if (max(bodies%n, contacts%n) > worth_sharing) default(none) &
-      !$omp    shared(network, bodies, contacts, coefficient, dt) private(c, s)
+      !$omp    shared(network, bodies, contacts, coefficients, dt) private(c, s)
       !$omp do schedule(static)
       do s = 1_ip, bodies%n
          network%inverse(:, s) = 0.0_wp
@@ -85,7 +85,7 @@ contains
       !$omp end do
       !$omp do schedule(static)
       do c = 1_ip, contacts%n
-         call fill_contact(coefficient, contacts, c, network)
+         call fill_contact(coefficients(c), contacts, c, network)
       end do
       !$omp end do
       !$omp end parallel

@@ -33,7 +33,7 @@ contains
    end subroutine hash_all_bodies
 
    !> Compute the hash of the initial bodies: their state, and their constant properties (fixed or free, mass, inertia,
-   !> shape). Collective.
+   !> shape, material). Collective.
    subroutine hash_scene(comm, bodies, hash)
       class(communicator_t), intent(inout) :: comm
       !> Bodies of this rank at time 0
@@ -68,6 +68,10 @@ contains
       end do
       call order_vertices(comm, bodies, blocks)
       call blocks%to_blocks(comm, words, block)
+      call mix_blocks(comm, block, hash)
+      if (.not. allocated(bodies%material)) return
+      call order_bodies(comm, bodies, blocks)
+      call blocks%to_blocks(comm, reshape(int(bodies%material, lp), [1, size(bodies%material)]), block)
       call mix_blocks(comm, block, hash)
    end subroutine hash_scene
 

@@ -25,6 +25,8 @@ module polydem_packed_bodies
       integer(ip) :: n_all = 0_ip, last_id = 0_ip
       !> Instruction set of the kernels that compute with the bodies
       integer :: isa = isa_base
+      !> Whether the bodies have materials
+      logical :: has_materials = .false.
    end type packed_bodies_t
 
 contains
@@ -51,6 +53,7 @@ contains
       packed%n_all = bodies%n_all
       packed%last_id = bodies%last_id
       packed%isa = bodies%isa
+      packed%has_materials = allocated(bodies%material)
       corners = bodies%pieces%vertex_start(2:) - bodies%pieces%vertex_start(:bodies%n)
       packed%list%slots = slots
       call serialize_list(packed%list, bodies%global_index, corners)
@@ -178,6 +181,7 @@ contains
       bodies%n_all = packed%n_all
       bodies%last_id = packed%last_id
       bodies%isa = packed%isa
+      if (packed%has_materials) allocate (bodies%material(n))
       allocate (slots(n))
       slots(order) = [(s, s=1_ip, n)]
       call packed%constants%restore_to(slots)

@@ -148,12 +148,14 @@ contains
    !> The order 'descending' is the worst start of a sweep that exchanges neighbours in lists of box ends: all pairs of
    !> boxes are in the wrong order on x, and half of them on y. No other order has a larger total. Each box has two
    !> ends, so n grains that hardly overlap need about 2 n**2 exchanges on x and n**2 on y.
-   subroutine append_grains(list, group, density, grains, centres, velocities, spins)
+   subroutine append_grains(list, group, density, material, grains, centres, velocities, spins)
       type(body_list_t), intent(inout) :: list
       !> Order
       type(grains_settings_t), intent(in) :: group
       !> Density [kg/m3]
       real(wp), intent(in) :: density
+      !> Number of the material
+      integer(ip), intent(in) :: material
       type(grains_t), intent(in) :: grains
       !> Position of the origin of the corners of each grain, (2, grain) [m]
       real(wp), intent(in) :: centres(:, :)
@@ -177,7 +179,8 @@ contains
          corners = grains%polygon(k)
          corners(1, :) = corners(1, :) + centres(1, k)
          corners(2, :) = corners(2, :) + centres(2, k)
-         call list%append(corners, density=density, velocity=velocities(:, k), angular_velocity=spins(k))
+         call list%append(corners, density=density, velocity=velocities(:, k), angular_velocity=spins(k), &
+                          material=material)
       end do
    end subroutine append_grains
 

@@ -54,6 +54,7 @@ contains
       grains%momentum = 'random'
       grains%order = 'natural'
       grains%wall = ''
+      grains%material = ''
       grains%packing = ''
       allocate (grains%vertices(0), grains%outline(0))
    end function new_grains
@@ -66,6 +67,7 @@ contains
 
       wall%name = name
       wall%outline = outline
+      wall%material = ''
       allocate (wall%vertices(0), wall%bodies(0))
    end function new_wall_part
 

@@ -9,6 +9,7 @@ module polydem_place_parts
    use polydem_kinds, only: ip, lp, wp
    use polydem_outlines, only: are_apart
    use polydem_packing, only: rotate_with_walls
+   use polydem_pair_parameters, only: density_of, material_number
    use polydem_parts, only: parts_t
    use polydem_polygon, only: clean_polygon
    use polydem_polygon_list, only: polygon_list_t
@@ -73,10 +74,28 @@ contains
          walls(k)%id = parts%walls(k)%bodies
       end do
       do k = 1_ip, outlines%n
-         call list%append(outlines%polygon(k), fixed=.true.)
+         call list%append(outlines%polygon(k), fixed=.true., material=material_of_wall(settings, parts, wall_of(k)))
          walls(wall_of(k))%id = [walls(wall_of(k))%id, list%last_id()]
       end do
    end subroutine list_parts
+
+   !> Number of the material of a wall
+   pure integer(ip) function material_of_wall(settings, parts, w) result(material)
+      type(settings_t), intent(in) :: settings
+      type(parts_t), intent(in) :: parts
+      !> Number of the wall
+      integer(ip), intent(in) :: w
+
+      associate (scene => settings%scene, wall => parts%walls(w))
+         if (wall%material /= '') then
+            material = material_number(settings, wall%material)
+         else if (scene%wall_material /= '') then
+            material = material_number(settings, scene%wall_material)
+         else
+            material = material_number(settings, scene%material)
+         end if
+      end associate
+   end function material_of_wall
 
    !> Raise an error about an entry of a part. The error of a recipe names no entry; its place is known to the caller.
    subroutine raise_problem(parts, settings, kind, name, problem, error)
@@ -140,18 +159,20 @@ contains
       type(grains_t) :: grains
       real(wp), allocatable :: centres(:, :), velocities(:, :), spins(:), corners(:, :)
       real(wp) :: density
-      integer(ip) :: k, n_found, seed
+      integer(ip) :: k, material, n_found, seed
 
       group = parts%grains(number)
+      if (group%material == '') group%material = settings%scene%material
+      material = material_number(settings, group%material)
       density = group%density
-      if (.not. density > 0.0_wp) density = settings%scene%density
+      if (.not. density > 0.0_wp) density = density_of(settings, material)
       seed = group%seed
       if (seed == 0_ip) seed = int(modulo(int(settings%scene%seed, lp) + number - 1_lp, int(huge(seed), lp)), ip)
       call check_group(group, problem)
       if (allocated(problem%text)) return
       random = new_random(seed)
       if (group%arrangement == 'column' .or. group%arrangement == 'single') then
-         call place_bodies(parts%recipe, group, density, settings, walls, random, grains, centres, problem)
+         call place_bodies(parts, group, density, settings, walls, wall_of, random, grains, centres, problem)
       else
          call prepare_region(parts, walls, wall_of, placed, seed, group, region, problem)
          if (allocated(problem%text)) return
@@ -170,7 +191,7 @@ contains
       call find_velocities(group, grains%area, random, velocities, spins)
       if (group%arrangement == 'packing') &
          call rotate_with_walls(settings%motion, group%wall, centres, velocities, spins)
-      call append_grains(list, group, density, grains, centres, velocities, spins)
+      call append_grains(list, group, density, material, grains, centres, velocities, spins)
       if (number == size(parts%grains)) return
       do k = 1_ip, group%number
          corners = grains%polygon(k)
@@ -194,20 +215,21 @@ contains
    end subroutine check_group
 
    !> Place a single body, or a column of bodies, where the group says.
-   subroutine place_bodies(recipe, group, density, settings, walls, random, grains, centres, problem)
-      !> Name of the recipe, empty if the group is one of the namelist
-      character(len=*), intent(in) :: recipe
+   subroutine place_bodies(parts, group, density, settings, walls, wall_of, random, grains, centres, problem)
+      type(parts_t), intent(in) :: parts
       type(grains_settings_t), intent(in) :: group
       real(wp), intent(in) :: density
       type(settings_t), intent(in) :: settings
+      !> Polygons of all walls, and the wall of each of them
       type(polygon_list_t), intent(in) :: walls
+      integer(ip), intent(in) :: wall_of(:)
       type(random_t), intent(inout) :: random
       type(grains_t), intent(out) :: grains
       real(wp), allocatable, intent(out) :: centres(:, :)
       type(problem_t), intent(inout) :: problem
       type(error_t), allocatable :: too_heavy
       real(wp), allocatable :: corners(:, :, :)
-      integer(ip) :: k
+      integer(ip) :: materials(size(wall_of)), k
 
       allocate (centres(2, group%number))
       if (group%arrangement == 'single') then
@@ -215,11 +237,12 @@ contains
          call draw_grains(group, random, 1_ip, grains)
          return
       end if
-      call pile_up(group, density, settings%forces, walls, corners, too_heavy)
+      materials = [(material_of_wall(settings, parts, wall_of(k)), k=1_ip, size(wall_of, kind=ip))]
+      call pile_up(group, density, settings, walls, materials, corners, too_heavy)
       if (allocated(too_heavy)) then
          problem%key = 'height'
          problem%text = too_heavy%message
-         if (recipe == '') problem%text = 'does not bear the load: '//problem%text
+         if (parts%recipe == '') problem%text = 'does not bear the load: '//problem%text
          return
       end if
       centres = 0.0_wp

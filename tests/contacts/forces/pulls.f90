@@ -5,6 +5,7 @@ module pulls
    use polydem_contact_history, only: contact_history_t
    use polydem_force_part, only: force_part_t, stage_normal
    use polydem_kinds, only: ip, wp
+   use polydem_pair_parameters, only: pair_parameters_t
    use polydem_settings, only: forces_settings_t
    implicit none
    private
@@ -31,11 +32,12 @@ module pulls
 contains
 
    !> Set name and stage.
-   subroutine configure_cohesion(self, settings)
+   subroutine configure_cohesion(self, settings, pairs)
       class(cohesion_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
-      associate (unused => settings)
+      associate (unused => settings, unused_pairs => pairs)
       end associate
       self%name = 'cohesion'
       self%stage = stage_normal
@@ -60,11 +62,12 @@ contains
    end subroutine add_cohesion
 
    !> Set name and stage.
-   subroutine configure_drag(self, settings)
+   subroutine configure_drag(self, settings, pairs)
       class(drag_t), intent(inout) :: self
       type(forces_settings_t), intent(in) :: settings
+      type(pair_parameters_t), intent(in) :: pairs
 
-      associate (unused => settings)
+      associate (unused => settings, unused_pairs => pairs)
       end associate
       self%name = 'drag'
       self%stage = stage_normal

@@ -63,6 +63,8 @@ class Frame:
         mass              [kg/m]   masses; infinite for a fixed body without a mass of its own, (n)
         inertia           [kg m]   moments of inertia about the centres of mass; infinite likewise, (n)
         number            [1]      number of the frame in the run, from 0
+        material          [1]      numbers of the materials: position in `material_names`, from 1; 0: none, (n)
+        material_names    [1]      list of the names of the materials of the run
 
     Everything else is computed from these when it is first asked for.
     """
@@ -80,7 +82,14 @@ class Frame:
     mass: FloatArray
     inertia: FloatArray
     number: int = 0
+    material: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    material_names: tuple[str, ...] = ()
     _source: FrameSource | None = field(default=None)
+
+    def __post_init__(self) -> None:
+        """Bodies without materials have number 0."""
+        if not len(self.material):
+            object.__setattr__(self, "material", np.zeros(len(self.id), dtype=np.int64))
 
     def __len__(self) -> int:
         """Number of bodies."""
@@ -190,11 +199,6 @@ class Frame:
         """Density of each body: mass over area; infinite where the mass is [kg/m3], (n)."""
         return self.mass / self.area
 
-    @property
-    def material(self) -> IntArray:
-        """Number of the material of each body [1], (n). A run has one material, number 0; densities may differ."""
-        return np.zeros(len(self), dtype=np.int64)
-
     @cached_property
     def radius(self) -> FloatArray:
         """Distance of the farthest vertex of each body from its centre of mass [m], (n)."""
@@ -277,10 +281,11 @@ class Frame:
         """Write the bodies as a bodies file, from which a run can start; return their number.
 
         In the namelist: &scene name = 'file', bodies_file = the path. The file has vertices in the world, identifiers,
-        fixed bodies, velocities, angular velocities, masses and moments of inertia, all to the last bit; the centres of
-        mass of the run follow from the vertices, within rounding. Angles and time begin at 0, and friction begins
-        without history: to continue a run to the same bits, use its checkpoints. Fixed bodies have no velocity in the
-        file: give `motion` in the namelist. `bodies_file.write_bodies` writes other outlines and columns.
+        fixed bodies, velocities, angular velocities, masses, moments of inertia and materials, all to the last bit;
+        the centres of mass of the run follow from the vertices, within rounding. Angles and time begin at 0, and
+        friction begins without history: to continue a run to the same bits, use its checkpoints. Fixed bodies have no
+        velocity in the file: give `motion` in the namelist. `bodies_file.write_bodies` writes other outlines and
+        columns.
         """
         return write_frame(self, path, self._source.origin_for(self) if self._source else (0.0, 0.0), overwrite)
 
@@ -327,12 +332,14 @@ def _index_of(frame: Frame, identifiers: npt.NDArray[np.integer[Any]]) -> IntArr
 def sound_frame(path: Path, frame: Frame) -> Frame:
     """The frame, if its arrays fit together."""
     n, vertices = len(np.atleast_1d(frame.id)), len(np.atleast_1d(frame.shape))
-    names = ("id", "fixed", "position", "angle", "velocity", "angular_velocity", "shape", "vertex_start")
+    names = ("id", "fixed", "position", "angle", "velocity", "angular_velocity", "shape", "vertex_start", "material")
     arrays = {name: getattr(frame, name) for name in names}
     shapes: dict[str, tuple[int, ...]] = {
         "position": (n, 2), "velocity": (n, 2), "shape": (vertices, 2), "vertex_start": (n + 1,)}
     insist(path, "frame", arrays, {name: shapes.get(name, (n,)) for name in arrays})
     masses = {"mass": frame.mass, "inertia": frame.inertia}
+    if np.any(frame.material < 0) or np.any(frame.material > len(frame.material_names)):
+        raise ResultError(f"{path}: bodies/material has numbers of materials that the namelist does not have")
     insist(path, "bodies", masses, dict.fromkeys(masses, (n,)), finite=False)
     if np.isnan(frame.mass).any() or np.isnan(frame.inertia).any() or np.any(np.diff(frame.id) <= 0):
         raise ResultError(f"{path}: bodies holds masses that are not numbers, or identifiers that do not ascend")

@@ -305,7 +305,7 @@ class Trajectory:
             columns["position"] = columns["position"] + self._shift
         return sound_frame(segment.path, Frame(
             step=int(segment.steps[row]), time=float(segment.times[row]), number=number, **columns, **self._bodies[1],
-            _source=self))
+            material_names=tuple(self.settings.get("material", {})), _source=self))
 
     def contacts_of(self, frame: Frame) -> Contacts:
         """The contacts of a frame of this run; `frame.contacts` calls it."""
@@ -380,6 +380,8 @@ def _bodies_in(file: h5py.File) -> dict[str, Any]:
     for name in ("mass", "inertia"):
         values = bodies[name][:]
         columns[name] = np.where(values == 0.0, np.inf, values)
+    if "material" in bodies:
+        columns["material"] = bodies["material"][:].astype(np.int64)
     return columns
 
 
