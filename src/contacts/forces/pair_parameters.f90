@@ -115,8 +115,8 @@ contains
       real(wp), intent(in) :: a(n_parameters), b(n_parameters)
       real(wp) :: mixed(n_parameters)
 
-      mixed = [2.0_wp*min(a(1), b(1))*(max(a(1), b(1))/(a(1) + b(1))), min(a(2), b(2)), 0.5_wp*(a(3) + b(3)), min(a(4), b(4)), &
-               0.5_wp*(a(5) + b(5))]
+      mixed = [2.0_wp*min(a(1), b(1))*(max(a(1), b(1))/(a(1) + b(1))), min(a(2), b(2)), &
+               0.5_wp*(a(3) + b(3)), min(a(4), b(4)), 0.5_wp*(a(5) + b(5))]
       where (abs(a - b) <= 0.0_wp) mixed = a
    end function mixed
 
