@@ -22,6 +22,8 @@ module polydem_contact_block
    type, extends(overlap_columns_t) :: contact_block_t
       !> Number of contacts
       integer(ip) :: n = 0_ip
+      !> Whether the column `cohesion` is not zero
+      logical :: has_cohesion = .false.
       !> Index in the pair list
       integer(ip) :: pair(block_size) = 0_ip
       !> Slots of the first and of the second body
@@ -112,6 +114,7 @@ contains
       logical :: exchanged
 
       block%n = min(high, block_size)
+      block%has_cohesion = contacts%has_cohesion
       do b = 1_ip, block%n
          c = high - b + 1_ip
          block%pair(b) = contacts%pair(c)

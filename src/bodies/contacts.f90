@@ -16,8 +16,8 @@ module polydem_contacts
       integer(ip) :: n = 0_ip
       !> Number of degenerate contacts, which have no direction (one body inside the other, or crossing bars)
       integer(ip) :: n_degenerate = 0_ip
-      !> Whether the elastic force has an energy, quadratic in `area`: elastic*area/(2 length)
-      logical :: energy_is_quadratic = .false.
+      !> Whether the elastic force has an energy, elastic*area/(2 length), and cohesion has cohesion*area/length
+      logical :: energy_is_known = .false.
       !> Whether `area` and the columns derived from it (`rate`, `normal`, `moment`, `direction`, `length`) are those of
       !> the effective area (see `polydem_effective_area`)
       logical :: area_is_effective = .false.

@@ -158,6 +158,11 @@ contains
             second(9, c) = -tangential*(block%arm_second(c, 1)*x + block%arm_second(c, 2)*y)
             second(10, c) = first(10, c)
          end do
+         if (.not. block%has_cohesion) return
+         do c = 1_ip, block%n
+            first(10, c) = first(10, c) + 0.5_wp*block%cohesion(c)*block%area(c)/block%length(c)
+            second(10, c) = first(10, c)
+         end do
       end associate
    end subroutine terms_of_block
 

@@ -12,7 +12,7 @@ module polydem_wall_terms
    !> Terms of the fixed bodies of contacts, in descending order of the contacts. The partners are the free bodies
    type, extends(term_list_t) :: wall_terms_t
       !> Whether the elastic force has an energy (see `contacts_t`)
-      logical :: energy_is_quadratic = .false.
+      logical :: energy_is_known = .false.
    end type wall_terms_t
 
 contains
@@ -73,7 +73,7 @@ contains
       type(contact_terms_t) :: terms
       integer(ip) :: high
 
-      walls%energy_is_quadratic = contacts%energy_is_quadratic
+      walls%energy_is_known = contacts%energy_is_known
       walls%n = 0_ip
       do high = contacts%n, 1_ip, -block_size
          call load_block(bodies, contacts, high, block)

@@ -186,6 +186,8 @@ contains
          end if
          if (index(parts, 'friction') > 0) text = text//', friction '// &
             to_text(pairs%friction_coefficient%of(materials), 3)
+         if (index(parts, 'cohesion') > 0) text = text//', cohesion '//to_text(pairs%cohesion%of(materials), 3)// &
+            ' N/m2'
       end associate
    end function pair_text
 

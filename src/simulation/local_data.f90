@@ -34,7 +34,7 @@ contains
       call new_force_law(self%settings%forces, self%bodies, self%law, pair_parameters(self%settings))
       call fit_table(self%law, self%contacts)
       self%walk%walls%n = 0_ip
-      self%walk%walls%energy_is_quadratic = self%law%energy_is_quadratic
+      self%walk%walls%energy_is_known = self%law%energy_is_known
       call fit_table(self%law, self%walk%flagged)
       self%n_contacts = 0_ip
       self%walk%passing_pair = 0_ip
@@ -74,7 +74,7 @@ contains
       type(contacts_t), intent(out) :: contacts
 
       contacts%area_is_effective = law%needs_effective_area
-      contacts%energy_is_quadratic = law%energy_is_quadratic
+      contacts%energy_is_known = law%energy_is_known
       contacts%has_cohesion = law%needs_cohesion
       contacts%has_twist = law%needs_twist
       call reserve_contacts(contacts, 0_ip)

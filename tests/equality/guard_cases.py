@@ -107,11 +107,11 @@ VARIED = {
     "forces.restitution": "0.3",
     "forces.tilt_damping": "0.5", "forces.friction_coefficient": "0.6", "forces.tangential_stiffness": "0.5",
     "forces.tangential_damping": "0.5", "forces.friction_tolerance": "1e-6",
-    "forces.drag": "2", "scene.material": "one", "scene.wall_material": "one", "grains.one.material": "one",
+    "forces.drag": "2", "forces.cohesion": "2e4", "scene.material": "one", "scene.wall_material": "one", "grains.one.material": "one",
     "wall.one.material": "one", "material.one.density": "1000", "contact_pair.one.materials": "one', 'one",
     **{f"{group}.one.{key}": value for group in ("material", "contact_pair") for key, value in {
         "stiffness": "1e6", "restitution": "0.3", "damping_coefficient": "0.2", "friction_coefficient": "0.6",
-        "tangential_stiffness": "0.5"}.items()},
+        "tangential_stiffness": "0.5", "cohesion": "2e4"}.items()},
     "guards.displacement_limit": "0.2", "guards.overlap_limit": "0.5", "guards.energy_limit": "0.5",
     "guards.listed_depth": "1e-4", "guards.relaxed_depth": "1e-3",
     "integrate.dt": "5e-5", "integrate.fraction": "0.1", "integrate.speed": "3", "integrate.duration": "0.025",
@@ -126,11 +126,11 @@ BESIDE = {"output.trace_start": {"output.trace_steps": "10"}, "guards.energy_lim
           **{name: {"material.one.density": "1000", "material.one.stiffness": "3e5"} for name in (
               "scene.material", "scene.wall_material", "grains.one.material", "wall.one.material")},
           **{f"material.one.{key}": {"scene.material": "one"} for key in (
-              "density", "stiffness", "restitution", "friction_coefficient", "tangential_stiffness")},
+              "density", "stiffness", "restitution", "friction_coefficient", "tangential_stiffness", "cohesion")},
           "material.one.damping_coefficient": {"scene.material": "one", "forces.damping_coefficient": "0.1"},
           **{f"contact_pair.one.{key}": {"material.one.density": "1000", "scene.material": "one",
                                          "contact_pair.one.materials": VARIED["contact_pair.one.materials"]}
-             for key in ("stiffness", "restitution", "friction_coefficient", "tangential_stiffness")},
+             for key in ("stiffness", "restitution", "friction_coefficient", "tangential_stiffness", "cohesion")},
           "contact_pair.one.materials": {"material.one.density": "1000", "scene.material": "one",
                                          "contact_pair.one.friction_coefficient": "0.6"},
           "contact_pair.one.damping_coefficient": {

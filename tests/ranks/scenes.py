@@ -52,9 +52,9 @@ SCENES = {
     "materials": """\
 &scene wall_material = 'steel' /
 &material name = 'glass' stiffness = 4e5 restitution = 0.9 friction_coefficient = 0.1 /
-&material name = 'rubber' density = 900 stiffness = 1e5 restitution = 0.3 friction_coefficient = 0.9 /
+&material name = 'rubber' density = 900 stiffness = 1e5 restitution = 0.3 friction_coefficient = 0.9 cohesion = 300 /
 &material name = 'steel' stiffness = 1e6 tangential_stiffness = 0.8 /
-&contact_pair name = 'dust' materials = 'steel', 'rubber' friction_coefficient = 0.05 restitution = 0.7 /
+&contact_pair name = 'dust' materials = 'steel', 'rubber' friction_coefficient = 0.05 restitution = 0.7 cohesion = 100 /
 &wall name = 'drum' outline = 'ring' radius = 0.1 segments = 30 thickness = 0.01 /
 &wall name = 'shelf' outline = 'line' from = -0.04, -0.02 to = 0.04, -0.02 thickness = 0.004 material = 'glass' /
 &grains name = 'heavy' region = 'inside' wall = 'drum' number = 80 speed = 1 material = 'glass' /

@@ -8,7 +8,7 @@ module b05_closed_loops
    use outlines, only: pi
    use polydem_kinds, only: ip, wp
    use polydem_strings, only: to_text
-   use posed_pair, only: new_pair, pair_t, press
+   use posed_pair, only: new_pair, pair_t, press, young
    use trial, only: block_at
    use verification_table, only: table_t
    implicit none
@@ -39,6 +39,9 @@ module b05_closed_loops
    type(path_t), parameter :: tilting = &
       path_t(0.6_wp, [0.0_wp, 0.75_wp, 0.0_wp], [0.1_wp, 0.02_wp, 0.25_wp], [0.0_wp, 0.5_wp*pi, 1.0_wp])
 
+   !> Attraction that exceeds the repulsion on parts of the paths [N/m2]
+   real(wp), parameter :: attraction = 0.1_wp*young
+
 contains
 
    !> Run five smooth paths, and one on which corners enter and leave.
@@ -52,6 +55,10 @@ contains
       do k = 1, size(smooth)
          call table%expect_absolute('conservative law, path '//to_text(int(k, ip))//', 400 steps', 0.0_wp, &
                                     work('conservative', smooth(k), 400), 1.0e-13_wp)
+      end do
+      do k = 1, size(smooth)
+         call table%expect_absolute('conservative law with cohesion, path '//to_text(int(k, ip))//', 400 steps', 0.0_wp, &
+                                    work('conservative', smooth(k), 400, attraction), 1.0e-13_wp)
       end do
       coarse = work('conservative', tilting, 250)
       fine = work('conservative', tilting, 16000)
@@ -68,17 +75,19 @@ contains
    end subroutine run_closed_loops
 
    !> Work on a body along a path in n steps, as a share of the sum of absolute works
-   function work(law, path, n) result(share)
+   function work(law, path, n, cohesion) result(share)
       character(len=*), intent(in) :: law
       type(path_t), intent(in) :: path
       integer, intent(in) :: n
+      !> Attraction per length of a contact [N/m2]
+      real(wp), intent(in), optional :: cohesion
       real(wp) :: share
       type(pair_t) :: pair
       real(wp) :: angle(3), pose(3), rate(3), piece, total
       integer :: k
 
       call new_pair(law, block_at(0.0_wp, 0.0_wp, 1.0_wp, 1.0_wp, 0.0_wp), &
-                    block_at(0.0_wp, 0.0_wp, path%side, path%side, 0.0_wp), pair)
+                    block_at(0.0_wp, 0.0_wp, path%side, path%side, 0.0_wp), pair, cohesion)
       share = 0.0_wp
       total = 0.0_wp
       do k = 1, n

@@ -32,13 +32,15 @@ module posed_pair
 contains
 
    !> Create two bodies from their polygons.
-   subroutine new_pair(law, first, second, pair)
+   subroutine new_pair(law, first, second, pair, cohesion)
       !> Entry `law` of &forces
       character(len=*), intent(in) :: law
       !> Corners of each body, (2, corner) [m]
       real(wp), intent(in) :: first(:, :), second(:, :)
       !> The pair
       type(pair_t), intent(out) :: pair
+      !> Attraction per length of a contact, 0 if absent [N/m2]
+      real(wp), intent(in), optional :: cohesion
       type(body_list_t) :: list
       type(forces_settings_t) :: settings
       type(error_t), allocatable :: error
@@ -50,8 +52,10 @@ contains
       settings%law = law
       settings%damping = 'none'
       settings%friction = 'none'
+      if (present(cohesion)) settings%cohesion = cohesion
       call new_force_law(settings, pair%bodies, pair%law)
       pair%contacts%area_is_effective = pair%law%needs_effective_area
+      pair%contacts%has_cohesion = pair%law%needs_cohesion
    end subroutine new_pair
 
    !> Compute the forces and torques of the present poses.

@@ -235,7 +235,7 @@ contains
       associate (works => dt*total(at_channels + 1:at_walls), on_walls => dt*total(at_walls + 1:), &
                  mass_time => dt*total(at_mass), torques => dt*total(at_torque:at_torque + 1))
          balance%elastic_work = works(1)
-         if (walls%energy_is_quadratic .and. .not. total(at_unknown) > 0.0_wp) &
+         if (walls%energy_is_known .and. .not. total(at_unknown) > 0.0_wp) &
             balance%elastic_work = sums%elastic_start - total(at_energy)
          balance%damping_work = works(2)
          balance%friction_work = works(3)
@@ -344,7 +344,7 @@ contains
          call accumulate_all(now, -0.5_wp, gravity, bodies, forces)
          call add_walls(bodies, walls, -0.5_wp, 1_ip, bodies%n, now%power_sum, now%wall_sum, energy)
       end if
-      if (.not. walls%energy_is_quadratic) energy = 0.0_wp
+      if (.not. walls%energy_is_known) energy = 0.0_wp
       n = size(bodies%free, kind=ip)
       n_blocks = max(1_ip, min(n/block, most_blocks))
       ends(:n_blocks) = [(int(int(n, lp)*int(b, lp)/int(n_blocks, lp), ip), b=0_ip, n_blocks)]

@@ -63,7 +63,7 @@ contains
       end associate
       self%stage = stage_elastic
       self%needs_effective_area = .true.
-      self%energy_is_quadratic = .true.
+      self%energy_is_known = .true.
       self%stiffness = pairs%stiffness
    end subroutine configure
 

@@ -4,9 +4,8 @@
 !> force changes by -k_t v_t dt and is limited to mu F_n. So is its sum with the dashpot force -d sqrt(k_t m_t) v_t,
 !> 1/m_t = 1/m1 + 1/m2 + r1^2/I1 + r2^2/I2 (p. 144). The contact history stores the limited spring force.
 !>
-!> Coulomb's limit applies to contacts under pressure, F_n >= 0. Where another part pulls the bodies together, F_n < 0,
-!> the limit is zero: there is no friction, and the spring force is reset to zero. A cohesive part with friction under
-!> tension must compute that friction itself.
+!> Coulomb's limit applies to the pressure of a contact, the normal force without cohesion. A contact without pressure
+!> has no friction, and its spring force is reset to zero.
 !>
 !> With v_t at the end of the step, as in Matuttis & Chen, the spring is of first order in the step with any integration
 !> scheme, and an undamped spring is unstable for w dt > 1.41. With v_t in the middle of the step its extension follows
@@ -71,8 +70,8 @@ contains
       type(contact_history_t), intent(inout) :: history
       real(wp) :: load(block_size)
 
-      if (allocated(self%coefficient%factor)) then
-         load(:block%n) = block%normal_force(:block%n)
+      if (block%has_cohesion .or. allocated(self%coefficient%factor)) then
+         load(:block%n) = block%normal_force(:block%n) - block%cohesion(:block%n)
          call self%coefficient%scale(block%n, block%material, load)
          call add_limited(self, bodies, dt, load, block, history)
       else
@@ -86,7 +85,7 @@ contains
       !> Bodies, for their masses and velocities
       type(bodies_t), intent(in) :: bodies
       real(wp), intent(in) :: dt
-      !> Normal force of each contact, times the factor of its friction coefficient [N/m]
+      !> Normal force of each contact without cohesion, times the factor of its friction coefficient [N/m]
       real(wp), intent(in) :: load(block_size)
       type(contact_block_t), intent(inout) :: block
       type(contact_history_t), intent(inout) :: history

@@ -6,6 +6,7 @@
 module polydem_force_law
    use polydem_area_law, only: area_law_t
    use polydem_bodies, only: bodies_t
+   use polydem_cohesion, only: cohesion_t
    use polydem_conservative_law, only: conservative_law_t
    use polydem_contact_block, only: contact_block_t
    use polydem_linearised_contact, only: linearised_contact_t
@@ -53,8 +54,8 @@ module polydem_force_law
       logical :: needs_shares = .false.
       !> Whether a part needs the accelerations of the last step
       logical :: needs_accelerations = .false.
-      !> Whether the energy of all elastic forces is half of elastic area/length
-      logical :: energy_is_quadratic = .false.
+      !> Whether the energy of all elastic forces is known: half of elastic area/length, and cohesion area/length
+      logical :: energy_is_known = .false.
       !> Names of the parts, for `polydem check` and the log
       character(len=:), allocatable :: description
    contains
@@ -111,6 +112,7 @@ contains
          if (s%damping == 'matuttis_chen') call law%add(matuttis_chen_damping_t(name='Matuttis-Chen damping'), s)
          if (s%damping == 'rate' .and. s%damping_from_touch) &
             call law%add(damping_onset_t(name='from first touch'), s)
+         if (law%pairs%cohesion%greatest() > 0.0_wp) call law%add(cohesion_t(name='cohesion'), s)
          if (s%damping /= 'none' .and. s%tilt_damping > 0.0_wp) call law%add(tilt_damping_t(name='damping of tilts'), s)
          if (law%pairs%friction_coefficient%greatest() > 0.0_wp) then
             if (s%friction == 'cundall_strack') call law%add(cundall_strack_t(name='Cundall-Strack friction'), s)
@@ -176,7 +178,7 @@ contains
             law%needs_twist = law%needs_twist .or. part%needs_twist
             law%needs_shares = law%needs_shares .or. part%needs_shares
             law%needs_accelerations = law%needs_accelerations .or. part%needs_accelerations
-            law%energy_is_quadratic = law%energy_is_quadratic .or. part%energy_is_quadratic
+            law%energy_is_known = law%energy_is_known .or. part%energy_is_known
             part%first_column = size(law%history_kinds) + 1
             if (allocated(part%history_kinds)) law%history_kinds = [law%history_kinds, part%history_kinds]
             if (k > 1 .and. part%stage /= stage_on_damping) law%description = law%description//','
@@ -190,7 +192,11 @@ contains
             law%description = law%description//', '//trim(part%name)
          end associate
       end if
-      if (law%needs_cohesion) law%energy_is_quadratic = .false.
+      do k = 1, size(law%parts)
+         associate (part => law%parts(k)%part)
+            if (part%needs_cohesion .and. .not. part%cohesion_has_energy) law%energy_is_known = .false.
+         end associate
+      end do
       law%description = trim(adjustl(law%description))
    end subroutine collect_needs
 
@@ -237,6 +243,7 @@ contains
       type(contact_history_t), intent(inout) :: history
       integer :: k
 
+      block%has_cohesion = law%needs_cohesion
       associate (n => block%n)
          block%elastic(:n) = 0.0_wp
          block%cohesion(:n) = 0.0_wp
@@ -328,7 +335,7 @@ contains
             is_weak = is_weak .or. (part%dissipates .and. part%is_weak)
          end associate
       end do
-      if (.not. law%energy_is_quadratic) note = note//', the area law gains energy where slender bodies rock'
+      if (.not. law%energy_is_known) note = note//', the area law gains energy where slender bodies rock'
       if (.not. damps) note = note//', nothing is damped'
       if (damps .and. is_weak) note = note//', damping is weak'
       if (damps .and. .not. damps_tilts) note = note//', tilts are not damped'

@@ -47,8 +47,8 @@ module polydem_force_part
       integer :: stage = stage_normal
       !> Whether `area` and the derived columns must be those of the effective area
       logical :: needs_effective_area = .false.
-      !> Whether it adds to the column `cohesion`
-      logical :: needs_cohesion = .false.
+      !> Whether it adds to the column `cohesion`, and whether the energy of this attraction is cohesion*area/length
+      logical :: needs_cohesion = .false., cohesion_has_energy = .false.
       !> Whether it adds to the column `twist`
       logical :: needs_twist = .false.
       !> Whether it needs the shares of contacts with fixed bodies
@@ -56,7 +56,7 @@ module polydem_force_part
       !> Whether it needs the accelerations of the last step
       logical :: needs_accelerations = .false.
       !> Whether the energy of its elastic force is half of elastic area/length
-      logical :: energy_is_quadratic = .false.
+      logical :: energy_is_known = .false.
       !> Whether it dissipates energy in every normal impact
       logical :: dissipates = .false.
       !> Whether it damps tilts

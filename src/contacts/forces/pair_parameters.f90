@@ -6,7 +6,8 @@
 !> * stiffness: harmonic mean, 2 E1 E2/(E1 + E2). Each body deforms as if it were half of the contact, and both halves
 !>   bear the same force;
 !> * restitution and friction coefficient: the smaller one, since the more dissipative and the smoother body decide;
-!> * damping coefficient and ratio of tangential stiffness: arithmetic mean.
+!> * damping coefficient and ratio of tangential stiffness: arithmetic mean;
+!> * cohesion: geometric mean, so a material without cohesion sticks to none.
 !>
 !> Bodies without a material have number 0 and the values of &forces.
 module polydem_pair_parameters
@@ -31,10 +32,12 @@ module polydem_pair_parameters
       type(pair_value_t) :: friction_coefficient
       !> Tangential stiffness k_t [N/m2]
       type(pair_value_t) :: tangential_stiffness
+      !> Attraction per length of a contact [N/m2]
+      type(pair_value_t) :: cohesion
    end type pair_parameters_t
 
    !> Number of parameters
-   integer, parameter :: n_parameters = 5
+   integer, parameter :: n_parameters = 6
 
 contains
 
@@ -52,7 +55,8 @@ contains
       allocate (values(n_parameters, 0:n), table(0:n, 0:n, n_parameters))
       do i = 0_ip, n
          values(:, i) = [settings%forces%stiffness, settings%forces%restitution, settings%forces%damping_coefficient, &
-                         settings%forces%friction_coefficient, settings%forces%tangential_stiffness]
+                         settings%forces%friction_coefficient, settings%forces%tangential_stiffness, &
+                         settings%forces%cohesion]
          if (i == 0_ip) cycle
          associate (material => settings%material(i))
             call take(values(1, i), material%stiffness)
@@ -60,6 +64,7 @@ contains
             call take(values(3, i), material%damping_coefficient)
             call take(values(4, i), material%friction_coefficient)
             call take(values(5, i), material%tangential_stiffness)
+            call take(values(6, i), material%cohesion)
          end associate
       end do
       do j = 0_ip, n
@@ -76,6 +81,7 @@ contains
             call take(table(i, j, 3), pair%damping_coefficient)
             call take(table(i, j, 4), pair%friction_coefficient)
             call take(table(i, j, 5), pair%tangential_stiffness)
+            call take(table(i, j, 6), pair%cohesion)
             table(j, i, :) = table(i, j, :)
          end associate
       end do
@@ -85,6 +91,7 @@ contains
       pairs%damping_coefficient = new_pair_value(table(:, :, 3), 1.0_wp)
       pairs%friction_coefficient = new_pair_value(table(:, :, 4), 1.0_wp)
       pairs%tangential_stiffness = new_pair_value(table(:, :, 5)*table(:, :, 1), pairs%tangential_stiffness%one)
+      pairs%cohesion = new_pair_value(table(:, :, 6), 1.0_wp)
    end function pair_parameters
 
    !> Parameters of contacts between bodies without materials
@@ -97,6 +104,7 @@ contains
       pairs%damping_coefficient%one = forces%damping_coefficient
       pairs%friction_coefficient%one = forces%friction_coefficient
       pairs%tangential_stiffness%one = forces%tangential_stiffness*forces%stiffness
+      pairs%cohesion%one = forces%cohesion
    end function uniform_parameters
 
    !> Take a value if it is given.
@@ -116,7 +124,8 @@ contains
       real(wp) :: mixed(n_parameters)
 
       mixed = [2.0_wp*min(a(1), b(1))*(max(a(1), b(1))/(a(1) + b(1))), min(a(2), b(2)), &
-               0.5_wp*(a(3) + b(3)), min(a(4), b(4)), 0.5_wp*(a(5) + b(5))]
+               0.5_wp*(a(3) + b(3)), min(a(4), b(4)), 0.5_wp*(a(5) + b(5)), &
+               sqrt(a(6))*sqrt(b(6))]
       where (abs(a - b) <= 0.0_wp) mixed = a
    end function mixed
 

@@ -13,7 +13,7 @@ module polydem_static_depth
 
 contains
 
-   !> Find the depth d at which the elastic force of a flat contact, E w d/l, balances a load.
+   !> Find the depth d at which the elastic force of a flat contact, E w d/l, balances a load and the cohesion.
    subroutine static_depth(settings, block, depth, error)
       !> Groups &forces, &material and &contact_pair
       type(settings_t), intent(in) :: settings
@@ -24,9 +24,12 @@ contains
       !> Allocated if the depth is not less than the height of the block
       type(error_t), allocatable, intent(inout) :: error
       type(force_law_t) :: law
+      type(resting_block_t) :: loaded
 
       call choose_parts(settings%forces, law, pair_parameters(settings))
-      depth = law%static_depth(block)
+      loaded = block
+      loaded%load = block%load + law%pairs%cohesion%of(block%materials)*block%width
+      depth = law%static_depth(loaded)
       if (depth >= 0.0_wp .and. depth < block%height) return
       call raise(error, input_error, 'a block of height '//to_text(block%height)//' m sinks deeper than its height '// &
                  'under a load of '//to_text(block%load)//' N/m; increase stiffness in &forces, or '// &

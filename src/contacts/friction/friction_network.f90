@@ -98,7 +98,7 @@ contains
       type(contacts_t), intent(in) :: contacts
       integer(ip), intent(in) :: c
       type(friction_network_t), intent(inout) :: network
-      real(wp) :: lever(2)
+      real(wp) :: lever(2), pressure
 
       associate (d => contacts%direction(:, c), i => contacts%first(c), j => contacts%second(c))
          ! With the tangent (-d_y, d_x), arm x tangent = arm . d.
@@ -110,8 +110,10 @@ contains
             + (lever(1)**2*network%inverse(2, i) + lever(2)**2*network%inverse(2, j))
       end associate
       network%inverse_mobility(c) = 1.0_wp/network%mobility(c)
-      network%limit(c) = merge(0.0_wp, coefficient*max(0.0_wp, contacts%normal_force(c)), is_degenerate(contacts, c))
-      network%noise(c) = rounding*network%mobility(c)*abs(contacts%normal_force(c))
+      pressure = contacts%normal_force(c)
+      if (contacts%has_cohesion) pressure = pressure - contacts%cohesion(c)
+      network%limit(c) = merge(0.0_wp, coefficient*max(0.0_wp, pressure), is_degenerate(contacts, c))
+      network%noise(c) = rounding*network%mobility(c)*abs(pressure)
    end subroutine fill_contact
 
    !> Choose the order of sweeps.

@@ -37,7 +37,7 @@ contains
       type(contacts_t), intent(inout) :: contacts
       type(contact_history_t), intent(inout) :: history
 
-      contacts%energy_is_quadratic = law%energy_is_quadratic
+      contacts%energy_is_known = law%energy_is_known
       call walk(bodies, dt, contacts, history, law=law)
    end subroutine evaluate_law
 
