@@ -15,10 +15,9 @@ module polydem_force_sums
    use polydem_kinds, only: ip, wp
    implicit none
    private
-   public :: force_sums_t, contact_terms_t, term_list_t, n_terms, of_elastic, of_normal, of_tangential
-   public :: sum_x, sum_y, sum_torque, sum_energy, begin_sums, start_sums, clear_sums, terms_of_block, term_of
-   public :: reserve_terms, append_term, add_terms, add_late_terms, assemble_forces, total_forces, find_forces
-   public :: set_force
+   public :: force_sums_t, contact_terms_t, term_list_t, n_terms, of_elastic, of_normal, of_tangential, sum_x, sum_y
+   public :: sum_torque, sum_energy, begin_sums, start_sums, clear_sums, terms_of_block, term_of, reserve_terms
+   public :: append_term, add_terms, add_late_terms, assemble_forces, total_forces, find_forces, set_force
 
    !> Kinds of forces: elastic forces with cohesion; all normal forces, with the twist; tangential forces
    integer, parameter :: of_elastic = 1, of_normal = 2, of_tangential = 3
@@ -74,7 +73,6 @@ contains
 
    !> Make room for the sums of n bodies. New sums are zero.
    subroutine reserve_sums(n, sums)
-      !> Number of bodies
       integer(ip), intent(in) :: n
       type(force_sums_t), intent(inout) :: sums
 
@@ -86,12 +84,11 @@ contains
       allocate (sums%has_terms(n), source=.false.)
    end subroutine reserve_sums
 
-   !> Set the sums of all bodies to zero.
+   !> Set the sums of all n bodies to zero.
    subroutine start_sums(n, sums)
       !> Number of bodies
       integer(ip), intent(in) :: n
       type(force_sums_t), intent(inout) :: sums
-
       call reserve_sums(n, sums)
       call clear_sums(1_ip, n, sums)
    end subroutine start_sums
@@ -158,12 +155,10 @@ contains
             second(9, c) = -tangential*(block%arm_second(c, 1)*x + block%arm_second(c, 2)*y)
             second(10, c) = first(10, c)
          end do
-         if (.not. block%has_cohesion) return
-         do c = 1_ip, block%n
-            first(10, c) = first(10, c) + 0.5_wp*block%cohesion(c)*block%area(c)/block%length(c)
-            second(10, c) = first(10, c)
-         end do
       end associate
+      if (block%has_cohesion) terms%first(10, :block%n) = terms%first(10, :block%n) &
+         + 0.5_wp*block%cohesion(:block%n)*block%area(:block%n)/block%length(:block%n)
+      if (block%has_cohesion) terms%second(10, :block%n) = terms%first(10, :block%n)
    end subroutine terms_of_block
 
    !> Term of one body of a contact. The energy of a contact is divided between its two bodies.

@@ -107,7 +107,8 @@ VARIED = {
     "forces.restitution": "0.3",
     "forces.tilt_damping": "0.5", "forces.friction_coefficient": "0.6", "forces.tangential_stiffness": "0.5",
     "forces.tangential_damping": "0.5", "forces.friction_tolerance": "1e-6",
-    "forces.drag": "2", "forces.cohesion": "2e4", "scene.material": "one", "scene.wall_material": "one", "grains.one.material": "one",
+    "forces.drag": "2", "forces.cohesion": "2e4",
+    "scene.material": "one", "scene.wall_material": "one", "grains.one.material": "one",
     "wall.one.material": "one", "material.one.density": "1000", "contact_pair.one.materials": "one', 'one",
     **{f"{group}.one.{key}": value for group in ("material", "contact_pair") for key, value in {
         "stiffness": "1e6", "restitution": "0.3", "damping_coefficient": "0.2", "friction_coefficient": "0.6",

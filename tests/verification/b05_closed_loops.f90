@@ -57,8 +57,8 @@ contains
                                     work('conservative', smooth(k), 400), 1.0e-13_wp)
       end do
       do k = 1, size(smooth)
-         call table%expect_absolute('conservative law with cohesion, path '//to_text(int(k, ip))//', 400 steps', 0.0_wp, &
-                                    work('conservative', smooth(k), 400, attraction), 1.0e-13_wp)
+         call table%expect_absolute('conservative law with cohesion, path '//to_text(int(k, ip))//', 400 steps', &
+                                    0.0_wp, work('conservative', smooth(k), 400, attraction), 1.0e-13_wp)
       end do
       coarse = work('conservative', tilting, 250)
       fine = work('conservative', tilting, 16000)
