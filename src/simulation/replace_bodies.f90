@@ -8,6 +8,7 @@
 !> the bodies bring and take.
 module polydem_replace_bodies
    use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_bodies_in_cell, only: set_cell
    use polydem_body_fields, only: serialize_bodies
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: ip, lp, wp
@@ -54,6 +55,7 @@ contains
       call pack_state(self, slots, added%n, packed)
       if (added%n_all > 0_ip) then
          call start_added(self, added)
+         call set_cell(added, self%bodies%cell)
          slots = [(s, s=1_ip, added%n)]
          call pack_bodies(added, slots, new)
          call join_packed(packed%bodies, new)

@@ -2,6 +2,8 @@
 module polydem_packed_bodies
    use polydem_bodies, only: allocate_with_corners, bodies_t
    use polydem_body_fields, only: serialize_constants, serialize_corners, serialize_sizes, serialize_vertices
+   use polydem_bodies_in_cell, only: set_cell
+   use polydem_cell, only: cell_t
    use polydem_communicator, only: communicator_t
    use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp
@@ -25,6 +27,8 @@ module polydem_packed_bodies
       integer(ip) :: n_all = 0_ip, last_id = 0_ip
       !> Instruction set of the kernels that compute with the bodies
       integer :: isa = isa_base
+      !> Periodic cell in which the bodies are
+      type(cell_t) :: cell
    end type packed_bodies_t
 
 contains
@@ -51,6 +55,7 @@ contains
       packed%n_all = bodies%n_all
       packed%last_id = bodies%last_id
       packed%isa = bodies%isa
+      packed%cell = bodies%cell
       corners = bodies%pieces%vertex_start(2:) - bodies%pieces%vertex_start(:bodies%n)
       packed%list%slots = slots
       call serialize_list(packed%list, bodies%global_index, corners)
@@ -178,6 +183,7 @@ contains
       bodies%n_all = packed%n_all
       bodies%last_id = packed%last_id
       bodies%isa = packed%isa
+      call set_cell(bodies, packed%cell)
       allocate (slots(n))
       slots(order) = [(s, s=1_ip, n)]
       call packed%constants%restore_to(slots)
