@@ -8,6 +8,7 @@
 !> from the difference of their positions, which is exact; the precision is then independent of the distance from the
 !> origin.
 module polydem_bodies
+   use polydem_cell, only: cell_t
    use polydem_elementary, only: sines_and_cosines
    use polydem_hash, only: mix_word
    use polydem_instruction_set, only: isa_base
@@ -17,7 +18,7 @@ module polydem_bodies
    implicit none
    private
    public :: bodies_t, allocate_bodies, allocate_with_corners, measure_bodies, turn_bodies, turn_block, &
-      find_directions, block_size, measure_sizes, state_hash, state_words
+      find_directions, block_size, measure_sizes, state_hash, state_words, image_word
 
    !> Greatest number of bodies of a block for `turn_block`
    integer(ip), parameter :: block_size = 64_ip
@@ -64,6 +65,13 @@ module polydem_bodies
       real(wp), allocatable :: acceleration(:, :)
       !> Angular acceleration [rad/s2]
       real(wp), allocatable :: angular_acceleration(:)
+      !> Periodic cell in which the bodies are
+      type(cell_t) :: cell
+      !> In a periodic cell the number of cells that each body has crossed along each axis: without the cell its centre
+      !> would be at `position + image*cell%size`, (slot, x or y)
+      integer(ip), allocatable :: image(:, :)
+      !> In a periodic cell 1/size for each body and axis, 0 along axes along which it does not repeat, (2, slot) [1/m]
+      real(wp), allocatable :: folds(:, :)
       !> Sum of the forces, (2, slot) [N/m]. A step keeps the sums of fixed bodies only, see `total_forces`
       real(wp), allocatable :: force(:, :)
       !> Sum of the torques about the centre of mass, likewise [N]
@@ -250,6 +258,10 @@ contains
             state_hash = mix_word(state_hash, words(k))
          end do
       end do
+      if (.not. allocated(bodies%image)) return
+      do s = 1_ip, bodies%n
+         state_hash = mix_word(state_hash, image_word(bodies, s))
+      end do
    end function state_hash
 
    !> Contribution of a body to the hash of the state
@@ -263,6 +275,15 @@ contains
       words = [int(bodies%id(s), lp), bits(bodies%position(1, s)), bits(bodies%position(2, s)), bits(bodies%angle(s)), &
                bits(bodies%velocity(1, s)), bits(bodies%velocity(2, s)), bits(bodies%angular_velocity(s))]
    end function state_words
+
+   !> Contribution of the cells that a body has crossed to the hash of the state in a periodic cell
+   pure integer(lp) function image_word(bodies, s)
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+
+      image_word = ior(shiftl(int(bodies%image(s, 1), lp), 32), iand(int(bodies%image(s, 2), lp), 2_lp**32 - 1_lp))
+   end function image_word
 
    !> Bits of a real number in double precision
    pure integer(lp) function bits(number)

@@ -17,6 +17,10 @@ contains
       type(bodies_t), intent(inout) :: bodies
 
       call serializer%field('/bodies/position', bodies%position, 'm', 'centres of mass')
+      if (allocated(bodies%image)) then
+         call serializer%field('/bodies/image_x', bodies%image(:, 1), '1', 'cells crossed along x')
+         call serializer%field('/bodies/image_y', bodies%image(:, 2), '1', 'cells crossed along y')
+      end if
       call serializer%field('/bodies/angle', bodies%angle, 'rad', 'angles since the start')
       call serializer%field('/bodies/velocity', bodies%velocity, 'm/s', 'velocities of the centres of mass')
       call serializer%field('/bodies/angular_velocity', bodies%angular_velocity, 'rad/s', 'angular velocities')

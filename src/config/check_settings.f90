@@ -23,6 +23,9 @@ module polydem_check_settings
    character(len=*), parameter :: too_slender = 'must not exceed 1e6 times', too_small = 'must be 0, or at least'
    !> What is said of an oscillation beyond the limit of the speed
    character(len=*), parameter :: too_fast = 'gives a speed of 1e6 m/s or more together with'
+   !> What is said of a rotation in a periodic cell
+   character(len=*), parameter :: no_rotation = 'cannot be ''rotation'' in a periodic cell, whose copies do not '// &
+      'turn with it; use translation or oscillation'
    !> Angle of a full turn [rad]
    real(wp), parameter :: two_pi = 6.283185307179586_wp
    !> Lower limit of the restitution. Below it, the stable time step is proportional to the square root of the
@@ -47,6 +50,7 @@ contains
 
       call check_scene(settings, instances(index_of_instance(instances, 'scene')), error)
       call check_motions(settings, instances, error)
+      call check_cell(settings, instances, error)
       associate (group => instances(index_of_instance(instances, 'forces')))
          associate (given => group%values(row_of(group, 'restitution')))
             if (given%is_active .and. settings%forces%restitution < least_restitution) then
@@ -132,6 +136,45 @@ contains
          end associate
       end do
    end subroutine check_motions
+
+   !> Check what cannot be combined with a periodic cell.
+   pure subroutine check_cell(settings, instances, error)
+      type(settings_t), intent(in) :: settings
+      type(instance_t), intent(in) :: instances(:)
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: axis, k
+
+      if (settings%cell%periodic == 'none') return
+      do axis = 1, 2
+         if (scan(settings%cell%periodic, 'xy'(axis:axis)) == 0 .or. settings%cell%size(axis) > 0.0_wp) cycle
+         call blame(instances(index_of_instance(instances, 'cell')), 'size', &
+            'must be positive along each periodic axis; for example size = 0.4, 0.4', error)
+      end do
+      associate (scene => instances(index_of_instance(instances, 'scene')))
+         if (.not. any(settings%scene%name == [character(len=5) :: 'parts', 'file'])) call blame(scene, 'name', &
+            'must be left out in a periodic cell, since recipes have walls around the grains; start from the '// &
+            'groups &grains and &wall that check --expand prints, without these walls', error)
+         if (settings%scene%motion == 'rotation') call blame(scene, 'motion', no_rotation, error)
+      end associate
+      do k = 1, size(settings%motion)
+         if (settings%motion(k)%kind == 'rotation') call blame( &
+            instances(index_of_instance(instances, 'motion', settings%motion(k)%name)), 'kind', no_rotation, error)
+      end do
+      if (settings%output%trace_steps > 0) call blame(instances(index_of_instance(instances, 'output')), &
+         'trace_steps', 'must be 0 in a periodic cell, where the number of boxes changes', error)
+   end subroutine check_cell
+
+   !> Raise an error about an entry.
+   pure subroutine blame(instance, key, text, error)
+      type(instance_t), intent(in) :: instance
+      character(len=*), intent(in) :: key
+      !> What is wrong, as a predicate
+      character(len=*), intent(in) :: text
+      type(error_t), allocatable, intent(inout) :: error
+
+      call raise(error, input_error, instance%values(row_of(instance, key))%place//': '''//key//''' in &'// &
+         trim(instance%group)//' '//text)
+   end subroutine blame
 
    !> Raise an error about two entries of a group if their relation does not hold. The error names the place of `key` if
    !> this entry is given, otherwise the place of `other`; of both, the place on the command line.

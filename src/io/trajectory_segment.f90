@@ -1,7 +1,9 @@
 !> One segment of a trajectory: a self-describing HDF5 file.
 !>
 !>     /bodies      id, fixed, mass, inertia, vertex_start, vertex: the bodies, in ascending order of identifiers
-!>     /frames      step, time, position, angle, velocity, angular_velocity: one row per frame
+!>     /cell        low, size: periodic cell (in a periodic cell)
+!>     /frames      step, time, position, angle, velocity, angular_velocity: one row per frame;
+!>                  image (in a periodic cell)
 !>     /walls       id; force and torque on the fixed bodies: one row per frame
 !>     /contacts    start: rows start[k] to start[k + 1] - 1 belong to frame k; first, second, area, point,
 !>                  normal, force: one row per contact (optional)
@@ -62,6 +64,11 @@ contains
          call blocks%to_blocks(comm, reshape(int(bodies%material, lp), [1, size(bodies%material)]), block)
          call file%write('/bodies/material', int(block(1, :), ip), error, '1', &
                          'material: position among the groups &material of the namelist, 0: none of them', part)
+      end if
+      if (bodies%cell%is_periodic) then
+         call file%write('/cell/low', real(bodies%cell%low, dp), error, 'm', 'lower left corner of the periodic cell')
+         call file%write('/cell/size', real(bodies%cell%size, dp), error, 'm', &
+                         'its width and height; 0 along an axis that is not periodic')
       end if
       if (.not. any(bodies%fixed(:bodies%n))) return
       call file%write('/walls/id', pack(bodies%id(:bodies%n), bodies%fixed(:bodies%n)), error, '1', &
@@ -149,6 +156,7 @@ contains
       type(row_distribution_t) :: blocks
       type(part_t) :: part
       real(dp), allocatable :: state(:, :), block(:, :)
+      integer(lp), allocatable :: images(:, :)
       integer(ip) :: s
 
       allocate (state(6, bodies%n))
@@ -171,6 +179,10 @@ contains
                       rows=one_row)
       call file%write('/frames/angular_velocity', component(block, 6), error, 'rad/s', &
                       'angular velocities, anticlockwise', part, rows=one_row)
+      if (.not. allocated(bodies%image)) return
+      call blocks%to_blocks(comm, transpose(int(bodies%image, lp)), images)
+      call file%write('/frames/image', int(images, ip), error, '1', &
+                      'cells crossed: position + image*size is the path without the cell', part, rows=one_row)
    end subroutine add_frame
 
    !> Add the forces and torques on the fixed bodies, if there are any.

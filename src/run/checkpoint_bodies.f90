@@ -2,8 +2,10 @@
 !> the scene.
 module polydem_checkpoint_bodies
    use polydem_bodies, only: allocate_with_corners, bodies_t, measure_bodies
+   use polydem_bodies_in_cell, only: set_cell
    use polydem_body_fields, only: serialize_bodies, serialize_constants, serialize_corners, serialize_vertices
    use polydem_body_list, only: check_mass
+   use polydem_cell, only: cell_t
    use polydem_communicator, only: communicator_t
    use polydem_errors, only: error_t, input_error, raise
    use polydem_kinds, only: far, ip, lp, wp
@@ -67,6 +69,7 @@ contains
       integer(ip) :: k, last_id(1)
       integer :: isa
       logical :: has_materials
+      type(cell_t) :: cell
 
       call choose_bodies(serializer, comm, taken)
       if (allocated(serializer%error)) return
@@ -74,11 +77,13 @@ contains
       call serialize_last(serializer, last_id)
       isa = bodies%isa
       has_materials = allocated(bodies%material)
+      cell = bodies%cell
       call allocate_with_corners(bodies, taken%corners)
       if (has_materials) allocate (bodies%material(bodies%n))
       bodies%n_all = taken%n_all
       bodies%last_id = max(last_id(1), taken%last_id)
       bodies%isa = isa
+      call set_cell(bodies, cell)
       bodies%global_index = int(taken%row, ip)
       call serializer%choose_rows('/bodies/', taken%row)
       call serializer%choose_rows('/vertices/', taken%vertex)

@@ -29,6 +29,7 @@ contains
       associate (s => simulation)
          call log%write_line('bodies     '//to_text(measures%free)//' free, '//to_text(measures%fixed)//' fixed, '// &
                              to_text(measures%corners)//' vertices')
+         if (s%bodies%cell%is_periodic) call log%write_line('cell       '//cell_text(s))
          call write_measures(measures, log)
          call log%write_line('boxes      '//to_text(measures%boxes)//', including '//to_text(measures%fixed_boxes)// &
                              ' of fixed bodies')
@@ -66,6 +67,26 @@ contains
          end if
       end associate
    end subroutine describe
+
+   !> Periodic axes and sides of the cell, and the number of bodies that were outside
+   function cell_text(simulation) result(text)
+      type(simulation_t), intent(in) :: simulation
+      character(len=:), allocatable :: text
+      character(len=1), parameter :: name(2) = ['x', 'y']
+      integer :: axis
+
+      text = 'periodic'
+      associate (cell => simulation%bodies%cell)
+         do axis = 1, 2
+            if (.not. cell%size(axis) > 0.0_wp) cycle
+            text = text//', '//name(axis)//' '//to_text(cell%low(axis))//' to '// &
+               to_text(cell%low(axis) + cell%size(axis))//' m'
+         end do
+      end associate
+      if (simulation%n_outside == 1_lp) text = text//'; 1 body outside was moved into it'
+      if (simulation%n_outside > 1_lp) text = text//'; '//to_text(simulation%n_outside)// &
+         ' bodies outside were moved into it'
+   end function cell_text
 
    !> Write sizes, masses, densities and speeds of the bodies.
    subroutine write_measures(measures, log)

@@ -20,16 +20,19 @@ contains
       type(simulation_t), intent(inout) :: simulation
       type(log_t), intent(inout) :: log
       type(balance_t) :: balance
+      character(len=:), allocatable :: angular
 
       call compute_balance(simulation, balance)
       call log%write_line('')
       call log%write_line('work [J/m]: elastic '//to_text(balance%elastic_work, 4)//', damping '// &
                           to_text(balance%damping_work, 4)//', friction '//to_text(balance%friction_work, 4)// &
                           ', walls '//to_text(balance%wall_work, 4))
+      angular = ''
+      if (.not. simulation%bodies%cell%is_periodic) &
+         angular = ', angular momentum '//to_text(balance%relative_angular_residual, 2)
       call log%write_line('residuals: energy '//to_text(balance%relative_energy_residual, 2)// &
                           ' of the largest kinetic energy or work so far, momentum '// &
-                          to_text(balance%relative_momentum_residual, 2)//', angular momentum '// &
-                          to_text(balance%relative_angular_residual, 2))
+                          to_text(balance%relative_momentum_residual, 2)//angular)
       if (balance%relative_energy_residual > suspicious) call log%write_line( &
          'warning: the energy balance leaves '//to_text(balance%energy_residual, 3)//' J/m unexplained, '// &
          to_text(balance%relative_energy_residual, 3)//' of the largest kinetic energy or work so far. Reduce dt '// &

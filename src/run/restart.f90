@@ -352,7 +352,7 @@ contains
       end if
       ! The first step distributes the bodies again. The sums over all ranks continue on the root rank.
       associate (s => simulation, median_diameter => simulation%domain%median_diameter)
-         call new_domain(s%domain, s%settings%decomposition, (median_diameter), s%comm)
+         call new_domain(s%domain, s%settings%decomposition, (median_diameter), s%comm, s%bodies%cell)
          if (.not. s%comm%is_root()) then
             s%sums = 0_lp
             s%timers = timers_t()

@@ -85,7 +85,7 @@ contains
 
       if (.not. run%simulation%settings%output%energy_balance) return
       call compute_balance(run%simulation, run%balance)
-      call name_terms(run%balance, run%row)
+      call name_terms(run%balance, .not. run%simulation%bodies%cell%is_periodic, run%row)
    end subroutine update_balance
 
    !> Write a frame, unless an earlier attempt wrote it; collective.

@@ -12,6 +12,7 @@
 !> reverses, but this is harmless.
 module polydem_contact_flags
    use polydem_bodies, only: bodies_t
+   use polydem_cell, only: nearest_copy
    use polydem_contact_block, only: block_size, contact_block_t
    use polydem_contact_history, only: contact_history_t
    use polydem_contacts, only: contacts_t
@@ -189,6 +190,10 @@ contains
 
       x = bodies%position(1, s) - bodies%position(1, other)
       y = bodies%position(2, s) - bodies%position(2, other)
+      if (bodies%cell%is_periodic) then
+         x = nearest_copy(x, min(bodies%folds(1, s), bodies%folds(1, other)), bodies%cell%size(1))
+         y = nearest_copy(y, min(bodies%folds(2, s), bodies%folds(2, other)), bodies%cell%size(2))
+      end if
       centre_inside = x*x + y*y < radius(other)*radius(other)
       if (.not. centre_inside) return
       w = bodies%pieces%vertex_start(other + 1_ip) - 1_ip

@@ -1,5 +1,6 @@
 !> Parts of a simulation that depend on the bodies of a rank: force law, boxes, pair list with contact history, guards.
 module polydem_local_data
+   use polydem_bodies_in_cell, only: find_folds
    use polydem_box_maker, only: new_box_maker
    use polydem_contact_history, only: add_column, column_of, contact_history_t
    use polydem_contact_incidence, only: incidence_t
@@ -31,6 +32,7 @@ contains
       !> Median diameter of all free bodies of the run [m]; default: median of the free bodies of this rank
       real(wp), intent(in), optional :: median_diameter
 
+      call find_folds(self%bodies)
       call new_force_law(self%settings%forces, self%bodies, self%law, pair_parameters(self%settings))
       call fit_table(self%law, self%contacts)
       self%walk%walls%n = 0_ip
@@ -46,7 +48,7 @@ contains
       call rebuild_guard(self)
       associate (choice => self%settings%boxes)
          call new_box_maker(self%maker, self%bodies, choice%largest_ratio, choice%margin, self%boxes, error, &
-            median_diameter)
+            median_diameter, self%domain%margin)
       end associate
       if (allocated(error)) return
       call rebuild_neighbours(self, error)

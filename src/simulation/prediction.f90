@@ -4,7 +4,8 @@
 module polydem_prediction
    use polydem_bodies, only: block_size
    use polydem_body_runs, only: find_run, list_others, number_of_parts
-   use polydem_box_maker, only: have_boxes_within
+   use polydem_bodies_in_cell, only: put_into_cell
+   use polydem_boxes_within, only: have_boxes_within
    use polydem_errors, only: error_t
    use polydem_motion_check, only: check_poses, have_valid_poses
    use polydem_kinds, only: ip, wp
@@ -160,6 +161,7 @@ contains
 
       do k = 1, size(self%walls)
          call move_wall(self%walls(k), time, self%bodies)
+         if (self%bodies%cell%is_periodic) call put_into_cell(self%bodies, self%walls(k)%slots)
       end do
    end subroutine move_walls
 

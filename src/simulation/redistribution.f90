@@ -6,7 +6,7 @@
 !> restored. At the start of a run the bodies of a rank are anywhere; the first redistribution gives each rank its own.
 module polydem_redistribution
    use polydem_bodies, only: turn_bodies
-   use polydem_box_maker, only: have_boxes_within
+   use polydem_boxes_within, only: have_boxes_within
    use polydem_errors, only: error_t
    use polydem_motion_check, only: greatest_displacement
    use polydem_halo, only: new_halo
@@ -144,6 +144,7 @@ contains
       call rebuild_local_data(self, error, self%domain%median_diameter)
       call self%comm%all_reduce_error(error)
       if (allocated(error)) return
+      call measure_halo(self)
       call self%domain%set_reference(self%boxes%bounds(:, :self%boxes%n), self%step)
       associate (domain => self%domain)
          domain%redistributions = domain%redistributions + 1_lp
@@ -234,10 +235,9 @@ contains
       type(packed_boxes_t), intent(inout) :: own
       type(packed_bodies_t) :: halo
       integer(ip), allocatable :: sent(:), counts(:), counts_received(:), slots(:)
-      integer(lp) :: n_halo(1)
       integer(ip) :: s, n
 
-      call self%domain%rank_bounds%publish(self%comm, own%boxes)
+      call self%domain%rank_bounds%publish(self%comm, own%boxes, self%domain%period)
       call list_needed(self%domain, self%comm, own%boxes, sent, counts)
       sent = own%free(sent)
       call copy_packed(own%bodies, sent, halo)
@@ -249,9 +249,17 @@ contains
       self%bodies%free = pack([(s, s=1_ip, self%bodies%n)],.not. (self%bodies%fixed .or. self%bodies%in_halo))
       call new_halo(self%domain%halo, self%bodies%free, counts, slots(sent), counts_received, slots(n + 1_ip:), &
                     self%law%needs_accelerations)
-      n_halo = int(self%bodies%n - n, lp)
+   end subroutine receive_halo
+
+   !> Measure what the margin costs in each step: halo bodies, and images of boxes. Collective.
+   subroutine measure_halo(self)
+      type(simulation_t), intent(inout) :: self
+      integer(lp) :: n_halo(1)
+
+      n_halo = size(self%domain%halo%slots, kind=lp)
+      if (allocated(self%maker%images%source)) n_halo = n_halo + size(self%maker%images%source, kind=lp)
       call self%comm%all_reduce_sum(n_halo)
       self%domain%halo_share = real(n_halo(1), wp)/real(self%bodies%n_all, wp)
-   end subroutine receive_halo
+   end subroutine measure_halo
 
 end module polydem_redistribution

@@ -76,6 +76,8 @@ contains
       end do
       self%relaxation%move = greatest_displacement(self)
       deallocate (self%relaxation%from)
+      ! Images of boxes are chosen for the boxes of the last redistribution.
+      if (self%bodies%cell%is_periodic) call self%domain%forget_halo()
       call rebuild_local_data(self, error, self%domain%median_diameter)
    end subroutine relax_bodies
 

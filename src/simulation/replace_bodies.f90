@@ -8,6 +8,7 @@
 !> the bodies bring and take.
 module polydem_replace_bodies
    use polydem_bodies, only: bodies_t, turn_bodies
+   use polydem_bodies_in_cell, only: set_cell
    use polydem_body_fields, only: serialize_bodies
    use polydem_errors, only: error_t, raise, run_error
    use polydem_kinds, only: ip, lp, wp
@@ -56,6 +57,7 @@ contains
          if (allocated(self%bodies%material) .and. .not. allocated(added%material)) &
             allocate (added%material(added%n), source=0_ip)
          call start_added(self, added)
+         call set_cell(added, self%bodies%cell)
          slots = [(s, s=1_ip, added%n)]
          call pack_bodies(added, slots, new)
          call join_packed(packed%bodies, new)

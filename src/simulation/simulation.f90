@@ -109,6 +109,8 @@ module polydem_simulation
       type(expected_impact_t) :: expected
       !> Check of poses and displacements
       type(motion_check_t) :: motion_check
+      !> Number of bodies that were outside the periodic cell at the start
+      integer(lp) :: n_outside = 0_lp
       !> Summary of the relaxation before time 0
       type(relaxation_t) :: relaxation
       !> What a step leaves out for bodies in free flight

@@ -1,7 +1,9 @@
 !> The time step of a simulation.
 module polydem_time_step
    use polydem_bodies, only: turn_bodies
+   use polydem_box_images, only: place_images
    use polydem_box_maker, only: turn_and_bound
+   use polydem_boxes_within, only: have_boxes_within
    use polydem_completion, only: complete_step
    use polydem_contact_walk, only: walk_contacts
    use polydem_energy_balance, only: begin_step
@@ -48,7 +50,7 @@ contains
             call domain%halo%receive_halo(self%comm, self%bodies)
             call timers%lap(stage_decomposition)
          end if
-         call bound_others(self, error)
+         call bound_others(self, has_left, error)
          call timers%lap(stage_boxes)
          if (domain%has_zone()) then
             call redistribute(self, has_left, error)
@@ -70,14 +72,25 @@ contains
       end associate
    end subroutine advance
 
-   !> Update vertices and boxes of all but the free bodies.
-   subroutine bound_others(self, error)
+   !> Update vertices and boxes of all but the free bodies, and all images.
+   subroutine bound_others(self, has_left, error)
       type(simulation_t), intent(inout) :: self
+      !> Becomes true if a box of a wall leaves its padded box, for which its images are chosen
+      logical, intent(inout) :: has_left
       !> An error of the step, after which nothing is done
       type(error_t), allocatable, intent(in) :: error
 
-      if (.not. allocated(error)) &
-         call turn_and_bound(self%maker, self%moving(size(self%bodies%free) + 1:), self%bodies, self%boxes)
+      integer :: k
+
+      if (allocated(error)) return
+      call turn_and_bound(self%maker, self%moving(size(self%bodies%free) + 1:), self%bodies, self%boxes)
+      if (.not. self%bodies%cell%is_periodic) return
+      call place_images(self%maker%images, self%boxes)
+      if (.not. allocated(self%domain%reference)) return
+      do k = 1, size(self%walls)
+         has_left = has_left .or. .not. have_boxes_within(self%maker, self%walls(k)%slots, self%boxes, &
+                                                          self%domain%rank_bounds%zone, self%domain%reference)
+      end do
    end subroutine bound_others
 
    !> Update the pairs of bodies whose boxes overlap, and move their contact history with them.

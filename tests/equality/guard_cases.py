@@ -102,6 +102,7 @@ VARIED = {
     "grains.one.outline": "-4e-3, -4e-3, 4e-3, -4e-3, 0, 5e-3", "grains.one.angle": "30, 40",
     "grains.one.size_ratio": "2", "grains.one.velocity": "0.1, 0.2", "grains.one.speed": "1.5",
     "grains.one.moving_grains": "5", "grains.one.spin": "20", "grains.one.density": "1000", "grains.one.seed": "7",
+    "cell.low": "-0.3, -0.3", "cell.size": "0.6, 0.6", "wall.one.corners": "6",
     "boxes.largest_ratio": "2", "boxes.margin": "1e-4", "neighbours.skin": "1e-3",
     "forces.gravity": "10, -40", "forces.stiffness": "1e6", "forces.damping_coefficient": "0.2",
     "forces.restitution": "0.3",
@@ -242,7 +243,7 @@ def entry_cases(entries):
             continue
         condition, words = entry.condition or ("", ())
         scene = words[next(turn) % len(words)] if condition == "scene.name" else "drum"
-        scene = "parts" if entry.name.startswith((*PARTS, f"motion.{NAME}.wall")) else scene
+        scene = "parts" if entry.name.startswith((*PARTS, f"motion.{NAME}.wall", "cell.")) else scene
         base = dict(SCENES[scene])
         if condition and condition != "scene.name" and OUTPUT.get(condition) not in words:
             base[condition] = words[0]

@@ -63,6 +63,25 @@ SCENES = {
 &forces gravity = 0, -40 /
 &integrate duration = 0.02 /
 """,
+    # Grains that fly around a cell that is periodic along both axes, over its edges and corners.
+    "cell": """\
+&cell periodic = 'xy' low = -0.05, -0.03 size = 0.1, 0.1 /
+&grains name = 'sample' region = 'box' low = -0.05, -0.03 high = 0.05, 0.07 number = 70 arrangement = 'spread'
+   speed = 1 spin = 50 momentum = 'zero' /
+&forces gravity = 0, 0 stiffness = 2e5 /
+&integrate safety_factor = 0.1 duration = 0.03 /
+""",
+    # A chute: grains slide over a rough base that moves itself, and a shaking floor that spans the cell.
+    "chute": """\
+&cell periodic = 'x' low = 0.1, 0 size = 0.2, 0 /
+&wall name = 'base' outline = 'row' from = 0, 0 to = 0.2, 0 segments = 12 radius = 4e-3 corners = 7 /
+&wall name = 'floor' outline = 'line' from = 0, -5e-3 to = 0.4, -5e-3 thickness = 0.01 /
+&grains name = 'grains' region = 'box' low = 0, 6e-3 high = 0.2, 0.06 number = 80 speed = 1 /
+&motion name = 'belt' kind = 'translation' velocity = 2, 0 wall = 'base' /
+&motion name = 'shake' kind = 'oscillation' amplitude = 0, 1e-3 frequency = 100 wall = 'floor' /
+&forces gravity = 40, -60 stiffness = 2e6 /
+&integrate accumulation = 'compensated' duration = 0.02 /
+""",
     # At rest: nothing goes over a border unless the border moves.
     "stack": """\
 &scene name = 'stack' bodies = 9 width = 0.01 height = 0.01 /

@@ -9,8 +9,11 @@ module polydem_balance_values
 contains
 
    !> Set the terms of the balance as named values.
-   subroutine name_terms(balance, row)
+   subroutine name_terms(balance, with_angular, row)
       type(balance_t), intent(in) :: balance
+      !> Whether angular momentum is among them: in a periodic cell it is not conserved, since copies of a contact have
+      !> other arms
+      logical, intent(in) :: with_angular
       !> Row of named values; those of the balance are set
       type(named_values_t), intent(inout) :: row
 
@@ -22,10 +25,12 @@ contains
       call row%set('wall_work', balance%wall_work, 'J/m', 'work done by moving walls')
       call row%set('impulse_x', balance%impulse(1), 'N s/m', 'impulse of gravity and fixed bodies along x')
       call row%set('impulse_y', balance%impulse(2), 'N s/m', 'impulse of gravity and fixed bodies along y')
-      call row%set('angular_impulse', balance%angular_impulse, 'N s', 'their angular impulse about the origin')
+      if (with_angular) &
+         call row%set('angular_impulse', balance%angular_impulse, 'N s', 'their angular impulse about the origin')
       call row%set('momentum_x', balance%momentum(1), 'N s/m', 'momentum of the free bodies along x')
       call row%set('momentum_y', balance%momentum(2), 'N s/m', 'momentum of the free bodies along y')
-      call row%set('angular_momentum', balance%angular_momentum, 'N s', 'their angular momentum about the origin')
+      if (with_angular) &
+         call row%set('angular_momentum', balance%angular_momentum, 'N s', 'their angular momentum about the origin')
       call row%set('energy_residual', balance%energy_residual, 'J/m', 'unexplained energy')
    end subroutine name_terms
 

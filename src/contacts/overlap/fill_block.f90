@@ -12,6 +12,7 @@
 !> A contact of a batch is never degenerate.
 module polydem_fill_block
    use polydem_bodies, only: bodies_t
+   use polydem_cell, only: fold_offsets, nearest_copy
    use polydem_contact_block, only: block_size, contact_block_t, copy_motion
    use polydem_contact_history, only: contact_history_t
    use polydem_convex_overlap, only: find_overlap, overlap_t
@@ -54,6 +55,8 @@ contains
       call select_pairs(bodies, first, second, low, next, tested, history, block, batch)
       call describe_pairs(block%n, block%pair, first, second, bodies%radius, bodies%pieces%vertex_start, &
                           bodies%position, block%first, block%second, batch)
+      if (bodies%cell%is_periodic) &
+         call fold_offsets(bodies%cell, block%n, block%first, block%second, bodies%folds, batch%offset)
       call evaluate_batch(batch, block%n, bodies%pieces%turned, effective, bodies%isa, block%overlap_columns_t)
       block%degenerate(:block%n) = 0.0_wp
       all_certified = count(batch%certified(:block%n) > 0.0_wp) == block%n
@@ -110,6 +113,7 @@ contains
          n = min(block_size, n_found - done)
          call describe_pairs(n, found(done + 1:done + n), first, second, bodies%radius, bodies%pieces%vertex_start, &
                              bodies%position, i, j, batch)
+         if (bodies%cell%is_periodic) call fold_offsets(bodies%cell, n, i, j, bodies%folds, batch%offset)
          do k = 1_ip, n
             batch%memory(k) = memory(found(done + k))
          end do
@@ -186,7 +190,7 @@ contains
       block%n = c
    end subroutine select_in_range
 
-   !> Centre of the second body minus centre of the first [m]
+   !> Centre of the second body minus centre of the first; in a periodic cell the vector to the nearest copy [m]
    pure function offset_of(bodies, i, j) result(offset)
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: i, j
@@ -194,6 +198,8 @@ contains
 
       offset(1) = bodies%position(1, j) - bodies%position(1, i)
       offset(2) = bodies%position(2, j) - bodies%position(2, i)
+      if (bodies%cell%is_periodic) &
+         offset = nearest_copy(offset, min(bodies%folds(:, i), bodies%folds(:, j)), bodies%cell%size)
    end function offset_of
 
    !> Search the overlaps of the pairs that are not certified, and remove those that are no contacts.

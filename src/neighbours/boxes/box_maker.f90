@@ -14,6 +14,7 @@ module polydem_box_maker
    use polydem_bodies, only: block_size, bodies_t, turn_block
    use polydem_body_tiles, only: cut_body
    use polydem_body_sizes, only: median_of_diameters
+   use polydem_box_images, only: add_images, box_images_t, place_images, place_near
    use polydem_box_placement, only: extent_of, place_box, place_whole, turn
    use polydem_boxes, only: boxes_t
    use polydem_elementary, only: sine_and_cosine
@@ -24,8 +25,8 @@ module polydem_box_maker
    use polydem_strings, only: to_text
    implicit none
    private
-   public :: box_maker_t, new_box_maker, turn_and_bound, turn_and_bound_block, place_boxes, update_boxes, &
-      have_boxes_within
+   public :: box_maker_t, new_box_maker, turn_and_bound, turn_and_bound_block, turn_and_bound_in_cell, place_boxes, &
+      place_in_cell, update_boxes
 
    !> Allowance for rounding, in units of epsilon times the diameter of a body
    real(wp), parameter :: roundings = 64.0_wp
@@ -44,9 +45,8 @@ module polydem_box_maker
 
    !> Constant data for the boxes of bodies: tiles and paddings
    type :: box_maker_t
-      private
       !> Median diameter of the free bodies; huge if there is none [m]
-      real(wp), public :: median_diameter = huge(1.0_wp)
+      real(wp) :: median_diameter = huge(1.0_wp)
       !> Padding of the boxes of whole bodies on each side [m]
       real(wp) :: margin = 0.0_wp
       !> Box of each whole body, (body); for a body that is cut, minus its index in `cut`
@@ -55,12 +55,14 @@ module polydem_box_maker
       type(cut_body_t), allocatable :: cut(:)
       !> Tiles of these bodies in the body frame
       type(polygon_list_t) :: tiles
+      !> Images of boxes in a periodic cell
+      type(box_images_t) :: images
    end type box_maker_t
 
 contains
 
    !> Cut large bodies into tiles, and make the boxes of all bodies.
-   subroutine new_box_maker(maker, bodies, largest_ratio, margin, boxes, error, median_diameter)
+   subroutine new_box_maker(maker, bodies, largest_ratio, margin, boxes, error, median_diameter, room)
       !> Data for `update_boxes`
       type(box_maker_t), intent(out) :: maker
       !> Bodies at their present positions
@@ -73,9 +75,10 @@ contains
       type(boxes_t), intent(out) :: boxes
       !> Allocated if a body is so large that it would need too many tiles
       type(error_t), allocatable, intent(inout) :: error
-      !> Median diameter of the free bodies of the run, for ranks with a part of the bodies; by default that of `bodies`
-      !> [m]
+      !> Median diameter of the free bodies of all ranks; by default that of `bodies` [m]
       real(wp), intent(in), optional :: median_diameter
+      !> Distance that boxes may move before they are made again; default: they get no images in a periodic cell [m]
+      real(wp), intent(in), optional :: room
       integer(ip) :: s
 
       if (present(median_diameter)) maker%median_diameter = median_diameter
@@ -89,8 +92,9 @@ contains
                 boxes%passive(boxes%n), boxes%reach(boxes%n))
       do s = 1_ip, bodies%n
          call describe_boxes(maker, bodies, s, boxes)
-         call update_box(maker, bodies, s, boxes)
+         call update_box(maker, bodies, s, boxes, is_first=.true.)
       end do
+      if (present(room) .and. bodies%cell%is_periodic) call add_images(bodies%cell, room, boxes, maker%images)
    end subroutine new_box_maker
 
    !> Cut the bodies that are too large. Each of the others has one box and no tile.
@@ -192,72 +196,6 @@ contains
       boxes%reach(b) = (0.5_wp*length + padding)*(1.0_wp + roundings*epsilon(1.0_wp))
    end subroutine describe_box
 
-   !> Whether every box of some bodies lies within a zone, or within a limit of its own. Touching counts as within.
-   pure logical function have_boxes_within(maker, slots, boxes, zone, limit)
-      type(box_maker_t), intent(in) :: maker
-      !> Slots of the bodies
-      integer(ip), intent(in), contiguous :: slots(:)
-      type(boxes_t), intent(in) :: boxes
-      !> xmin, ymin, xmax, ymax of the zone [m]
-      real(wp), intent(in) :: zone(4)
-      !> xmin, ymin, xmax, ymax of the limit of each box, (4, box) [m]
-      real(wp), intent(in) :: limit(:, :)
-      integer(ip) :: others(block_size + 1_ip), low, high, b, k, n, first, last
-
-      have_boxes_within = .true.
-      do low = 1_ip, size(slots, kind=ip), block_size
-         high = min(low + block_size - 1_ip, size(slots, kind=ip))
-         call list_outside(slots(low:high), maker%box, boxes%bounds, zone, n, others)
-         do k = 1_ip, n
-            first = maker%box(others(k))
-            last = first
-            if (first < 0_ip) then
-               last = maker%cut(-first)%first_box + maker%cut(-first)%n - 1_ip
-               first = maker%cut(-first)%first_box
-            end if
-            do b = first, last
-               have_boxes_within = have_boxes_within .and. &
-                  (is_within(boxes%bounds(:, b), zone) .or. is_within(boxes%bounds(:, b), limit(:, b)))
-            end do
-         end do
-      end do
-   end function have_boxes_within
-
-   !> List the bodies that are cut, and those whose box is not within a zone. There is no branch, since a processor
-   !> cannot predict which bodies these are.
-   pure subroutine list_outside(slots, box, bounds, zone, n, outside)
-      !> Slots of the bodies, at most `block_size`
-      integer(ip), intent(in), contiguous :: slots(:)
-      !> Box of each body, (slot); negative if it is cut
-      integer(ip), intent(in), contiguous :: box(:)
-      !> Bounds of all boxes, and xmin, ymin, xmax, ymax of the zone [m]
-      real(wp), intent(in), contiguous :: bounds(:, :)
-      real(wp), intent(in) :: zone(4)
-      !> Number and slots of the listed bodies. A slot is written before it is known to count, so there is a spare one
-      integer(ip), intent(out) :: n
-      integer(ip), intent(inout) :: outside(block_size + 1_ip)
-      real(wp) :: room
-      integer(ip) :: b, k
-
-      n = 0_ip
-      do k = 1_ip, size(slots, kind=ip)
-         outside(n + 1_ip) = slots(k)
-         b = max(box(slots(k)), 1_ip)
-         room = min(min(bounds(1, b) - zone(1), bounds(2, b) - zone(2)), &
-                    min(zone(3) - bounds(3, b), zone(4) - bounds(4, b)))
-         n = n + ior(merge(0_ip, 1_ip, room >= 0.0_wp), shiftr(box(slots(k)), bit_size(n) - 1))
-      end do
-   end subroutine list_outside
-
-   !> Whether a box lies within a rectangle
-   pure logical function is_within(box, rectangle)
-      !> xmin, ymin, xmax, ymax [m]
-      real(wp), intent(in) :: box(4), rectangle(4)
-
-      is_within = box(1) >= rectangle(1) .and. box(2) >= rectangle(2) .and. box(3) <= rectangle(3) &
-                  .and. box(4) <= rectangle(4)
-   end function is_within
-
    !> Turn bodies to their angles and update their boxes in one pass: the same as `turn_bodies` and then `update_boxes`.
    subroutine turn_and_bound(maker, moving, bodies, boxes)
       !> From `new_box_maker`
@@ -273,8 +211,13 @@ contains
       !$omp parallel do if (size(moving) > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(maker, moving, bodies, boxes) private(low)
       do low = 1_ip, size(moving, kind=ip), block_size
-         call turn_and_bound_block(maker, moving(low:min(low + block_size - 1_ip, size(moving, kind=ip))), bodies, &
-                                   boxes)
+         associate (slots => moving(low:min(low + block_size - 1_ip, size(moving, kind=ip))))
+            if (bodies%cell%is_periodic) then
+               call turn_and_bound_in_cell(maker, slots, bodies, boxes)
+            else
+               call turn_and_bound_block(maker, slots, bodies, boxes)
+            end if
+         end associate
       end do
       !$omp end parallel do
    end subroutine turn_and_bound
@@ -296,7 +239,23 @@ contains
       call place_boxes(maker, slots, extent, direction, bodies, boxes)
    end subroutine turn_and_bound_block
 
-   !> Update the boxes of up to `block_size` bodies from the extents of their turned vertices.
+   !> The same in a periodic cell. It stands apart, so that the other is small enough to be compiled as a whole.
+   subroutine turn_and_bound_in_cell(maker, slots, bodies, boxes)
+      !> From `new_box_maker`
+      type(box_maker_t), intent(in) :: maker
+      !> Slots of the bodies
+      integer(ip), intent(in), contiguous :: slots(:)
+      !> Bodies; only `turned` changes
+      type(bodies_t), intent(inout) :: bodies
+      !> Boxes; only `bounds` changes
+      type(boxes_t), intent(inout) :: boxes
+      real(wp) :: extent(4, block_size), direction(2, block_size)
+
+      call turn_block(bodies, slots, extent, direction)
+      call place_in_cell(maker, slots, extent, direction, bodies, boxes)
+   end subroutine turn_and_bound_in_cell
+
+   !> Update the boxes of up to `block_size` bodies in the plane from the extents of their turned vertices.
    pure subroutine place_boxes(maker, slots, extent, direction, bodies, boxes)
       !> From `new_box_maker`
       type(box_maker_t), intent(in) :: maker
@@ -321,7 +280,27 @@ contains
       end do
    end subroutine place_boxes
 
-   !> Update the boxes of the given bodies to their positions. The boxes of other bodies do not change.
+   !> Update the boxes of up to `block_size` bodies in a periodic cell from the extents of their turned vertices.
+   pure subroutine place_in_cell(maker, slots, extent, direction, bodies, boxes)
+      !> From `new_box_maker`
+      type(box_maker_t), intent(in) :: maker
+      !> Slots of the bodies
+      integer(ip), intent(in), contiguous :: slots(:)
+      !> Least x and y and greatest x and y of the turned vertices of each, (4, body) [m]
+      real(wp), intent(in) :: extent(4, block_size)
+      !> Cosine and sine of the angle of each, (2, body)
+      real(wp), intent(in) :: direction(2, block_size)
+      type(bodies_t), intent(in) :: bodies
+      !> Boxes; only `bounds` changes
+      type(boxes_t), intent(inout) :: boxes
+      integer(ip) :: k
+
+      do k = 1_ip, size(slots, kind=ip)
+         call bound_in_cell(maker, bodies, slots(k), extent(:, k), direction(:, k), boxes)
+      end do
+   end subroutine place_in_cell
+
+   !> Update the boxes of the given bodies to their positions, and all images. The boxes of other bodies do not change.
    subroutine update_boxes(maker, bodies, moving, boxes)
       !> From `new_box_maker`
       type(box_maker_t), intent(in) :: maker
@@ -336,23 +315,30 @@ contains
       !$omp parallel do if (size(moving) > min_parallel_size) schedule(static) default(none) &
       !$omp    shared(maker, bodies, moving, boxes) private(k)
       do k = 1_ip, size(moving, kind=ip)
-         call update_box(maker, bodies, moving(k), boxes)
+         call update_box(maker, bodies, moving(k), boxes, is_first=.false.)
       end do
       !$omp end parallel do
+      call place_images(maker%images, boxes)
    end subroutine update_boxes
 
    !> Update the boxes of a body that is turned to its angle.
-   pure subroutine update_box(maker, bodies, s, boxes)
+   pure subroutine update_box(maker, bodies, s, boxes, is_first)
       type(box_maker_t), intent(in) :: maker
       type(bodies_t), intent(in) :: bodies
       integer(ip), intent(in) :: s
       type(boxes_t), intent(inout) :: boxes
+      !> Whether its boxes have no bounds so far
+      logical, intent(in) :: is_first
       real(wp) :: extent(4), direction(2)
 
       extent = extent_of(bodies%pieces%turned_polygon(s))
       direction = 0.0_wp
       if (maker%box(s) < 0_ip) call sine_and_cosine(bodies%angle(s), direction(2), direction(1))
-      call bound_body(maker, bodies%position(:, s), s, extent, direction, boxes)
+      if (bodies%cell%is_periodic .and. .not. is_first) then
+         call bound_in_cell(maker, bodies, s, extent, direction, boxes)
+      else
+         call bound_body(maker, bodies%position(:, s), s, extent, direction, boxes)
+      end if
    end subroutine update_box
 
    !> Update the boxes of a body.
@@ -383,5 +369,32 @@ contains
          end do
       end associate
    end subroutine bound_body
+
+   !> Update the boxes of a body in a periodic cell to those of the copy that is nearest to its former boxes. These do
+   !> not jump when it returns to the cell.
+   pure subroutine bound_in_cell(maker, bodies, s, extent, direction, boxes)
+      type(box_maker_t), intent(in) :: maker
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      !> Extent of the turned vertices of the whole body [m]
+      real(wp), intent(in) :: extent(4)
+      !> Cosine and sine of its angle
+      real(wp), intent(in) :: direction(2)
+      type(boxes_t), intent(inout) :: boxes
+      real(wp) :: former(4)
+      integer(ip) :: first, last
+
+      first = maker%box(s)
+      last = first
+      if (first < 0_ip) then
+         last = maker%cut(-first)%first_box + maker%cut(-first)%n - 1_ip
+         first = maker%cut(-first)%first_box
+      end if
+      ! All boxes of a body move together.
+      former = boxes%bounds(:, first)
+      call bound_body(maker, bodies%position(:, s), s, extent, direction, boxes)
+      call place_near(bodies%cell, bodies%folds(:, s), former, boxes%bounds(:, first:last))
+   end subroutine bound_in_cell
 
 end module polydem_box_maker

@@ -5,7 +5,8 @@ module polydem_boxes
    private
    public :: boxes_t
 
-   !> Boxes 1..n. A piece of common size has one box. A large piece has several boxes, which overlap slightly.
+   !> Boxes 1..n. A piece of common size has one box. A large piece has several boxes, which overlap slightly. In a
+   !> periodic cell boxes near its border have images behind all others (`polydem_box_images`).
    type :: boxes_t
       !> Number of boxes
       integer(ip) :: n = 0_ip
@@ -15,13 +16,14 @@ module polydem_boxes
       logical :: one_to_one = .true.
       !> xmin, ymin, xmax, ymax of each closed box, (4, box) [m]; half a cache line per box
       real(wp), allocatable :: bounds(:, :)
-      !> Piece of each box, ascending. A pair of boxes is recorded as the pair of their pieces
+      !> Piece of each box, ascending but for images. A pair of boxes is recorded as the pair of their pieces
       integer(ip), allocatable :: piece(:)
-      !> Slot of the body of each box, ascending
+      !> Slot of the body of each box, ascending but for images
       integer(ip), allocatable :: body(:)
       !> Whether that body is fixed
       logical, allocatable :: fixed(:)
-      !> Whether that body is passive: fixed, or moved by another rank. Two passive bodies never form a pair
+      !> Whether that body is passive: fixed, or moved by another rank, or the box is an image. Two passive boxes never
+      !> form a pair
       logical, allocatable :: passive(:)
       !> Upper bound of the half sides of a box at any angle of its body [m]
       real(wp), allocatable :: reach(:)
@@ -31,7 +33,7 @@ module polydem_boxes
 
 contains
 
-   !> Whether two boxes can form a pair: they belong to two bodies that are not both passive. All finders ask here.
+   !> Whether two boxes can form a pair: they belong to two bodies and are not both passive. All finders ask here.
    pure logical function may_meet(self, i, j)
       class(boxes_t), intent(in) :: self
       !> Indices of the boxes

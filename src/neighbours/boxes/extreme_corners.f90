@@ -7,7 +7,7 @@
 !> its neighbours than 1e-9 of the size, which is far above all rounding errors here.
 module polydem_extreme_corners
    use polydem_bodies, only: block_size, bodies_t, find_directions
-   use polydem_box_maker, only: box_maker_t, place_boxes, turn_and_bound_block
+   use polydem_box_maker, only: box_maker_t, place_boxes, place_in_cell, turn_and_bound_block, turn_and_bound_in_cell
    use polydem_boxes, only: boxes_t
    use polydem_kinds, only: ip, wp
    implicit none
@@ -82,8 +82,17 @@ contains
          direction(:, n_known) = direction(:, k)
          extent(:, n_known) = extent_of(self%known(single(k))%corner, direction(:, k))
       end do
-      call place_boxes(maker, single(:n_known), extent, direction, bodies, boxes)
-      if (n_others > 0_ip) call turn_and_bound_block(maker, others(:n_others), bodies, boxes)
+      if (bodies%cell%is_periodic) then
+         call place_in_cell(maker, single(:n_known), extent, direction, bodies, boxes)
+      else
+         call place_boxes(maker, single(:n_known), extent, direction, bodies, boxes)
+      end if
+      if (n_others == 0_ip) return
+      if (bodies%cell%is_periodic) then
+         call turn_and_bound_in_cell(maker, others(:n_others), bodies, boxes)
+      else
+         call turn_and_bound_block(maker, others(:n_others), bodies, boxes)
+      end if
    end subroutine bound_block
 
    !> Divide bodies into those without pairs and the others. Which are which, a processor cannot predict; there is no

@@ -6,9 +6,14 @@
 !> that no body of another rank can enter. If a box is in neither, the next redistribution takes place in the middle of
 !> the step, after the prediction and before the search for pairs: no pair can be missed.
 !>
+!> In a periodic cell one rank alone redistributes, too: then the images of boxes are chosen again
+!> (`polydem_box_images`), for which the same margin gives room. A pair across the border is two boxes that meet through
+!> a copy of one of them. Either box is within its padded box, or in the zone, which meets no copy of any padded box.
+!>
 !> A redistribution also takes place after a thousand steps without one, since the work of the ranks is compared then.
 module polydem_domain
    use polydem_bodies, only: bodies_t
+   use polydem_cell, only: cell_t
    use polydem_communicator, only: communicator_t
    use polydem_halo, only: halo_t
    use polydem_kinds, only: dp, ip, lp, wp
@@ -31,9 +36,13 @@ module polydem_domain
       type(halo_t) :: halo
       !> Distance that a box may move before the next redistribution [m]
       real(wp) :: margin = 0.0_wp
+      !> Greatest margin that a periodic cell allows [m]
+      real(wp) :: most = huge(1.0_wp)
+      !> Width and height of the periodic cell, 0 along an axis that is not periodic [m]
+      real(wp) :: period(2) = 0.0_wp
       !> Median diameter of the free bodies of the run [m]
       real(wp) :: median_diameter = 0.0_wp
-      !> Number of halo bodies of all ranks per body of the run
+      !> Number of halo bodies and images of all ranks per body of the run
       real(wp) :: halo_share = 0.0_wp
       !> Padded boxes recorded at the last redistribution, (4, box) [m]
       real(wp), allocatable :: reference(:, :)
@@ -75,25 +84,35 @@ module polydem_domain
    integer(lp), parameter :: longest_interval = 1000_lp
    !> Greatest factor by which the margin changes in a redistribution
    real(wp), parameter :: greatest_change = 3.0_wp
+   !> Greatest margin over the side of a periodic cell. Bodies reach at most a quarter of the side, so all padded boxes
+   !> together are shorter than two sides, and only the next copies of a box can meet them
+   real(wp), parameter :: share_of_cell = 0.125_wp
 
 contains
 
-   !> Start a domain. In a run on several ranks the first redistribution is in the first step.
-   subroutine new_domain(domain, settings, median_diameter, comm)
+   !> Start a domain. In a run on several ranks, or in a periodic cell, the first redistribution is in the first step.
+   subroutine new_domain(domain, settings, median_diameter, comm, cell)
       type(domain_t), intent(out) :: domain
       type(decomposition_settings_t), intent(in) :: settings
       !> Median diameter of the free bodies of the run [m]
       real(wp), intent(in) :: median_diameter
       class(communicator_t), intent(in) :: comm
+      !> Periodic cell; absent: the plane
+      type(cell_t), intent(in), optional :: cell
 
       domain%settings = settings
       domain%median_diameter = median_diameter
       domain%margin = settings%margin
       if (settings%margin <= 0.0_wp) domain%margin = first_margin*median_diameter
-      if (comm%size > 1_ip) allocate (domain%partition)
+      if (present(cell)) then
+         domain%period = cell%size
+         if (cell%is_periodic) domain%most = share_of_cell*minval(cell%size, cell%size > 0.0_wp)
+         domain%margin = min(domain%margin, domain%most)
+      end if
+      if (comm%size > 1_ip .or. any(domain%period > 0.0_wp)) allocate (domain%partition)
    end subroutine new_domain
 
-   !> Whether bodies that leave the zone of this rank are redistributed: there are other ranks.
+   !> Whether bodies that leave the zone of this rank are redistributed: there are other ranks, or the cell is periodic.
    pure logical function has_zone(self)
       class(domain_t), intent(in) :: self
 
@@ -130,7 +149,7 @@ contains
 
       if (self%settings%margin > 0.0_wp) return
       self%margin = min(max(first_interval*move, first_margin*self%median_diameter), &
-                        greatest_first*self%median_diameter)
+                        greatest_first*self%median_diameter, self%most)
    end subroutine choose_margin
 
    !> Record the padded boxes of a redistribution.
@@ -173,7 +192,7 @@ contains
       if (cost_of_margin*greatest_change**2 > cost_of_redistributions) &
          factor = max(1.0_wp/greatest_change, sqrt(cost_of_redistributions/cost_of_margin))
       self%margin = max(least_margin*self%median_diameter, min(factor*self%margin, &
-         greatest_margin*self%median_diameter))
+         greatest_margin*self%median_diameter, self%most))
    end subroutine adapt_margin
 
    !> Begin the halo exchange of a step: send the bodies of the border.

@@ -1,6 +1,6 @@
 !> Hashes of all bodies of a run, independent of the number of ranks.
 module polydem_global_hash
-   use polydem_bodies, only: bodies_t, state_words
+   use polydem_bodies, only: bodies_t, image_word, state_words
    use polydem_communicator, only: communicator_t
    use polydem_row_distribution, only: row_distribution_t
    use polydem_hash, only: mix_word
@@ -30,10 +30,13 @@ contains
       call blocks%to_blocks(comm, words, block)
       hash = int(bodies%n_all, lp)
       call mix_blocks(comm, block, hash)
+      if (.not. allocated(bodies%image)) return
+      call blocks%to_blocks(comm, reshape([(image_word(bodies, k), k=1_ip, bodies%n)], [1_ip, bodies%n]), block)
+      call mix_blocks(comm, block, hash)
    end subroutine hash_all_bodies
 
    !> Compute the hash of the initial bodies: their state, and their constant properties (fixed or free, mass, inertia,
-   !> shape, material). Collective.
+   !> shape, material), and their periodic cell. Collective.
    subroutine hash_scene(comm, bodies, hash)
       class(communicator_t), intent(inout) :: comm
       !> Bodies of this rank at time 0
@@ -69,10 +72,16 @@ contains
       call order_vertices(comm, bodies, blocks)
       call blocks%to_blocks(comm, words, block)
       call mix_blocks(comm, block, hash)
-      if (.not. allocated(bodies%material)) return
-      call order_bodies(comm, bodies, blocks)
-      call blocks%to_blocks(comm, reshape(int(bodies%material, lp), [1, size(bodies%material)]), block)
-      call mix_blocks(comm, block, hash)
+      if (allocated(bodies%material)) then
+         call order_bodies(comm, bodies, blocks)
+         call blocks%to_blocks(comm, reshape(int(bodies%material, lp), [1, size(bodies%material)]), block)
+         call mix_blocks(comm, block, hash)
+      end if
+      if (.not. bodies%cell%is_periodic) return
+      do k = 1_ip, 2_ip
+         hash = mix_word(hash, transfer(real(bodies%cell%low(k), dp), 0_lp))
+         hash = mix_word(hash, transfer(real(bodies%cell%size(k), dp), 0_lp))
+      end do
    end subroutine hash_scene
 
    !> Continue a hash with the rows of all blocks. Each rank continues the hash of the ranks below it. Collective.

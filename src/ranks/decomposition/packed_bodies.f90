@@ -2,6 +2,8 @@
 module polydem_packed_bodies
    use polydem_bodies, only: allocate_with_corners, bodies_t
    use polydem_body_fields, only: serialize_constants, serialize_corners, serialize_sizes, serialize_vertices
+   use polydem_bodies_in_cell, only: set_cell
+   use polydem_cell, only: cell_t
    use polydem_communicator, only: communicator_t
    use polydem_instruction_set, only: isa_base
    use polydem_kinds, only: ip, lp
@@ -27,6 +29,8 @@ module polydem_packed_bodies
       integer :: isa = isa_base
       !> Whether the bodies have materials
       logical :: has_materials = .false.
+      !> Periodic cell in which the bodies are
+      type(cell_t) :: cell
    end type packed_bodies_t
 
 contains
@@ -54,6 +58,7 @@ contains
       packed%last_id = bodies%last_id
       packed%isa = bodies%isa
       packed%has_materials = allocated(bodies%material)
+      packed%cell = bodies%cell
       corners = bodies%pieces%vertex_start(2:) - bodies%pieces%vertex_start(:bodies%n)
       packed%list%slots = slots
       call serialize_list(packed%list, bodies%global_index, corners)
@@ -182,6 +187,7 @@ contains
       bodies%last_id = packed%last_id
       bodies%isa = packed%isa
       if (packed%has_materials) allocate (bodies%material(n))
+      call set_cell(bodies, packed%cell)
       allocate (slots(n))
       slots(order) = [(s, s=1_ip, n)]
       call packed%constants%restore_to(slots)

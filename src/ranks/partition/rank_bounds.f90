@@ -4,6 +4,9 @@
 !> body overlaps one of its rectangles (touching counts). If the boxes of two bodies overlap, the owner of each
 !> therefore needs the other. Rectangles follow the bodies and are independent of the partition of space: bodies may
 !> leave the region of their rank, and large bodies may extend beyond it.
+!>
+!> In a periodic cell a rectangle stands for all its copies, and so does a box. Each copy of a rank, also of this rank
+!> itself, bounds the zone as another rank would.
 module polydem_rank_bounds
    use polydem_bounding_rectangles, only: bounds_of, cover
    use polydem_communicator, only: communicator_t
@@ -22,6 +25,10 @@ module polydem_rank_bounds
       real(wp), allocatable :: rectangle(:, :)
       !> Rank of each rectangle, ascending, (rectangle)
       integer(ip), allocatable :: owner(:)
+      !> Number of the copy of each rectangle, ascending for each rank; 0 for all in the plane, (rectangle)
+      integer, allocatable :: copy(:)
+      !> Bounds of the copies of the boxes of this rank, (4, copy) [m]
+      real(wp), allocatable :: own_copies(:, :)
       !> Indices of the rectangles that overlap `own`
       integer(ip), allocatable :: near(:)
       !> Number of rectangles of all ranks
@@ -44,66 +51,120 @@ module polydem_rank_bounds
 contains
 
    !> Exchange the bounding rectangles of all ranks. Collective.
-   subroutine publish(self, comm, boxes)
+   subroutine publish(self, comm, boxes, period)
       class(rank_bounds_t), intent(inout) :: self
       class(communicator_t), intent(inout) :: comm
       !> xmin, ymin, xmax, ymax of the padded boxes of the bodies that this rank owns; the padding is the distance that
       !> they may move before the next call, (4, body) [m]
       real(wp), intent(in) :: boxes(:, :)
-      real(wp), allocatable :: mine(:, :)
+      !> Width and height of the periodic cell, 0 along an axis that is not periodic; absent: the plane [m]
+      real(wp), intent(in), optional :: period(2)
+      real(wp), allocatable :: mine(:, :), shift(:, :)
       real(dp), allocatable :: all_bounds(:)
       integer(ip), allocatable :: counts(:)
       integer(ip) :: rank, k, r, n
+      integer :: c
 
+      allocate (shift(2, 0))
+      if (present(period)) call list_shifts(period, shift)
       call cover(boxes, mine)
       call comm%gather(rounded_outwards(mine), all_bounds, counts)
       counts = counts/4_ip
       self%n_published = sum(counts)
-      n = self%n_published - counts(comm%rank)
-      if (allocated(self%owner)) deallocate (self%owner, self%near, self%rectangle)
-      allocate (self%owner(n), self%rectangle(4, n))
+      n = (self%n_published - counts(comm%rank))*(1_ip + size(shift, 2, kind=ip))
+      if (allocated(self%owner)) deallocate (self%owner, self%copy, self%near, self%rectangle, self%own_copies)
+      allocate (self%owner(n), self%copy(n), self%rectangle(4, n), self%own_copies(4, size(shift, 2)))
       n = 0_ip
       k = 0_ip
       do rank = 0_ip, comm%size - 1_ip
-         do r = 1_ip, counts(rank)
-            k = k + 1_ip
-            if (rank == comm%rank) cycle
-            n = n + 1_ip
-            self%owner(n) = rank
-            self%rectangle(:, n) = real(all_bounds(4_ip*k - 3_ip:4_ip*k), wp)
+         do c = 0, merge(-1, size(shift, 2), rank == comm%rank)
+            do r = 1_ip, counts(rank)
+               n = n + 1_ip
+               self%owner(n) = rank
+               self%copy(n) = c
+               self%rectangle(:, n) = real(all_bounds(4_ip*(k + r) - 3_ip:4_ip*(k + r)), wp)
+               if (c > 0) self%rectangle(:, n) = moved(self%rectangle(:, n), shift(:, c))
+            end do
          end do
+         k = k + counts(rank)
       end do
       self%own = bounds_of(boxes)
+      do c = 1, size(shift, 2)
+         self%own_copies(:, c) = moved(self%own, shift(:, c))
+      end do
       call build_map(self)
       self%zone = zone_of(self)
    end subroutine publish
 
-   !> Cut the bounding rectangle of this rank at those of the other ranks. Each of the four parts at a rectangle would
-   !> do; the largest one is kept.
+   !> List the vectors to the copies of a periodic cell around it.
+   pure subroutine list_shifts(period, shift)
+      !> Width and height of the cell, 0 along an axis that is not periodic [m]
+      real(wp), intent(in) :: period(2)
+      !> The vectors, (2, copy) [m]
+      real(wp), allocatable, intent(out) :: shift(:, :)
+      integer :: i, j, n, most(2)
+
+      most = merge(1, 0, period > 0.0_wp)
+      allocate (shift(2, product(2*most + 1) - 1))
+      n = 0
+      do j = -most(2), most(2)
+         do i = -most(1), most(1)
+            if (i == 0 .and. j == 0) cycle
+            n = n + 1
+            shift(:, n) = real([i, j], wp)*period
+         end do
+      end do
+   end subroutine list_shifts
+
+   !> A rectangle that covers another one after a shift, in spite of rounding [m]
+   pure function moved(rectangle, shift)
+      real(wp), intent(in) :: rectangle(4), shift(2)
+      real(wp) :: moved(4), extra(2)
+
+      extra = 8.0_wp*epsilon(1.0_wp)*(max(abs(rectangle(1:2)), abs(rectangle(3:4))) + abs(shift))
+      moved = rectangle + [shift - extra, shift + extra]
+   end function moved
+
+   !> Cut the bounding rectangle of this rank at those of the other ranks and at all copies. Each of the four parts at a
+   !> rectangle would do; the largest one is kept.
    pure function zone_of(self) result(zone)
       type(rank_bounds_t), intent(in) :: self
-      real(wp) :: zone(4), parts(4, 4), other(4)
+      real(wp) :: zone(4)
       integer(ip) :: first, last
+      integer :: c
 
       zone = self%own
+      do c = 1, size(self%own_copies, 2)
+         call cut_zone(self%own_copies(:, c), zone)
+      end do
       first = 1_ip
       do while (first <= size(self%owner, kind=ip))
          last = first
          do while (last < size(self%owner, kind=ip))
-            if (self%owner(last + 1_ip) /= self%owner(first)) exit
+            if (self%owner(last + 1_ip) /= self%owner(first) .or. self%copy(last + 1_ip) /= self%copy(first)) exit
             last = last + 1_ip
          end do
-         other = bounds_of(self%rectangle(:, first:last))
+         call cut_zone(bounds_of(self%rectangle(:, first:last)), zone)
          first = last + 1_ip
-         if (.not. boxes_overlap(zone, other)) cycle
-         parts = spread(zone, 2, 4)
-         parts(3, 1) = nearest(other(1), -1.0_wp)
-         parts(4, 2) = nearest(other(2), -1.0_wp)
-         parts(1, 3) = nearest(other(3), 1.0_wp)
-         parts(2, 4) = nearest(other(4), 1.0_wp)
-         zone = parts(:, maxloc(max(0.0_wp, parts(3, :) - parts(1, :))*max(0.0_wp, parts(4, :) - parts(2, :)), 1))
       end do
    end function zone_of
+
+   !> Cut a zone at a rectangle.
+   pure subroutine cut_zone(other, zone)
+      !> The rectangle [m]
+      real(wp), intent(in) :: other(4)
+      !> The zone; afterwards its largest part without a point in common with the rectangle [m]
+      real(wp), intent(inout) :: zone(4)
+      real(wp) :: parts(4, 4)
+
+      if (.not. boxes_overlap(zone, other)) return
+      parts = spread(zone, 2, 4)
+      parts(3, 1) = nearest(other(1), -1.0_wp)
+      parts(4, 2) = nearest(other(2), -1.0_wp)
+      parts(1, 3) = nearest(other(3), 1.0_wp)
+      parts(2, 4) = nearest(other(4), 1.0_wp)
+      zone = parts(:, maxloc(max(0.0_wp, parts(3, :) - parts(1, :))*max(0.0_wp, parts(4, :) - parts(2, :)), 1))
+   end subroutine cut_zone
 
    !> Number of rectangles of all ranks in the last call of `publish`
    pure integer(ip) function n_rectangles(self)

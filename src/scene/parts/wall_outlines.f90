@@ -44,6 +44,8 @@ contains
          call outline_rectangle(wall, polygons, problem)
       case ('ring')
          call outline_ring(wall, polygons)
+      case ('row')
+         call outline_row(wall, polygons, problem)
       case ('polygon')
          call outline_polygon(wall, polygons, problem)
       case default
@@ -65,6 +67,7 @@ contains
          if (.not. allocated(problem%text)) cycle
          problem%key = 'thickness'
          if (wall%outline == 'rectangle') problem%key = 'high'
+         if (wall%outline == 'row') problem%key = 'radius'
          problem%text = 'makes a body that '//problem%text//'; give more thickness, for example '// &
             to_text(1.0e-4_wp*maxval(abs(polygons%polygon(k))), 2)
          return
@@ -141,6 +144,29 @@ contains
          call polygons%append_polygon(corners(:, :, k) + spread(wall%centre, 2, 4))
       end do
    end subroutine outline_ring
+
+   !> List the grains of a row: regular polygons at even distances along a line. Those of a line that is as long as a
+   !> periodic cell have this distance across its border, too.
+   subroutine outline_row(wall, polygons, problem)
+      type(wall_settings_t), intent(in) :: wall
+      type(polygon_list_t), intent(inout) :: polygons
+      type(problem_t), intent(inout) :: problem
+      real(wp), allocatable :: corners(:, :)
+      real(wp) :: centre(2)
+      integer(ip) :: k
+
+      if (.not. any(abs(wall%to - wall%from) > 0.0_wp)) then
+         problem%key = 'to'
+         problem%text = 'is the same point as ''from''; give another one, for example '// &
+            list_text(wall%from + [2.0_wp*wall%radius*real(wall%segments, wp), 0.0_wp])
+         return
+      end if
+      call draw_ring(wall%radius, wall%corners, corners)
+      do k = 1_ip, wall%segments
+         centre = wall%from + (real(k, wp) - 0.5_wp)/real(wall%segments, wp)*(wall%to - wall%from)
+         call polygons%append_polygon(corners + spread(centre, 2, int(wall%corners)))
+      end do
+   end subroutine outline_row
 
    !> Compute the corners of the segments of a ring. Neighbouring segments share corners with identical bits.
    subroutine draw_segments(radius, thickness, n, corners)

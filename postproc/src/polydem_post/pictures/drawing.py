@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import matplotlib
 import numpy as np
@@ -11,6 +12,7 @@ from matplotlib.collections import PathCollection
 from matplotlib.colors import Colormap, Normalize
 from matplotlib.lines import Line2D
 from matplotlib.path import Path
+from matplotlib.transforms import Affine2D
 
 from ..base.result_file import ResultError
 from ..read.frames import Frame
@@ -110,6 +112,7 @@ class _Extent:
 
     def __init__(self) -> None:
         self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
+        self.periodic = np.zeros(2, dtype=bool)
         self.values: list[np.ndarray] = []
         self.forces: list[np.ndarray] = []
         self.stresses: list[np.ndarray] = []
@@ -119,6 +122,11 @@ class _Extent:
         if len(frame.vertex):
             self.low = np.minimum(self.low, frame.vertex.min(axis=0))
             self.high = np.maximum(self.high, frame.vertex.max(axis=0))
+            # Of a periodic cell all is in the cell.
+            periodic = frame.cell_size > 0.0
+            self.low[periodic] = frame.cell_low[periodic]
+            self.high[periodic] = (frame.cell_low + frame.cell_size)[periodic]
+        self.periodic = frame.cell_size > 0.0
         free = ~frame.fixed
         if look.quantity and look.colour_range is None:
             self.values.append(look.quantity.values(frame)[free])
@@ -136,7 +144,8 @@ class _Extent:
             margin = 0.02 * max(self.high - self.low)
             if not 0.0 < margin < np.inf:
                 raise ResultError("the bodies have no extent that can be drawn")
-            limits = (self.low[0] - margin, self.high[0] + margin, self.low[1] - margin, self.high[1] + margin)
+            aside, above = np.where(self.periodic, 0.0, margin)
+            limits = (self.low[0] - aside, self.high[0] + aside, self.low[1] - above, self.high[1] + above)
         elif np.any(self.high < limits[::2]) or np.any(self.low > limits[1::2]):
             spans = (f"{axis} {low:.4g} to {high:.4g} m" for axis, low, high in zip("xy", self.low, self.high))
             raise ResultError(f"no body is within the limits {','.join(f'{side:g}' for side in limits)}; the bodies "
@@ -173,7 +182,10 @@ def settle(trajectory: Trajectory, numbers: list[int], look: Look) -> SettledLoo
 
 
 class Bodies:
-    """Some bodies in axes. Their outlines are views of one array, so moving them costs little."""
+    """Some bodies in axes, in a periodic cell with copies around it.
+
+    Their outlines are views of one array, so moving them costs little.
+    """
 
     def __init__(self, axis: Axes, frame: Frame, rows: np.ndarray, **style):
         start = frame.vertex_start
@@ -188,12 +200,27 @@ class Bodies:
         paths = [Path(self._vertices[a:b], closed=True) for a, b in zip(begins, ends)]
         self.artist = PathCollection(paths, **style)
         axis.add_collection(self.artist, autolim=False)
+        copies = [PathCollection(paths, **style) for _ in frame.shifts]
+        _add_copies(axis, frame, copies)
+        self.artists = [self.artist, *copies]
+
+    def set(self, **properties: Any) -> None:
+        """Set properties of the artist and of its copies."""
+        for artist in self.artists:
+            artist.set(**properties)
 
     def move(self, frame: Frame, look: SettledLook) -> None:
         """Move them to where they are in another frame."""
         self._vertices[:] = frame.vertex[self._chosen]
         if look.quantity and self.artist.get_array() is not None:
-            self.artist.set_array(look.quantity.values(frame)[self.rows])
+            self.set(array=look.quantity.values(frame)[self.rows])
+
+
+def _add_copies(axis: Axes, frame: Frame, copies: list[PathCollection]) -> None:
+    """Draw an artist again in each of the copies around a periodic cell."""
+    for shift, copy in zip(frame.shifts, copies):
+        copy.set_transform(Affine2D().translate(*shift) + axis.transData)
+        axis.add_collection(copy, autolim=False)
 
 
 def draw_bodies(axis: Axes, frame: Frame, look: SettledLook) -> tuple[Bodies, Bodies]:
@@ -202,7 +229,7 @@ def draw_bodies(axis: Axes, frame: Frame, look: SettledLook) -> tuple[Bodies, Bo
     walls = Bodies(axis, frame, fixed, facecolor=WALL_COLOUR, edgecolor="none", zorder=1)
     grains = Bodies(axis, frame, ~fixed, facecolor=PLAIN_COLOUR, edgecolor="black", linewidth=0.2, zorder=2)
     if look.quantity:
-        grains.artist.set(array=look.quantity.values(frame)[grains.rows], cmap=look.colour_map(look.quantity),
+        grains.set(array=look.quantity.values(frame)[grains.rows], cmap=look.colour_map(look.quantity),
                           norm=Normalize(*look.colour_range))
     return walls, grains
 
@@ -210,12 +237,16 @@ def draw_bodies(axis: Axes, frame: Frame, look: SettledLook) -> tuple[Bodies, Bo
 def overlays(axis: Axes, frame: Frame, look: SettledLook) -> list[PathCollection]:
     """Draw what is laid over the bodies. Widths are in units of the axes, which must have their final size."""
     makers = {"cells": _cells, "boxes": _boxes, "stress": _stresses, "forces": _forces, "contacts": _contacts}
-    drawn = [artist for name, make in makers.items() if name in look.show
-             for artist in make(frame, look, points_per_metre(axis))]
-    for order, artist in enumerate(drawn):
-        artist.set_zorder(3 + order)
-        axis.add_collection(artist, autolim=False)
-    return drawn
+    scale = points_per_metre(axis)
+    # Each artist, and the same again for each copy of a periodic cell.
+    alike = [artists for name, make in makers.items() if name in look.show
+             for artists in zip(*(make(frame, look, scale) for _ in range(1 + len(frame.shifts))))]
+    for order, artists in enumerate(alike):
+        for artist in artists:
+            artist.set_zorder(3 + order)
+        axis.add_collection(artists[0], autolim=False)
+        _add_copies(axis, frame, list(artists[1:]))
+    return [artist for artists in alike for artist in artists]
 
 
 def points_per_metre(axis: Axes) -> float:
@@ -226,7 +257,7 @@ def points_per_metre(axis: Axes) -> float:
 
 def fit_outlines(grains: Bodies, frame: Frame, scale: float) -> None:
     """Give the outlines of bodies a width that suits the size in which they are drawn."""
-    grains.artist.set_linewidth(float(np.clip(OUTLINE * _typical_size(frame) * scale, *OUTLINES)))
+    grains.set(linewidth=float(np.clip(OUTLINE * _typical_size(frame) * scale, *OUTLINES)))
 
 
 def force_width(frame: Frame, scale: float) -> float:
@@ -246,8 +277,9 @@ def _forces(frame: Frame, look: SettledLook, scale: float) -> list[PathCollectio
     if not look.greatest_force or not len(contacts):
         return []
     # A wall is large, and its centre may be anywhere: draw no line to it.
-    ends = [np.where(frame.fixed[rows][:, None], contacts.point, frame.position[rows])
-            for rows in (contacts.first_index, contacts.second_index)]
+    ends = [np.where(frame.fixed[rows][:, None], contacts.point, contacts.point - arm)
+            for rows, arm in ((contacts.first_index, contacts.first_arm),
+                              (contacts.second_index, contacts.second_arm))]
     widths = np.minimum(contacts.force_magnitude / look.greatest_force, 1.0) * force_width(frame, scale)
     lines = np.stack([ends[0], contacts.point, ends[1]], axis=1)
     # Lines of about the same width are one path, which is drawn much faster.

@@ -63,7 +63,7 @@ class Painter:
         add_scale(self._figure, [self._axis], self._bodies[1:], film.look, film.extend)
         finish_axes(self._figure, [self._axis], frame, film.look)
         drawing.fit_outlines(self._bodies[1], frame, drawing.points_per_metre(self._axis))
-        for artist in (*(each.artist for each in self._bodies), self._axis.title):
+        for artist in (*(artist for each in self._bodies for artist in each.artists), self._axis.title):
             artist.set_animated(True)
         self._figure.set_layout_engine("none")
         self._canvas.draw()
@@ -78,7 +78,7 @@ class Painter:
         self._axis.title.set_text(self._title(frame.time))
         self._canvas.restore_region(self._background)
         overlays = drawing.overlays(self._axis, frame, look)
-        for artist in (*(each.artist for each in self._bodies), *overlays, self._axis.title):
+        for artist in (*(artist for each in self._bodies for artist in each.artists), *overlays, self._axis.title):
             self._axis.draw_artist(artist)
         for artist in overlays:
             artist.remove()

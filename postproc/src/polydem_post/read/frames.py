@@ -65,6 +65,9 @@ class Frame:
         number            [1]      number of the frame in the run, from 0
         material          [1]      numbers of the materials: position in `material_names`, from 1; 0: none, (n)
         material_names    [1]      list of the names of the materials of the run
+        image             [1]      cells crossed along each axis, (n, 2); None in the plane
+        cell_low          [m]      lower left corner of the periodic cell, (2)
+        cell_size         [m]      width and height of the periodic cell; 0 along an axis that is not periodic, (2)
 
     Everything else is computed from these when it is first asked for.
     """
@@ -84,6 +87,9 @@ class Frame:
     number: int = 0
     material: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
     material_names: tuple[str, ...] = ()
+    image: IntArray | None = None
+    cell_low: FloatArray = field(default_factory=lambda: np.zeros(2))
+    cell_size: FloatArray = field(default_factory=lambda: np.zeros(2))
     _source: FrameSource | None = field(default=None)
 
     def __post_init__(self) -> None:
@@ -168,6 +174,31 @@ class Frame:
     def static(self) -> npt.NDArray[np.bool_]:
         """Whether each body is fixed without a prescribed motion [1], (n)."""
         return self.fixed & ~self.driven
+
+    @property
+    def unwrapped(self) -> FloatArray:
+        """Centres of mass on their paths through the copies of a periodic cell [m], (n, 2)."""
+        return self.position if self.image is None else self.position + self.image * self.cell_size
+
+    @property
+    def shifts(self) -> FloatArray:
+        """Vectors to the m copies of the periodic cell around it [m], (m, 2): none in the plane."""
+        steps = [(-1, 0, 1) if size > 0.0 else (0,) for size in self.cell_size]
+        return np.array([(x, y) for x in steps[0] for y in steps[1] if x or y]).reshape(-1, 2) * self.cell_size
+
+    def nearest(self, first: IntArray, second: IntArray, vectors: FloatArray) -> FloatArray:
+        """Vectors between bodies of these indices as those to the nearest copies [m], (k, 2).
+
+        Fixed bodies that are about as long as the cell have no copies along it.
+        """
+        nearest = vectors.copy()
+        for axis in np.flatnonzero(self.cell_size > 0.0):
+            size = self.cell_size[axis]
+            reach = np.abs(self.bounds[:, [axis, axis + 2]] - self.position[:, [axis]]).max(axis=1)
+            spans = self.fixed & (4.0 * reach >= size)
+            folded = ~(spans[first] | spans[second])
+            nearest[folded, axis] -= np.rint(vectors[folded, axis] / size) * size
+        return nearest
 
     @cached_property
     def vertex(self) -> FloatArray:
@@ -316,10 +347,14 @@ class _Given:
 def find_contacts(frame: Frame, columns: dict[str, Any]) -> Contacts:
     """Contacts from their own columns (CONTACT_FIELDS) and the bodies of the frame; indices count from 0."""
     first, second = (_index_of(frame, columns[name]) for name in ("first", "second"))
+    branch = frame.position[first] - frame.position[second]
+    first_arm, second_arm = (columns["point"] - frame.position[rows] for rows in (first, second))
+    if frame.cell_size.any():
+        branch = frame.nearest(first, second, branch)
+        second_arm = first_arm + branch
     return Contacts(
-        **{name: columns[name] for name in CONTACT_FIELDS}, first_index=first, second_index=second,
-        branch=frame.position[first] - frame.position[second], first_arm=columns["point"] - frame.position[first],
-        second_arm=columns["point"] - frame.position[second], with_fixed=frame.fixed[first] | frame.fixed[second])
+        **{name: columns[name] for name in CONTACT_FIELDS}, first_index=first, second_index=second, branch=branch,
+        first_arm=first_arm, second_arm=second_arm, with_fixed=frame.fixed[first] | frame.fixed[second])
 
 
 def _index_of(frame: Frame, identifiers: npt.NDArray[np.integer[Any]]) -> IntArray:
@@ -337,6 +372,10 @@ def sound_frame(path: Path, frame: Frame) -> Frame:
     shapes: dict[str, tuple[int, ...]] = {
         "position": (n, 2), "velocity": (n, 2), "shape": (vertices, 2), "vertex_start": (n + 1,)}
     insist(path, "frame", arrays, {name: shapes.get(name, (n,)) for name in arrays})
+    cell = {"cell_low": frame.cell_low, "cell_size": frame.cell_size}
+    insist(path, "cell", cell, dict.fromkeys(cell, (2,)))
+    if frame.image is not None:
+        insist(path, "frames", {"image": frame.image}, {"image": (n, 2)})
     masses = {"mass": frame.mass, "inertia": frame.inertia}
     if np.any(frame.material < 0) or np.any(frame.material > len(frame.material_names)):
         raise ResultError(f"{path}: bodies/material has numbers of materials that the namelist does not have")

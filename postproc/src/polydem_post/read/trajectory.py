@@ -300,11 +300,13 @@ class Trajectory:
         frames = file["frames"]
         if self._bodies[0] != segment.path:
             self._bodies = (segment.path, _bodies_in(file))
-        columns = {name: frames[name][row] for name in GROWING}
+        bodies = self._bodies[1]
+        columns = {name: frames[name][row] for name in (*GROWING, *(["image"] if "image" in frames else []))}
         if self._shift is not None:
             columns["position"] = columns["position"] + self._shift
+            bodies = {**bodies, "cell_low": bodies["cell_low"] + self._shift} if "cell_low" in bodies else bodies
         return sound_frame(segment.path, Frame(
-            step=int(segment.steps[row]), time=float(segment.times[row]), number=number, **columns, **self._bodies[1],
+            step=int(segment.steps[row]), time=float(segment.times[row]), number=number, **columns, **bodies,
             material_names=tuple(self.settings.get("material", {})), _source=self))
 
     def contacts_of(self, frame: Frame) -> Contacts:
@@ -363,7 +365,7 @@ def _wall_bodies(settings: Settings, frame: Frame) -> dict[str, Any]:
     counts = {}
     for name, wall in settings.get("wall", {}).items():
         corners = np.size(wall.get("vertices", [])) // 2
-        counts[name] = {"bodies": 0, "ring": wall.get("segments"),
+        counts[name] = {"bodies": 0, "ring": wall.get("segments"), "row": wall.get("segments"),
                         "polyline": corners - (not wall.get("closed"))}.get(wall["outline"], 1)
     ends = len(frame.id) - sum(counts.values()) + np.cumsum([0, *counts.values()])
     found = {name: np.sort(frame.id)[first:last] for name, first, last in zip(counts, ends, ends[1:])}
@@ -382,6 +384,8 @@ def _bodies_in(file: h5py.File) -> dict[str, Any]:
         columns[name] = np.where(values == 0.0, np.inf, values)
     if "material" in bodies:
         columns["material"] = bodies["material"][:].astype(np.int64)
+    if "cell" in file:
+        columns.update(cell_low=file["cell/low"][:], cell_size=file["cell/size"][:])
     return columns
 
 

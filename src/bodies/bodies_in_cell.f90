@@ -1,0 +1,94 @@
+!> Bodies in a periodic cell: which of them repeat, and how they return to the cell when they have left it.
+!>
+!> A fixed body that *spans* the cell, such as a straight floor, reaches beyond both of its borders. It does not repeat
+!> along this axis, and vectors to it are as in the plane. A free body that has left the cell returns at the start of
+!> the next step. Between two steps it may therefore be outside by the motion of one step.
+module polydem_bodies_in_cell
+   use polydem_bodies, only: bodies_t
+   use polydem_cell, only: cell_t
+   use polydem_kinds, only: ip, wp
+   implicit none
+   private
+   public :: set_cell, find_folds, wrap_bodies, put_into_cell
+
+contains
+
+   !> Put bodies into a cell, without moving them. Nothing is allocated in the plane.
+   pure subroutine set_cell(bodies, cell)
+      type(bodies_t), intent(inout) :: bodies
+      type(cell_t), intent(in) :: cell
+
+      bodies%cell = cell
+      if (cell%is_periodic .and. .not. allocated(bodies%image)) allocate (bodies%image(bodies%n, 2), source=0_ip)
+   end subroutine set_cell
+
+   !> Find out along which axes bodies repeat.
+   pure subroutine find_folds(bodies)
+      !> Bodies with turned vertices; `folds` is set in a periodic cell
+      type(bodies_t), intent(inout) :: bodies
+      integer(ip) :: s
+
+      if (.not. bodies%cell%is_periodic) return
+      if (allocated(bodies%folds)) deallocate (bodies%folds)
+      allocate (bodies%folds(2, bodies%n))
+      do s = 1_ip, bodies%n
+         bodies%folds(:, s) = bodies%cell%inverse
+         if (bodies%fixed(s)) where (4.0_wp*reach_of(bodies, s) >= bodies%cell%size) bodies%folds(:, s) = 0.0_wp
+      end do
+   end subroutine find_folds
+
+   !> Greatest distance of a vertex of a body from its centre along each axis [m]
+   pure function reach_of(bodies, s) result(reach)
+      !> Bodies with turned vertices
+      type(bodies_t), intent(in) :: bodies
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      real(wp) :: reach(2)
+
+      reach = maxval(abs(bodies%pieces%turned_polygon(s)), 2)
+   end function reach_of
+
+   !> Return those of some free bodies to the cell that have left it. Several threads may call it for different bodies.
+   pure subroutine wrap_bodies(bodies, slots)
+      !> Bodies at the end of a step; `position` and `image` change
+      type(bodies_t), intent(inout) :: bodies
+      !> Slots of the bodies
+      integer(ip), intent(in), contiguous :: slots(:)
+      integer(ip) :: k, crossed
+      integer :: axis
+
+      do axis = 1, 2
+         associate (low => bodies%cell%low(axis), side => bodies%cell%size(axis))
+            if (.not. side > 0.0_wp) cycle
+            do k = 1_ip, size(slots, kind=ip)
+               associate (x => bodies%position(axis, slots(k)), image => bodies%image(slots(k), axis))
+                  crossed = merge(1_ip, 0_ip, x >= low + side) - merge(1_ip, 0_ip, x < low)
+                  x = x - real(crossed, wp)*side
+                  image = image + crossed
+               end associate
+            end do
+         end associate
+      end do
+   end subroutine wrap_bodies
+
+   !> Put bodies that may be anywhere into the cell. Those that span it stay where they are.
+   pure subroutine put_into_cell(bodies, slots)
+      !> Bodies after `find_folds`; `position` changes, and `image` is set to the number of cells that were crossed
+      type(bodies_t), intent(inout) :: bodies
+      !> Slots of the bodies
+      integer(ip), intent(in) :: slots(:)
+      integer(ip) :: k
+      integer :: axis
+
+      do k = 1_ip, size(slots, kind=ip)
+         do axis = 1, 2
+            associate (s => slots(k), cell => bodies%cell)
+               bodies%image(s, axis) = &
+                  floor((bodies%position(axis, s) - cell%low(axis))*bodies%folds(axis, s), ip)
+               bodies%position(axis, s) = bodies%position(axis, s) - real(bodies%image(s, axis), wp)*cell%size(axis)
+            end associate
+         end do
+      end do
+   end subroutine put_into_cell
+
+end module polydem_bodies_in_cell

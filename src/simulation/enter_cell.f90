@@ -1,0 +1,134 @@
+!> Puts the bodies of a simulation into its periodic cell at the start.
+module polydem_enter_cell
+   use polydem_bodies, only: turn_bodies
+   use polydem_bodies_in_cell, only: find_folds, put_into_cell, set_cell
+   use polydem_cell, only: new_cell
+   use polydem_errors, only: error_t, input_error, raise
+   use polydem_global_reductions, only: reduce_to_greatest
+   use polydem_kinds, only: ip, lp, wp
+   use polydem_simulation, only: simulation_t
+   use polydem_source_locations, only: place_of
+   use polydem_strings, only: to_text
+   implicit none
+   private
+   public :: enter_cell
+
+   !> Names of the axes
+   character(len=1), parameter :: name(2) = ['x', 'y']
+
+contains
+
+   !> Put all bodies into the cell, if there is one, and check that it is large enough for them. Collective; all ranks
+   !> get the same error.
+   subroutine enter_cell(self, error)
+      !> The simulation with its settings, bodies and walls; `n_outside` counts the bodies that were outside the cell
+      type(simulation_t), intent(inout) :: self
+      !> Names a body that is too large for the cell
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: largest(1)
+      integer(ip) :: s
+
+      if (self%settings%cell%periodic == 'none') return
+      associate (bodies => self%bodies, settings => self%settings)
+         call set_cell(bodies, new_cell(settings%cell%periodic, settings%cell%low, settings%cell%size))
+         call turn_bodies(bodies, [(s, s=1_ip, bodies%n)])
+         call find_folds(bodies)
+         largest = 0.0_wp
+         if (size(bodies%free) > 0) largest = 2.0_wp*maxval(bodies%radius(bodies%free))
+         call reduce_to_greatest(self%comm, largest)
+         do s = 1_ip, bodies%n
+            call check_size(self, s, largest(1) + 2.0_wp*settings%boxes%margin, error)
+            if (allocated(error)) exit
+         end do
+         call check_walls(self, error)
+         call self%comm%all_reduce_error(error)
+         if (allocated(error)) return
+         call put_into_cell(bodies, [(s, s=1_ip, bodies%n)])
+         self%n_outside = count(any(bodies%image(bodies%free, :) /= 0_ip, 2), kind=lp)
+         if (self%comm%is_root()) self%n_outside = self%n_outside &
+            + count(any(bodies%image /= 0_ip, 2) .and. bodies%fixed, kind=lp)
+         call reduce_count(self)
+         ! The cell in which a fixed body starts is its own.
+         do s = 1_ip, bodies%n
+            if (bodies%fixed(s)) bodies%image(s, :) = 0_ip
+         end do
+         do s = 1_ip, size(self%walls, kind=ip)
+            self%walls(s)%position = bodies%position(:, self%walls(s)%slots)
+         end do
+      end associate
+   end subroutine enter_cell
+
+   !> Add up the bodies of all ranks that were outside. Collective.
+   subroutine reduce_count(self)
+      type(simulation_t), intent(inout) :: self
+      integer(lp) :: n(1)
+
+      n = self%n_outside
+      call self%comm%all_reduce_sum(n)
+      self%n_outside = n(1)
+   end subroutine reduce_count
+
+   !> Check that a body is small enough for the cell, or spans it.
+   subroutine check_size(self, s, largest, error)
+      type(simulation_t), intent(in) :: self
+      !> Slot of the body
+      integer(ip), intent(in) :: s
+      !> Largest diameter of a free body, with the margins of two boxes [m]
+      real(wp), intent(in) :: largest
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp) :: low, high
+      integer :: axis
+
+      associate (bodies => self%bodies, cell => self%bodies%cell)
+         do axis = 1, 2
+            if (.not. cell%size(axis) > 0.0_wp) cycle
+            if (.not. bodies%fixed(s)) then
+               if (4.0_wp*(bodies%radius(s) + self%settings%boxes%margin) < cell%size(axis)) cycle
+               call raise(error, input_error, place_of(self%settings, 'cell', 'size')//': ''size'' in &cell: body '// &
+                  to_text(bodies%id(s))//' needs more than '// &
+                  to_text(4.0_wp*(bodies%radius(s) + self%settings%boxes%margin))//' m along '//name(axis)// &
+                  ', twice its diameter, but the cell has '//to_text(cell%size(axis))//' m')
+            else
+               if (bodies%folds(axis, s) > 0.0_wp) cycle
+               associate (place => bodies%position(axis, s), shape => bodies%pieces%turned_polygon(s))
+                  low = place + minval(shape(axis, :))
+                  high = place + maxval(shape(axis, :))
+               end associate
+               if (low <= cell%low(axis) - largest .and. high >= cell%low(axis) + cell%size(axis) + largest) cycle
+               call raise(error, input_error, place_of(self%settings, 'cell', 'size')//': ''size'' in &cell: the '// &
+                  'fixed body '//to_text(bodies%id(s))//' reaches along '//name(axis)//' from '//to_text(low)// &
+                  ' to '//to_text(high)//' m. Make it shorter than half the cell, or let it reach at least from '// &
+                  to_text(cell%low(axis) - largest)//' to '//to_text(cell%low(axis) + cell%size(axis) + largest)// &
+                  ' m, a diameter beyond both borders')
+            end if
+            error%place = int(bodies%global_index(s), lp)
+            return
+         end do
+      end associate
+   end subroutine check_size
+
+   !> Check that no body that spans the cell moves along it.
+   subroutine check_walls(self, error)
+      type(simulation_t), intent(in) :: self
+      type(error_t), allocatable, intent(inout) :: error
+      integer(ip) :: k
+      integer :: axis, w
+
+      do w = 1, size(self%walls)
+         do k = 1_ip, size(self%walls(w)%slots, kind=ip)
+            associate (s => self%walls(w)%slots(k), bodies => self%bodies, motions => self%walls(w)%motions)
+               do axis = 1, 2
+                  if (allocated(error)) return
+                  if (.not. bodies%cell%size(axis) > 0.0_wp .or. bodies%folds(axis, s) > 0.0_wp) cycle
+                  if (.not. any(abs(motions%velocity(axis)) > 0.0_wp .or. abs(motions%amplitude(axis)) > 0.0_wp)) cycle
+                  call raise(error, input_error, place_of(self%settings, 'cell', 'periodic')//': ''periodic'' in '// &
+                     '&cell: the fixed body '//to_text(bodies%id(s))//' spans the cell and cannot move along '// &
+                     name(axis)//'; make it of bodies that are shorter than half the cell, for example with '// &
+                     'outline = ''row'' in &wall')
+               end do
+            end associate
+         end do
+      end do
+   end subroutine check_walls
+
+end module polydem_enter_cell

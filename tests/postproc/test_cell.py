@@ -1,0 +1,70 @@
+"""Results of runs in a periodic cell: paths, contacts across the border, pictures with copies."""
+
+import os
+import subprocess
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from polydem_post import Trajectory
+from polydem_post.pictures.drawing import Look, draw_bodies, overlays, settle
+from polydem_post.pictures.movie import make_movie
+
+SCENE = """\
+&cell periodic = 'xy' low = 0.01, 0 size = 0.06, 0.05 /
+&grains name = 'sample' region = 'box' low = 0, 0 high = 0.06, 0.05 number = 12 speed = 3 spin = 100 /
+&forces gravity = 0, 0 stiffness = 2e5 /
+&integrate dt = 2e-5 duration = 0.06 /
+&output frame_interval = 1e-3 contacts = .true. folder = '{folder}' /
+"""
+
+
+@pytest.fixture(scope="module")
+def trajectory(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("cell")
+    (folder / "cell.nml").write_text(SCENE.format(folder=folder / "result"), encoding="utf-8")
+    subprocess.run([os.environ["POLYDEM_PROGRAM"], "run", folder / "cell.nml"], check=True, stdout=subprocess.PIPE)
+    return Trajectory(folder / "result")
+
+
+def test_paths_are_smooth_where_positions_jump(trajectory):
+    position, path = trajectory.series("position"), trajectory.series("unwrapped")
+    assert np.abs(np.diff(position, axis=0)).max() > 0.04
+    assert np.abs(np.diff(path, axis=0)).max() < 0.02
+    assert np.abs(path).max() > 0.1
+    assert trajectory[0].cell_low.tolist() == [0.01, 0.0] and trajectory[0].cell_size.tolist() == [0.06, 0.05]
+
+
+def test_the_origin_moves_the_cell(trajectory):
+    world = trajectory.in_world()
+    world._shift = np.array([5.0, 7.0])
+    assert world[0].cell_low.tolist() == [5.01, 7.0] and trajectory[0].cell_low.tolist() == [0.01, 0.0]
+
+
+def test_contacts_across_the_border_have_short_arms(trajectory):
+    crossing = 0
+    for frame in trajectory:
+        contacts = frame.contacts
+        for index, arm in ((contacts.first_index, contacts.first_arm), (contacts.second_index, contacts.second_arm)):
+            assert np.all(np.hypot(*arm.T) <= frame.radius[index] + 1e-12)
+        apart = frame.position[contacts.first_index] - frame.position[contacts.second_index]
+        crossing += np.count_nonzero(np.abs(apart - contacts.branch).max(axis=1) > 0.01)
+    assert crossing > 10
+
+
+def test_pictures_show_the_cell_with_copies_at_its_border(trajectory):
+    look = settle(trajectory, [3], Look(colour="speed", show=("forces", "contacts")))
+    assert look.limits == pytest.approx((0.01, 0.07, 0.0, 0.05))
+    axis = Figure().add_subplot()
+    _, grains = draw_bodies(axis, trajectory[3], look)
+    assert len(grains.artists) == 9
+    assert len(overlays(axis, trajectory[3], look)) == 18
+    grains.move(trajectory[4], look)
+    for artist in grains.artists:
+        assert np.array_equal(artist.get_array(), trajectory[4].speed)
+        assert np.array_equal(artist.get_paths()[0].vertices[:-1], trajectory[4].vertices[0])
+
+
+def test_a_film_of_a_cell(trajectory, tmp_path):
+    make_movie(trajectory, [0, 1, 2], tmp_path / "cell.gif", Look(show=("forces",)), size=(200, 160))
+    assert (tmp_path / "cell.gif").stat().st_size > 1000
