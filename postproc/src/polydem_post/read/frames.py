@@ -64,8 +64,8 @@ class Frame:
         inertia           [kg m]   moments of inertia about the centres of mass; infinite likewise, (n)
         number            [1]      number of the frame in the run, from 0
         image             [1]      cells crossed along each axis, (n, 2); None in the plane
-        cell_low          [m]      lower left corner of the periodic cell, (2)
-        cell_size         [m]      width and height of the periodic cell; 0 along an axis that is not periodic, (2)
+        cell_low          [m]      x and y of the lower left corner of the periodic cell, as of vectors
+        cell_size         [m]      width and height of the periodic cell, as of vectors; 0 along an axis without period
 
     Everything else is computed from these when it is first asked for.
     """
