@@ -31,7 +31,6 @@ PAGES = [
 OTHERS = {
     "README.md",
     "inputs/README.md",
-    "inputs/cells.md",
     "inputs/checks.md",
     "inputs/entries.md",
     "inputs/getting_started.md",

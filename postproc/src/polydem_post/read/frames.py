@@ -66,8 +66,8 @@ class Frame:
         material          [1]      numbers of the materials: position in `material_names`, from 1; 0: none, (n)
         material_names    [1]      list of the names of the materials of the run
         image             [1]      cells crossed along each axis, (n, 2); None in the plane
-        cell_low          [m]      lower left corner of the periodic cell, (2)
-        cell_size         [m]      width and height of the periodic cell; 0 along an axis that is not periodic, (2)
+        cell_low          [m]      x and y of the lower left corner of the periodic cell, as of vectors
+        cell_size         [m]      width and height of the periodic cell, as of vectors; 0 along an axis without period
 
     Everything else is computed from these when it is first asked for.
     """
