@@ -31,6 +31,7 @@ contains
       real(wp), intent(in), optional :: median_diameter
 
       call new_force_law(self%settings%forces, self%bodies, self%law)
+      if (self%stages%number > 0_ip) call self%law%scale_friction(self%stages%friction_scale)
       call fit_table(self%law, self%contacts)
       self%walk%walls%n = 0_ip
       self%walk%walls%energy_is_quadratic = self%law%energy_is_quadratic

@@ -25,8 +25,8 @@ module polydem_cundall_strack
 
    !> Friction by a tangential spring
    type, extends(force_part_t) :: cundall_strack_t
-      !> Friction coefficient mu
-      real(wp) :: coefficient = 0.0_wp
+      !> Friction coefficient mu, and that of the settings
+      real(wp) :: coefficient = 0.0_wp, full_coefficient = 0.0_wp
       !> Stiffness of the spring k_t [N/m2]
       real(wp) :: stiffness = 0.0_wp
       !> Dashpot as a share d of sqrt(k_t m_t)
@@ -35,6 +35,7 @@ module polydem_cundall_strack
       logical :: midstep = .false.
    contains
       procedure :: configure
+      procedure :: scale_friction
       procedure :: add
       procedure :: stiffen
    end type cundall_strack_t
@@ -48,12 +49,21 @@ contains
 
       self%stage = stage_last
       self%coefficient = settings%friction_coefficient
+      self%full_coefficient = settings%friction_coefficient
       self%stiffness = settings%tangential_stiffness*settings%stiffness
       self%damping = settings%tangential_damping
       self%midstep = settings%midstep_slip
       self%needs_accelerations = self%midstep
       self%history_kinds = [history_kind_t('tangential', 'N/m', 'force of the tangential spring')]
    end subroutine configure
+
+   !> Scale the friction coefficient.
+   subroutine scale_friction(self, factor)
+      class(cundall_strack_t), intent(inout) :: self
+      real(wp), intent(in) :: factor
+
+      self%coefficient = factor*self%full_coefficient
+   end subroutine scale_friction
 
    !> Add the tangential force and store the spring force.
    subroutine add(self, bodies, dt, block, history)

@@ -46,8 +46,8 @@ module polydem_exact_friction
 
    !> Coulomb friction without a spring
    type, extends(velocity_constraint_t) :: exact_friction_t
-      !> Friction coefficient mu
-      real(wp) :: coefficient = 0.0_wp
+      !> Friction coefficient mu, and that of the settings
+      real(wp) :: coefficient = 0.0_wp, full_coefficient = 0.0_wp
       !> Accepted remaining slip, as a share of the greatest slip velocity that friction removes in a step
       real(wp) :: tolerance = 0.0_wp
       !> Network of the contacts of the last step
@@ -60,6 +60,7 @@ module polydem_exact_friction
       real(wp), private :: greatest_residual = 0.0_wp
    contains
       procedure :: configure
+      procedure :: scale_friction
       procedure :: check
       procedure :: apply
       procedure :: report
@@ -76,9 +77,18 @@ contains
       type(forces_settings_t), intent(in) :: settings
 
       self%coefficient = settings%friction_coefficient
+      self%full_coefficient = settings%friction_coefficient
       self%tolerance = settings%friction_tolerance
       self%history_kinds = [history_kind_t('tangential', 'N/m', 'tangential force of the last step')]
    end subroutine configure
+
+   !> Scale the friction coefficient.
+   subroutine scale_friction(self, factor)
+      class(exact_friction_t), intent(inout) :: self
+      real(wp), intent(in) :: factor
+
+      self%coefficient = factor*self%full_coefficient
+   end subroutine scale_friction
 
    !> Refuse integration schemes without a velocity in the middle of a step, and several ranks.
    subroutine check(self, settings, n_processes, error)
